@@ -26,6 +26,7 @@ export const LAYERS: readonly string[] = [
   "xr",
   "share",
   "offline",
+  "capture",
   "bench",
   "app",
 ];

@@ -43,8 +43,8 @@ from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
-    sides_of,
     open_stage,
+    sides_of,
     specimen_name,
     tile_prims,
 )

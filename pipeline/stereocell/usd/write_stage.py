@@ -31,8 +31,8 @@ from stereocell.storage.workspace import cached
 from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import (
     LAYER_SUFFIXES,
-    ROOT,
     PATIENT_API,
+    ROOT,
     SIDES,
     SPECIMEN_API,
     TILES,

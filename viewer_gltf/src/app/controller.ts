@@ -4,6 +4,7 @@
  * `layOut` and hands its wishes to `perform`.
  */
 
+import { FRAMES_PER_S, pngOf } from "../capture/encode_video";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
@@ -55,6 +56,9 @@ import type { Viewer } from "./viewer";
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
+
+const BUSY = "A picture or a video is being made.";
+const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
 
 const LENS_KEY = "stereocell-lens";
 const EYE_ROWS = [EYE_DISTANCE, STEREO_STRENGTH] as const;
@@ -133,6 +137,8 @@ export class Controller {
   /** As they were when they were last remembered. */
   private eyes = EYE_ROWS.map((row) => row.get(START_TOOLS)).join();
   private canScan = false;
+  /** While a picture or a video is made. */
+  private filming: AbortController | null = null;
 
   constructor(
     private readonly viewer: Viewer,
@@ -233,6 +239,10 @@ export class Controller {
       this.card.open(this.viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
     } else if (command === "own-light") {
       void this.lightByFile();
+    } else if (command === "save-picture") {
+      void this.savePicture();
+    } else if (command === "save-video") {
+      void this.saveVideo();
     } else if (command === "save-csv") {
       this.saveMeasurements();
     } else if (command === "find") {
@@ -347,16 +357,72 @@ export class Controller {
     }
   }
 
+  private async savePicture(): Promise<void> {
+    const { viewer } = this;
+    if (this.filming !== null || viewer.stereo.kind !== null) {
+      this.say(viewer.stereo.kind === null ? BUSY : ON_THE_SCREEN);
+      return;
+    }
+    this.filming = new AbortController();
+    try {
+      const canvas = await viewer.picture(Number(viewer.state.pictureSize), (done, of) => {
+        if (of > 1) this.say(`Picture: part ${done} of ${of}`);
+      });
+      this.save("picture", "png", await pngOf(canvas));
+    } catch (error) {
+      this.refuse("The picture can't be saved", error);
+    } finally {
+      this.filming = null;
+      this.refresh();
+    }
+  }
+
+  private async saveVideo(): Promise<void> {
+    const { viewer } = this;
+    if (viewer.stereo.kind !== null) {
+      this.say(ON_THE_SCREEN);
+      return;
+    }
+    if (this.filming !== null) {
+      this.filming.abort(); // asked for once more: it is left
+      return;
+    }
+    this.filming = new AbortController();
+    const { signal } = this.filming;
+    this.refresh();
+    try {
+      const file = await viewer.film((done, of) => {
+        if (done % FRAMES_PER_S === 1) this.say(`Video: ${done} of ${of}`);
+      }, signal);
+      if (file === null) this.say("The video was left.");
+      else this.save("video", file.suffix, file.content);
+    } catch (error) {
+      this.refuse("The video can't be made", error);
+    } finally {
+      this.filming = null;
+      this.refresh();
+    }
+  }
+
+  private refuse(what: string, error: unknown): void {
+    if (!(error instanceof DOMException)) throw error;
+    this.say(`${what}: ${error.message}.`);
+  }
+
+  private save(what: string, suffix: string, content: Blob): void {
+    const name = fileName(this.viewer.bundle.manifest.specimen.name, what, suffix);
+    saveFile(name, content);
+    this.say(`Saved: ${name}`);
+  }
+
   private saveMeasurements(): void {
-    const { state, bundle } = this.viewer;
+    const { state } = this.viewer;
     const list = allOf(state);
     if (list.length === 0) {
       this.say("Nothing is measured.");
       return;
     }
-    const name = fileName(bundle.manifest.specimen.name, "measurements", "csv");
-    saveFile(name, new Blob([measurementsCsv(list)], { type: "text/csv" }));
-    this.say(`Saved: ${name}`);
+    this.save("measurements", "csv", new Blob([measurementsCsv(list)], { type: "text/csv" }));
   }
 
   private get shown(): Box {
@@ -402,6 +468,7 @@ export class Controller {
       isLoading,
       values: viewer.snapshot().measuredValues,
       sliceValues: viewer.sliceValues,
+      isFilming: this.filming !== null,
       undo: viewer.undoes,
       redo: viewer.redoes,
     };

@@ -16,6 +16,8 @@ import { MAX_STEPS } from "../volumes/tile_raymarch";
 import type { Stereo } from "../xr/stereo";
 import type { Contents } from "./scene_contents";
 
+/** Most samples of each pixel of a picture that is saved. */
+const MOST_SAMPLES = 64;
 /** Longest time that a frame counts, s: nobody looked at a page that slept. */
 const LONGEST_FRAME_S = 0.1;
 
@@ -55,6 +57,7 @@ export class FrameLoop {
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
   private wasMoving = false;
   private waiting: (() => void)[] = [];
+  private readonly pixel = new Uint8Array(4);
   private drawn: (() => void)[] = [];
 
   constructor(private readonly options: FrameOptions) {
@@ -176,6 +179,47 @@ export class FrameLoop {
     const isAtRest = isStereo || (!isMoving && !this.hasCome);
     if (this.waiting.length > 0 && !contents.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
+    }
+  }
+
+  /** Keep from drawing while a job draws by `drawStill`. */
+  async apart<T>(job: () => Promise<T>): Promise<T> {
+    this.stop();
+    try {
+      return await job();
+    } finally {
+      this.start();
+      this.change();
+    }
+  }
+
+  /** Follow the flat camera, without drawing. */
+  follow(dt_s: number): void {
+    const camera = this.poseMono(dt_s);
+    this.advance(dt_s);
+    const { width, height } = this.options.renderer.domElement;
+    const { contents } = this.options.shown();
+    if (contents.hasJustBegun()) this.options.onFollow();
+    contents.stream(camera, width, height, ERROR_TARGET_PX);
+  }
+
+  /** The flat camera's view, at once: samples are gathered for so long, but for the quality Low or High. */
+  drawStill(most_ms: number): void {
+    const { contents, navigation, state } = this.options.shown();
+    const { traced, surfaces } = contents;
+    this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
+    surfaces.dressAll();
+    const start_ms = performance.now();
+    const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
+    for (let i = 0; i < MOST_SAMPLES; i++) {
+      const gathers = i > 0 && !traced.isShown;
+      this.draw(navigation.camera, { ...pace, gathers });
+      const isDone = traced.isShown
+        ? traced.status().samples >= MOST_SAMPLES
+        : state.quality !== "auto" || !this.picture.canGather;
+      // a pixel that is read waits for the drawing, which `finish` does not where another process draws
+      this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, this.pixel);
+      if (isDone || performance.now() - start_ms > most_ms) return;
     }
   }
 

@@ -3,8 +3,14 @@ import { type Matrix4, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
+import { axesOf } from "../annotations/orientation_axes";
+import { umPerPixelAt } from "../annotations/scale_bar";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
+import { pathThrough, turntable } from "../capture/camera_path";
+import type { Caption } from "../capture/caption";
+import { type FilmedFile, FRAMES_PER_S } from "../capture/encode_video";
+import { legendOf } from "../capture/legend";
 import { Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
@@ -35,6 +41,7 @@ import type { Profile } from "../xr/cardboard/viewer_profile";
 import { ahead } from "../xr/head_pose";
 import { Stereo } from "../xr/stereo";
 import type { Snapshot } from "./automation_api";
+import { drawPicture, type Scene as Filmed, film } from "./capture";
 import { FrameLoop } from "./frame_loop";
 import { Contents } from "./scene_contents";
 import { Steps } from "./steps";
@@ -45,8 +52,12 @@ const MAX_PIXEL_RATIO = 2;
 /** The switch distance of the opening at least, as a multiple of the eye's from the middle. */
 const NEAR_AT_START = 1.1;
 
+/** Length of a video: once round, and from one kept view to the next, s. */
+const ROUND_S = 6;
+const LEG_S = 2;
+
 /** Before these the place from which the specimen is seen is a step of its own. */
-const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
+const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset", "next-view"]);
 
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
 
@@ -73,6 +84,7 @@ export class Viewer {
   private readonly size: StageSize;
   private readonly steps: Steps;
   private readonly sliceView: SliceView;
+  private nextView = 0;
   private readonly disposed = new AbortController();
 
   /**
@@ -219,6 +231,11 @@ export class Viewer {
       case "undo":
       case "redo":
         return this.step(command);
+      case "keep-view":
+      case "next-view":
+      case "forget-views":
+        if (!this.keepViews(command)) return false;
+        break;
       case "reset":
         this.dispatch({ type: "isolate", tile: null });
         this.recentre();
@@ -244,6 +261,70 @@ export class Viewer {
       }
     }
     this.loop.change();
+    return true;
+  }
+
+  /** What the screen shows, so many times as large. */
+  picture(scale: number, onPart: (done: number, of: number) => void): Promise<HTMLCanvasElement> {
+    return drawPicture(this.filmed, scale, onPart);
+  }
+
+  /** Through the kept views, or once round; null: it was left. */
+  async film(
+    onFrame: (done: number, of: number) => void,
+    signal: AbortSignal,
+  ): Promise<FilmedFile | null> {
+    const { keptViews } = this.state;
+    const before = this.cameraView;
+    const path =
+      keptViews.length > 1
+        ? pathThrough(keptViews, LEG_S * FRAMES_PER_S * (keptViews.length - 1) + 1)
+        : turntable(this.navigation.lookNow, ROUND_S * FRAMES_PER_S);
+    try {
+      return await film(
+        this.filmed,
+        path,
+        (view) => this.navigation.lookFrom(view),
+        (done) => onFrame(done, path.length),
+        signal,
+      );
+    } finally {
+      this.transition.restore(before);
+    }
+  }
+
+  private get filmed(): Filmed {
+    const { renderer, navigation, loop, stage } = this;
+    const { sides } = this.bundle.manifest.specimen;
+    const { camera, controls } = navigation;
+    const { specimen } = this.room;
+    const caption = (): Caption => ({
+      um_per_px: umPerPixelAt(
+        controls.target,
+        camera,
+        stage.clientHeight,
+        specimen.group.matrixWorld.getMaxScaleOnAxis(),
+      ),
+      legend: legendOf(this.state, this.bundle.manifest),
+      axes: axesOf(sides),
+      head: camera.matrixWorld,
+      specimen: specimen.group.matrixWorld,
+    });
+    return { renderer, camera, studio: loop, caption };
+  }
+
+  /** The flat camera's views that were kept: one more, on to the next one, none. */
+  private keepViews(command: "keep-view" | "next-view" | "forget-views"): boolean {
+    const { keptViews } = this.state;
+    if (this.stereo.kind !== null) return false;
+    if (command === "next-view") {
+      const next = keptViews[this.nextView++ % Math.max(1, keptViews.length)];
+      if (next !== undefined) this.navigation.lookFrom(next);
+      return next !== undefined;
+    }
+    const views = command === "forget-views" ? [] : [...keptViews, this.navigation.lookNow];
+    this.nextView = 0;
+    this.dispatch({ type: "keep-views", views });
     return true;
   }
 

@@ -25,6 +25,7 @@ const CONTEXT: KeyContext = {
         [3, 4, 0],
       ],
     } as const,
+    { type: "keep-views", views: [{ position: [0, 0, 2], target: [0, 0, 0] }] } as const,
     { type: "notify", text: "a fault", isMendable: true } as const,
     { type: "set-clip", clip: { box: SPECIMEN_BOX, plane: null } } as const,
     {
@@ -76,6 +77,7 @@ describe("the keys", () => {
       "move-lamp": false, // a drag
       "move-slices": true,
       dismiss: true,
+      "keep-views": false, // by the commands
       restore: false, // by the commands undo and redo
       notify: false, // the viewer's own
     };
@@ -92,6 +94,11 @@ describe("the keys", () => {
       scan: true,
       share: true,
       "save-csv": true,
+      "save-picture": true,
+      "save-video": true,
+      "keep-view": true,
+      "next-view": true,
+      "forget-views": true,
       retry: true,
       press: true,
       front: true,
@@ -211,7 +218,7 @@ describe("the keys", () => {
   });
 
   it("do nothing where there is nothing to do", () => {
-    expect(wishOf("0", CONTEXT)).toBeNull();
+    expect(wishOf("F9", CONTEXT)).toBeNull();
     expect(wishOf("F12", CONTEXT)).toBeNull();
     expect(wishOf("g", { ...CONTEXT, focusTile: null })).toBeNull();
   });

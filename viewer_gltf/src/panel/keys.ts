@@ -3,6 +3,7 @@ import type { Wish } from "./controls";
 import type { Key, KeyContext, KeyGroup } from "./key";
 import { CHANNEL_KEYS } from "./sections/channel_keys";
 import { LIGHT_KEYS } from "./sections/path_trace_keys";
+import { SAVE_KEYS } from "./sections/save";
 import { SLICE_KEYS } from "./sections/slice_keys";
 import { TILE_KEYS } from "./sections/tile_keys";
 import { TOOL_KEYS } from "./sections/tool_keys";
@@ -19,6 +20,7 @@ export const KEYS: readonly KeyGroup[] = [
   { name: "Light", keys: LIGHT_KEYS },
   { name: "Tiles", keys: TILE_KEYS },
   { name: "Tools", keys: TOOL_KEYS },
+  { name: "Pictures and video", keys: SAVE_KEYS },
 ];
 
 const BY_KEY: ReadonlyMap<string, Key> = new Map(

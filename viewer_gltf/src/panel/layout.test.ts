@@ -37,6 +37,7 @@ const FACTS: Facts = {
   isLoading: false,
   values: [],
   sliceValues: [],
+  isFilming: false,
   undo: null,
   redo: null,
 };

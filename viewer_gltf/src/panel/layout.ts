@@ -16,6 +16,7 @@ import { channelItems, type Ranges } from "./sections/channels";
 import { measureItems } from "./sections/measure";
 import { MOVES } from "./sections/move";
 import { lightItems } from "./sections/path_trace";
+import { saveItems } from "./sections/save";
 import { sliceItems } from "./sections/slices";
 import { stereoItems } from "./sections/stereo";
 import { tileItems } from "./sections/tiles";
@@ -50,6 +51,8 @@ export type Facts = StereoSupport &
     values: readonly (readonly string[])[];
     /** The channels' values where the slices meet. */
     sliceValues: readonly string[];
+    /** Whether a video is being made. */
+    isFilming: boolean;
     /** What undoing and redoing would change, in words; null: there is nothing. */
     undo: string | null;
     redo: string | null;
@@ -106,6 +109,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
       section("cut", "Cut open", cutItems(state, facts.shown)),
       section("slices", "Slices", sliceItems(state, facts.sliceValues)),
       section("quality", "Quality", qualityItems(state, facts)),
+      section("save", "Pictures and video", saveItems(state, facts.isFilming)),
       section("share", "Share", [
         command("share", "Copy a link to this view"),
         ...(view.link === ""

@@ -145,6 +145,13 @@ describe("a link to a view", () => {
       },
       { type: "move-slices", at: [0.25, 0.5, 0.75], turn_deg: [10, -20, 30] },
       { type: "set", id: "slice-planes", value: true },
+      {
+        type: "keep-views",
+        views: [
+          { position: [0, 0.5, 2], target: [0, 0, 0] },
+          { position: [1.5, 0, 0.25], target: [0.1, 0, 0] },
+        ],
+      },
     ];
     const state = after(start(), changes);
     const hash = writeLink(state, start(), null);
@@ -195,6 +202,7 @@ describe("a link to a view", () => {
     ["#v=1&box=40,-10,4,10,-5,6", "box"],
     ["#v=1&cut=0,0,0,5", "cut"],
     ["#v=1&points=1,2", "points"],
+    ["#v=1&views=0,0,2,0,0", "views"],
     ["#v=1&measures=d:one:1,2,3", "measures d:one:1,2,3"],
     ["#v=1&measures=a:%ff:1,2,3,1,2,3,1,2,9", "measures a:%ff:1,2,3,1,2,3,1,2,9"],
     ["#v=1&points=1,2,3,4,5,6,7", "points"],

@@ -7,7 +7,8 @@
  * different, each with c(olour, sRGB) o(pacity) w(indow, low_high) s(hapes of a transfer function,
  * name_shapes: see shapes_link.ts) t(ransfer function) n(o volume).
  * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
- * corner), cut (a plane's normal and offset), points (um), measures (see measurements_link.ts), tool, dwell, quality, light (see
+ * corner), cut (a plane's normal and offset), points (um), measures (see measurements_link.ts), views
+ * (kept ones, as eye), tool, dwell, quality, light (see
  * path_trace_link.ts), lamps (shown or not), eye and pose.
  * An address is somebody else's text: whatever it holds, the actions are ones that a user could
  * have taken; an unreadable part is reported and left out.
@@ -88,6 +89,8 @@ function linkOf(
   if (plane !== null) parts.cut = written([...plane.normal, plane.offset_um]);
   const [list, newest] = linkedMeasurements(state);
   if (list !== "") parts.measures = list;
+  const views = state.keptViews.flatMap(({ position, target }) => [...position, ...target]);
+  if (views.length > 0) parts.views = written(views);
   if (newest.length > 0) parts.points = written(newest.flat());
   Object.assign(parts, Object.fromEntries(writeWords(OTHERS, state, start, WORDS)));
   const light = writeLight(state, start);
@@ -185,6 +188,7 @@ class LinkReader {
     this.readParameters(OTHERS);
     this.readPoints();
     this.readMeasurements();
+    this.readViews();
     this.readLight();
     const eye = this.parts.get("eye");
     const camera = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
@@ -314,6 +318,17 @@ class LinkReader {
     const { read, unread } = readMeasurements(text, (point) => this.within(point));
     if (read.length > 0) this.actions.push({ type: "set-measurements", measurements: read });
     for (const entry of unread) this.unread.push(`measures ${shortened(entry)}`);
+  }
+
+  private readViews(): void {
+    const text = this.parts.get("views");
+    if (text === undefined) return;
+    const words = text.split(",");
+    const views = Array.from({ length: Math.ceil(words.length / 6) }, (_, i) =>
+      readLook(words.slice(6 * i, 6 * i + 6).join(), null),
+    ).flatMap((view) => (view === null ? [] : [{ position: view.position, target: view.target }]));
+    if (6 * views.length !== words.length) this.unread.push("views");
+    else this.actions.push({ type: "keep-views", views });
   }
 
   /** The nearest point of the specimen. */

@@ -3,6 +3,7 @@
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { Clip } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
+import type { KeptView } from "./kept_views";
 import type { Measurement } from "./measurements";
 import type { SetAction } from "./parameters/kinds";
 import type { ViewerState } from "./viewer_state";
@@ -34,5 +35,7 @@ export type Action =
   | Readonly<{ type: "move-lamp"; lamp: number; place: Vec3 }>
   /** Back to a state of before, but for what is no user's: see history.ts. */
   | Readonly<{ type: "restore"; state: ViewerState }>
+  /** The views to go through. */
+  | Readonly<{ type: "keep-views"; views: readonly KeptView[] }>
   | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
   | Readonly<{ type: "dismiss"; texts: readonly string[] }>;

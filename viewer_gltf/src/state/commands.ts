@@ -15,6 +15,13 @@ export type Command =
   | "share"
   /** The measurements as a file. */
   | "save-csv"
+  /** What the screen shows, as large as is chosen. */
+  | "save-picture"
+  /** Once round, or through the views that were kept; once more: leave it. */
+  | "save-video"
+  | "keep-view"
+  | "next-view"
+  | "forget-views"
   /** Ask again for all that has failed. */
   | "retry"
   /** A tap in the middle of the view: for hands that have only keys. */

@@ -152,6 +152,8 @@ export function nameOfChange(action: Action, { channels }: ViewerState): string 
       return "measuring";
     case "move-lamp":
       return "lamp";
+    case "keep-views":
+      return "kept views";
     default:
       return "";
   }

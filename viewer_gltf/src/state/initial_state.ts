@@ -65,6 +65,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     measured: [],
     measuredAs: "distance",
     measurements: [],
+    keptViews: [],
     canTrace,
     notices:
       staged.length > VOLUME_TILES_AT_START

@@ -1,6 +1,7 @@
 /** The state after an action. Pure. */
 import type { Action } from "./actions";
 import { withOwn } from "./history";
+import { MAX_VIEWS } from "./kept_views";
 import { finished, MAX_POINTS, withinLimits, withPoint } from "./measurements";
 import { withValue } from "./parameters/kinds";
 import { LAMP } from "./parameters/light";
@@ -100,6 +101,8 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       return finished(state);
     case "set-measurements":
       return { ...state, measurements: withinLimits(action.measurements) };
+    case "keep-views":
+      return { ...state, keptViews: action.views.slice(-MAX_VIEWS) };
     case "restore":
       return withOwn(action.state, state);
     case "notify":

@@ -5,6 +5,7 @@
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Clip } from "../math/clip";
 import type { Rgb } from "../math/color";
+import type { KeptView } from "./kept_views";
 import type { Measuring } from "./measurements";
 import type { ChannelSettings } from "./parameters/channel";
 import type { LightSettings } from "./parameters/light";
@@ -57,6 +58,8 @@ export type ViewerState = VolumeSettings &
     isolated: string | null;
     /** The part of the specimen that the cuts leave, um. */
     clip: Clip;
+    /** Views that a video goes through. */
+    keptViews: readonly KeptView[];
     /** Whether this device can gather light: draw into textures of floats. */
     canTrace: boolean;
     /** Faults that leave the rest usable, newest last. */

@@ -29,6 +29,8 @@ export const ELSEWHERE: ReadonlySet<string> = new Set([
   ...["scan", "lens-code", "measure-screen"],
   ...["own-light", "save-csv"],
   "slice-pictures", // the planes in the specimen are what a headset shows
+  // of the screen's camera, as files
+  ...["picture-size", "save-picture", "save-video", "keep-view", "next-view", "forget-views"],
   "help",
 ]);
 /** Widths in a channel's row. */

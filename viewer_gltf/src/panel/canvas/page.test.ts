@@ -28,9 +28,19 @@ const FACTS: Facts = {
   isLoading: false,
   values: [],
   sliceValues: [],
+  isFilming: false,
   undo: null,
   redo: null,
 };
+/** By the camera of the flat screen, into files. */
+const OF_THE_SCREEN = [
+  "picture-size",
+  "save-picture",
+  "save-video",
+  "keep-view",
+  "next-view",
+  "forget-views",
+];
 const start = (channels = 12) => initialState(sampleManifest(channels));
 const SPLIT = { isAvailable: true, reason: "" };
 const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
@@ -122,8 +132,14 @@ describe("the panel on a plane", () => {
         const controls = isOpen ? [...inRow, ...item.more] : inRow;
         for (const { id, kind, refusal } of controls) {
           const isElsewhere =
-            ["stereo", "split", "measure-screen", "help", "slice-pictures"].includes(id) ||
-            kind === "link";
+            [
+              "stereo",
+              "split",
+              "measure-screen",
+              "help",
+              "slice-pictures",
+              ...OF_THE_SCREEN,
+            ].includes(id) || kind === "link";
           const isClosed = item.kind === "group" && !isOpen && kind === "choice";
           if (isElsewhere || isClosed || refusal || kind === "text") continue;
           expect(ids, id).toContain(id);
@@ -152,11 +168,12 @@ describe("the panel on a plane", () => {
     }
     expect(inStereo).toContain("leave"); // for what leads in: `stereo` and `split`
     const missing = [...offered].filter((id) => !inStereo.has(id)).sort();
-    // what is done with the phone out of its viewer: its code, its screen; files; a keyboard's list; pictures
-    // beside the specimen, which stands alone before the eyes
+    // what is done with the phone out of its viewer: its code, its screen; files, of the screen's own
+    // camera too; a keyboard's list; pictures beside the specimen, which stands alone before the eyes
     const phone = ["lens-code", "scan", "measure-screen"];
+    const files = OF_THE_SCREEN.filter((id) => !["next-view", "forget-views"].includes(id));
     expect(missing).toEqual(
-      ["stereo", "split", ...phone, "own-light", "help", "slice-pictures"].sort(),
+      ["stereo", "split", ...phone, ...files, "own-light", "help", "slice-pictures"].sort(),
     );
   });
 

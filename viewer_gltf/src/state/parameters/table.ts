@@ -4,7 +4,13 @@ import { CHANNEL } from "./channel";
 import { type Parameter, type SetAction, type Value, withValue } from "./kinds";
 import { LAMPS_SHOWN, LIGHT } from "./light";
 import { SLICES } from "./slices";
-import { MEASURE_PARAMETERS, QUALITY, QUALITY_PARAMETERS, STEREO_PARAMETERS } from "./tools";
+import {
+  MEASURE_PARAMETERS,
+  PICTURE_PARAMETERS,
+  QUALITY,
+  QUALITY_PARAMETERS,
+  STEREO_PARAMETERS,
+} from "./tools";
 import { DISC_RADIUS, MODE, SWITCH_DISTANCE, VOLUMES } from "./volumes";
 
 /** Besides those of the channels. */
@@ -14,6 +20,7 @@ export const PARAMETERS: readonly Parameter<ViewerState>[] = [
   ...MEASURE_PARAMETERS,
   ...STEREO_PARAMETERS,
   ...QUALITY_PARAMETERS,
+  ...PICTURE_PARAMETERS,
   ...LIGHT,
   LAMPS_SHOWN,
 ];

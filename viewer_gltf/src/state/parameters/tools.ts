@@ -16,6 +16,9 @@ const MEASURES = ["distance", "angle", "line"] as const;
 /** Between two points, at the second of three, through several. */
 export type MeasureKind = (typeof MEASURES)[number];
 
+const PICTURE_SIZES = ["1", "2", "4"] as const;
+export type PictureSize = (typeof PICTURE_SIZES)[number];
+
 /** The tools of a bundle that has just opened. */
 export const START_TOOLS = {
   /** The effect of a tap or a dwell on the specimen. */
@@ -25,6 +28,8 @@ export const START_TOOLS = {
   /** Whether looking at something for long is as good as pressing the button. */
   isDwellOn: true,
   quality: "auto" as QualityLevel,
+  /** How many times as large as the screen a saved picture is. */
+  pictureSize: "2" as PictureSize,
   /** Between the user's pupils, mm: adults have 54 to 74. */
   eyeDistance_mm: 63,
   /** Factor to it: 0 shows both eyes the same. */
@@ -84,6 +89,17 @@ export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
   spoken: ({ quality }) => `Quality: ${quality}`,
 };
 
+export const PICTURE_SIZE: ChoiceParameter<ToolSettings, PictureSize> = {
+  kind: "choice",
+  id: "picture-size",
+  label: "Picture",
+  ...lens("pictureSize"),
+  values: PICTURE_SIZES,
+  names: { "1": "1 x", "2": "2 x", "4": "4 x" },
+  key: ["0", "Next size of saved pictures: 1, 2 or 4 times the screen"],
+  spoken: ({ pictureSize }) => `Pictures: ${pictureSize} times the screen`,
+};
+
 export const EYE_DISTANCE: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "eye-distance",
@@ -135,4 +151,5 @@ export const STEREO_NUMBERS: readonly NumberParameter<ToolSettings>[] = [
 /** By the panel's section that lists them. */
 export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL, ...STEREO_NUMBERS];
 export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL, MEASURE_KIND];
+export const PICTURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [PICTURE_SIZE];
 export const QUALITY_PARAMETERS: readonly Parameter<ToolSettings>[] = [QUALITY];

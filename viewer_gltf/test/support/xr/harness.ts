@@ -53,6 +53,7 @@ const FACTS: Facts = {
   isLoading: false,
   values: [],
   sliceValues: [],
+  isFilming: false,
   undo: null,
   redo: null,
 };

@@ -1,0 +1,119 @@
+/** Pictures larger than the screen, and videos: drawn apart from the frames of the page, which wait. */
+import type { PerspectiveCamera, WebGLRenderer } from "three";
+import { type Caption, drawCaption } from "../capture/caption";
+import { type FilmedFile, FRAMES_PER_S, frameWriter } from "../capture/encode_video";
+import { element } from "../dom/element";
+import type { KeptView } from "../state/kept_views";
+
+/** Most pixels of a picture: browsers refuse larger canvases, phones at less. */
+const MOST_PIXELS = 120e6;
+/** Longest time for one part of a picture, and for one frame of a video, ms: then it is as good as it is. */
+const PART_MS = 8000;
+const FRAME_MS = 400;
+/** Longest edge of a video, pixels. */
+const LONGEST_FRAME_PX = 1920;
+
+/** What draws: the loop of frames. */
+export interface Studio {
+  /** Keep the page's own frames from drawing while a job runs. */
+  apart<T>(job: () => Promise<T>): Promise<T>;
+  /** Follow the camera, as long in seconds as a frame takes. */
+  follow(dt_s: number): void;
+  /** Draw the view as well as can be in so many ms. */
+  drawStill(most_ms: number): void;
+}
+
+export type Scene = Readonly<{
+  renderer: WebGLRenderer;
+  camera: PerspectiveCamera;
+  studio: Studio;
+  /** What is written on it, now. */
+  caption: () => Caption;
+}>;
+
+/** Let the page do what waits. Not by a timer: those of a page that nobody sees tick once a second. */
+function turn(): Promise<void> {
+  const { port1, port2 } = new MessageChannel();
+  return new Promise((resolve) => {
+    port1.onmessage = () => {
+      port1.close();
+      resolve();
+    };
+    port2.postMessage(null);
+  });
+}
+
+function canvasOf(width: number, height: number) {
+  const canvas = element("canvas", { width, height });
+  const context = canvas.getContext("2d");
+  if (context === null) throw new DOMException("there is no canvas of this size", "EncodingError");
+  return { canvas, context };
+}
+
+/**
+ * The view, `scale` times as large as the screen has it, part by part: each fills the screen's own canvas,
+ * so that no more of the GPU's memory is needed. Scale bar, legend and axes are drawn on it.
+ */
+export function drawPicture(
+  { renderer, camera, studio, caption }: Scene,
+  wanted: number,
+  onPart: (done: number, of: number) => void,
+): Promise<HTMLCanvasElement> {
+  const { width, height } = renderer.domElement;
+  const scale = Math.max(
+    1,
+    Math.min(wanted, Math.floor(Math.sqrt(MOST_PIXELS / (width * height)))),
+  );
+  return studio.apart(async () => {
+    const { canvas, context } = canvasOf(scale * width, scale * height);
+    const words = caption(); // before the camera sees parts alone
+    try {
+      for (let row = 0; row < scale; row++) {
+        for (let column = 0; column < scale; column++) {
+          const [x, y] = [column * width, row * height];
+          camera.setViewOffset(scale * width, scale * height, x, y, width, height);
+          studio.drawStill(PART_MS);
+          context.drawImage(renderer.domElement, x, y);
+          onPart(row * scale + column + 1, scale * scale);
+          await turn();
+        }
+      }
+    } finally {
+      camera.clearViewOffset();
+    }
+    drawCaption(context, canvas, scale * renderer.getPixelRatio(), words);
+    return canvas;
+  });
+}
+
+/** Null: it was given up. */
+export function film(
+  { renderer, studio, caption }: Scene,
+  path: readonly KeptView[],
+  lookFrom: (view: KeptView) => void,
+  onFrame: (done: number) => void,
+  signal: AbortSignal,
+): Promise<FilmedFile | null> {
+  const { width, height } = renderer.domElement;
+  const shrink = Math.min(1, LONGEST_FRAME_PX / Math.max(width, height));
+  const even = (edge: number) => Math.max(2, 2 * Math.floor((shrink * edge) / 2));
+  return studio.apart(async () => {
+    const { canvas, context } = canvasOf(even(width), even(height));
+    const writer = await frameWriter(canvas.width, canvas.height);
+    for (const [i, view] of path.entries()) {
+      if (signal.aborted) {
+        writer.close();
+        return null;
+      }
+      lookFrom(view);
+      studio.follow(1 / FRAMES_PER_S);
+      studio.drawStill(FRAME_MS);
+      context.drawImage(renderer.domElement, 0, 0, canvas.width, canvas.height);
+      drawCaption(context, canvas, shrink * renderer.getPixelRatio(), caption());
+      await writer.add(canvas);
+      onFrame(i + 1);
+      await turn();
+    }
+    return writer.finish();
+  });
+}

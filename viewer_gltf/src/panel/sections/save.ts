@@ -1,0 +1,31 @@
+/** The panel's section of pictures and videos, and its keys. Pure. */
+import { PICTURE_PARAMETERS } from "../../state/parameters/tools";
+import type { ViewerState } from "../../state/viewer_state";
+import { command, controlsOf } from "../control_templates";
+import type { Control } from "../controls";
+import { type Key, key, keysOf } from "../key";
+
+export function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
+  const { length } = state.keptViews;
+  const path = length > 1 ? `through ${length} views` : "once round";
+  const none = length === 0 ? "No view is kept." : "";
+  return [
+    ...controlsOf(PICTURE_PARAMETERS, state),
+    command("save-picture", "Save the picture"),
+    command("save-video", isFilming ? "Leave the video" : `Save a video, ${path}`),
+    command("keep-view", length === 0 ? "Keep this view" : `Keep this view (${length} kept)`),
+    { ...command("next-view", "Next kept view"), refusal: none },
+    { ...command("forget-views", "Forget them"), name: "Forget the kept views", refusal: none },
+  ];
+}
+
+export const SAVE_KEYS: readonly Key[] = [
+  ...PICTURE_PARAMETERS.flatMap(keysOf),
+  key('"', "Save the picture", "save-picture"),
+  key(")", "Save a video: once round, or through the kept views; again: leave it", "save-video"),
+  key("'", "Keep this view for a video", "keep-view"),
+  key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? null : "next-view")),
+  key("End", "Forget the kept views", ({ state }) =>
+    state.keptViews.length === 0 ? null : "forget-views",
+  ),
+];

@@ -1,0 +1,133 @@
+/** Pictures larger than the screen, videos, and the file of measurements, as the page saves them. */
+import { mkdtemp, readFile, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import type { Download } from "playwright-core";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+const SHOTS = process.env.STEREOCELL_SHOTS;
+
+describeInChromium("what the page saves", () => {
+  const stand = prepareStand({ viewport: { width: 560, height: 240 }, sharesPage: true });
+  const page = () => stand.viewer.page;
+  const saved = async (key: string): Promise<Download> => {
+    const [download] = await Promise.all([
+      page().waitForEvent("download", { timeout: 60_000 }),
+      page().keyboard.press(key),
+    ]);
+    return download;
+  };
+  let folder: string;
+  const contentOf = async (download: Download) => {
+    const path = join(SHOTS ?? folder, download.suggestedFilename());
+    await download.saveAs(path);
+    return readFile(path);
+  };
+
+  beforeAll(async () => {
+    folder = await mkdtemp(join(tmpdir(), "stereocell-saved-"));
+    await stand.open("&mode=off#v=1&points=8,-8,12,20,-8,12");
+    await stand.viewer.settled();
+    await page().keyboard.press("ArrowRight");
+    await stand.viewer.still();
+  });
+
+  afterAll(() => rm(folder, { recursive: true, force: true }));
+
+  it("is a picture of four times the screen's size that shows the same, with its scale", async () => {
+    const stage = await page().locator(".stage canvas").boundingBox();
+    await page().keyboard.press(":"); // from 2 to 4
+    const download = await saved('"');
+    expect(download.suggestedFilename()).toBe("Fixture-picture.png");
+    const png = await contentOf(download);
+    expect([png.readUInt32BE(16), png.readUInt32BE(20)]).toEqual([
+      4 * (stage?.width ?? 0),
+      4 * (stage?.height ?? 0),
+    ]);
+    // shrunk again it is what the screen shows
+    const screen = await page().screenshot({ clip: stage ?? undefined });
+    const differing = await page().evaluate(
+      async ([a, b]) => {
+        const load = async (base64: string) => {
+          const blob = await (await fetch(`data:image/png;base64,${base64}`)).blob();
+          return createImageBitmap(blob);
+        };
+        const [large, small] = [await load(a), await load(b)];
+        const { width, height } = small;
+        const draw = (image: ImageBitmap) => {
+          const canvas = Object.assign(document.createElement("canvas"), { width, height });
+          const context = canvas.getContext("2d");
+          if (context === null) throw new Error("no canvas");
+          context.imageSmoothingQuality = "high";
+          context.drawImage(image, 0, 0, width, height);
+          return context.getImageData(0, 0, width, height).data;
+        };
+        const [p, q] = [draw(large), draw(small)];
+        let count = 0;
+        for (let i = 0; i < p.length; i += 4) {
+          if (Math.abs(p[i] - q[i]) + Math.abs(p[i + 1] - q[i + 1]) > 90) count++;
+        }
+        return count / (width * height);
+      },
+      [png.toString("base64"), screen.toString("base64")] as const,
+    );
+    expect(differing).toBeLessThan(0.06); // edges, and the legend, which the screen has not
+  });
+
+  it("is a video through the views that were kept, which plays", async () => {
+    await page().keyboard.press("'");
+    await page().keyboard.press("ArrowLeft");
+    await stand.viewer.still();
+    await page().keyboard.press("'");
+    const download = await saved(")");
+    const file = await contentOf(download);
+    expect(download.suggestedFilename()).toBe("Fixture-video.webm");
+    const blank = await page().context().newPage(); // the viewer's own lets no video in
+    const played = await blank.evaluate(async (base64) => {
+      const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+      const video = document.createElement("video");
+      video.src = URL.createObjectURL(new Blob([bytes], { type: "video/webm" }));
+      await new Promise((resolve, reject) => {
+        video.onloadeddata = resolve;
+        video.onerror = () => reject(new Error(video.error?.message));
+      });
+      return { duration: video.duration, width: video.videoWidth };
+    }, file.toString("base64"));
+    await blank.close();
+    await page().bringToFront();
+    expect(played.duration).toBeCloseTo(61 / 30, 2);
+    expect(played.width).toBeGreaterThan(100);
+  });
+
+  it("is a zip of pictures where the browser has no encoder", async () => {
+    await page().evaluate(() => {
+      Object.assign(window, { VideoEncoder: undefined });
+    });
+    // as it is handed over: another download by itself the browser would ask about
+    await page().evaluate(() => {
+      const make = URL.createObjectURL.bind(URL);
+      URL.createObjectURL = (blob: Blob) => {
+        Object.assign(window, { handed: blob });
+        return make(blob);
+      };
+    });
+    await page().keyboard.press(")");
+    await page().waitForFunction(() => "handed" in window, null, { timeout: 60_000 });
+    const base64 = await page().evaluate(async () => {
+      const { handed } = window as unknown as { handed: Blob };
+      const bytes = new Uint8Array(await handed.arrayBuffer());
+      return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+    });
+    const zip = Buffer.from(base64, "base64");
+    expect(zip.subarray(0, 4)).toEqual(Buffer.from("PK\u0003\u0004"));
+    expect(zip.readUInt16LE(zip.length - 12)).toBe(61); // of its list: two seconds and the last
+  });
+
+  it("is a table of the measurements", async () => {
+    const download = await saved("(");
+    const csv = (await contentOf(download)).toString();
+    expect(csv.split("\r\n")[1]).toBe("Distance 1,distance,12,,8,-8,12,20,-8,12");
+  });
+});
