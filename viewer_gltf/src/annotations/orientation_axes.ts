@@ -88,7 +88,7 @@ class End {
     this.line.setAttribute("y2", (-LENGTH * y).toFixed(2));
     this.letter.setAttribute("x", (LETTER * x).toFixed(2));
     this.letter.setAttribute("y", (-LETTER * y).toFixed(2));
-    this.letter.setAttribute("visibility", hasOpposite && z < -END_ON ? "hidden" : "visible");
+    this.letter.setAttribute("visibility", hasOpposite && z < -END_ON ? "hidden" : "inherit");
     this.whole.setAttribute("opacity", z < -0.1 ? "0.55" : "1"); // leads away
   }
 }

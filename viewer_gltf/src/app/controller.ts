@@ -218,8 +218,9 @@ export class Controller {
     const asked = [...settingsOf(search), ...actions];
     for (const action of asked) viewer.dispatch(action);
     const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
+    const stand = standOf(search); // what `reset` returns to, wherever a link looks from
+    if (camera === null || stand !== null) viewer.openWith(stand, saysDistance);
     if (camera !== null) viewer.lookFrom(camera);
-    else viewer.openWith(standOf(search), saysDistance);
     viewer.forgetSteps();
   }
 

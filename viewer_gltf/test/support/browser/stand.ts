@@ -121,9 +121,8 @@ export function prepareStand(options: StandOptions): Stand {
     open: (query = "") => {
       const quality = query.includes("&quality=") ? "" : "&quality=low";
       const view = query.includes("&view=") ? "" : "&view=front"; // where points are known to show
-      const [search, ...hash] = query.split(/(?=#)/);
-      const address = `${host.address}/app/?bundle=../bundle/${search ?? ""}${view}${quality}`;
-      return viewer.open(address + hash.join(""));
+      const [, search, hash] = /^([^#]*)(.*)$/.exec(query) ?? [];
+      return viewer.open(`${host.address}/app/?bundle=../bundle/${search}${view}${quality}${hash}`);
     },
   };
 }
