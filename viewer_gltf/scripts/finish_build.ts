@@ -21,6 +21,8 @@ const SERVICE_WORKER = "sw.js";
 const PAGE = "index.html";
 const FILES = /(["'`])__VIEWER_FILES__\1/;
 const BOOT = new URL("../boot/", import.meta.url);
+/** The page's style, as Vite links it. */
+const STYLE = /<link rel="stylesheet"[^>]* href="\.\/([^"]+\.css)"/;
 /** What is packed already gains nothing. */
 const SHRINKS = new Set([".js", ".css", ".html", ".json", ".svg", ".wasm", ".webmanifest"]);
 /** Less than a packet of the network. */
@@ -140,10 +142,12 @@ export function finishBuild(): Plugin {
       if (!(SERVICE_WORKER in bundle)) return; // the tests' own small pages have none
       const files = Object.values(bundle);
       const entry = files.find((file) => file.type === "chunk" && file.isEntry);
-      const style = files.find(({ fileName }) => fileName.endsWith(".css"));
+      const page = join(folder, PAGE);
+      // parts that are fetched later have styles of their own
+      const [, style] = (await readFile(page, "utf8")).match(STYLE) ?? [];
       if (entry?.type !== "chunk" || style === undefined) throw new Error("no code, or no style");
       const { plain, code } = await splitCode(folder, entry.fileName, entry.exports);
-      await writePage(join(folder, PAGE), await scriptFor(plain, code, style.fileName));
+      await writePage(page, await scriptFor(plain, code, style));
       await listFiles(folder, plain);
       await compressAll(folder);
     },

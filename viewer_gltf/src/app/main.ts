@@ -7,7 +7,6 @@ import "../panel/html/overlays.css";
 import "../annotations/annotations.css";
 import "../slices/slices.css";
 import { sizeText } from "../annotations/measure";
-import { flightAsked } from "../bench/flight";
 import { bundleAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -23,6 +22,7 @@ import {
   StereoButton,
   showFatal,
 } from "../panel/html/overlays";
+import { flightAsked } from "../share/bench_parameter";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
 import { findXrSupport, wayToStereo } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
@@ -125,7 +125,7 @@ async function offerBench(
   hasHeadset: boolean,
 ): Promise<void> {
   const [{ benchCard }, { subjectOf }] = await Promise.all([
-    import("../bench/page"),
+    import("../bench/bench_card"),
     import("./bench_subject"),
   ]);
   const card = benchCard(flight_s, {

@@ -4,9 +4,6 @@
  */
 import type { Vec3 } from "../math/vec3";
 
-/** Of each run, s, where the address says nothing; and at most. */
-const FLIGHT_S = 4;
-const LONGEST_S = 60;
 /** How far it comes towards the eyes, as a share of the way to them. */
 const NEAREST_SHARE = 0.45;
 /** The most that it tips towards the eyes, rad. */
@@ -38,12 +35,4 @@ export function poseAt(share: number, eye: Vec3, middle: Vec3): FlightPose {
     orientation: [sinX * cosY, cosX * sinY, sinX * sinY, cosX * cosY],
     scale: 1,
   };
-}
-
-/** Whether an address asks for the benchmark, and how long its flights take, s. */
-export function flightAsked(search: string): number | null {
-  const asked = new URLSearchParams(search).get("bench");
-  if (asked === null) return null;
-  const seconds = Number(asked);
-  return asked !== "" && seconds > 0 ? Math.min(seconds, LONGEST_S) : FLIGHT_S;
 }

@@ -1,0 +1,13 @@
+/** What `?bench` in the page's address asks for. Pure. */
+
+/** Of each run, s, where the address says nothing; and at most. */
+const FLIGHT_S = 4;
+const LONGEST_S = 60;
+
+/** Whether an address asks for the benchmark, and how long its flights take, s. */
+export function flightAsked(search: string): number | null {
+  const asked = new URLSearchParams(search).get("bench");
+  if (asked === null) return null;
+  const seconds = Number(asked);
+  return asked !== "" && seconds > 0 ? Math.min(seconds, LONGEST_S) : FLIGHT_S;
+}
