@@ -38,7 +38,7 @@ describeInChromium("what the page saves", () => {
 
   it("is a picture of four times the screen's size that shows the same, with its scale", async () => {
     const stage = await page().locator(".stage canvas").boundingBox();
-    await page().keyboard.press(":"); // from 2 to 4
+    await page().keyboard.press("0"); // from 2 to 4
     const download = await saved('"');
     expect(download.suggestedFilename()).toBe("Fixture-picture.png");
     const png = await contentOf(download);
