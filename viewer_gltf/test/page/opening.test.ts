@@ -54,6 +54,11 @@ describeInChromium("the opening", () => {
     await page().mouse.click(stage.x + 4, stage.y + 4); // where nothing is to be chosen
     await stand.viewer.still();
     await expect.poll(() => hint.evaluate((found) => getComputedStyle(found).opacity)).toBe("0");
+
+    // how much of the picture it fills depends on how far it has turned: as it opens
+    await page().emulateMedia({ reducedMotion: "reduce" });
+    await stand.viewer.open(address("&quality=low"));
+    await stand.viewer.settled();
     const picture = await takePicture(page());
     const inside: [number, number][] = [];
     for (let y = 0; y < picture.height; y += 2) {
