@@ -10,7 +10,7 @@ from stereocell.cli.__main__ import main
 from support import phantoms
 
 SHAPE, TILE = (194, 5508, 10908), (194, 512, 512)
-PLANS_S = 5.0
+PLANS_S = 40.0  # it takes 3 to 5; a plan that compares units with units takes minutes
 
 
 def write_empty(path: Path, channels: int) -> Path:

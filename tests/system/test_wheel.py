@@ -118,10 +118,10 @@ def test_a_wheel_alone_builds_and_has_the_viewer(tmp_path: Path) -> None:
     with viewing(command, out) as address:
         shown = fetch(f"{address}/")
         assert shown == (out / "bundle" / "index.html").read_bytes()
-        scripts = re.findall(r'<script[^>]* src="\./([^"]+\.js)"', shown.decode())
-        assert scripts
-        for script in scripts:
-            assert fetch(f"{address}/{script}") == (out / "bundle" / script).read_bytes()
+        parts = re.findall(r'"(?:packed|plain|style)":"([^"]+)"', shown.decode())
+        assert len(parts) == 3  # the code packed and plain, and its style
+        for part in parts:
+            assert fetch(f"{address}/{part}") == (out / "bundle" / part).read_bytes()
 
     checked = run(command, "check", out, "--json", cwd=tmp_path)
     lines = json.loads(checked.stdout)["checks"]
