@@ -8,7 +8,15 @@ import type { Sides } from "../bundle/generated/bundle";
 import type { Box } from "../math/box";
 import { type Vec3, withPart } from "../math/vec3";
 import { Label } from "./label";
-import { AXIS_COLORS, disposeMarks, lengthAt, markMesh, type Sight } from "./style";
+import {
+  AXIS_COLORS,
+  disposeMarks,
+  lengthAt,
+  type MarkMesh,
+  markOf,
+  type Piece,
+  type Sight,
+} from "./style";
 
 /** A line through the specimen: `ends` are the letters where `direction` leads to, and opposite. */
 export type Axis = Readonly<{
@@ -148,7 +156,7 @@ function whither(axis: Vector3): string {
 /** The same as an object in the room. um, world. */
 export class Axes {
   readonly group = new Object3D();
-  private readonly arrows = new Object3D();
+  private readonly arrows: MarkMesh;
   /** Where each arm leads, and its letter. */
   private readonly arms: readonly { direction: Vector3; label: Label }[];
   /** Arms lead both ways, so that the middle lies farther from the specimen. */
@@ -158,28 +166,19 @@ export class Axes {
   constructor(sides?: Sides) {
     const axes = axesOf(sides);
     this.isCross = sides !== undefined;
-    this.arms = axes.flatMap(({ direction, ends: [forth, back] }, i) => [
-      this.makeArm(new Vector3(...direction), forth, i, true),
-      ...(back === null ? [] : [this.makeArm(new Vector3(...direction).negate(), back, i, false)]),
+    const arms = axes.flatMap(({ direction, ends: [forth, back] }, i) => [
+      { direction: new Vector3(...direction), text: forth, axis: i, hasHead: true },
+      ...(back === null
+        ? []
+        : [{ direction: new Vector3(...direction).negate(), text: back, axis: i, hasHead: false }]),
     ]);
+    this.arrows = markOf(arms.flatMap(arrow));
+    this.arms = arms.map(({ direction, text, axis }) => {
+      const label = new Label("above", AXIS_COLORS[axis]);
+      label.write(text);
+      return { direction, label };
+    });
     this.group.add(this.arrows, ...this.arms.map(({ label }) => label.sprite));
-  }
-
-  private makeArm(direction: Vector3, text: string, axis: number, hasHead: boolean) {
-    const arrow = new Object3D();
-    const shaft = markMesh(SHAFT, AXIS_COLORS[axis]);
-    shaft.position.y = 0.4;
-    arrow.add(shaft);
-    if (hasHead) {
-      const head = markMesh(HEAD, AXIS_COLORS[axis]);
-      head.position.y = 0.9;
-      arrow.add(head);
-    }
-    arrow.quaternion.copy(new Quaternion().setFromUnitVectors(UP, direction));
-    this.arrows.add(arrow);
-    const label = new Label("above", AXIS_COLORS[axis]);
-    label.write(text);
-    return { direction, label };
   }
 
   /** Left of the front lower corner of what is shown. */
@@ -205,8 +204,18 @@ export class Axes {
   }
 }
 
+/** Of length 1, from the middle. */
+function arrow({ direction, axis, hasHead }: Arm): readonly Piece[] {
+  const color = AXIS_COLORS[axis];
+  const turn = new Quaternion().setFromUnitVectors(UP, direction);
+  const shaft = new CylinderGeometry(0.03, 0.03, 0.8, 8).translate(0, 0.4, 0);
+  const head = new ConeGeometry(0.09, 0.22, 12).translate(0, 0.9, 0);
+  const shapes = hasHead ? [shaft, head] : [shaft];
+  return shapes.map((shape) => ({ geometry: shape.applyQuaternion(turn), color }));
+}
+
+type Arm = Readonly<{ direction: Vector3; axis: number; hasHead: boolean }>;
+
 const UP = new Vector3(0, 1, 0);
 const GAP = 0.12;
 const ARROW_RAD = (3 * Math.PI) / 180;
-const SHAFT = new CylinderGeometry(0.03, 0.03, 0.8, 8);
-const HEAD = new ConeGeometry(0.09, 0.22, 12);

@@ -6,7 +6,7 @@ import { BoxGeometry, Object3D, Vector3 } from "three";
 import type { Box } from "../math/box";
 import { chooseScaleBar, LONGEST_PX } from "../math/round_length";
 import { Label } from "./label";
-import { DIM, disposeMarks, lengthAt, MARKS_ORDER, markMesh, type Sight } from "./style";
+import { BRIGHT, DIM, disposeMarks, lengthAt, markOf, type Piece, type Sight } from "./style";
 
 /** Angle under which the user sees the longest ruler, radians. */
 const LONGEST_RAD = (16 * Math.PI) / 180;
@@ -16,6 +16,9 @@ const GAP = 0.06;
 /** Parts of the ruler, every second one dark: five parts distinguish lengths of 1, 2 and 5. */
 const PARTS = 5;
 
+/** How wide the ticks at its ends are, as a share of the ruler. */
+const TICK = 0.012;
+
 /** A round length for a ruler at a distance, um. */
 export function rulerLength(distance_um: number): { length_um: number; label: string } | null {
   return chooseScaleBar((2 * distance_um * Math.tan(LONGEST_RAD / 2)) / LONGEST_PX);
@@ -24,22 +27,11 @@ export function rulerLength(distance_um: number): { length_um: number; label: st
 export class Ruler {
   readonly group = new Object3D();
   length_um = 0;
-  private readonly bar = new Object3D();
+  private readonly bar = markOf([...ticks(), ...parts()]);
   private readonly label = new Label("below");
   private readonly at = new Vector3();
 
   constructor() {
-    for (let i = 0; i < PARTS; i++) {
-      const part = markMesh(PART, i % 2 === 0 ? 0xffffff : DIM, i % 2 === 0 ? 1 : 0.35);
-      part.position.x = (i + 0.5) / PARTS - 0.5;
-      this.bar.add(part);
-    }
-    for (const side of [-0.5, 0.5]) {
-      const tick = markMesh(TICK, 0xffffff);
-      tick.position.x = side;
-      tick.renderOrder = MARKS_ORDER + 1;
-      this.bar.add(tick);
-    }
     this.group.add(this.bar, this.label.sprite);
   }
 
@@ -55,7 +47,6 @@ export class Ruler {
     const thickness = lengthAt(this.at, sight, THICKNESS_RAD);
     this.bar.position.copy(this.at);
     this.bar.scale.set(chosen.length_um, thickness, thickness);
-    for (const tick of this.bar.children.slice(PARTS)) tick.scale.x = thickness / chosen.length_um;
     this.label.write(chosen.label);
     this.label.place(this.at, sight);
   }
@@ -67,5 +58,17 @@ export class Ruler {
   }
 }
 
-const PART = new BoxGeometry(1 / PARTS, 1, 1);
-const TICK = new BoxGeometry(0.5, 3.2, 0.5);
+/** A ruler of length 1 and thickness 1, about its middle. */
+function parts(): readonly Piece[] {
+  return Array.from({ length: PARTS }, (_, i) => {
+    const geometry = new BoxGeometry(1 / PARTS, 1, 1).translate((i + 0.5) / PARTS - 0.5, 0, 0);
+    return i % 2 === 0 ? { geometry, color: BRIGHT } : { geometry, color: DIM, opacity: 0.35 };
+  });
+}
+
+function ticks(): readonly Piece[] {
+  return [-0.5, 0.5].map((x) => ({
+    geometry: new BoxGeometry(TICK, 3.2, 0.5).translate(x, 0, 0),
+    color: BRIGHT,
+  }));
+}

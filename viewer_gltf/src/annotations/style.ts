@@ -4,7 +4,9 @@
  */
 import {
   BackSide,
+  BufferAttribute,
   type BufferGeometry,
+  Color,
   type ColorRepresentation,
   GreaterDepth,
   type Line,
@@ -16,6 +18,7 @@ import {
   type Object3D,
   type Vector3,
 } from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 
 const RADIANS = Math.PI / 180;
 /** Render order: after the marched volumes, which lie over everything else. */
@@ -71,6 +74,26 @@ export function markMesh(
 ): MarkMesh {
   const material = new MeshBasicMaterial({ color, opacity, ...MATERIAL });
   return ghosted(new Mesh(geometry, material), new Mesh(geometry, material.clone()));
+}
+
+/** A part of a mark; `geometry` is the mark's from here on. */
+export type Piece = Readonly<{
+  geometry: BufferGeometry;
+  color: ColorRepresentation;
+  opacity?: number;
+}>;
+
+/** One mark of several parts, each in its colour: a mark of many meshes is drawn as often. */
+export function markOf(pieces: readonly Piece[]): MarkMesh {
+  const geometries = pieces.map(({ geometry, color, opacity = 1 }) => {
+    const rgba = [...new Color(color).toArray(), opacity];
+    const { count } = geometry.attributes.position;
+    const colors = Float32Array.from({ length: 4 * count }, (_, i) => rgba[i % 4]);
+    return geometry.setAttribute("color", new BufferAttribute(colors, 4));
+  });
+  const material = new MeshBasicMaterial({ vertexColors: true, ...MATERIAL });
+  const merged = mergeGeometries(geometries);
+  return ghosted(new Mesh(merged, material), new Mesh(merged, material.clone()));
 }
 
 export function markLine(
