@@ -66,6 +66,7 @@ export function probeSurfaces(
   const direction = new Vector3(...ray.direction).transformDirection(specimen);
   const byMesh = new Map(surfaces.map((surface) => [surface.mesh, surface]));
   const caster = new Raycaster(origin, direction);
+  caster.layers.enableAll();
   const toSpecimen = specimen.clone().invert();
   for (const hit of caster.intersectObjects<Mesh>([...byMesh.keys()], false)) {
     const found = byMesh.get(hit.object);

@@ -167,7 +167,7 @@ export class FrameLoop {
       const { passes } = this.gathering;
       // late frames give up smooth edges first
       const isSmooth = !isMoving || settings.steps >= MAX_STEPS;
-      this.draw(camera, { resolution: settings.resolution, isMoving, passes, isSmooth, gathers });
+      this.draw({ resolution: settings.resolution, isMoving, passes, isSmooth, gathers });
       if (isGathering) this.gathering.submit(time_ms);
       if (!isMoving) this.resting.submit(time_ms);
       this.frames++;
@@ -213,7 +213,7 @@ export class FrameLoop {
     const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
     for (let i = 0; i < MOST_SAMPLES; i++) {
       const gathers = i > 0 && !traced.isShown;
-      this.draw(navigation.camera, { ...pace, gathers });
+      this.draw({ ...pace, gathers });
       const isDone = traced.isShown
         ? traced.status().samples >= MOST_SAMPLES
         : state.quality !== "auto" || !this.picture.canGather;
@@ -261,7 +261,7 @@ export class FrameLoop {
     return { isChanging, isFading };
   }
 
-  private draw(camera: Camera, pace: FramePace): void {
+  private draw(pace: FramePace): void {
     const { picture, head } = this;
     const { contents, stereo, state } = this.options.shown();
     const { volumes, traced, surfaces, marks, slicePlanes: slices } = contents;
@@ -273,7 +273,7 @@ export class FrameLoop {
       bounds: this.options.bounds,
       solids: surfaces.triangles + slices.solid,
     };
-    stereo.present(() => picture.draw(camera, head, drawn, state.clip, pace));
+    stereo.present(() => picture.draw(head, drawn, state.clip, pace));
   }
 
   stop(): void {

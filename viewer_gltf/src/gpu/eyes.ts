@@ -56,6 +56,7 @@ export class Eyes {
     let eye = this.pool[this.count];
     if (eye === undefined) {
       eye = { camera: new PerspectiveCamera(), viewport: new Vector4() };
+      eye.camera.viewport = eye.viewport;
       eye.camera.matrixAutoUpdate = false;
       eye.camera.matrixWorldAutoUpdate = false;
       this.pool.push(eye);

@@ -1,5 +1,11 @@
 /** Draw a scene into a texture, for each eye in its part of it. */
-import { type Scene, Vector4, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import {
+  type ArrayCamera,
+  type Scene,
+  Vector4,
+  type WebGLRenderer,
+  type WebGLRenderTarget,
+} from "three";
 import type { Eye, Eyes } from "./eyes";
 
 /** An eye's part of a target that is `scale` times as large as the frame buffer: whole pixels. */
@@ -21,11 +27,39 @@ export function drawEyes(
   scale: number,
   onEye?: (eye: Eye, part: Vector4) => void,
 ): void {
+  drawInto(renderer, eyes, target, scale, () => {
+    for (const eye of eyes.all) {
+      partOf(eye, scale, target.viewport);
+      renderer.setRenderTarget(target);
+      onEye?.(eye, target.viewport);
+      renderer.render(scene, eye.camera);
+    }
+  });
+}
+
+/** The same at the frame buffer's size, by a camera that has all eyes. */
+export function drawAllEyes(
+  renderer: WebGLRenderer,
+  scene: Scene,
+  eyes: Eyes,
+  camera: ArrayCamera,
+  target: WebGLRenderTarget,
+): void {
+  drawInto(renderer, eyes, target, 1, () => renderer.render(scene, camera));
+}
+
+function drawInto(
+  renderer: WebGLRenderer,
+  { width_px, height_px }: Eyes,
+  target: WebGLRenderTarget,
+  scale: number,
+  draw: () => void,
+): void {
   const before = renderer.getRenderTarget();
   const { autoClear } = renderer;
   const { enabled } = renderer.xr; // else three would draw the headset's eyes by itself
-  const width = Math.max(1, Math.ceil(eyes.width_px * scale));
-  const height = Math.max(1, Math.ceil(eyes.height_px * scale));
+  const width = Math.max(1, Math.ceil(width_px * scale));
+  const height = Math.max(1, Math.ceil(height_px * scale));
   target.setSize(width, height);
   target.viewport.set(0, 0, width, height);
   renderer.xr.enabled = false;
@@ -35,12 +69,7 @@ export function drawEyes(
   renderer.setClearAlpha(0);
   renderer.clear();
   renderer.setClearAlpha(clearAlpha);
-  for (const eye of eyes.all) {
-    partOf(eye, scale, target.viewport);
-    renderer.setRenderTarget(target);
-    onEye?.(eye, target.viewport);
-    renderer.render(scene, eye.camera);
-  }
+  draw();
   renderer.xr.enabled = enabled;
   renderer.autoClear = autoClear;
   renderer.setRenderTarget(before);

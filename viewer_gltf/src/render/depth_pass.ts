@@ -14,9 +14,10 @@ import {
   type WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
+import { BothEyes } from "../gpu/both_eyes";
 import type { Cuts } from "../gpu/clip_planes";
 import type { Eyes } from "../gpu/eyes";
-import { drawEyes } from "../gpu/offscreen_target";
+import { drawAllEyes, drawEyes } from "../gpu/offscreen_target";
 import { depthMaterial, PANES } from "../surfaces/blend_material";
 
 export class DepthPass {
@@ -26,8 +27,11 @@ export class DepthPass {
   private readonly panes = depthTarget();
   private readonly material: Material;
 
-  constructor({ uCuts, uCutCount }: Pick<Cuts, "uCuts" | "uCutCount">) {
-    this.material = depthMaterial({ uCuts, uCutCount });
+  constructor(
+    { uCuts, uCutCount }: Pick<Cuts, "uCuts" | "uCutCount">,
+    private readonly both = new BothEyes(),
+  ) {
+    this.material = depthMaterial({ uCuts, uCutCount, ...both.uniforms }, both);
   }
 
   get texture(): DepthTexture {
@@ -43,7 +47,9 @@ export class DepthPass {
     const visibility = hidden.map((object) => object.visible);
     for (const object of hidden) object.visible = false;
     scene.overrideMaterial = this.material;
-    withoutBackground(scene, () => drawEyes(renderer, scene, eyes, this.solid, 1));
+    withoutBackground(scene, () =>
+      drawAllEyes(renderer, scene, eyes, this.both.cameraOf(eyes), this.solid),
+    );
     scene.overrideMaterial = null;
     hidden.forEach((object, i) => {
       object.visible = visibility[i];

@@ -2,15 +2,9 @@
  * One frame: depth of the surfaces, volumes marched up to it, the scene, the volumes over it. All of
  * it is linear light until the end, when it is encoded once.
  */
-import {
-  type Camera,
-  Matrix4,
-  type Object3D,
-  Vector3,
-  type WebGLRenderer,
-  type WebGLRenderTarget,
-} from "three";
+import { Matrix4, type Object3D, Vector3, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
+import { BothEyes } from "../gpu/both_eyes";
 import { Cuts } from "../gpu/clip_planes";
 import { EncodePass } from "../gpu/encode_pass";
 import { Eyes } from "../gpu/eyes";
@@ -60,8 +54,9 @@ const MIXED_PX = 2;
 export class Picture {
   /** Where they are in this frame. */
   readonly eyes = new Eyes();
+  private readonly both = new BothEyes();
   private readonly cuts = new Cuts();
-  private readonly depth = new DepthPass(this.cuts);
+  private readonly depth = new DepthPass(this.cuts, this.both);
   /** The part of a frame that all volumes share. */
   readonly marchFrame = makeFrame(this.depth.texture, this.depth.paneTexture);
   /** The part of a frame that all surfaces share. */
@@ -94,7 +89,7 @@ export class Picture {
     const { uDisc, uIsCrossing } = this.marchFrame;
     const disc = { ...this.cone, uDisc, uIsCrossing };
     this.march = new MarchPass(renderer, this.marchFrame, disc);
-    this.surfaceFrame = makeSurfaceFrame(disc, this.march.picture, this.cuts);
+    this.surfaceFrame = makeSurfaceFrame(disc, this.march.picture, this.cuts, this.both);
     this.light = linearTarget(renderer, { hasDepth: true, isMultisampled: true });
     this.draft = linearTarget(renderer, { hasDepth: true });
     room.scene.add(...this.march.overlays);
@@ -106,7 +101,6 @@ export class Picture {
    * @param pace how much the frame's budget allows
    */
   draw(
-    camera: Camera,
     head: Matrix4,
     drawn: Drawn,
     clip: Clip,
@@ -149,7 +143,7 @@ export class Picture {
       traced.render(renderer, this.eyes, scene, resolution, isMoving, passes, standIn);
       if (traced.isOnScreen) this.march.hide();
     }
-    this.show(camera, isSmooth ? this.light : this.draft);
+    this.show(isSmooth ? this.light : this.draft);
   }
 
   /** Whether another frame of the view at rest would make the march's picture better. */
@@ -200,12 +194,15 @@ export class Picture {
   }
 
   /** Draw the room's light, and encode it for the present target. */
-  private show(camera: Camera, light: WebGLRenderTarget): void {
-    const { renderer, eyes } = this;
+  private show(light: WebGLRenderTarget): void {
+    const { renderer, eyes, both } = this;
     const before = renderer.getRenderTarget();
+    const { enabled } = renderer.xr; // else three would draw the headset's eyes by itself
     light.setSize(eyes.width_px, eyes.height_px);
+    renderer.xr.enabled = false;
     renderer.setRenderTarget(light);
-    renderer.render(this.room.scene, camera);
+    renderer.render(this.room.scene, both.cameraOf(eyes));
+    renderer.xr.enabled = enabled;
     this.encode.render(renderer, light, before);
   }
 

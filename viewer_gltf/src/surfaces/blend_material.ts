@@ -19,6 +19,16 @@ import {
   SrcAlphaFactor,
   ZeroFactor,
 } from "three";
+import {
+  type BothEyes,
+  type BothEyesUniforms,
+  forBoth,
+  NOT_THE_OTHERS,
+  NOT_THE_OTHERS_DECLARED,
+  SOLIDS,
+  TO_EACH_EYE,
+  TO_EACH_EYE_DECLARED,
+} from "../gpu/both_eyes";
 import type { Cuts } from "../gpu/clip_planes";
 import { type Disc, LAID, type MarchedUniforms } from "../gpu/composite_pass";
 import { CHUNKS } from "../gpu/glsl_chunks";
@@ -28,16 +38,22 @@ import { includeChunks } from "../gpu/glsl_include";
  * What all surfaces share, by reference: the disc's cone and the cuts in the room, metres, and the
  * volumes' picture, which takes their place in the disc.
  */
-export type SurfaceFrame = Pick<Disc, "uDisc" | "uApex" | "uAxis"> &
-  Pick<Cuts, "uCuts" | "uCutCount"> &
-  MarchedUniforms;
+export type SurfaceFrame = Readonly<{
+  uniforms: Pick<Disc, "uDisc" | "uApex" | "uAxis"> &
+    Pick<Cuts, "uCuts" | "uCutCount"> &
+    MarchedUniforms &
+    BothEyesUniforms;
+  both: BothEyes;
+}>;
 
 export function makeSurfaceFrame(
   { uDisc, uApex, uAxis }: Disc,
   picture: MarchedUniforms,
   { uCuts, uCutCount }: Pick<Cuts, "uCuts" | "uCutCount">,
+  both: BothEyes,
 ): SurfaceFrame {
-  return { uDisc, uApex, uAxis, uCuts, uCutCount, ...picture };
+  const shared = { uDisc, uApex, uAxis, uCuts, uCutCount };
+  return { uniforms: { ...shared, ...picture, ...both.uniforms }, both };
 }
 
 /** A surface that is not opaque now; a pane: the march has to know what lies behind it. */
@@ -53,9 +69,9 @@ export type Share = Readonly<{
   isCrossing: boolean;
 }>;
 
-const VARYING = "varying vec3 vRoom;\n";
+const VARYINGS = "varying vec3 vRoom;\nvarying float vEye;\n";
 const DECLARED = includeChunks(
-  `varying vec3 vRoom;
+  `${VARYINGS}${NOT_THE_OTHERS_DECLARED}
 #include <chunks/clip_planes>
 uniform vec2 uDisc;
 uniform vec3 uApex;
@@ -80,32 +96,38 @@ bool isGone() {
 /**
  * Writes depth alone, cut as the surfaces are.
  *
+ * @param uniforms with those of `both`
  * @param condition statement that may discard; knows `vRoom`
  */
 export function depthMaterial(
   uniforms: Record<string, { value: unknown }>,
+  both: BothEyes,
   condition = "",
 ): ShaderMaterial {
-  return new ShaderMaterial({
+  const material = new ShaderMaterial({
     glslVersion: GLSL3,
     colorWrite: false,
     side: DoubleSide,
     uniforms,
-    vertexShader: `out vec3 vRoom;
+    vertexShader: `${VARYINGS.replaceAll("varying", "out")}${TO_EACH_EYE_DECLARED}
 void main() {
   vec3 transformed = position;
   vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
   vec4 mvPosition = modelViewMatrix * vec4(transformed, 1.0);
   gl_Position = projectionMatrix * mvPosition;
+  ${TO_EACH_EYE}
 }`,
-    fragmentShader: `${DECLARED.replace("varying", "in")}
+    fragmentShader: `${DECLARED.replaceAll("varying", "in")}
 out vec4 oColor;
 void main() {
+  ${NOT_THE_OTHERS}
   if (isCut(vRoom)) discard;
   ${condition}
   oColor = vec4(0.0);
 }`,
   });
+  both.adopt(material);
+  return material;
 }
 
 /** The picture of the volumes. */
@@ -147,17 +169,18 @@ const LEAVES_A_SHARE = {
 export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
-  private readonly twins: Mesh[] = [];
+  private readonly meshes: readonly Mesh[];
+  private readonly twins: readonly Mesh[];
   isBlended = false;
   isPane = false;
 
   constructor(
     private readonly scene: Object3D,
     private readonly materials: readonly MeshStandardMaterial[],
-    frame: SurfaceFrame,
+    { uniforms, both }: SurfaceFrame,
   ) {
     this.uniforms = {
-      ...frame,
+      ...uniforms,
       uOpacity: { value: 1 },
       uTaken: { value: 0 },
       uInDisc: { value: false },
@@ -165,10 +188,11 @@ export class BlendedSurface {
     };
     for (const material of materials) {
       this.patch(material);
+      both.adopt(material);
       material.forceSinglePass = true; // the depth that is written first sorts both sides
       Object.assign(material, LEAVES_A_SHARE);
     }
-    this.depth = depthMaterial(this.uniforms, "if (isGone()) discard;");
+    this.depth = depthMaterial(this.uniforms, both, "if (isGone()) discard;");
     // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
     // what lies behind a rim through.
     this.depth.polygonOffset = true;
@@ -179,26 +203,32 @@ export class BlendedSurface {
       if (object instanceof Mesh) meshes.push(object);
     });
     for (const mesh of meshes) {
+      mesh.geometry = forBoth(mesh.geometry);
+      mesh.layers.set(SOLIDS);
+    }
+    this.meshes = meshes;
+    this.twins = meshes.map((mesh) => {
       const twin = new Mesh(mesh.geometry, this.depth);
       twin.renderOrder = AFTER_OPAQUE;
       twin.visible = false;
       mesh.add(twin);
-      this.twins.push(twin);
-    }
+      return twin;
+    });
   }
 
   private patch(material: MeshStandardMaterial): void {
     material.onBeforeCompile = (shader) => {
       Object.assign(shader.uniforms, this.uniforms);
-      shader.vertexShader = (VARYING + shader.vertexShader).replace(
+      shader.vertexShader = (VARYINGS + TO_EACH_EYE_DECLARED + shader.vertexShader).replace(
         "#include <project_vertex>",
-        "#include <project_vertex>\n\tvRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;",
+        "#include <project_vertex>\n\tvRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;" +
+          TO_EACH_EYE,
       );
       shader.fragmentShader = (DECLARED + MARCHED + shader.fragmentShader)
         .replace("#include <dithering_fragment>", `${BLENDED}\n#include <dithering_fragment>`)
         .replace(
           "#include <color_fragment>",
-          "#include <color_fragment>\n\tif (isGone() || isCut(vRoom)) discard;",
+          `#include <color_fragment>${NOT_THE_OTHERS}\tif (isGone() || isCut(vRoom)) discard;`,
         )
         .replace(
           "#include <normal_fragment_maps>",
@@ -227,6 +257,7 @@ export class BlendedSurface {
       material.blending = this.isBlended ? CustomBlending : NormalBlending;
       material.needsUpdate = true; // an opaque surface's shader leaves its alpha out
     }
+    for (const mesh of this.meshes) mesh.layers.set(this.isBlended ? 0 : SOLIDS);
     for (const twin of this.twins) {
       twin.visible = this.isBlended;
       if (this.isPane) twin.layers.enable(PANES);

@@ -154,10 +154,21 @@ describeInChromium("the page in stereo", () => {
     const { width, height } = { width: 480, height: 270 };
     const half = { y: 0, width: width / 2, height };
     const isDrawn = (pixel: readonly [number, number, number]) => Math.max(...pixel) > 60;
+    const lit = [];
     for (const x of [0, width / 2]) {
       const eye = await takePicture(stand.viewer.page, { x, ...half });
-      expect(eye.count(isDrawn)).toBeGreaterThan(100);
+      lit.push(eye.count(isDrawn));
     }
+    expect(Math.min(...lit)).toBeGreaterThan(100);
+    expect(Math.abs(lit[0] - lit[1])).toBeLessThan(0.2 * lit[0]);
+    // The balls' surface, one a tile, is drawn once for both eyes; each change is told before them.
+    const draws = [];
+    for (let i = 0; i < 2; i++) {
+      await stand.viewer.page.keyboard.press("2");
+      await stand.viewer.page.waitForTimeout(1000);
+      draws.push((await stand.viewer.snapshot()).drawCalls);
+    }
+    expect(draws[1] - draws[0]).toBe(stand.manifest.tiles.length);
     await stand.viewer.page.keyboard.press("Escape");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
     expect((await stand.viewer.snapshot()).told).toEqual([]);

@@ -15,6 +15,7 @@ import {
   WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
+import { BothEyes } from "../../../src/gpu/both_eyes";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { leaveUncut } from "../../../src/gpu/unclipped_material";
 import type { Target } from "../../../src/interaction/ray_pointer";
@@ -321,7 +322,9 @@ function leftOfTheUncut(): readonly (readonly [number, number])[] {
   renderer.setSize(side_px, side_px, false);
   const cuts = new Cuts();
   cuts.follow({ box: null, plane: { normal: [0, 0, 1], offset_um: -1e6 } }, new Matrix4());
-  const material = depthMaterial({ uCuts: cuts.uCuts, uCutCount: cuts.uCutCount });
+  const both = new BothEyes();
+  const { uCuts, uCutCount } = cuts;
+  const material = depthMaterial({ uCuts, uCutCount, ...both.uniforms }, both);
   material.colorWrite = true; // it writes zeros
   const scene = new Scene();
   scene.overrideMaterial = material;

@@ -1,0 +1,123 @@
+/**
+ * Opaque surfaces are drawn once for both eyes: as two instances, of which each is put into its eye's
+ * half of the picture. So a surface costs one draw call in stereo too, on any WebGL 2: multiview does
+ * the same, but three has it only where it draws straight into a headset's layer, and this picture is
+ * one of linear light that is encoded at the end.
+ */
+import {
+  ArrayCamera,
+  type BufferGeometry,
+  InstancedBufferGeometry,
+  type Material,
+  Matrix4,
+  PerspectiveCamera,
+  Vector3,
+  Vector4,
+} from "three";
+import type { Eyes } from "./eyes";
+
+/** The layer of what is drawn so; no other camera sees it. WebXR has 1 and 2. */
+export const SOLIDS = 4;
+
+/**
+ * By reference. `uEyeClip`: from the room to the clip space of the whole picture, in which each eye has
+ * its part. `uMiddle`: where the right eye's part begins, pixels.
+ */
+function makeUniforms() {
+  return {
+    uIsForBoth: { value: false },
+    uEyeClip: { value: [new Matrix4(), new Matrix4()] },
+    uMiddle: { value: 0 },
+  };
+}
+export type BothEyesUniforms = ReturnType<typeof makeUniforms>;
+
+/** In a vertex shader, after `gl_Position` is set; knows `vRoom`, sets `vEye`. */
+export const TO_EACH_EYE = `
+  vEye = -1.0;
+  if (uIsForBoth) {
+    vEye = float(gl_InstanceID);
+    gl_Position = uEyeClip[gl_InstanceID] * vec4(vRoom, 1.0);
+  }
+`;
+export const TO_EACH_EYE_DECLARED = `uniform bool uIsForBoth;
+uniform mat4 uEyeClip[2];
+`;
+/** In a fragment shader: what reaches into the other eye's part. */
+export const NOT_THE_OTHERS = `
+  if (vEye >= 0.0 && (gl_FragCoord.x < uMiddle) != (vEye < 0.5)) discard;
+`;
+export const NOT_THE_OTHERS_DECLARED = "uniform float uMiddle;\n";
+
+/** A geometry that is drawn as often as there are eyes; it shares what it is made of. */
+export function forBoth({ attributes, index, groups, ...rest }: BufferGeometry): BufferGeometry {
+  const made = new InstancedBufferGeometry();
+  Object.assign(made, { attributes, index, groups, instanceCount: 1 });
+  made.boundingBox = rest.boundingBox;
+  made.boundingSphere = rest.boundingSphere;
+  return made;
+}
+
+export class BothEyes {
+  readonly uniforms = makeUniforms();
+  private readonly camera = new ArrayCamera();
+  /** Sees the opaque surfaces for all eyes, from between them. */
+  private readonly between = new PerspectiveCamera();
+  private isStereo = false;
+  private readonly part = new Matrix4();
+  private readonly point = new Vector3();
+  private readonly other = new Vector3();
+
+  constructor() {
+    for (const camera of [this.camera, this.between]) {
+      camera.matrixAutoUpdate = false;
+      camera.matrixWorldAutoUpdate = false;
+    }
+    this.camera.layers.enable(SOLIDS);
+    this.between.layers.set(SOLIDS);
+  }
+
+  /** A material whose shaders have the parts above draws for whom the camera is. */
+  adopt(material: Material): void {
+    const { uIsForBoth } = this.uniforms;
+    material.onBeforeRender = (_renderer, _scene, camera, geometry) => {
+      uIsForBoth.value = this.isStereo && camera === this.between;
+      if (geometry instanceof InstancedBufferGeometry) {
+        geometry.instanceCount = uIsForBoth.value ? 2 : 1;
+      }
+    };
+  }
+
+  /** All of a frame's eyes in one. */
+  cameraOf(eyes: Eyes): ArrayCamera {
+    const { camera, between, uniforms } = this;
+    const { all, width_px, height_px } = eyes;
+    camera.cameras = [];
+    const [first, second] = all;
+    if (first === undefined) return camera; // before a headset's first pose
+    this.isStereo = second !== undefined;
+    between.viewport ??= new Vector4();
+    between.viewport.set(0, 0, width_px, height_px);
+    between.matrixWorld.copy(first.camera.matrixWorld);
+    if (second !== undefined) {
+      this.point.setFromMatrixPosition(first.camera.matrixWorld);
+      this.other.setFromMatrixPosition(second.camera.matrixWorld);
+      between.matrixWorld.setPosition(this.point.lerp(this.other, 0.5));
+    }
+    for (const each of [camera, between]) {
+      each.matrixWorld.copy(between.matrixWorld);
+      each.matrixWorldInverse.copy(between.matrixWorld).invert();
+      each.projectionMatrix.copy(first.camera.projectionMatrix);
+      each.projectionMatrixInverse.copy(first.camera.projectionMatrixInverse);
+    }
+    camera.cameras.push(between, ...all.map((eye) => eye.camera));
+    uniforms.uMiddle.value = second?.viewport.x ?? 0;
+    all.slice(0, 2).forEach(({ camera: eye, viewport: { x, y, z, w } }, i) => {
+      const [right, up] = [(2 * x + z) / width_px - 1, (2 * y + w) / height_px - 1];
+      this.part.makeScale(z / width_px, w / height_px, 1).setPosition(right, up, 0);
+      const clip = uniforms.uEyeClip.value[i].copy(this.part);
+      clip.multiply(eye.projectionMatrix).multiply(eye.matrixWorldInverse);
+    });
+    return camera;
+  }
+}
