@@ -8,12 +8,14 @@ import { type Disc, FIRST, LAST, type MarchedUniforms, Overlay } from "../gpu/co
 import type { Eyes } from "../gpu/eyes";
 import { linearTarget } from "../gpu/linear_target";
 import { drawEyes } from "../gpu/offscreen_target";
+import { aimLens, FilledPeriphery } from "../gpu/periphery";
 import { RunningMean } from "../gpu/running_mean";
 import type { MarchFrame } from "../volumes/tile_raymarch";
 
 export class MarchPass {
-  private readonly target: WebGLRenderTarget;
+  readonly target: WebGLRenderTarget;
   private readonly mean: RunningMean;
+  readonly filled: FilledPeriphery;
   private readonly front: Overlay;
   private readonly behind: Overlay;
   private scale = 1;
@@ -25,6 +27,7 @@ export class MarchPass {
   ) {
     this.target = linearTarget(renderer, { count: 2 });
     this.mean = new RunningMean(renderer);
+    this.filled = new FilledPeriphery(renderer, frame.uLens);
     const [front, behind] = this.target.textures;
     this.front = new Overlay(front, frame.uSceneDepth, { order: LAST, disc });
     this.behind = new Overlay(behind, frame.uSceneDepth, { order: FIRST, disc });
@@ -60,13 +63,17 @@ export class MarchPass {
    * @param gathers whether the picture is of the same view as the last one, and is averaged with it
    */
   render(scene: Scene, eyes: Eyes, scale: number, gathers = false): void {
-    drawEyes(this.renderer, scene, eyes, this.target, scale, ({ viewport }, part) => {
-      this.frame.uEye.value.copy(viewport);
+    const isWorn = eyes.all.length > 1;
+    drawEyes(this.renderer, scene, eyes, this.target, scale, (eye, part) => {
+      this.frame.uEye.value.copy(eye.viewport);
       this.frame.uPart.value.copy(part);
+      aimLens(eye, isWorn, this.frame.uLens.value);
     });
+    if (isWorn) this.filled.render(this.target, eyes, scale);
     if (gathers) this.mean.add(this.target);
     else this.mean.count = 0;
-    const [front, behind] = gathers ? this.mean.textures : this.target.textures;
+    const shown = isWorn ? this.filled : gathers ? this.mean : this;
+    const [front, behind] = shown.target.textures;
     this.front.uniforms.uMarched.value = front;
     this.behind.uniforms.uMarched.value = behind;
     this.scale = scale;
@@ -83,6 +90,7 @@ export class MarchPass {
   dispose(): void {
     this.target.dispose();
     this.mean.dispose();
+    this.filled.dispose();
     this.front.dispose();
     this.behind.dispose();
   }

@@ -63,6 +63,8 @@ export type MarchFrame = Readonly<{
   /** The eye's part of the picture, and of the march: x, y, width, height in pixels of each. */
   uEye: { value: Vector4 };
   uPart: { value: Vector4 };
+  /** Tangents from the eye's axis by its clip space: factor, offset; 0: it looks through no lens. */
+  uLens: { value: Vector4 };
   /** Cosines of the disc's inner and outer radius; below -1 the disc is everything. */
   uDisc: { value: Vector2 };
   /** Cosine of the radius within which the disc is marched. */
@@ -86,6 +88,7 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
     uPhase: { value: 0 },
     uEye: { value: new Vector4(0, 0, 1, 1) },
     uPart: { value: new Vector4(0, 0, 1, 1) },
+    uLens: { value: new Vector4(0, 0, 0, 0) },
     uDisc: { value: new Vector2(-2, -3) },
     uReach: { value: -1 },
     uIsCrossing: { value: false },

@@ -110,6 +110,24 @@ describeInChromium("the ray-march", () => {
     }
   });
 
+  it("draws half of what lies beside a lens's middle, in fewer steps, and shows all of it", async () => {
+    const pixels = await bare.call("sparsePixels");
+    for (const eye of [0, 1]) {
+      const mine = pixels.filter((pixel) => pixel.eye === eye);
+      const middle = mine.filter(({ angle }) => angle < 19);
+      expect(middle.length).toBeGreaterThan(500);
+      expect(middle.every(({ isMarched, steps }) => isMarched && steps > 0.99)).toBe(true);
+      const beside = mine.filter(({ angle }) => angle > 30);
+      const share = beside.filter(({ isMarched }) => isMarched).length / beside.length;
+      expect(Math.abs(share - 0.5)).toBeLessThan(0.02);
+      const far = mine.filter(({ angle, isMarched }) => angle > 46 && isMarched);
+      expect(far.length).toBeGreaterThan(100);
+      expect(far.every(({ steps }) => Math.abs(steps - 0.5) < 0.01)).toBe(true);
+      expect(Math.max(...middle.map(({ off }) => off))).toBeLessThan(0.1);
+      expect(Math.max(...mine.map(({ off }) => off))).toBeLessThan(1.6);
+    }
+  });
+
   it("mixes light over the border of two tiles as within one", async () => {
     const columns = await bare.call("columnsOverBorder");
     for (const k of [0, 1, 2]) {

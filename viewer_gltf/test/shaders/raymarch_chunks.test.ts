@@ -579,6 +579,24 @@ describeInChromium("the shader's chunks", () => {
     }
   });
 
+  it("measure the angle from the lens's middle, and leave blocks out beyond 25 degrees", async () => {
+    // a part of 40 x 20 pixels from (10, 0), whose eye's axis lies at a quarter of its width
+    const part = vec(10, 0, 40, 20);
+    const at = async (x: number, y: number) => {
+      const body = `ivec2 pixel = ivec2(${x}, ${y});
+        oColor = vec4(tangentAt(vec2(pixel), ${part}), shareOfSteps(vec2(pixel), ${part}),
+          isSparse(pixel, ${part}), isLeftOut(pixel, ${part}));`;
+      return run(["periphery"], "", body, { uLens: [2, 1, 1, 0] });
+    };
+    expect(await at(20, 10)).toEqual([0, 1, 0, 0].map((v) => expect.closeTo(v, 5)));
+    const [tangent, share] = await at(30, 10); // half the clip space aside: 45 degrees
+    expect(tangent).toBeCloseTo(1, 5);
+    expect(share).toBeCloseTo(0.5, 5);
+    const blocks = [];
+    for (const x of [30, 31, 32, 33]) blocks.push((await at(x, 10))[3]);
+    expect(blocks).toEqual([0, 0, 1, 1]);
+  });
+
   it("have a test each", async () => {
     const tests = [
       "raymarch_chunks.test.ts",

@@ -90,6 +90,7 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/gradient>
 #include <chunks/shade>
 #include <chunks/jitter>
+#include <chunks/periphery>
 
 const float NOWHERE = 1e30;
 
@@ -119,6 +120,7 @@ vec4 shown(vec4 sum) {
 }
 
 void main() {
+  if (isLeftOut(ivec2(gl_FragCoord.xy), uPart)) discard;
   vec3 ray = vPosition - vEye;
   float back = length(ray);
   vec3 dir = ray / back;
@@ -127,7 +129,8 @@ void main() {
   span.x = max(span.x, 0.0);
   vec2 all = intersectBox(vEye, invDir, uAllLow, uAllHigh);
   float share = (span.y - span.x) / max(all.y - max(all.x, 0.0), 1e-6);
-  int steps = clamp(int(min(1.0, share) * float(uSteps - uSpare) + 1e-3), 1, MAX_STEPS);
+  share = min(1.0, share) * shareOfSteps(gl_FragCoord.xy, uPart);
+  int steps = clamp(int(share * float(uSteps - uSpare) + 1e-3), 1, MAX_STEPS);
   span = clipSpan(span, vEye, dir, invDir);
 #ifdef DISC
   if (uAllInDisc) span = coneSpan(span, vEye, dir);

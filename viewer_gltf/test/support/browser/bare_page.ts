@@ -20,7 +20,7 @@ export type BarePage<H extends Calls> = Readonly<{
     chunks: readonly string[],
     head: string,
     body: string,
-    textures?: Readonly<Record<string, Texture>>,
+    uniforms?: Parameters<typeof runProgram>[4],
   ) => Promise<readonly number[]>;
 }>;
 

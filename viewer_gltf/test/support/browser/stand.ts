@@ -90,6 +90,7 @@ export function prepareStand(options: StandOptions): Stand {
   /** A page that navigates costs half of what a new one does. */
   const clearPage = async () => {
     const { page } = viewer;
+    await page.context().setOffline(false);
     await page.goto("about:blank");
     await page.unrouteAll();
     page.removeAllListeners();

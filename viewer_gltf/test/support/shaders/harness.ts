@@ -25,6 +25,7 @@ import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
 import { cube, PIXELS } from "./cube";
 import { meansOf } from "./mean";
+import { sparsePixels } from "./periphery";
 import { columnsOverBorder } from "./seam";
 
 export type Run = Readonly<{
@@ -266,6 +267,7 @@ const harness = {
   meanAlong,
   columnsOverBorder,
   meansOf,
+  sparsePixels,
 };
 export type Harness = typeof harness;
 

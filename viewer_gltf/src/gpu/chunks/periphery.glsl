@@ -1,0 +1,26 @@
+// Before an eye that looks through a lens, what lies beside the lens's middle is marched in fewer
+// steps, and farther out in every second block of 2 x 2 pixels, which the GPU shades together: radial
+// density masking (Vlachos, Advanced VR Rendering Performance, GDC 2016).
+uniform vec4 uLens;  // tangents from the eye's axis by clip space: factor, offset; 0: no lens
+
+const vec2 SPARSE = vec2(0.36, 1.0);  // tangents between which steps fall by half: 20 and 45 degrees
+const float MASKED = 0.47;  // tangent from which blocks are left out: 25 degrees
+
+// `part`: what the eye has of the picture: x, y, width, height, pixels.
+float tangentAt(vec2 pixel, vec4 part) {
+  vec2 clip = 2.0 * (pixel - part.xy) / part.zw - 1.0;
+  return length(clip * uLens.xy + uLens.zw);
+}
+
+float shareOfSteps(vec2 pixel, vec4 part) {
+  return 1.0 - 0.5 * smoothstep(SPARSE.x, SPARSE.y, tangentAt(pixel, part));
+}
+
+bool isSparse(ivec2 pixel, vec4 part) {
+  return uLens.x > 0.0 && tangentAt(vec2(2 * (pixel >> 1) + 1), part) > MASKED;
+}
+
+bool isLeftOut(ivec2 pixel, vec4 part) {
+  ivec2 block = pixel >> 1;
+  return ((block.x + block.y) & 1) == 1 && isSparse(pixel, part);
+}

@@ -1,0 +1,44 @@
+/** What an eye that looks through a lens sees beside the lens's middle: marched at fewer pixels, and filled. */
+import type { Vector4, WebGLRenderer, WebGLRenderTarget } from "three";
+import type { Eye, Eyes } from "./eyes";
+import { nothing } from "./float_targets";
+import { linearTarget } from "./linear_target";
+import { drawEyes } from "./offscreen_target";
+import { ScreenPass } from "./screen_pass";
+import { FILL_FRAGMENT } from "./shaders/sources";
+
+/** The uniform of `chunks/periphery` for an eye; `isWorn`: there is a lens before it. */
+export function aimLens({ camera }: Eye, isWorn: boolean, uLens: Vector4): void {
+  const { elements: p } = camera.projectionMatrix;
+  const [x, y] = isWorn ? [1 / p[0], 1 / p[5]] : [0, 0];
+  uLens.set(x, y, x * p[8], y * p[9]);
+}
+
+export class FilledPeriphery {
+  readonly target: WebGLRenderTarget;
+  private readonly pass;
+
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly uLens: { value: Vector4 },
+  ) {
+    this.target = linearTarget(renderer, { count: 2 });
+    this.pass = new ScreenPass(FILL_FRAGMENT, { uFirst: nothing(), uSecond: nothing(), uLens });
+  }
+
+  /** Both textures of what was marched, at `scale` pixels to one of the frame buffer. */
+  render({ textures }: WebGLRenderTarget, eyes: Eyes, scale: number): void {
+    const { renderer, pass, target } = this;
+    const { uFirst, uSecond } = pass.uniforms;
+    [uFirst.value, uSecond.value] = textures;
+    drawEyes(renderer, pass.scene, eyes, target, scale, (eye, part) => {
+      pass.uPart.value.copy(part);
+      aimLens(eye, true, this.uLens.value);
+    });
+  }
+
+  dispose(): void {
+    this.target.dispose();
+    this.pass.dispose();
+  }
+}
