@@ -354,7 +354,7 @@ describeInChromium("the path-traced page", () => {
   });
 
   it("is drawn to both eyes, and gathers while the head rests", async () => {
-    const { width, height } = { width: 160, height: 200 }; // of an eye
+    const { width, height } = { width: 72, height: 90 }; // of an eye
     await page().setViewportSize({ width: 2 * width, height });
     await addHeadset(page(), true);
     await open(`#v=1&mode=traced&dwell=off&quality=low&${ONCE}`);

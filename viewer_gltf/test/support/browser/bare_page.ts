@@ -1,7 +1,7 @@
 /** A page with nothing on it, for numbers out of the GPU: by shaders' chunks, or by a harness. */
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll } from "vitest";
-import { readChunks, runProgram, type Texture } from "../shaders/chunk";
+import { readChunks, runProgram } from "../shaders/chunk";
 import { bundled } from "./bundled";
 import type { Browser } from "./chromium";
 import { openBrowser } from "./shared_browser";

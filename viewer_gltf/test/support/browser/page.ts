@@ -126,7 +126,8 @@ export class ViewerPage {
   }
 
   async enterStereo(): Promise<void> {
-    await this.page.locator('[data-action="stereo"]').click();
+    // not by the pointer: in a page of a few pixels a line of text may lie over the button
+    await this.page.locator('[data-action="stereo"]').dispatchEvent("click");
     await this.page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
     await this.settled();
     // Two more frames, so that both eyes have been drawn at the pose that holds.
