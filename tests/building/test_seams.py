@@ -26,6 +26,7 @@ from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box, Tile, cut
 from support import phantoms
+from support.meshes import welded
 
 TILE = phantoms.SEAM_TILE
 LODS = 4
@@ -131,7 +132,7 @@ def _chessboard(built: Built, even: int, odd: int) -> Mesh:
         built.lods[tile.id][(even, odd)[sum(start // TILE for start in tile.box.start) % 2]].mesh
         for tile in built.plan.tiles
     ]
-    whole = _welded(meshes)
+    whole = welded(meshes)
     assert len(whole.triangles) == sum(len(mesh.triangles) for mesh in meshes)
     return whole
 
@@ -147,21 +148,6 @@ def _assert_same_rims(built: Built, level: int) -> None:
         assert set(rim) == set(seam.rim(theirs[level], built.plan)), seam
         # and at any other level: viewers show neighbours at different ones
         assert set(rim) == set(seam.rim(theirs[0], built.plan)), seam
-
-
-def _welded(meshes: list[Mesh]) -> Mesh:
-    """Return one mesh of all, with one vertex at each place."""
-    places, number = np.unique(
-        np.concatenate([mesh.positions for mesh in meshes]), axis=0, return_inverse=True
-    )
-    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes)])[:-1]
-    triangles = np.concatenate(
-        [
-            mesh.triangles.astype(np.int64) + start
-            for mesh, start in zip(meshes, starts, strict=True)
-        ]
-    )
-    return Mesh(places, number.ravel()[triangles].astype(np.uint32), np.zeros_like(places))
 
 
 def test_scene_could_tell_neighbours_apart(built: Built) -> None:
@@ -202,7 +188,7 @@ def test_tiles_make_one_sound_surface_on_thinned_planes(
     assert TILE % 3
     assert built.plan.step == (3, 3, 3)
     meshes = [lods[0].mesh for lods in built.lods.values()]
-    whole = _welded(meshes)
+    whole = welded(meshes)
     assert len(np.unique(whole.triangles)) < sum(len(mesh.positions) for mesh in meshes)
     assert not find_defects(whole).total, find_defects(whole).counts
 

@@ -70,3 +70,18 @@ def open_edges(mesh: Mesh) -> int:
     edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
     count = len(mesh.positions)
     return len(np.setdiff1d(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]))
+
+
+def welded(meshes: list[Mesh]) -> Mesh:
+    """Return one mesh of all, with one vertex at each place."""
+    places, number = np.unique(
+        np.concatenate([mesh.positions for mesh in meshes]), axis=0, return_inverse=True
+    )
+    starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes)])[:-1]
+    triangles = np.concatenate(
+        [
+            mesh.triangles.astype(np.int64) + start
+            for mesh, start in zip(meshes, starts, strict=True)
+        ]
+    )
+    return Mesh(places, number.ravel()[triangles].astype(np.uint32), np.zeros_like(places))

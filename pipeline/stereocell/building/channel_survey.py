@@ -147,6 +147,8 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
         if found[channel.id].subtracts and found[channel.id].background is None:
             told = "there is no background to subtract: its level counts from 0"
             console.print(f"units: {look.name}: {told}", markup=False)
+        if told := survey[channel.id].thinning(plan):
+            console.print(f"units: {look.name}: {told}", markup=False)
         if look.surface_reason:
             console.print(f"units: {look.name}: {look.surface_reason}", markup=False)
     return survey
@@ -197,6 +199,7 @@ def _of_channel(
         doubt=found.doubt,
         modality="" if channel.source else plan.modality,
     )
+    most_faces = max((one["kept_faces"] for one in solids.values()), default=0)
     return ChannelSurvey(
         statistics,
         file,
@@ -211,6 +214,8 @@ def _of_channel(
         () if found.levels is None else found.levels.ladder,
         None if found.levels is None else Curve(*found.levels.curve()),
         found.window.holder,
+        plan.grid_for(most_faces),
+        most_faces,
     )
 
 

@@ -79,7 +79,15 @@ def unit_tasks(
         repair = survey[channel.id].repair
         holder = survey[channel.id].holder
         task, key = _unit_task(
-            out_folder, plan, tile_id, channel, field, repair, statistics, painted, holder
+            out_folder,
+            plan.with_grid(survey[channel.id].grid_um),
+            tile_id,
+            channel,
+            field,
+            repair,
+            statistics,
+            painted,
+            holder,
         )
         yield f"{tile_id}/{channel.id}", task, key
 

@@ -78,7 +78,34 @@ class Plan:
     @property
     def step(self) -> tuple[int, int, int]:
         """The step in voxels (z, y, x) between planes that carry the surface."""
-        return _step(self.settings, self.spacing_um)
+        return _step_of(self.settings.surface.grid_um, self.spacing_um)
+
+    def with_grid(self, grid_um: float) -> "Plan":
+        """Return the plan for surfaces that planes `grid_um` apart carry."""
+        if grid_um == self.settings.surface.grid_um:
+            return self
+        surface = replace(self.settings.surface, grid_um=grid_um)
+        settings = replace(self.settings, surface=surface)
+        return replace(self, settings=settings, halo=_halo(settings, self.spacing_um, self.region))
+
+    def grid_for(self, faces: int) -> float:
+        """Return how far apart planes lie, um, that carry a surface of at most surface.max_faces.
+
+        Of a smooth surface every k-th plane along each axis leaves a k^2-th of the faces, of noise
+        less. Thinned are the axes whose planes lie nearest, as long as a tile keeps LEAST_PLANES.
+
+        faces  of voxels, of the surface in one tile
+        """
+        surface = self.settings.surface
+        grid, size = surface.grid_um, self.settings.plan.tile_size
+        while faces / math.prod(_step_of(grid, self.spacing_um)) ** (2 / 3) > surface.max_faces:
+            step = _step_of(grid, self.spacing_um)
+            wider = min((k + 1) * h for k, h in zip(step, self.spacing_um, strict=True))
+            steps = _step_of(wider, self.spacing_um)
+            if any(-(-n // k) < LEAST_PLANES for n, k in zip(size, steps, strict=True) if k > 1):
+                break
+            grid = wider
+        return grid
 
     @property
     def shared_volumes(self) -> frozenset[str]:
@@ -266,7 +293,7 @@ def _halo(
     """
     surface = settings.surface
     smoothing = SMOOTHING_REACH * float(surface.smoothing_um)
-    every = _step(settings, spacing_um)
+    every = _step_of(settings.surface.grid_um, spacing_um)
     z, y, x = (step * n for step, n in zip(spacing_um, every, strict=True))
     repair = _repair_options(settings)
     reach = repair.reach_um((z, y, x)) + smoothing
@@ -299,16 +326,16 @@ def _halo(
     return depth, height, width
 
 
-def _step(settings: Settings, spacing_um: Sequence[float]) -> tuple[int, int, int]:
+def _step_of(grid_um: float, spacing_um: Sequence[float]) -> tuple[int, int, int]:
     # 0.01 for rounding: 0.42 um are three times 0.14 um
-    z, y, x = (max(1, int(settings.surface.grid_um / h + 0.01)) for h in spacing_um)
+    z, y, x = (max(1, int(grid_um / h + 0.01)) for h in spacing_um)
     return z, y, x
 
 
 def _require_planes(settings: Settings, spacing_um: Sequence[float]) -> None:
     """Raise UsageError where planes lie so far apart that a tile keeps hardly any."""
     size = settings.plan.tile_size
-    steps = _step(settings, spacing_um)
+    steps = _step_of(settings.surface.grid_um, spacing_um)
     for axis, n, k, h in zip("zyx", size, steps, spacing_um, strict=True):
         planes = -(-n // k)
         if k > 1 and planes < LEAST_PLANES:

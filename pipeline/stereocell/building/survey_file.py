@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan import Plan
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.repair import RepairOptions
@@ -56,6 +57,8 @@ class ChannelSurvey:
     ladder           all levels that were found, outermost first; empty where one was given
     curve            what they were found on; None where one was given
     holder           a CT's table or head holder, which is left out; None: there is none
+    grid_um          how far apart the planes lie that carry its surface; 0: all do
+    most_faces       most voxel faces of its surface in a tile, before planes are left out
     """
 
     statistics: ChannelStatistics
@@ -66,6 +69,19 @@ class ChannelSurvey:
     ladder: tuple[Level, ...]
     curve: Curve | None
     holder: Holder | None = None
+    grid_um: float = 0.0
+    most_faces: int = 0
+
+    def thinning(self, plan: Plan) -> str:
+        """Return what is said of a surface that fewer planes carry than asked for; empty: none."""
+        if self.grid_um == plan.settings.surface.grid_um:
+            return ""
+        z, y, x = plan.with_grid(self.grid_um).step
+        return (
+            f"up to {self.most_faces:,} voxel faces of its surface lie in a tile, more than "
+            f"{plan.settings.surface.max_faces:,} (surface.max_faces): of the planes along z, y, x "
+            f"one in {z}, {y}, {x} carries it"
+        )
 
 
 Survey = dict[str, ChannelSurvey]  # by channel ID

@@ -127,6 +127,11 @@ class SurfaceOptions:
         0.0,
         "planes of voxels so far apart carry the surface; 0: all; .42 alpha shows what alpha does",
     )
+    max_faces: int = setting(
+        5_000_000,
+        "voxel faces of a unit's surface: where noise or a sponge has more, planes farther apart "
+        "carry the channel's surface",
+    )
     min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
     max_fragment_um: float | str = setting(
         AUTO,
@@ -181,6 +186,8 @@ class SurfaceOptions:
             raise UsageError(
                 f"surface.grid_um is {self.grid_um:g}, expected a length in um, or 0: all planes"
             )
+        if self.max_faces < 1:
+            raise UsageError(f"surface.max_faces is {self.max_faces}, expected 1 or more")
         if self.offset_um != AUTO and float(self.offset_um) > coarsest:
             raise UsageError(
                 f"surface.offset_um is {self.offset_um:g}, expected at most a voxel ({coarsest:g})"

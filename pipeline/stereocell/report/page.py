@@ -156,6 +156,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "reason": appearance.surface_reason,
                 "confidence": appearance.iso_confidence,
                 "repair": found.repair,
+                "thinned": found.thinning(facts.plan),
                 "spread": (min(levels), max(levels)) if levels else None,
                 "above": found.statistics.background is not None,
                 "ladder": _ladder(found),
