@@ -51,3 +51,14 @@ def test_simplified_ball_is_one_body_and_says_so() -> None:
     done = simplify_without_defects(ball(), (), max_error_um=0.5)
     assert (done.simplified_again, done.fallbacks) == (0, 0)
     assert len(done.mesh.triangles) < 0.3 * len(ball().triangles)
+
+
+@pytest.mark.parametrize("error_um", [0.5, 1.5])
+def test_one_frayed_body_of_many_crossings_is_sound_as_a_whole(error_um: float) -> None:
+    """Later tries look only at what is new in them: nothing may be missed by that."""
+    field = np.random.default_rng(5).normal(size=(28, 28, 28)).astype(np.float32)
+    field = ndimage.gaussian_filter(field, 0.6)
+    mesh = extract_surface(field, Lattice.of_whole(Box((0, 0, 0), field.shape), (1.0, 1.0, 1.0)))
+    found = simplify_without_defects(mesh, (), max_error_um=error_um)
+    assert found.simplified_again > 0
+    assert not find_defects(found.mesh).total

@@ -6,8 +6,8 @@ all vertices of a body move outward by one distance, until its volume is the fin
 distance is at its bound. Towards a cut the move fades out, so that vertices of the cut stay bit by
 bit and no other reaches it. No vertex leaves the tile's box, or the fine mesh's where the caps of
 the data's end lie outside of that. Where bodies come to cross each other or themselves, the
-vertices there stay, and the others move farther for it; if that doesn't help, the whole body moves
-half as far, and at last not at all.
+vertices there stay, and the others move farther for it, unless these are FEW; if that doesn't help,
+the whole body moves half as far, and at last not at all.
 """
 
 from dataclasses import replace
@@ -24,6 +24,8 @@ STEPS = 4  # Newton's; volume is a cubic function of the distance
 FADE = 1.25  # moves are whole from this many largest moves from a cut on
 CALMED = 3  # tries in which the vertices of defects stay, and more around them with each
 HALVINGS = 3  # tries with half the move after that, before a body with defects stays
+
+FEW = 0.02  # share of a body's vertices that may stay without others moving farther for them
 
 Points = NDArray[np.float64]
 Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
@@ -78,12 +80,19 @@ class FineVolumes:
         share = _fade(mesh, planes, FADE * max_move_um)
         part = np.ones(count)
         fresh = np.ones(len(triangles), bool)
+        at = self._move(start, triangles, (label, count), wanted, share, max_move_um)
+        placed: Mesh | None = None
+        faulty = np.zeros(0, np.int64)
         for number in range(CALMED + HALVINGS + 2):
-            at = self._move(start, triangles, (label, count), wanted, share, max_move_um)
             moves = (at - start) * part[label][:, None]
             positions = (start + moves).astype(np.float32)
             # bit by bit: a sum would lose the sign of a zero
             positions = np.where(moves == 0, mesh.positions, positions)
+            if placed is not None:
+                # pairs that stand where they were found sound need not be looked at again
+                other = (positions != placed.positions).any(axis=1)
+                other[faulty] = True
+                fresh = other[mesh.triangles].any(axis=1)
             placed = replace(mesh, positions=positions)
             defects = find_defects(placed, planes, fresh)
             faulty = defects.vertices(mesh.triangles)
@@ -93,9 +102,13 @@ class FineVolumes:
                 break
             if number < CALMED:
                 share[_grow(faulty, mesh.triangles, len(start), number)] = 0.0
+                stay = np.bincount(label[share == 0], minlength=count)
+                few = (stay < FEW * np.bincount(label, minlength=count))[label][:, None]
+                moved = self._move(start, triangles, (label, count), wanted, share, max_move_um)
+                at = np.where(few, np.where(share[:, None] == 0, start, at), moved)
             else:
                 part[worst] *= 0.5 if number < CALMED + HALVINGS else 0.0
-            fresh = np.isin(label[mesh.triangles[:, 0]], worst)
+        assert placed is not None
         return placed, defects
 
     def _move(

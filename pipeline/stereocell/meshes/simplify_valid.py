@@ -85,10 +85,32 @@ def simplify_without_defects(
         else:
             kept |= worst
         rest = triangles[~chosen[body[triangles[:, 0]]]]
-        triangles = np.concatenate([rest, part])
-        fresh = np.arange(len(triangles)) >= len(rest)
+        before, triangles = triangles, np.concatenate([rest, part])
+        faulty = np.zeros(len(mesh.positions), bool)
+        faulty[used[defects.vertices(own)]] = True
+        # what was found sound in the draft before, and is there still, need not be looked at again
+        fresh = ~_are_among(triangles, before) | faulty[triangles].any(axis=1)
     used, own = renumber(triangles, len(mesh.positions))
     return Simplified(compact(mesh, triangles), used, len(redone - kept), len(kept))
+
+
+def _are_among(triangles: Triangles, others: Triangles) -> NDArray[np.bool_]:
+    """Return which triangles, wound alike, are among the others, bool (m,)."""
+    count = int(max(triangles.max(initial=0), others.max(initial=0))) + 1
+    (a, b, c), (d, e, f) = _least_first(triangles), _least_first(others)
+    keys, known = a * count + b, d * count + e
+    order = np.argsort(known)
+    place = np.minimum(np.searchsorted(known, keys, sorter=order), len(others) - 1)
+    # where an edge has several triangles one of them may be missed: it is looked at once more
+    found = order[place]
+    return np.asarray((known[found] == keys) & (f[found] == c))
+
+
+def _least_first(triangles: Triangles) -> NDArray[np.int64]:
+    """Return the corners, int64 (3, m), turned so that the least comes first."""
+    first = triangles.argmin(axis=1)
+    turn = (first[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(triangles, turn, axis=1).astype(np.int64).T
 
 
 def _around(
