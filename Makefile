@@ -34,6 +34,7 @@ BIN := $(VENV)/bin
 RUN := $(BIN)/stereocell
 WITH_ARGS := $(BIN)/python pipeline/with_args.py
 READY := $(VENV)/.ready
+KERNELS_READY := $(VENV)/.kernels
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 VIEWER := viewer_gltf
 VIEWER_READY := $(VIEWER)/node_modules/.ready
@@ -57,7 +58,7 @@ help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: $(READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+)
+setup: $(READY) $(KERNELS_READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+)
 
 $(READY): requirements.lock pyproject.toml
 	@"$$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -69,7 +70,10 @@ $(READY): requirements.lock pyproject.toml
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock || \
 	  $(PIP) --require-hashes -r requirements.lock
 	$(PIP) --no-deps --no-build-isolation -e .
-	@# loops over voxels and triangles: 25 s, so that no build waits for it
+	@touch $@
+
+# loops over voxels and triangles, compiled so that no build waits for it: 20 s
+$(KERNELS_READY): $(READY)
 	@$(BIN)/python -m stereocell.kernels
 	@touch $@
 
@@ -151,7 +155,7 @@ view: setup ## Serve OUT's bundle on localhost and open a browser
 serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
 	$(WITH_ARGS) $(RUN) serve ARGS -- "$$OUT"
 
-lint: setup ## ruff, mypy, layers of imports, biome, tsc
+lint: $(READY) $(VIEWER_READY) ## ruff, mypy, layers of imports, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
 	$(BIN)/ruff format --check pipeline tests docs
 	$(BIN)/mypy

@@ -1,5 +1,10 @@
 """Compile all kernels, so that no build waits for it: `python -m stereocell.kernels`."""
 
-from stereocell.kernels.compile_all import compile_all
+import sys
 
-compile_all()
+from stereocell.kernels.compile_all import OF_MESHES, compile_all, compile_of_meshes
+
+if sys.argv[1:] == [OF_MESHES]:
+    compile_of_meshes()
+else:
+    compile_all()

@@ -1,4 +1,10 @@
-"""Compile all kernels that are not in the cache yet: by a call of each, on a tetrahedron."""
+"""Compile all kernels that are not in the cache yet: by a call of each, on a tetrahedron.
+
+Two processes do it side by side, a half each: numba compiles on one core.
+"""
+
+import subprocess
+import sys
 
 import numpy as np
 
@@ -27,12 +33,24 @@ from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.visibility import cast_rays
 
+OF_MESHES = "of-meshes"  # the argument of the process that compiles these
+_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
+_TWINS = [11, 6, 3, 2, 8, 9, 1, 10, 4, 5, 7, 0]  # of each edge of these triangles
+_TRIANGLES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
+
 
 def compile_all() -> None:
-    """Call every kernel with arrays of the types that the package gives it."""
-    at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
-    triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
-    flags = np.ones(4, bool)
+    """Compile all kernels, for arrays of the types that the package gives them."""
+    command = [sys.executable, "-m", __package__, OF_MESHES]
+    with subprocess.Popen(command) as other:
+        compile_others()
+    if other.returncode == 0:
+        mark_compiled()
+
+
+def compile_of_meshes() -> None:
+    """Compile those that simplify and mend; they take half of the time."""
+    at, triangles, flags = _CORNERS, _TRIANGLES, np.ones(4, bool)
     twins = match_twins(triangles, 4)
     count_fans(triangles, twins, 4)
     labels, bodies = label_bodies(triangles, 4)
@@ -46,6 +64,11 @@ def compile_all() -> None:
     flip_edges(at, left, flags, bits, errors, 0.9)
     thin_rim(at, triangles, np.zeros(4, np.int8), flags, 0.1, 0.9)
 
+
+def compile_others() -> None:
+    """Compile those of grids, distances and voxels."""
+    at, triangles, flags = _CORNERS, _TRIANGLES, np.ones(4, bool)
+    twins = np.array(_TWINS, np.int32)
     low, high = bound_boxes(at, triangles)
     origin, edge, shape = low.min(axis=0), 0.5, np.array([3, 3, 3])
     count_entries(low, high, origin, edge)
@@ -71,4 +94,3 @@ def compile_all() -> None:
     components, touching, count = join_runs(first_run, start, stop, 3, True)
     measure_components(first_run, start, stop, components, touching, count, (3, 3, 3))
     mark_runs(first_run, start, stop, components, np.ones(count, bool), mask)
-    mark_compiled()
