@@ -23,8 +23,8 @@ import { Help } from "../panel/html/key_list";
 import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
 import { scanByCamera } from "../panel/html/qr_scanner";
-import type { KeyContext } from "../panel/key";
-import { listenForKeys } from "../panel/key_events";
+import { isRefusal, type KeyContext } from "../panel/key";
+import { isWritten, listenForKeys } from "../panel/key_events";
 import { wishOf } from "../panel/keys";
 import { type Facts, layOut } from "../panel/layout";
 import type { Ranges } from "../panel/sections/channels";
@@ -324,7 +324,11 @@ export class Controller {
       focusTile: viewer.snapshot().gazed,
     };
     const wish = wishOf(name, context);
-    if (wish === null) return false;
+    if (wish === null || isRefusal(wish)) {
+      if (wish !== null) this.say(wish.refusal);
+      else if (isWritten(name)) this.say(`No key ${name}: ? lists the keys.`);
+      return false;
+    }
     this.perform(wish);
     if (typeof wish !== "string" && "panel" in wish && wish.panel === "clip-part") {
       viewer.mean(handleOf(wish.clipPart));

@@ -6,7 +6,7 @@ import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
-import { Navigation, type Stand } from "../interaction/orbit_camera";
+import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
 import { sharesOf, turnedBy } from "../math/slice_frame";
@@ -21,7 +21,7 @@ import type { CameraView } from "../share/camera_link";
 import { SliceView } from "../slices/slice_view";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
-import { CANT, type Command } from "../state/commands";
+import { CANT, type Command, STAYS } from "../state/commands";
 import { discLimit } from "../state/focus_tiles";
 import { isSameView, keyOfChange, nameOfChange } from "../state/history";
 import { initialState } from "../state/initial_state";
@@ -49,6 +49,10 @@ const NEAR_AT_START = 1.1;
 
 /** Before these the place from which the specimen is seen is a step of its own. */
 const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset", "next-view"]);
+
+const NOTHING_AHEAD = "No tile is in the middle of the view.";
+const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
+const NEXT_KEPT = "` goes to the next.";
 
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
 
@@ -217,6 +221,16 @@ export class Viewer {
 
   /** Do what is no change of the state; whether this was one of the viewer's commands. */
   run(command: Command): boolean {
+    const { state } = this;
+    const before = this.stereo.kind === null ? this.navigation.lookNow : null;
+    const isDone = this.carryOut(command);
+    const stays = STAYS[command];
+    const isSame = this.state === state && before !== null && isSameLook(before, this.navigation);
+    if (isDone && isSame && stays !== undefined) this.onAnnounce(stays);
+    return isDone;
+  }
+
+  private carryOut(command: Command): boolean {
     if (ENDS_A_LOOK.has(command)) this.steps.note();
     switch (command) {
       case "undo":
@@ -241,7 +255,9 @@ export class Viewer {
         break;
       case "press":
         if (this.stereo.kind !== null) return this.stereo.run(command, this.state);
-        this.tap(rayAhead(this.loop.head, this.room.specimen.group));
+        if (!this.tap(rayAhead(this.loop.head, this.room.specimen.group))) {
+          this.onAnnounce(this.state.isolated === null ? NOTHING_AHEAD : NO_OTHER_TILE);
+        }
         break;
       default: {
         const isInRoom = this.stereo.kind !== null;
@@ -306,6 +322,8 @@ export class Viewer {
     const views = command === "forget-views" ? [] : [...keptViews, this.navigation.lookNow];
     this.nextView = 0;
     this.dispatch({ type: "keep-views", views });
+    const { length } = this.state.keptViews;
+    this.onAnnounce(length === 0 ? "No view is kept now." : `${length} kept: ${NEXT_KEPT}`);
     return true;
   }
 
@@ -412,6 +430,7 @@ export class Viewer {
     const { surfaces, volumes } = this.contents;
     return {
       state: this.state,
+      look: this.navigation.lookNow,
       hasFirstPicture: surfaces.hasFirst,
       overview: surfaces.overview,
       isLoading: this.contents.isLoading,
@@ -555,16 +574,19 @@ export class Viewer {
     this.onState(this.state);
   }
 
-  private tap(ray: Ray): void {
+  /** Whether there was anything to measure or to choose. */
+  private tap(ray: Ray): boolean {
     const tiles = shownTiles(this.bundle.manifest.tiles, this.state.isolated);
-    this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
+    return this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
   }
 
   /** Measure, or choose the tile; of one that is alone nothing is left to choose. */
-  private choose(ray: Ray, tile: string | null): void {
+  private choose(ray: Ray, tile: string | null): boolean {
     const { state } = this;
     if (state.tool === "measure") void this.contents.marks.measure(ray);
     else if (state.isolated === null && tile !== null) this.dispatch(chosenTile(state, tile));
+    else return false;
+    return true;
   }
 
   dispose(): void {

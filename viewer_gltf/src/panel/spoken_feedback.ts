@@ -22,6 +22,34 @@ export function spokenFeedback(
   state: ViewerState,
   ranges: Ranges,
 ): string {
+  const text = spokenWish(wish, before, state, ranges);
+  if (typeof wish === "string" || "panel" in wish || !isSame(before, state)) return text;
+  return text === "" ? "That changes nothing." : `${text}${whyUnchanged(wish)}`;
+}
+
+/** Why an action has left all as it was: a step that has an end, or the next one of several. */
+function whyUnchanged(action: Action): string {
+  switch (action.type) {
+    case "set":
+      return typeof action.value === "number" ? ": it goes no further" : "";
+    case "window":
+    case "set-shapes":
+      return ": it goes no further";
+    case "choose-transfer-function":
+    case "select":
+    case "isolate":
+      return ": the only one";
+    default:
+      return "";
+  }
+}
+
+/** Tables of shapes are made anew by an edit that changes none of their numbers. */
+function isSame(before: ViewerState, after: ViewerState): boolean {
+  return before === after || JSON.stringify(before) === JSON.stringify(after);
+}
+
+function spokenWish(wish: Wish, before: ViewerState, state: ViewerState, ranges: Ranges): string {
   if (typeof wish === "string") return "";
   if (!("panel" in wish)) {
     if (wish.type === "set-clip") return cutText(before.clip, state.clip);
@@ -71,6 +99,8 @@ function spokenAction(action: Action, state: ViewerState, ranges: Ranges): strin
     }
     case "set-measurements":
       return `${state.measurements.length} measurements`;
+    case "move-slices":
+      return "Slices: in the middle, straight";
     case "move-lamp":
       return `Lamp ${action.lamp + 1}: moved`;
     default:

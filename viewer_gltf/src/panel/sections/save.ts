@@ -3,7 +3,7 @@ import { PICTURE_PARAMETERS } from "../../state/parameters/tools";
 import type { ViewerState } from "../../state/viewer_state";
 import { command, controlsOf } from "../control_templates";
 import type { Control } from "../controls";
-import { type Key, key, keysOf } from "../key";
+import { type Key, key, keysOf, no } from "../key";
 
 export function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
   const { length } = state.keptViews;
@@ -19,13 +19,15 @@ export function saveItems(state: ViewerState, isFilming: boolean): readonly Cont
   ];
 }
 
+const NO_VIEW = no("No view is kept: ' keeps this one.");
+
 export const SAVE_KEYS: readonly Key[] = [
   ...PICTURE_PARAMETERS.flatMap(keysOf),
   key('"', "Save the picture", "save-picture"),
   key(")", "Save a video: once round, or through the kept views; again: leave it", "save-video"),
   key("'", "Keep this view for a video", "keep-view"),
-  key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? null : "next-view")),
+  key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? NO_VIEW : "next-view")),
   key("End", "Forget the kept views", ({ state }) =>
-    state.keptViews.length === 0 ? null : "forget-views",
+    state.keptViews.length === 0 ? NO_VIEW : "forget-views",
   ),
 ];
