@@ -1,8 +1,11 @@
+import { fileURLToPath } from "node:url";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 import { finishBuild } from "./scripts/finish_build.ts";
+import { oneChunk } from "./scripts/one_chunk.ts";
 
 const SERVICE_WORKER = "sw.js";
+const PAGE = fileURLToPath(new URL("index.html", import.meta.url));
 
 /** Shaders travel without their comments: the reader has the sources. */
 function stripShaders(): Plugin {
@@ -24,7 +27,13 @@ export default defineConfig({
   // Relative addresses: the page works from any folder of any static host.
   base: "./",
   plugins: [stripShaders(), finishBuild()],
-  build: { target: "es2022", outDir: "dist", emptyOutDir: true, chunkSizeWarningLimit: 1500 },
+  build: {
+    target: "es2022",
+    outDir: "dist",
+    emptyOutDir: true,
+    chunkSizeWarningLimit: 1500,
+    rolldownOptions: { output: { codeSplitting: { groups: [{ name: oneChunk(PAGE, "index") }] } } },
+  },
   server: { fs: { allow: [".."] } }, // the schemas lie beside this folder
   worker: {
     format: "es",

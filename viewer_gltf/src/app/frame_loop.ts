@@ -264,12 +264,12 @@ export class FrameLoop {
   private draw(camera: Camera, pace: FramePace): void {
     const { picture, head } = this;
     const { contents, stereo, state } = this.options.shown();
-    const { volumes, traced, surfaces, marks, slicePlanes: slices } = contents;
+    const { volumes, traced, surfaces, marks, slices } = contents;
     const drawn = {
       volumes,
       traced,
       panes: surfaces.blended,
-      overlays: [...marks.overlays, slices.marks, ...stereo.hands.overlays],
+      overlays: [...marks.overlays, ...slices.overlays, ...stereo.hands.overlays],
       bounds: this.options.bounds,
       solids: surfaces.triangles + slices.solid,
     };

@@ -5,7 +5,6 @@ import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../annotations/annotations.css";
-import "../slices/slices.css";
 import { sizeText } from "../annotations/measure";
 import { bundleAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";

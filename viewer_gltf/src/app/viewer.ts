@@ -9,8 +9,7 @@ import type { FilmedFile } from "../capture/encode_video";
 import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
-import { sharesOf, turnedBy } from "../math/slice_frame";
-import type { Ray, Vec3 } from "../math/vec3";
+import type { Ray } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
 import { StageSize } from "../render/canvas_size";
@@ -18,7 +17,6 @@ import { Hybrid } from "../render/gaze_focus";
 import { place, XR_DISTANCE_M } from "../render/placement";
 import { Room } from "../render/scene";
 import type { CameraView } from "../share/camera_link";
-import { SliceView } from "../slices/slice_view";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
 import { CANT, type Command, STAYS } from "../state/commands";
@@ -78,7 +76,6 @@ export class Viewer {
   private readonly transition: StereoTransition;
   private readonly size: StageSize;
   private readonly steps: Steps;
-  private readonly sliceView: SliceView;
   private nextView = 0;
   private readonly disposed = new AbortController();
 
@@ -121,6 +118,7 @@ export class Viewer {
       renderer: this.renderer,
       picture: this.loop.picture,
       state: this.state,
+      view: stage.parentElement ?? stage,
       dispatch: (action) => this.dispatch(action),
       announce: (text) => this.onAnnounce(text),
       onChange: () => this.loop.come(),
@@ -128,15 +126,7 @@ export class Viewer {
     });
     const { marks, surfaces, volumes } = this.contents;
     stage.append(...marks.overlayElements);
-    this.room.specimen.group.add(surfaces.group, marks.group, this.contents.slicePlanes.group);
-    this.sliceView = new SliceView(stage.parentElement ?? stage, this.contents.slices, {
-      move: (point) => {
-        const at = sharesOf(point, manifest.specimen.bounds_um);
-        this.dispatch({ type: "move-slices", at });
-      },
-      turn: (about, by_deg) => this.turnSlices(about, by_deg),
-      window: (wider, higher) => this.shiftWindow(wider, higher),
-    });
+    this.room.specimen.group.add(surfaces.group, marks.group, this.contents.slices.group);
 
     this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), () =>
       this.loop.change(),
@@ -497,23 +487,7 @@ export class Viewer {
 
   /** The channels' values where the slices meet, in the source's units; none: no slices show. */
   get sliceValues(): readonly string[] {
-    const { slices } = this.contents;
-    return slices.frames === null ? [] : slices.valuesAt(slices.point);
-  }
-
-  private turnSlices(about: Vec3, by_deg: number): void {
-    const { sliceTurnX_deg, sliceTurnY_deg, sliceTurnZ_deg } = this.state;
-    const turned = turnedBy([sliceTurnX_deg, sliceTurnY_deg, sliceTurnZ_deg], about, by_deg);
-    this.dispatch({ type: "move-slices", turn_deg: turned });
-  }
-
-  /** Of the first channel that is shown. */
-  private shiftWindow(wider: number, higher: number): void {
-    const channel = this.state.channels.find(({ shown }) => shown);
-    if (channel === undefined) return;
-    const [low, high] = channel.window;
-    const window = [low - wider / 2 - higher, high + wider / 2 - higher] as const;
-    this.dispatch({ type: "window", channel: channel.id, window });
+    return this.contents.slices.values;
   }
 
   /** Ask again for all that has failed. */
@@ -539,7 +513,6 @@ export class Viewer {
     const { manifest } = this.bundle;
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.contents.follow(this.state, this.hybrid);
-    this.sliceView.update(this.state.hasSlicePictures);
     this.room.mark(isolated === null ? selected : null);
     this.loop.setLevel(quality);
     this.loop.change();
@@ -594,7 +567,6 @@ export class Viewer {
     this.size.dispose();
     this.disposed.abort();
     this.stereo.dispose();
-    this.sliceView.dispose();
     this.navigation.dispose();
     this.contents.dispose();
     this.loop.dispose();

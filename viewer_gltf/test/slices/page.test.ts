@@ -100,3 +100,24 @@ describeInChromium("slices", () => {
     if (SHOTS) await page().screenshot({ path: `${SHOTS}/planes.png` });
   });
 });
+
+describeInChromium("slices whose code does not come", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 320 }, pixelRatio: 0.5 });
+
+  it("are asked for again, after a notice", async () => {
+    const { page } = stand.viewer;
+    const CODE = "**/assets/slices-*.js";
+    await page.route(CODE, (route) => route.abort());
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    await page.keyboard.press("|");
+    const notice = () => page.locator("[data-notices]").textContent();
+    await expect.poll(notice).toContain("that shows slices could not be loaded");
+    expect(await page.locator(".slices").count()).toBe(0);
+    await page.unroute(CODE);
+    await page.keyboard.press("R");
+    await stand.viewer.settled();
+    expect(await page.locator(".slices").count()).toBe(1);
+    expect(await notice()).toBe("");
+  });
+});
