@@ -44,6 +44,8 @@ export type Snapshot = Readonly<{
   /** Of three's own count. */
   gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;
   isStereo: boolean;
+  /** The specimen's middle in the room, m. */
+  specimenAt: readonly [number, number, number];
   /** The notices before the eyes now, in stereo. */
   told: readonly string[];
 }>;

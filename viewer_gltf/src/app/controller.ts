@@ -56,6 +56,7 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
 
+const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
 const BUSY = "A picture or a video is being made.";
 const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
 
@@ -120,6 +121,8 @@ export type ControllerOptions = Readonly<{
   subtitle: string;
   /** Enter stereo; called from within a click or a key, as is the other. */
   onStereo: () => void;
+  /** Enter the user's own room. */
+  onRoom: () => void;
   /** Split the screen for a phone viewer of such lenses. */
   onSplit: (lenses: Profile) => void;
 }>;
@@ -136,6 +139,7 @@ export class Controller {
   /** As they were when they were last remembered. */
   private eyes = EYE_ROWS.map((row) => row.get(START_TOOLS)).join();
   private canScan = false;
+  private hasRoom = false;
   /** While a picture or a video is made. */
   private filming: AbortController | null = null;
 
@@ -180,8 +184,10 @@ export class Controller {
     return layOut(this.viewer.state, this.factsFor(view), view);
   }
 
-  setStereo(support: XrSupport): void {
+  /** @param hasRoom whether the specimen can stand in the user's own room */
+  setStereo(support: XrSupport, hasRoom: boolean): void {
     this.stereo = support;
+    this.hasRoom = hasRoom;
     this.refresh();
   }
 
@@ -230,6 +236,10 @@ export class Controller {
       if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
       else if (this.stereo.isAvailable) this.options.onStereo();
       else this.say(this.stereo.reason);
+    } else if (command === "room") {
+      if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
+      else if (this.hasRoom) this.options.onRoom();
+      else this.say(NO_ROOM);
     } else if (command === "split") {
       this.splitScreen();
     } else if (command === "scan") {
@@ -461,6 +471,7 @@ export class Controller {
       stereo,
       split: viewer.stereo.kind === "headset" ? null : SPLIT,
       canScan: this.canScan,
+      hasRoom: this.hasRoom && viewer.stereo.kind === null,
       faultOfCode,
       frame_ms: frame_ms > 0 ? frame_ms : null,
       settings,

@@ -134,6 +134,7 @@ export class FrameLoop {
     const wasLoading = contents.isLoading;
     if (contents.hasJustBegun()) onFollow();
     const inRoom = stereo.pose(this.picture.eyes);
+    this.picture.isSeeThrough = stereo.isInUsersRoom;
     const isStereo = inRoom !== null;
     const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
     if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state);

@@ -19,7 +19,8 @@ import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/
 import { opensAr, WaysIn } from "../panel/html/ways_in";
 import { flightAsked } from "../share/bench_parameter";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
-import { findXrSupport, wayToStereo } from "../xr/support";
+import type { ImmersiveMode } from "../xr/session";
+import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
 import { Viewer } from "./viewer";
@@ -104,7 +105,8 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   );
   controller = new Controller(viewer, parent, said, {
     subtitle: describeSize(manifest),
-    onStereo: () => void enterStereo(viewer),
+    onStereo: () => void enterStereo(viewer, "immersive-vr"),
+    onRoom: () => void enterStereo(viewer, "immersive-ar"),
     onSplit: (lenses) => void viewer.startSplit(lenses).catch((error) => viewer.report(error)),
   });
   const { layOut } = controller;
@@ -116,9 +118,11 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     hint.leave();
   });
   const support = await findXrSupport(navigator.xr, isSecureContext);
-  controller.setStereo(support);
+  const hasRoom = await showsUsersRoom(navigator.xr, isSecureContext);
+  controller.setStereo(support, hasRoom);
   const way = wayToStereo(support, isTouch);
   waysIn.offerStereo(way, () => way && controller.perform(way));
+  if (hasRoom) waysIn.offerRoom(() => controller.perform("room"));
   const usdz = usdzFor(bundle);
   if (usdz !== null) waysIn.offerLink(usdz);
   const flight_s = flightAsked(location.search);
@@ -151,10 +155,10 @@ async function offerBench(
   parent.append(card);
 }
 
-async function enterStereo(viewer: Viewer): Promise<void> {
+async function enterStereo(viewer: Viewer, mode: ImmersiveMode): Promise<void> {
   if (navigator.xr === undefined) return;
   try {
-    await viewer.stereo.headset.start(navigator.xr);
+    await viewer.stereo.headset.start(navigator.xr, mode);
   } catch (error) {
     if (!(error instanceof DOMException)) throw error;
     viewer.dispatch({ type: "notify", text: `Stereo could not start: ${error.message}` });

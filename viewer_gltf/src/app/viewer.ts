@@ -1,5 +1,5 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Matrix4, type Vector2, Vector3, WebGLRenderer } from "three";
+import { type Matrix4, Quaternion, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
@@ -8,13 +8,21 @@ import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
 import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
+import type { HandPose } from "../math/grab";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
 import { StageSize } from "../render/canvas_size";
 import { Hybrid } from "../render/gaze_focus";
-import { place, XR_DISTANCE_M } from "../render/placement";
+import {
+  OVER_FLOOR_M,
+  place,
+  ROOM_DISTANCE_M,
+  ROOM_SIZE,
+  UNDER_EYES_M,
+  XR_DISTANCE_M,
+} from "../render/placement";
 import { Room } from "../render/scene";
 import type { CameraView } from "../share/camera_link";
 import type { Action } from "../state/actions";
@@ -440,6 +448,7 @@ export class Viewer {
         programs: this.renderer.info.programs?.length ?? 0,
       },
       isStereo: this.stereo.kind !== null,
+      specimenAt: this.room.specimen.middle,
       told: this.stereo.hands.notice.texts,
     };
   }
@@ -533,11 +542,27 @@ export class Viewer {
     const { specimen } = this.room;
     const head = this.stereo.recentre();
     if (head === null) specimen.goHome();
-    else specimen.anchorAt(ahead(head, XR_DISTANCE_M));
+    else if (this.stereo.isInUsersRoom) {
+      const { position, orientation } = this.tableBefore(head);
+      specimen.anchorAt(position, ROOM_SIZE, orientation);
+    } else specimen.anchorAt(ahead(head, XR_DISTANCE_M));
+  }
+
+  /** Where things stand in the user's own room, facing a head. */
+  private tableBefore(head: Matrix4): HandPose {
+    const position = ahead(head, ROOM_DISTANCE_M);
+    const eye = new Vector3().setFromMatrixPosition(head);
+    const heading = Math.atan2(eye.x - position.x, eye.z - position.z);
+    const { hasFloor } = this.stereo.headset;
+    const height_m = hasFloor ? OVER_FLOOR_M : eye.y - UNDER_EYES_M;
+    const orientation = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), heading);
+    return { position: position.setY(height_m), orientation };
   }
 
   private enterStereo(): void {
-    this.transition.enter(this.state.specimenSize_m / START_TOOLS.specimenSize_m);
+    const { isInUsersRoom, head } = this.stereo;
+    const table = isInUsersRoom && head !== null ? this.tableBefore(head) : null;
+    this.transition.enter(this.state.specimenSize_m / START_TOOLS.specimenSize_m, table);
     this.onState(this.state);
   }
 

@@ -108,6 +108,7 @@ describe("the keys", () => {
       reset: true,
       back: true,
       stereo: true,
+      room: true,
       undo: true,
       redo: true,
       split: true,

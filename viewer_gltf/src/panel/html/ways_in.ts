@@ -40,6 +40,13 @@ export class WaysIn {
     this.stereo.onclick = onClick;
   }
 
+  /** @param onClick called within the click */
+  offerRoom(onClick: () => void): void {
+    this.room.hidden = false;
+    this.room.title = "The specimen in your room, by this device's camera (Home)";
+    this.room.onclick = onClick;
+  }
+
   /** @param address of a .usdz file */
   offerLink(address: string): void {
     this.link.href = address;

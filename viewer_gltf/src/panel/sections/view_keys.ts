@@ -21,6 +21,7 @@ export const VIEW_KEYS: readonly Key[] = [
   key("Ctrl+z", "Undo the last change of the view", "undo"),
   key(["Ctrl+Z", "Ctrl+y"], "Redo what was undone", "redo"),
   key("V", "Enter stereo (VR), or leave it", "stereo"),
+  key("Home", "The specimen in your room (AR), or leave it", "room"),
   key("L", "Next phone viewer", ({ view }) => {
     const lenses = neighbour(LENSES, view.lenses, 1);
     return lenses === null ? no("There is no phone viewer.") : { panel: "lenses", lenses };
