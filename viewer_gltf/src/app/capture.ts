@@ -1,11 +1,12 @@
 /** Pictures larger than the screen, and videos: drawn apart from the frames of the page, which wait. */
-import type { Matrix4, WebGLRenderer } from "three";
+import type { Matrix4, Object3D, WebGLRenderer } from "three";
 import { axesOf } from "../annotations/orientation_axes";
 import { umPerPixelAt } from "../annotations/scale_bar";
 import type { Manifest } from "../bundle/generated/bundle";
 import { pathThrough, turntable } from "../capture/camera_path";
 import { type Caption, drawCaption } from "../capture/caption";
 import { type FilmedFile, FRAMES_PER_S, frameWriter, pngOf } from "../capture/encode_video";
+import { labelBoxes } from "../capture/label_boxes";
 import { legendOf } from "../capture/legend";
 import { element } from "../dom/element";
 import type { Navigation } from "../interaction/orbit_camera";
@@ -41,6 +42,8 @@ export type Scene = Readonly<{
   height_px: number;
   /** From um to the room. */
   specimen: Matrix4;
+  /** What has labels in it. */
+  labelled: Object3D;
   state: ViewerState;
   manifest: Manifest;
 }>;
@@ -55,7 +58,16 @@ function captionOf({ navigation, height_px, specimen, state, manifest }: Scene):
     axes: axesOf(manifest.specimen.sides),
     head: camera.matrixWorld,
     specimen,
+    labels: [], // in a video they move, and nothing is to hop about for them
   };
+}
+
+/** The same, clear of the labels in the picture. */
+function clearCaptionOf(scene: Scene): Caption {
+  const { navigation, labelled, height_px } = scene;
+  const { camera } = navigation;
+  const size = { width: height_px * camera.aspect, height: height_px };
+  return { ...captionOf(scene), labels: labelBoxes(labelled, camera, size) };
 }
 
 /** Let the page do what waits. Not by a timer: those of a page that nobody sees tick once a second. */
@@ -95,7 +107,7 @@ export function savePicture(
   );
   return studio.apart(async () => {
     const { canvas, context } = canvasOf(scale * width, scale * height);
-    const words = captionOf(scene); // before the camera sees parts alone
+    const words = clearCaptionOf(scene); // before the camera sees parts alone
     try {
       for (let row = 0; row < scale; row++) {
         for (let column = 0; column < scale; column++) {

@@ -303,6 +303,7 @@ export class Viewer {
       studio,
       height_px: stage.clientHeight,
       specimen: this.room.specimen.group.matrixWorld,
+      labelled: this.room.specimen.group,
       state: this.state,
       manifest: this.bundle.manifest,
     };
