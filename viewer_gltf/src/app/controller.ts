@@ -57,7 +57,6 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 const REFRESH_MS = 250;
 
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
-const BUSY = "A picture or a video is being made.";
 const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
 
 const LENS_KEY = "stereocell-lens";
@@ -373,16 +372,22 @@ export class Controller {
 
   private async savePicture(): Promise<void> {
     const { viewer } = this;
-    if (this.filming !== null || viewer.stereo.kind !== null) {
-      this.say(viewer.stereo.kind === null ? BUSY : ON_THE_SCREEN);
+    if (viewer.stereo.kind !== null) {
+      this.say(ON_THE_SCREEN);
+      return;
+    }
+    if (this.filming !== null) {
+      this.filming.abort(); // asked for once more: it is left
       return;
     }
     this.filming = new AbortController();
+    const { signal } = this.filming;
+    this.refresh();
     try {
-      const png = await viewer.picture(Number(viewer.state.pictureSize), (done, of) => {
-        if (of > 1) this.say(`Picture: part ${done} of ${of}`);
-      });
-      this.save("picture", "png", png);
+      const size = Number(viewer.state.pictureSize);
+      const png = await viewer.picture(size, (words) => this.say(`Picture: ${words}`), signal);
+      if (png === null) this.say("The picture was left.");
+      else this.save("picture", "png", png);
     } catch (error) {
       this.refuse("The picture can't be saved", error);
     } finally {

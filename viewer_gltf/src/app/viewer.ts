@@ -269,10 +269,14 @@ export class Viewer {
     return true;
   }
 
-  /** What the screen shows as a PNG, so many times as large. Rejects with a DOMException. */
-  async picture(scale: number, onPart: (done: number, of: number) => void): Promise<Blob> {
+  /** What the screen shows as a PNG, so many times as large; null: it was left. Rejects with a DOMException. */
+  async picture(
+    scale: number,
+    onPart: (words: string) => void,
+    signal: AbortSignal,
+  ): Promise<Blob | null> {
     const { savePicture } = await this.loadCapture();
-    return savePicture(this.filmed, scale, onPart);
+    return savePicture(this.filmed, scale, onPart, signal);
   }
 
   /** Through the kept views, or once round; null: it was left. Rejects with a DOMException. */

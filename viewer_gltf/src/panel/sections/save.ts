@@ -11,8 +11,8 @@ export function saveItems(state: ViewerState, isFilming: boolean): readonly Cont
   const none = length === 0 ? "No view is kept." : "";
   return [
     ...controlsOf(PICTURE_PARAMETERS, state),
-    command("save-picture", "Save the picture"),
-    command("save-video", isFilming ? "Leave the video" : `Save a video, ${path}`),
+    command("save-picture", isFilming ? "Leave it" : "Save the picture"),
+    command("save-video", isFilming ? "Leave it" : `Save a video, ${path}`),
     command("keep-view", length === 0 ? "Keep this view" : `Keep this view (${length} kept)`),
     { ...command("next-view", "Next kept view"), refusal: none },
     { ...command("forget-views", "Forget them"), name: "Forget the kept views", refusal: none },
@@ -23,7 +23,7 @@ const NO_VIEW = no("No view is kept: ' keeps this one.");
 
 export const SAVE_KEYS: readonly Key[] = [
   ...PICTURE_PARAMETERS.flatMap(keysOf),
-  key('"', "Save the picture", "save-picture"),
+  key('"', "Save the picture; again: leave it", "save-picture"),
   key(")", "Save a video: once round, or through the kept views; again: leave it", "save-video"),
   key("'", "Keep this view for a video", "keep-view"),
   key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? NO_VIEW : "next-view")),
