@@ -4,6 +4,7 @@
  * `layOut` and hands its wishes to `perform`.
  */
 
+import { unitOf } from "../annotations/measure";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
@@ -148,8 +149,9 @@ export class Controller {
     private readonly said: Said,
     private readonly options: ControllerOptions,
   ) {
-    const { channels } = viewer.bundle.manifest;
-    this.ranges = new Map(channels.map(({ id, window }) => [id, window]));
+    const { manifest } = viewer.bundle;
+    const unit = unitOf(manifest);
+    this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
     this.help = new Help(parent, () => {

@@ -11,7 +11,7 @@ import type { ViewerState } from "../state/viewer_state";
 import { clipPartName, cutText } from "./clip_by_key";
 import type { Wish } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
-import { intensityText, type Ranges } from "./sections/channels";
+import { type Ranges, windowTexts } from "./sections/channels";
 import { measuredText } from "./sections/measure";
 import { LENS_NAMES } from "./sections/stereo";
 
@@ -122,8 +122,7 @@ function spokenChannel(
     case "show":
       return `${name}: ${channel.shown ? "shown" : "hidden"}`;
     case "window": {
-      const ends = window.map((end) => intensityText(end, ranges.get(id)));
-      return `${name}: window ${ends.join(" – ")}`;
+      return `${name}: window ${windowTexts(window, ranges.get(id)).join(" – ")}`;
     }
     case "choose-transfer-function":
     case "set-shapes":
