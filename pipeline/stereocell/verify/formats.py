@@ -193,9 +193,11 @@ def _check_usdz(path: Path) -> str:
 
 def _check_usdz_of_bundle(bundle: Path) -> str:
     """Check specimen.usdz where the manifest names one; its hash is checked with all others."""
-    manifest = json.loads((bundle / MANIFEST).read_text())
+    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
     if manifest.get("usdz") is None:
         return f"no {USDZ_NAME}: {manifest.get('usdz_reason') or 'the manifest names none'}"
+    if not (bundle / USDZ_NAME).is_file():
+        raise CheckError(f"{USDZ_NAME}: missing, {_RUN_BUNDLE}")
     return _check_usdz(bundle / USDZ_NAME)
 
 
