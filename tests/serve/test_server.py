@@ -31,6 +31,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "index.html").write_text("<!doctype html>")
     (folder / "volumes" / "r0_c0" / "CD31.ktx2").write_bytes(DATA)
     (folder / "lod0.glb").write_bytes(b"glTF")
+    (folder / "specimen.usdz").write_bytes(b"PK")
     (folder / "assets" / "decoder.wasm").write_bytes(b"\0asm")
     (folder / "assets" / "index.js").write_text("0")
     (folder / "assets" / "code.js").write_bytes(CODE)
@@ -188,6 +189,7 @@ def test_caches_ask_each_time_and_pages_learn_of_the_bricks(port: int) -> None:
         ("/", "text/html; charset=utf-8"),
         ("/manifest.json", "application/json"),
         ("/lod0.glb", "model/gltf-binary"),
+        ("/specimen.usdz", "model/vnd.usdz+zip"),
         ("/volumes/r0_c0/CD31.ktx2", "image/ktx2"),
         ("/assets/decoder.wasm", "application/wasm"),
         ("/assets/index.js?v=1", "text/javascript; charset=utf-8"),

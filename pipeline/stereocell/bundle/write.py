@@ -5,6 +5,7 @@
                        transfer2d.json  histogram2d.ktx2
     volumes/<tile>/<channel>.ktx2  <channel>_bricks.ktx2
     luts/<channel>.ktx2
+    specimen.usdz                                  its surfaces, small: see write_ar
     index.html  assets/                            the viewer
 
 The stage is the only source. Tiles are exported each by itself, as parts that stay until the bundle
@@ -20,6 +21,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from stereocell.bundle.write_ar import write_ar
 from stereocell.bundle.write_tile import (
     BundleTile,
     FileRef,
@@ -155,6 +157,11 @@ def _fill(
         entry, written = _write_channel(root, appearance, [(t.id, t.channels[i]) for t in tiles])
         channels.append(entry)
         files += written
+    usdz, usdz_reason = write_ar(stage_path, root, as_written)
+    if usdz is None:
+        report_line(f"no specimen.usdz: {usdz_reason}")
+    else:
+        files.append(FileRef(**usdz))
     if viewer_dist is not None:
         files += _copy_viewer(viewer_dist, root)
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
@@ -162,7 +169,9 @@ def _fill(
     specimen: dict[str, Any] = {"name": specimen_name(stage), "modality": modality_of(stage)}
     if (sides := sides_of(stage)) is not None:
         specimen["sides"] = sides
-    write_file(root, MANIFEST, describe_bundle(specimen, tiles, channels=channels, index=index))
+    ar = {"usdz": usdz, "usdz_reason": usdz_reason}
+    manifest = describe_bundle(specimen, tiles, channels=channels, index=index, ar=ar)
+    write_file(root, MANIFEST, manifest)
     for tile in tiles:
         for channel in tile.channels:
             if channel.edit:
@@ -175,12 +184,14 @@ def describe_bundle(
     *,
     channels: Sequence[dict[str, Any]],
     index: FileRef,
+    ar: dict[str, Any] | None = None,
 ) -> bytes:
     """Return manifest.json.
 
     specimen  its name and modality, and where a patient's sides are
     channels  as `describe_channel` returns them
     index     files.json
+    ar        specimen.usdz, or why there is none; None: the manifest says nothing of it
     """
     manifest = {
         "format": "stereocell-bundle",
@@ -192,6 +203,7 @@ def describe_bundle(
             for tile in tiles
         ],
         "channels": channels,
+        **(ar or {}),
         "files": asdict(index),
     }
     return to_json(manifest)

@@ -34,6 +34,7 @@ _TYPES = {
     ".ktx2": "image/ktx2",
     ".png": "image/png",
     ".svg": "image/svg+xml",
+    ".usdz": "model/vnd.usdz+zip",
     ".wasm": "application/wasm",
     ".webmanifest": "application/manifest+json",
 }

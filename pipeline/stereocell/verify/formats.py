@@ -101,6 +101,7 @@ def _checks_of_bundle(bundle: Path, out_folder: OutFolder | None) -> list[_Check
         ("2D transfer functions", lambda: _check_transfer2d(bundle)),
         ("tilesets", lambda: _check_tilesets(bundle)),
         ("hashes", lambda: _check_hashes(bundle, out_folder)),
+        ("bundle usdz", lambda: _check_usdz_of_bundle(bundle)),
         ("glTF validator", lambda: _check_meshes(bundle)),
         ("KTX2 textures", lambda: _run_node("check_ktx2.mjs", _textures(bundle))),
     ]
@@ -188,6 +189,16 @@ def _check_usdz(path: Path) -> str:
     dependencies(path, path.parent)
     raise_on([str(finding) for finding in validate_usdz(path)])
     return f"{path.name}: nothing found by the validators of usdz and by our own rules"
+
+
+def _check_usdz_of_bundle(bundle: Path) -> str:
+    """Check specimen.usdz where the manifest names one; its hash is checked with all others."""
+    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
+    if manifest.get("usdz") is None:
+        return f"no {USDZ_NAME}: {manifest.get('usdz_reason') or 'the manifest names none'}"
+    if not (bundle / USDZ_NAME).is_file():
+        raise CheckError(f"{USDZ_NAME}: missing, {_RUN_BUNDLE}")
+    return _check_usdz(bundle / USDZ_NAME)
 
 
 def _check_stage_files(out: Path) -> str:

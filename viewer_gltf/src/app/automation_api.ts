@@ -5,6 +5,7 @@
  */
 
 import type { Report } from "../bench/report";
+import type { Look } from "../interaction/orbit_camera";
 import type { QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
 import type { Progress } from "../surfaces/overview_progress";
@@ -13,6 +14,8 @@ import type { VolumeStatus } from "../volumes/volume_set";
 export type Snapshot = Readonly<{
   state: ViewerState;
   /** Whether all tiles show, in the first channel. */
+  /** From where the flat camera sees the specimen, m of the room. */
+  look: Look;
   hasFirstPicture: boolean;
   /** Of all shown channels. */
   overview: Progress;
@@ -41,6 +44,8 @@ export type Snapshot = Readonly<{
   /** Of three's own count. */
   gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;
   isStereo: boolean;
+  /** The specimen's middle in the room, m. */
+  specimenAt: readonly [number, number, number];
   /** The notices before the eyes now, in stereo. */
   told: readonly string[];
 }>;

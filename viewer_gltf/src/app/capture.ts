@@ -1,22 +1,31 @@
 /** Pictures larger than the screen, and videos: drawn apart from the frames of the page, which wait. */
-import type { Matrix4, WebGLRenderer } from "three";
+import type { Matrix4, Object3D, WebGLRenderer } from "three";
 import { axesOf } from "../annotations/orientation_axes";
 import { umPerPixelAt } from "../annotations/scale_bar";
 import type { Manifest } from "../bundle/generated/bundle";
 import { pathThrough, turntable } from "../capture/camera_path";
 import { type Caption, drawCaption } from "../capture/caption";
 import { type FilmedFile, FRAMES_PER_S, frameWriter, pngOf } from "../capture/encode_video";
+import { labelBoxes } from "../capture/label_boxes";
 import { legendOf } from "../capture/legend";
 import { element } from "../dom/element";
 import type { Navigation } from "../interaction/orbit_camera";
 import type { KeptView } from "../state/kept_views";
+import { isTraced } from "../state/parameters/volumes";
 import type { ViewerState } from "../state/viewer_state";
+import { type Still, TRACED_SAMPLES } from "./frame_loop";
 
 /** Most pixels of a picture: browsers refuse larger canvases, phones at less. */
 const MOST_PIXELS = 120e6;
 /** Longest time for one part of a picture, and for one frame of a video, ms: then it is as good as it is. */
 const PART_MS = 8000;
+const TRACED_PART_MS = 60_000;
+/** Between two times that the page gets on with what else there is, ms. */
+const SLICE_MS = 500;
 const FRAME_MS = 400;
+const TRACED_FRAME_MS = 1500;
+/** Longest wait of a frame of a video for finer surfaces and volumes, ms. */
+const ARRIVAL_MS = 5000;
 /** Length of a video: once round, and from one kept view to the next, s. */
 const ROUND_S = 6;
 const LEG_S = 2;
@@ -27,10 +36,10 @@ const LONGEST_FRAME_PX = 1920;
 export interface Studio {
   /** Keep the page's own frames from drawing while a job runs. */
   apart<T>(job: () => Promise<T>): Promise<T>;
-  /** Follow the camera, as long in seconds as a frame takes. */
-  follow(dt_s: number): void;
-  /** Draw the view as well as can be in so many ms. */
-  drawStill(most_ms: number): void;
+  /** Follow the camera, as long in seconds as a frame takes, until what it sees has come: so many ms at most. */
+  arrive(dt_s: number, most_ms: number): Promise<void>;
+  /** Draw the view as well as can be in so many ms; `begun`: go on with it. */
+  drawStill(most_ms: number, begun?: Still | null): Still;
 }
 
 export type Scene = Readonly<{
@@ -41,6 +50,8 @@ export type Scene = Readonly<{
   height_px: number;
   /** From um to the room. */
   specimen: Matrix4;
+  /** What has labels in it. */
+  labelled: Object3D;
   state: ViewerState;
   manifest: Manifest;
 }>;
@@ -55,7 +66,16 @@ function captionOf({ navigation, height_px, specimen, state, manifest }: Scene):
     axes: axesOf(manifest.specimen.sides),
     head: camera.matrixWorld,
     specimen,
+    labels: [], // in a video they move, and nothing is to hop about for them
   };
+}
+
+/** The same, clear of the labels in the picture. */
+function clearCaptionOf(scene: Scene): Caption {
+  const { navigation, labelled, height_px } = scene;
+  const { camera } = navigation;
+  const size = { width: height_px * camera.aspect, height: height_px };
+  return { ...captionOf(scene), labels: labelBoxes(labelled, camera, size) };
 }
 
 /** Let the page do what waits. Not by a timer: those of a page that nobody sees tick once a second. */
@@ -79,13 +99,18 @@ function canvasOf(width: number, height: number) {
 
 /**
  * The view, `scale` times as large as the screen has it, part by part: each fills the screen's own canvas,
- * so that no more of the GPU's memory is needed. Scale bar, legend and axes are drawn on it.
+ * so that no more of the GPU's memory is needed. Scale bar, legend and axes are drawn on it. A traced one is
+ * gathered until it is clear.
+ *
+ * @param onPart told in words how far it is
+ * @returns null: it was left
  */
 export function savePicture(
   scene: Scene,
   wanted: number,
-  onPart: (done: number, of: number) => void,
-): Promise<Blob> {
+  onPart: (words: string) => void,
+  signal: AbortSignal,
+): Promise<Blob | null> {
   const { renderer, studio, navigation } = scene;
   const { camera } = navigation;
   const { width, height } = renderer.domElement;
@@ -95,15 +120,16 @@ export function savePicture(
   );
   return studio.apart(async () => {
     const { canvas, context } = canvasOf(scale * width, scale * height);
-    const words = captionOf(scene); // before the camera sees parts alone
+    const words = clearCaptionOf(scene); // before the camera sees parts alone
     try {
       for (let row = 0; row < scale; row++) {
         for (let column = 0; column < scale; column++) {
           const [x, y] = [column * width, row * height];
           camera.setViewOffset(scale * width, scale * height, x, y, width, height);
-          studio.drawStill(PART_MS);
-          context.drawImage(renderer.domElement, x, y);
-          onPart(row * scale + column + 1, scale * scale);
+          const part = `part ${row * scale + column + 1} of ${scale * scale}`;
+          const isWhole = await drawPart(studio, part, onPart, signal);
+          if (!isWhole) return null;
+          context.drawImage(renderer.domElement, x, y); // in the turn that it was drawn in
           await turn();
         }
       }
@@ -115,6 +141,26 @@ export function savePicture(
   });
 }
 
+/** Draw what the camera sees until it is clear, or its time is over; false: it was left. */
+async function drawPart(
+  studio: Studio,
+  part: string,
+  onPart: (words: string) => void,
+  signal: AbortSignal,
+): Promise<boolean> {
+  const start_ms = performance.now();
+  let still: Still | null = null;
+  for (;;) {
+    still = studio.drawStill(SLICE_MS, still);
+    const { samples, isDone } = still;
+    onPart(samples === null ? part : `${part}, ${samples} of ${TRACED_SAMPLES} samples of light`);
+    const most_ms = samples === null ? PART_MS : TRACED_PART_MS;
+    if (isDone || performance.now() - start_ms > most_ms) return true;
+    await turn();
+    if (signal.aborted) return false;
+  }
+}
+
 /** Through views, if there are two, else once round; `onSecond` after each second of it. Null: it was left. */
 export function saveVideo(
   scene: Scene,
@@ -122,7 +168,7 @@ export function saveVideo(
   onSecond: (done: number, of: number) => void,
   signal: AbortSignal,
 ): Promise<FilmedFile | null> {
-  const { renderer, studio, navigation } = scene;
+  const { renderer, studio, navigation, state } = scene;
   const path =
     views.length > 1
       ? pathThrough(views, LEG_S * FRAMES_PER_S * (views.length - 1) + 1)
@@ -139,8 +185,8 @@ export function saveVideo(
         return null;
       }
       navigation.lookFrom(view);
-      studio.follow(1 / FRAMES_PER_S);
-      studio.drawStill(FRAME_MS);
+      await studio.arrive(1 / FRAMES_PER_S, ARRIVAL_MS);
+      studio.drawStill(isTraced(state) ? TRACED_FRAME_MS : FRAME_MS);
       context.drawImage(renderer.domElement, 0, 0, canvas.width, canvas.height);
       drawCaption(context, canvas, shrink * renderer.getPixelRatio(), captionOf(scene));
       await writer.add(canvas);

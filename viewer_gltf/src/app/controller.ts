@@ -4,6 +4,7 @@
  * `layOut` and hands its wishes to `perform`.
  */
 
+import { unitOf } from "../annotations/measure";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
@@ -23,8 +24,8 @@ import { Help } from "../panel/html/key_list";
 import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
 import { scanByCamera } from "../panel/html/qr_scanner";
-import type { KeyContext } from "../panel/key";
-import { listenForKeys } from "../panel/key_events";
+import { isRefusal, type KeyContext } from "../panel/key";
+import { isWritten, listenForKeys } from "../panel/key_events";
 import { wishOf } from "../panel/keys";
 import { type Facts, layOut } from "../panel/layout";
 import type { Ranges } from "../panel/sections/channels";
@@ -56,7 +57,7 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
 
-const BUSY = "A picture or a video is being made.";
+const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
 const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
 
 const LENS_KEY = "stereocell-lens";
@@ -120,6 +121,8 @@ export type ControllerOptions = Readonly<{
   subtitle: string;
   /** Enter stereo; called from within a click or a key, as is the other. */
   onStereo: () => void;
+  /** Enter the user's own room. */
+  onRoom: () => void;
   /** Split the screen for a phone viewer of such lenses. */
   onSplit: (lenses: Profile) => void;
 }>;
@@ -136,6 +139,7 @@ export class Controller {
   /** As they were when they were last remembered. */
   private eyes = EYE_ROWS.map((row) => row.get(START_TOOLS)).join();
   private canScan = false;
+  private hasRoom = false;
   /** While a picture or a video is made. */
   private filming: AbortController | null = null;
 
@@ -145,8 +149,9 @@ export class Controller {
     private readonly said: Said,
     private readonly options: ControllerOptions,
   ) {
-    const { channels } = viewer.bundle.manifest;
-    this.ranges = new Map(channels.map(({ id, window }) => [id, window]));
+    const { manifest } = viewer.bundle;
+    const unit = unitOf(manifest);
+    this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
     this.help = new Help(parent, () => {
@@ -180,8 +185,10 @@ export class Controller {
     return layOut(this.viewer.state, this.factsFor(view), view);
   }
 
-  setStereo(support: XrSupport): void {
+  /** @param hasRoom whether the specimen can stand in the user's own room */
+  setStereo(support: XrSupport, hasRoom: boolean): void {
     this.stereo = support;
+    this.hasRoom = hasRoom;
     this.refresh();
   }
 
@@ -230,6 +237,10 @@ export class Controller {
       if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
       else if (this.stereo.isAvailable) this.options.onStereo();
       else this.say(this.stereo.reason);
+    } else if (command === "room") {
+      if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
+      else if (this.hasRoom) this.options.onRoom();
+      else this.say(NO_ROOM);
     } else if (command === "split") {
       this.splitScreen();
     } else if (command === "scan") {
@@ -324,7 +335,11 @@ export class Controller {
       focusTile: viewer.snapshot().gazed,
     };
     const wish = wishOf(name, context);
-    if (wish === null) return false;
+    if (wish === null || isRefusal(wish)) {
+      if (wish !== null) this.say(wish.refusal);
+      else if (isWritten(name)) this.say(`No key ${name}: ? lists the keys.`);
+      return false;
+    }
     this.perform(wish);
     if (typeof wish !== "string" && "panel" in wish && wish.panel === "clip-part") {
       viewer.mean(handleOf(wish.clipPart));
@@ -359,16 +374,22 @@ export class Controller {
 
   private async savePicture(): Promise<void> {
     const { viewer } = this;
-    if (this.filming !== null || viewer.stereo.kind !== null) {
-      this.say(viewer.stereo.kind === null ? BUSY : ON_THE_SCREEN);
+    if (viewer.stereo.kind !== null) {
+      this.say(ON_THE_SCREEN);
+      return;
+    }
+    if (this.filming !== null) {
+      this.filming.abort(); // asked for once more: it is left
       return;
     }
     this.filming = new AbortController();
+    const { signal } = this.filming;
+    this.refresh();
     try {
-      const png = await viewer.picture(Number(viewer.state.pictureSize), (done, of) => {
-        if (of > 1) this.say(`Picture: part ${done} of ${of}`);
-      });
-      this.save("picture", "png", png);
+      const size = Number(viewer.state.pictureSize);
+      const png = await viewer.picture(size, (words) => this.say(`Picture: ${words}`), signal);
+      if (png === null) this.say("The picture was left.");
+      else this.save("picture", "png", png);
     } catch (error) {
       this.refuse("The picture can't be saved", error);
     } finally {
@@ -457,6 +478,7 @@ export class Controller {
       stereo,
       split: viewer.stereo.kind === "headset" ? null : SPLIT,
       canScan: this.canScan,
+      hasRoom: this.hasRoom && viewer.stereo.kind === null,
       faultOfCode,
       frame_ms: frame_ms > 0 ? frame_ms : null,
       settings,

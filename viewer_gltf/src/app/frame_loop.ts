@@ -16,8 +16,12 @@ import { MAX_STEPS } from "../volumes/tile_raymarch";
 import type { Stereo } from "../xr/stereo";
 import type { Contents } from "./scene_contents";
 
-/** Most samples of each pixel of a picture that is saved. */
+/** Most frames of a picture that is saved that are averaged, where it is marched. */
 const MOST_SAMPLES = 64;
+/** Samples of each pixel where it is traced: with so many nothing has to be denoised. */
+export const TRACED_SAMPLES = 192;
+/** Between two looks at whether all has come, ms. */
+const POLL_MS = 20;
 /** Longest time that a frame counts, s: nobody looked at a page that slept. */
 const LONGEST_FRAME_S = 0.1;
 
@@ -39,6 +43,14 @@ export type FrameOptions = Readonly<{
   onFollow: () => void;
   /** Called after every frame drawn. */
   onFrame: () => void;
+}>;
+
+/** How far a picture that is saved has come. */
+export type Still = Readonly<{
+  frames: number;
+  isDone: boolean;
+  /** Of each pixel, where it is traced; null: it is not. */
+  samples: number | null;
 }>;
 
 export class FrameLoop {
@@ -134,6 +146,7 @@ export class FrameLoop {
     const wasLoading = contents.isLoading;
     if (contents.hasJustBegun()) onFollow();
     const inRoom = stereo.pose(this.picture.eyes);
+    this.picture.isSeeThrough = stereo.isInUsersRoom;
     const isStereo = inRoom !== null;
     const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
     if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state);
@@ -203,23 +216,41 @@ export class FrameLoop {
     contents.stream(camera, width, height, ERROR_TARGET_PX);
   }
 
-  /** The flat camera's view, at once: samples are gathered for so long, but for the quality Low or High. */
-  drawStill(most_ms: number): void {
+  /** Follow the flat camera until what it sees has come, for so long at most. */
+  async arrive(dt_s: number, most_ms: number): Promise<void> {
+    const start_ms = performance.now();
+    this.follow(dt_s);
+    while (this.options.shown().contents.isLoading && performance.now() - start_ms < most_ms) {
+      await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+      this.follow(0);
+    }
+  }
+
+  /**
+   * The flat camera's view, at once: samples are gathered for so long, but for the quality Low or High.
+   *
+   * @param begun what it has returned for the same view, to go on with
+   */
+  drawStill(most_ms: number, begun: Still | null = null): Still {
     const { contents, navigation, state } = this.options.shown();
     const { traced, surfaces } = contents;
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     surfaces.dressAll();
     const start_ms = performance.now();
     const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
-    for (let i = 0; i < MOST_SAMPLES; i++) {
-      const gathers = i > 0 && !traced.isShown;
+    for (let frames = begun?.frames ?? 0; ; ) {
+      const gathers = frames > 0 && !traced.isShown;
       this.draw({ ...pace, gathers });
+      frames++;
+      const { samples } = traced.status();
       const isDone = traced.isShown
-        ? traced.status().samples >= MOST_SAMPLES
-        : state.quality !== "auto" || !this.picture.canGather;
+        ? samples >= TRACED_SAMPLES
+        : state.quality !== "auto" || !this.picture.canGather || frames >= MOST_SAMPLES;
       // a pixel that is read waits for the drawing, which `finish` does not where another process draws
       this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, this.pixel);
-      if (isDone || performance.now() - start_ms > most_ms) return;
+      if (isDone || performance.now() - start_ms > most_ms) {
+        return { frames, isDone, samples: traced.isShown ? Math.floor(samples) : null };
+      }
     }
   }
 
@@ -264,12 +295,12 @@ export class FrameLoop {
   private draw(pace: FramePace): void {
     const { picture, head } = this;
     const { contents, stereo, state } = this.options.shown();
-    const { volumes, traced, surfaces, marks, slicePlanes: slices } = contents;
+    const { volumes, traced, surfaces, marks, slices } = contents;
     const drawn = {
       volumes,
       traced,
       panes: surfaces.blended,
-      overlays: [...marks.overlays, slices.marks, ...stereo.hands.overlays],
+      overlays: [...marks.overlays, ...slices.overlays, ...stereo.hands.overlays],
       bounds: this.options.bounds,
       solids: surfaces.triangles + slices.solid,
     };

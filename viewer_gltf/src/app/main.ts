@@ -5,26 +5,22 @@ import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../annotations/annotations.css";
-import "../slices/slices.css";
 import { sizeText } from "../annotations/measure";
 import { bundleAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
+import { fileAddress } from "../bundle/fetch";
 import type { Manifest } from "../bundle/generated/bundle";
-import { loadBundle } from "../bundle/load";
+import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { keepOffline } from "../offline/register";
-import {
-  FirstHint,
-  Notices,
-  ProgressBar,
-  Said,
-  StereoButton,
-  showFatal,
-} from "../panel/html/overlays";
+import { isKept } from "../offline/request_plan";
+import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
+import { opensAr, WaysIn } from "../panel/html/ways_in";
 import { flightAsked } from "../share/bench_parameter";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
-import { findXrSupport, wayToStereo } from "../xr/support";
+import type { ImmersiveMode } from "../xr/session";
+import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
 import { Viewer } from "./viewer";
@@ -62,6 +58,18 @@ function whenTouched(then: () => void): void {
   for (const kind of ["pointerdown", "wheel", "keydown"]) addEventListener(kind, touch, options);
 }
 
+/** Address of the file that this device shows in the user's room; null: it shows none. */
+function usdzFor({ base, manifest }: Bundle): string | null {
+  const usdz = manifest.usdz ?? null;
+  return usdz !== null && opensAr() ? fileAddress(base, usdz.path) : null;
+}
+
+/** What is kept for a visit without a network, though the page itself does not fetch it. */
+function alsoKept({ bundle }: Viewer): readonly string[] {
+  const usdz = usdzFor(bundle);
+  return usdz !== null && isKept(bundle.manifest.usdz ?? null) ? [usdz] : [];
+}
+
 async function open(parent: HTMLElement): Promise<Viewer> {
   checkWebGl2();
   sayAtStart("Reading the bundle");
@@ -77,10 +85,10 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     (texts) => viewer.dispatch({ type: "dismiss", texts }),
     () => viewer.run("retry"),
   );
-  const stereoButton = new StereoButton();
+  const waysIn = new WaysIn();
   const isTouch = matchMedia("(pointer: coarse)").matches;
   const hint = new FirstHint(isTouch);
-  const over = [hint.root, progress.root, said.root, notices.root, stereoButton.root];
+  const over = [hint.root, progress.root, said.root, notices.root, waysIn.root];
   parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
   const viewer: Viewer = new Viewer(
@@ -97,7 +105,8 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   );
   controller = new Controller(viewer, parent, said, {
     subtitle: describeSize(manifest),
-    onStereo: () => void enterStereo(viewer),
+    onStereo: () => void enterStereo(viewer, "immersive-vr"),
+    onRoom: () => void enterStereo(viewer, "immersive-ar"),
     onSplit: (lenses) => void viewer.startSplit(lenses).catch((error) => viewer.report(error)),
   });
   const { layOut } = controller;
@@ -109,9 +118,13 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     hint.leave();
   });
   const support = await findXrSupport(navigator.xr, isSecureContext);
-  controller.setStereo(support);
+  const hasRoom = await showsUsersRoom(navigator.xr, isSecureContext);
+  controller.setStereo(support, hasRoom);
   const way = wayToStereo(support, isTouch);
-  stereoButton.offer(way, () => way && controller.perform(way));
+  waysIn.offerStereo(way, () => way && controller.perform(way));
+  if (hasRoom) waysIn.offerRoom(() => controller.perform("room"));
+  const usdz = usdzFor(bundle);
+  if (usdz !== null) waysIn.offerLink(usdz);
   const flight_s = flightAsked(location.search);
   if (flight_s !== null) await offerBench(viewer, parent, flight_s, support.isAvailable);
   return viewer;
@@ -142,10 +155,10 @@ async function offerBench(
   parent.append(card);
 }
 
-async function enterStereo(viewer: Viewer): Promise<void> {
+async function enterStereo(viewer: Viewer, mode: ImmersiveMode): Promise<void> {
   if (navigator.xr === undefined) return;
   try {
-    await viewer.stereo.headset.start(navigator.xr);
+    await viewer.stereo.headset.start(navigator.xr, mode);
   } catch (error) {
     if (!(error instanceof DOMException)) throw error;
     viewer.dispatch({ type: "notify", text: `Stereo could not start: ${error.message}` });
@@ -181,7 +194,7 @@ void opened.then(
 );
 const sayReady = () => said.say("Ready offline: what has been shown opens without a network, too.");
 void ready.then(
-  () => keepOffline(sayReady),
+  () => keepOffline(sayReady, viewer === null ? [] : alsoKept(viewer)),
   () => undefined,
 );
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";

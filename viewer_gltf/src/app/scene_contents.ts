@@ -7,8 +7,6 @@ import type { Box } from "../math/box";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
-import { SliceImages } from "../slices/slice_images";
-import { SlicePlanes } from "../slices/slice_planes";
 import type { Action } from "../state/actions";
 import { isTraced } from "../state/parameters/volumes";
 import { wantedTiles } from "../state/representation";
@@ -20,12 +18,15 @@ import { BrickService } from "../volumes/bricks/brick_service";
 import type { BrickView } from "../volumes/bricks/protocol";
 import { TransferFunctions2dLoader } from "../volumes/transfer_functions_loader";
 import { VolumeSet } from "../volumes/volume_set";
+import { SlicesPart } from "./slices_part";
 
 export type ContentsOptions = Readonly<{
   bundle: Bundle;
   renderer: WebGLRenderer;
   picture: Picture;
   state: ViewerState;
+  /** The part of the page with the stage. */
+  view: HTMLElement;
   dispatch: (action: Action) => void;
   announce: (text: string) => void;
   /** The picture is no longer true. */
@@ -42,8 +43,7 @@ export class Contents {
   readonly transferFunctions2d: TransferFunctions2dLoader;
   readonly marks: Marks;
   /** Pictures of the slices, and the planes that show them in the specimen. */
-  readonly slices: SliceImages;
-  readonly slicePlanes: SlicePlanes;
+  readonly slices: SlicesPart;
   private readonly bricks: BrickService | null;
   private readonly clip = new Matrix4();
   private readonly point = new Vector3();
@@ -99,12 +99,9 @@ export class Contents {
     };
     const { manifest, base } = bundle;
     const { sourceOf } = reading;
-    this.slices = new SliceImages({ manifest, base, sourceOf, onChange, onError });
-    this.slicePlanes = new SlicePlanes(this.slices);
-    this.marks = new Marks(
-      { ...reading, slices: () => (this.slicePlanes.group.visible ? this.slices : null) },
-      options.state,
-    );
+    const { view, dispatch } = options;
+    this.slices = new SlicesPart({ manifest, base, sourceOf, view, dispatch, onChange, onError });
+    this.marks = new Marks({ ...reading, slices: () => this.slices.standing }, options.state);
   }
 
   get isLoading(): boolean {
@@ -128,7 +125,6 @@ export class Contents {
     this.traced.follow(state);
     this.surfaces.follow(state, focusTiles);
     this.slices.follow(state);
-    this.slicePlanes.follow(state.hasSlicePlanes);
     this.marks.follow(state);
   }
 
@@ -166,7 +162,7 @@ export class Contents {
     const isFading = this.volumes.advance(view.dt_s);
     this.traced.advance(view.dt_s);
     this.marks.update(view);
-    this.slicePlanes.update(this.marks.sight);
+    this.slices.update(this.marks.sight);
     return isFading;
   }
 
@@ -195,7 +191,6 @@ export class Contents {
 
   dispose(): void {
     this.marks.dispose();
-    this.slicePlanes.dispose();
     this.slices.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();

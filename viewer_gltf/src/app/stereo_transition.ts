@@ -2,17 +2,22 @@
  * From where the specimen is seen, on the screen and in stereo: what was looked at on the one is
  * looked at in the other, and back.
  */
-import { Quaternion, Vector3 } from "three";
+import { Euler, Quaternion, Vector3 } from "three";
 import type { Navigation } from "../interaction/orbit_camera";
 import { type HandPose, type SpecimenPose, zoomAbout } from "../math/grab";
-import { XR_DISTANCE_M } from "../render/placement";
+import { ROOM_SIZE, XR_DISTANCE_M } from "../render/placement";
 import { intoRoom, ontoScreen } from "../render/screen_to_room";
 import type { Specimen } from "../render/specimen_pose";
 import type { CameraView } from "../share/camera_link";
 
 export class StereoTransition {
   /** In stereo: where the specimen was when it began, in the room and on the screen. */
-  private entered: Readonly<{ inRoom: SpecimenPose; onScreen: SpecimenPose | null }> | null = null;
+  private entered: Readonly<{
+    inRoom: SpecimenPose;
+    onScreen: SpecimenPose | null;
+    hold: HandPose;
+    facing: Quaternion;
+  }> | null = null;
 
   constructor(
     private readonly navigation: Navigation,
@@ -23,19 +28,23 @@ export class StereoTransition {
    * The specimen turns the same side to the head as to the screen, what was looked at ahead.
    *
    * @param larger than it opens, unless someone has made it as large as it is
+   * @param table where it stands in the user's own room, upright; null: before the eyes
    */
-  enter(larger = 1): void {
+  enter(larger = 1, table: HandPose | null = null): void {
     const { navigation, specimen } = this;
     navigation.stopTurning();
     navigation.controls.enabled = false;
-    const ahead_m = new Vector3(0, 0, -XR_DISTANCE_M);
+    const ahead_m = table?.position ?? new Vector3(0, 0, -XR_DISTANCE_M);
+    const facing = table?.orientation ?? new Quaternion();
+    const size = table === null ? 1 : ROOM_SIZE;
     const onScreen = this.poseOnScreen;
-    const pose = intoRoom(specimen.pose, this.screenHold, ahead_m);
-    specimen.anchorAt(ahead_m);
-    const sized = onScreen === null ? zoomAbout(pose, ahead_m, larger) : pose;
-    const isOther = !navigation.isStraight || onScreen !== null || larger !== 1;
+    const hold = table === null ? this.screenHold : levelled(this.screenHold);
+    const pose = intoRoom(specimen.pose, hold, ahead_m, facing);
+    specimen.anchorAt(ahead_m, size, facing);
+    const sized = zoomAbout(pose, ahead_m, onScreen === null ? size * larger : size);
+    const isOther = !navigation.isStraight || onScreen !== null || larger !== 1 || table !== null;
     if (isOther) specimen.moveTo(sized, new Vector3());
-    this.entered = { inRoom: specimen.pose, onScreen };
+    this.entered = { inRoom: specimen.pose, onScreen, hold, facing };
   }
 
   /** What was looked at stays. */
@@ -88,6 +97,13 @@ export class StereoTransition {
     if (entered === null) return isMoved ? pose : null;
     if (pose === entered.inRoom) return entered.onScreen; // nobody has moved it there
     if (!isMoved && navigation.isStraight) return null;
-    return ontoScreen(isMoved ? pose : home, this.screenHold, anchor);
+    const there = zoomAbout(isMoved ? pose : home, anchor, 1 / this.specimen.size);
+    return ontoScreen(there, entered.hold, anchor, entered.facing);
   }
+}
+
+/** The same without its tilt: a thing on a table stands upright. */
+function levelled({ position, orientation }: HandPose): HandPose {
+  const { y } = new Euler().setFromQuaternion(orientation, "YXZ");
+  return { position, orientation: new Quaternion().setFromEuler(new Euler(0, y, 0)) };
 }

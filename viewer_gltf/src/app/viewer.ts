@@ -1,27 +1,33 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
-import { type Matrix4, type Vector2, Vector3, WebGLRenderer } from "three";
+import { type Matrix4, Quaternion, type Vector2, Vector3, WebGLRenderer } from "three";
 import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
 import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
-import { Navigation, type Stand } from "../interaction/orbit_camera";
+import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
+import type { HandPose } from "../math/grab";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
-import { sharesOf, turnedBy } from "../math/slice_frame";
-import type { Ray, Vec3 } from "../math/vec3";
+import type { Ray } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
 import { StageSize } from "../render/canvas_size";
 import { Hybrid } from "../render/gaze_focus";
-import { place, XR_DISTANCE_M } from "../render/placement";
+import {
+  OVER_FLOOR_M,
+  place,
+  ROOM_DISTANCE_M,
+  ROOM_SIZE,
+  UNDER_EYES_M,
+  XR_DISTANCE_M,
+} from "../render/placement";
 import { Room } from "../render/scene";
 import type { CameraView } from "../share/camera_link";
-import { SliceView } from "../slices/slice_view";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
-import { CANT, type Command } from "../state/commands";
+import { CANT, type Command, STAYS } from "../state/commands";
 import { discLimit } from "../state/focus_tiles";
 import { isSameView, keyOfChange, nameOfChange } from "../state/history";
 import { initialState } from "../state/initial_state";
@@ -50,6 +56,10 @@ const NEAR_AT_START = 1.1;
 /** Before these the place from which the specimen is seen is a step of its own. */
 const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset", "next-view"]);
 
+const NOTHING_AHEAD = "No tile is in the middle of the view.";
+const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
+const NEXT_KEPT = "` goes to the next.";
+
 const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
 
 export class Viewer {
@@ -74,7 +84,6 @@ export class Viewer {
   private readonly transition: StereoTransition;
   private readonly size: StageSize;
   private readonly steps: Steps;
-  private readonly sliceView: SliceView;
   private nextView = 0;
   private readonly disposed = new AbortController();
 
@@ -117,6 +126,7 @@ export class Viewer {
       renderer: this.renderer,
       picture: this.loop.picture,
       state: this.state,
+      view: stage.parentElement ?? stage,
       dispatch: (action) => this.dispatch(action),
       announce: (text) => this.onAnnounce(text),
       onChange: () => this.loop.come(),
@@ -124,15 +134,7 @@ export class Viewer {
     });
     const { marks, surfaces, volumes } = this.contents;
     stage.append(...marks.overlayElements);
-    this.room.specimen.group.add(surfaces.group, marks.group, this.contents.slicePlanes.group);
-    this.sliceView = new SliceView(stage.parentElement ?? stage, this.contents.slices, {
-      move: (point) => {
-        const at = sharesOf(point, manifest.specimen.bounds_um);
-        this.dispatch({ type: "move-slices", at });
-      },
-      turn: (about, by_deg) => this.turnSlices(about, by_deg),
-      window: (wider, higher) => this.shiftWindow(wider, higher),
-    });
+    this.room.specimen.group.add(surfaces.group, marks.group, this.contents.slices.group);
 
     this.navigation = new Navigation(canvas, place(manifest.specimen.bounds_um), () =>
       this.loop.change(),
@@ -217,6 +219,16 @@ export class Viewer {
 
   /** Do what is no change of the state; whether this was one of the viewer's commands. */
   run(command: Command): boolean {
+    const { state } = this;
+    const before = this.stereo.kind === null ? this.navigation.lookNow : null;
+    const isDone = this.carryOut(command);
+    const stays = STAYS[command];
+    const isSame = this.state === state && before !== null && isSameLook(before, this.navigation);
+    if (isDone && isSame && stays !== undefined) this.onAnnounce(stays);
+    return isDone;
+  }
+
+  private carryOut(command: Command): boolean {
     if (ENDS_A_LOOK.has(command)) this.steps.note();
     switch (command) {
       case "undo":
@@ -241,7 +253,9 @@ export class Viewer {
         break;
       case "press":
         if (this.stereo.kind !== null) return this.stereo.run(command, this.state);
-        this.tap(rayAhead(this.loop.head, this.room.specimen.group));
+        if (!this.tap(rayAhead(this.loop.head, this.room.specimen.group))) {
+          this.onAnnounce(this.state.isolated === null ? NOTHING_AHEAD : NO_OTHER_TILE);
+        }
         break;
       default: {
         const isInRoom = this.stereo.kind !== null;
@@ -255,10 +269,14 @@ export class Viewer {
     return true;
   }
 
-  /** What the screen shows as a PNG, so many times as large. Rejects with a DOMException. */
-  async picture(scale: number, onPart: (done: number, of: number) => void): Promise<Blob> {
+  /** What the screen shows as a PNG, so many times as large; null: it was left. Rejects with a DOMException. */
+  async picture(
+    scale: number,
+    onPart: (words: string) => void,
+    signal: AbortSignal,
+  ): Promise<Blob | null> {
     const { savePicture } = await this.loadCapture();
-    return savePicture(this.filmed, scale, onPart);
+    return savePicture(this.filmed, scale, onPart, signal);
   }
 
   /** Through the kept views, or once round; null: it was left. Rejects with a DOMException. */
@@ -289,6 +307,7 @@ export class Viewer {
       studio,
       height_px: stage.clientHeight,
       specimen: this.room.specimen.group.matrixWorld,
+      labelled: this.room.specimen.group,
       state: this.state,
       manifest: this.bundle.manifest,
     };
@@ -306,6 +325,8 @@ export class Viewer {
     const views = command === "forget-views" ? [] : [...keptViews, this.navigation.lookNow];
     this.nextView = 0;
     this.dispatch({ type: "keep-views", views });
+    const { length } = this.state.keptViews;
+    this.onAnnounce(length === 0 ? "No view is kept now." : `${length} kept: ${NEXT_KEPT}`);
     return true;
   }
 
@@ -412,6 +433,7 @@ export class Viewer {
     const { surfaces, volumes } = this.contents;
     return {
       state: this.state,
+      look: this.navigation.lookNow,
       hasFirstPicture: surfaces.hasFirst,
       overview: surfaces.overview,
       isLoading: this.contents.isLoading,
@@ -431,6 +453,7 @@ export class Viewer {
         programs: this.renderer.info.programs?.length ?? 0,
       },
       isStereo: this.stereo.kind !== null,
+      specimenAt: this.room.specimen.middle,
       told: this.stereo.hands.notice.texts,
     };
   }
@@ -478,23 +501,7 @@ export class Viewer {
 
   /** The channels' values where the slices meet, in the source's units; none: no slices show. */
   get sliceValues(): readonly string[] {
-    const { slices } = this.contents;
-    return slices.frames === null ? [] : slices.valuesAt(slices.point);
-  }
-
-  private turnSlices(about: Vec3, by_deg: number): void {
-    const { sliceTurnX_deg, sliceTurnY_deg, sliceTurnZ_deg } = this.state;
-    const turned = turnedBy([sliceTurnX_deg, sliceTurnY_deg, sliceTurnZ_deg], about, by_deg);
-    this.dispatch({ type: "move-slices", turn_deg: turned });
-  }
-
-  /** Of the first channel that is shown. */
-  private shiftWindow(wider: number, higher: number): void {
-    const channel = this.state.channels.find(({ shown }) => shown);
-    if (channel === undefined) return;
-    const [low, high] = channel.window;
-    const window = [low - wider / 2 - higher, high + wider / 2 - higher] as const;
-    this.dispatch({ type: "window", channel: channel.id, window });
+    return this.contents.slices.values;
   }
 
   /** Ask again for all that has failed. */
@@ -520,7 +527,6 @@ export class Viewer {
     const { manifest } = this.bundle;
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.contents.follow(this.state, this.hybrid);
-    this.sliceView.update(this.state.hasSlicePictures);
     this.room.mark(isolated === null ? selected : null);
     this.loop.setLevel(quality);
     this.loop.change();
@@ -541,11 +547,27 @@ export class Viewer {
     const { specimen } = this.room;
     const head = this.stereo.recentre();
     if (head === null) specimen.goHome();
-    else specimen.anchorAt(ahead(head, XR_DISTANCE_M));
+    else if (this.stereo.isInUsersRoom) {
+      const { position, orientation } = this.tableBefore(head);
+      specimen.anchorAt(position, ROOM_SIZE, orientation);
+    } else specimen.anchorAt(ahead(head, XR_DISTANCE_M));
+  }
+
+  /** Where things stand in the user's own room, facing a head. */
+  private tableBefore(head: Matrix4): HandPose {
+    const position = ahead(head, ROOM_DISTANCE_M);
+    const eye = new Vector3().setFromMatrixPosition(head);
+    const heading = Math.atan2(eye.x - position.x, eye.z - position.z);
+    const { hasFloor } = this.stereo.headset;
+    const height_m = hasFloor ? OVER_FLOOR_M : eye.y - UNDER_EYES_M;
+    const orientation = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), heading);
+    return { position: position.setY(height_m), orientation };
   }
 
   private enterStereo(): void {
-    this.transition.enter(this.state.specimenSize_m / START_TOOLS.specimenSize_m);
+    const { isInUsersRoom, head } = this.stereo;
+    const table = isInUsersRoom && head !== null ? this.tableBefore(head) : null;
+    this.transition.enter(this.state.specimenSize_m / START_TOOLS.specimenSize_m, table);
     this.onState(this.state);
   }
 
@@ -555,16 +577,19 @@ export class Viewer {
     this.onState(this.state);
   }
 
-  private tap(ray: Ray): void {
+  /** Whether there was anything to measure or to choose. */
+  private tap(ray: Ray): boolean {
     const tiles = shownTiles(this.bundle.manifest.tiles, this.state.isolated);
-    this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
+    return this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
   }
 
   /** Measure, or choose the tile; of one that is alone nothing is left to choose. */
-  private choose(ray: Ray, tile: string | null): void {
+  private choose(ray: Ray, tile: string | null): boolean {
     const { state } = this;
     if (state.tool === "measure") void this.contents.marks.measure(ray);
     else if (state.isolated === null && tile !== null) this.dispatch(chosenTile(state, tile));
+    else return false;
+    return true;
   }
 
   dispose(): void {
@@ -572,7 +597,6 @@ export class Viewer {
     this.size.dispose();
     this.disposed.abort();
     this.stereo.dispose();
-    this.sliceView.dispose();
     this.navigation.dispose();
     this.contents.dispose();
     this.loop.dispose();

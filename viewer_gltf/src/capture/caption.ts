@@ -4,6 +4,7 @@ import type { Matrix4 } from "three";
 import { type Axis, axesSeen } from "../annotations/orientation_axes";
 import { AXIS_COLORS } from "../annotations/style";
 import { chooseScaleBar } from "../math/round_length";
+import { type Corner, clearestOf, inCorners, type Rect } from "./label_boxes";
 
 export type LegendEntry = Readonly<{ name: string; hex: string; range: string }>;
 
@@ -14,62 +15,114 @@ export type Caption = Readonly<{
   axes: readonly Axis[];
   head: Matrix4;
   specimen: Matrix4;
+  /** Labels in the picture, pixels of the screen: what is written keeps clear of them. */
+  labels: readonly Rect[];
 }>;
 
 const FONT = 'system-ui, "Noto Sans", sans-serif';
+const BAR_FONT = `13px ${FONT}`;
+const NAME_FONT = `600 13px ${FONT}`;
+const RANGE_FONT = `12px ${FONT}`;
 const EDGE = 16;
 const LINE = 20;
+const BAR_HEIGHT = 28;
+/** Edge of the axes' square. */
+const AXES = 84;
+
+const CORNERS = {
+  bar: ["bottom-left", "bottom-right", "top-right", "top-left"],
+  axes: ["bottom-right", "top-right", "bottom-left", "top-left"],
+  legend: ["top-left", "top-right", "bottom-left", "bottom-right"],
+} as const satisfies Readonly<Record<string, readonly Corner[]>>;
 
 /** @param scale pixels of the picture to one of the screen */
 export function drawCaption(
   context: CanvasRenderingContext2D,
   { width, height }: Readonly<{ width: number; height: number }>,
   scale: number,
-  { um_per_px, legend, axes, head, specimen }: Caption,
+  { um_per_px, legend, axes, head, specimen, labels }: Caption,
 ): void {
   context.save();
   context.scale(scale, scale);
-  const [right, bottom] = [width / scale, height / scale];
+  const picture = { width: width / scale, height: height / scale };
+  const taken = [...labels];
+  const placeFor = (what: keyof typeof CORNERS, width: number, height: number): Rect => {
+    const place = clearestOf(inCorners(CORNERS[what], { width, height }, picture, EDGE), taken);
+    taken.push(place);
+    return place;
+  };
   context.shadowColor = "#000";
   context.shadowBlur = 3 * scale;
   context.textBaseline = "middle";
   context.lineCap = "round";
-  if (um_per_px !== null) drawScaleBar(context, bottom, um_per_px);
-  drawLegend(context, legend);
-  drawAxes(context, right - 48, bottom - 46, axes, axesSeen(head, specimen, axes));
+  const bar = um_per_px === null ? null : chooseScaleBar(um_per_px);
+  if (bar !== null) {
+    context.font = BAR_FONT;
+    const { width } = context.measureText(bar.label);
+    const place = placeFor("bar", Math.max(bar.length_px, width), BAR_HEIGHT);
+    drawScaleBar(context, place, bar);
+  }
+  const square = placeFor("axes", AXES, AXES);
+  const middle = AXES / 2;
+  drawAxes(context, square.x + middle, square.y + middle, axes, axesSeen(head, specimen, axes));
+  drawLegend(
+    context,
+    placeFor("legend", legendWidth(context, legend), LINE * legend.length),
+    legend,
+  );
   context.restore();
 }
 
-function drawScaleBar(context: CanvasRenderingContext2D, bottom: number, um_per_px: number): void {
-  const bar = chooseScaleBar(um_per_px);
-  if (bar === null) return;
-  const y = bottom - 36;
+function drawScaleBar(
+  context: CanvasRenderingContext2D,
+  { x, y }: Rect,
+  { length_px, label }: Readonly<{ length_px: number; label: string }>,
+): void {
+  const line = y + 6;
   context.strokeStyle = context.fillStyle = "#fff";
   context.lineWidth = 2;
   context.beginPath();
-  context.moveTo(EDGE, y - 4);
-  context.lineTo(EDGE, y);
-  context.lineTo(EDGE + bar.length_px, y);
-  context.lineTo(EDGE + bar.length_px, y - 4);
+  context.moveTo(x, line - 4);
+  context.lineTo(x, line);
+  context.lineTo(x + length_px, line);
+  context.lineTo(x + length_px, line - 4);
   context.stroke();
-  context.font = `13px ${FONT}`;
+  context.font = BAR_FONT;
   context.textAlign = "left";
-  context.fillText(bar.label, EDGE, y + 14);
+  context.fillText(label, x, line + 14);
 }
 
-function drawLegend(context: CanvasRenderingContext2D, legend: readonly LegendEntry[]): void {
+/** From the left: the dot, the name, the range. */
+const NAME_AT = 20;
+const GAP = 8;
+
+function legendWidth(context: CanvasRenderingContext2D, legend: readonly LegendEntry[]): number {
+  const widths = legend.map(({ name, range }) => {
+    context.font = NAME_FONT;
+    const named = context.measureText(name).width;
+    context.font = RANGE_FONT;
+    return NAME_AT + named + GAP + context.measureText(range).width;
+  });
+  return Math.max(0, ...widths);
+}
+
+function drawLegend(
+  context: CanvasRenderingContext2D,
+  { x, y: top }: Rect,
+  legend: readonly LegendEntry[],
+): void {
   context.textAlign = "left";
   legend.forEach(({ name, hex, range }, i) => {
-    const y = EDGE + 6 + i * LINE;
+    const y = top + 6 + i * LINE;
     context.fillStyle = hex;
     context.beginPath();
-    context.arc(EDGE + 6, y, 6, 0, 2 * Math.PI);
+    context.arc(x + 6, y, 6, 0, 2 * Math.PI);
     context.fill();
     context.fillStyle = "#fff";
-    context.font = `600 13px ${FONT}`;
-    context.fillText(name, EDGE + 20, y);
-    const after = EDGE + 28 + context.measureText(name).width;
-    context.font = `12px ${FONT}`;
+    context.font = NAME_FONT;
+    context.fillText(name, x + NAME_AT, y);
+    const after = x + NAME_AT + GAP + context.measureText(name).width;
+    context.font = RANGE_FONT;
     context.fillStyle = "#cfd6e4";
     context.fillText(range, after, y);
   });

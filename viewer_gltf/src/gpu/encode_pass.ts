@@ -10,6 +10,11 @@ export class EncodePass {
   private readonly pass = new ScreenPass(ENCODE_FRAGMENT, { uLight: nothing() });
   private readonly kept = new Vector4();
 
+  /** Whether what lies behind the picture shows where it is empty. */
+  set isSeeThrough(is: boolean) {
+    this.pass.define("SEE_THROUGH", is ? 1 : null);
+  }
+
   /** Over the whole of a target that is as large as the light's; null: the canvas. */
   render(
     renderer: WebGLRenderer,

@@ -38,6 +38,15 @@ export type Look = Readonly<{
   target: readonly [number, number, number];
 }>;
 
+/** Largest difference of two numbers of a look that is the same, m. */
+const SAME_M = 1e-4;
+
+/** Whether nothing has moved since the look was taken. */
+export function isSameLook(look: Look, { lookNow }: Pick<Navigation, "lookNow">): boolean {
+  const [was, is] = [look, lookNow].map(({ position, target }) => [...position, ...target]);
+  return was.every((v, i) => Math.abs(v - is[i]) < SAME_M);
+}
+
 export class Navigation {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
   readonly controls: OrbitControls;

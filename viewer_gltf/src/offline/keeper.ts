@@ -7,7 +7,7 @@
 import { checkFile, fileAddress } from "../bundle/fetch";
 import type { FileRef } from "../bundle/generated/bundle";
 import type { Asked } from "../bundle/request_log";
-import { type Keys, ownBundle, type Plan, planFor } from "./request_plan";
+import { isKept, type Keys, ownBundle, type Plan, planFor } from "./request_plan";
 import type { Store } from "./store";
 
 /** Longest wait for the network's answer, ms: then a kept copy is used. */
@@ -157,7 +157,7 @@ export class Keeper {
   ): Promise<Response> {
     const listed = (await this.listedOf(base)) ?? {};
     const ref = Object.hasOwn(listed, path) ? listed[path] : undefined;
-    if (ref === undefined) return fetch(request);
+    if (ref === undefined || !isKept({ path, ...ref })) return fetch(request);
     const range = request.headers.get("Range");
     const isAskedAnew = request.cache === "reload"; // what was kept has the wrong hash
     const part =

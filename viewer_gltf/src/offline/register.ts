@@ -18,8 +18,9 @@ export function canKeep(page: string, isSecure: boolean): boolean {
  * browser keeps nothing, as on a full disk: the viewer then works as before.
  *
  * @param onReady called once on the visit that made it so
+ * @param also addresses of files of the bundle that the page has not asked for
  */
-export async function keepOffline(onReady: () => void): Promise<void> {
+export async function keepOffline(onReady: () => void, also: readonly string[]): Promise<void> {
   const { serviceWorker } = navigator as { serviceWorker?: ServiceWorkerContainer };
   const isAble = !import.meta.env.DEV && canKeep(location.href, isSecureContext);
   if (!isAble || serviceWorker === undefined) {
@@ -47,7 +48,7 @@ export async function keepOffline(onReady: () => void): Promise<void> {
   const message: Opened = {
     type: "opened",
     page: location.href,
-    asked: wasServed ? [] : asked,
+    asked: [...(wasServed ? [] : asked), ...also.map((url) => ({ url, range: null }))],
     loaded,
   };
   active?.postMessage(message, [port2]);

@@ -1,10 +1,18 @@
 import { describe, expect, it } from "vitest";
-import { Keys, ownBundle, planFor } from "./request_plan";
+import { isKept, Keys, MAX_KEPT_USDZ_BYTES, ownBundle, planFor } from "./request_plan";
 
 const FOLDER = "https://host/cells/";
 const FIXED = ["app.webmanifest", "icon.svg"];
 const plan = (address: string, page: string | null = FOLDER) =>
   planFor(address, FOLDER, page, FIXED);
+
+it("keeps all of a bundle but what is large and drawn by no page", () => {
+  const large = MAX_KEPT_USDZ_BYTES + 1;
+  expect(isKept({ path: "volumes/a.ktx2", bytes: large })).toBe(true);
+  expect(isKept({ path: "specimen.usdz", bytes: large })).toBe(false);
+  expect(isKept({ path: "specimen.usdz", bytes: MAX_KEPT_USDZ_BYTES })).toBe(true);
+  expect(isKept(null)).toBe(false);
+});
 
 describe("the answer to a request", () => {
   it("is the page for its folder and its file, whatever the query", () => {

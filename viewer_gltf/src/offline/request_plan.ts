@@ -6,6 +6,7 @@
  */
 import { bundleAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
+import type { FileRef } from "../bundle/generated/bundle";
 
 export type Plan =
   | { kind: "page" }
@@ -14,6 +15,15 @@ export type Plan =
   | { kind: "manifest"; base: string }
   | { kind: "file"; base: string; path: string }
   | { kind: "none" };
+
+/** Largest file for a phone's own viewer of augmented reality that is kept: no page draws it. */
+export const MAX_KEPT_USDZ_BYTES = 4 * 1024 * 1024;
+
+/** Whether a bundle's file is kept for a visit without a network; null: there is none. */
+export function isKept(file: Pick<FileRef, "path" | "bytes"> | null): boolean {
+  if (file === null) return false;
+  return !file.path.endsWith(".usdz") || file.bytes <= MAX_KEPT_USDZ_BYTES;
+}
 
 const NONE: Plan = { kind: "none" };
 const ASSETS = "assets/";

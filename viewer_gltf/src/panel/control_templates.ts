@@ -106,7 +106,6 @@ export function paletteOf<On>(
   return { ...colourOf(row, on, channel), id, palettes: PALETTES };
 }
 
-/** The controls of those that change anything now. */
 export function controlsOf<On>(rows: readonly Parameter<On>[], on: On): readonly Control[] {
-  return rows.filter(({ isShown }) => isShown?.(on) ?? true).map((row) => controlOf(row, on));
+  return rows.map((row) => controlOf(row, on));
 }

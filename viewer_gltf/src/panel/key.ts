@@ -12,14 +12,28 @@ export type KeyContext = Readonly<{
   focusTile: string | null;
 }>;
 
+/** Why a key does nothing now, in words for the status line. */
+export type Refusal = Readonly<{ refusal: string }>;
+
 export type Key = Readonly<{
   /** As `keyName` has them; several mean the same. */
   keys: readonly string[];
   label: string;
-  /** null: there is nothing to do now. `name`: which of its keys it was. */
-  to: (context: KeyContext, name: string) => Wish | null;
+  /** @param name which of its keys it was */
+  to: (context: KeyContext, name: string) => Wish | Refusal;
 }>;
 export type KeyGroup = Readonly<{ name: string; keys: readonly Key[] }>;
+
+export function no(refusal: string): Refusal {
+  return { refusal };
+}
+
+export function isRefusal(answer: Wish | Refusal): answer is Refusal {
+  return typeof answer !== "string" && "refusal" in answer;
+}
+
+const NO_CHANNEL = no("No channel is shown.");
+const NOTHING = no("There is nothing that it changes now.");
 
 /** The item after (or before) the present one, round the end. */
 export function neighbour<T>(items: readonly T[], present: T | undefined, by: number): T | null {
@@ -35,6 +49,15 @@ export function meantChannel({ state, view }: KeyContext): ChannelState | undefi
   return shown.find(({ id }) => id === view.picked) ?? shown[0];
 }
 
+/** The meant channel, or why there is none. */
+export function withChannel(
+  context: KeyContext,
+  to: (channel: ChannelState) => Wish | Refusal,
+): Wish | Refusal {
+  const channel = meantChannel(context);
+  return channel === undefined ? NO_CHANNEL : to(channel);
+}
+
 export function key(keys: string | readonly string[], label: string, to: Wish | Key["to"]): Key {
   return {
     keys: typeof keys === "string" ? [keys] : keys,
@@ -47,15 +70,18 @@ export function key(keys: string | readonly string[], label: string, to: Wish | 
 export function ofChannel(
   name: string,
   label: string,
-  to: (channel: ChannelState) => Wish | null,
+  to: (channel: ChannelState) => Wish | Refusal,
 ): Key {
-  return key(name, label, (context) => {
-    const channel = meantChannel(context);
-    return channel === undefined ? null : to(channel);
-  });
+  return key(name, label, (context) => withChannel(context, to));
 }
 
-/** What keys do to a parameter; `find` gives what it is of, null: there is none now. */
+/** Why a parameter can't be set now; null: it can. */
+export function refusalOf<On>(row: Parameter<On>, on: On): Refusal | null {
+  const reason = row.refusal?.(on) ?? "";
+  return reason === "" ? null : no(reason);
+}
+
+/** What keys do to a parameter; `find` gives what it is of, null: there is no channel now. */
 function keysFor<On>(
   row: Parameter<On>,
   find: (context: KeyContext) => Readonly<{ on: On; channel?: string }> | null,
@@ -63,9 +89,11 @@ function keysFor<On>(
   const toValue = (next: (on: On) => Value | null): Key["to"] => {
     return (context) => {
       const found = find(context);
-      if (found === null || !(row.isShown?.(found.on) ?? true)) return null;
+      if (found === null) return NO_CHANNEL;
+      const refused = refusalOf(row, found.on);
+      if (refused !== null) return refused;
       const value = next(found.on);
-      return value === null ? null : setTo<Value>(row, value, found.channel);
+      return value === null ? NOTHING : setTo<Value>(row, value, found.channel);
     };
   };
   switch (row.kind) {

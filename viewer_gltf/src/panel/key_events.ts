@@ -15,6 +15,11 @@ export function keyName(pressed: Pressed): string {
   return `Ctrl+${pressed.shiftKey ? name.toUpperCase() : name.toLowerCase()}`;
 }
 
+/** Whether a key writes something: one character, and no space. */
+export function isWritten(name: string): boolean {
+  return [...name].length === 1 && name.trim() !== "";
+}
+
 function plainName({ key: written, code, shiftKey }: Pressed): string {
   if (written.length > 1) return shiftKey ? `Shift+${written}` : written;
   const [, letter] = /^Key([A-Z])$/.exec(code) ?? [];

@@ -11,7 +11,7 @@ import { STEREO_NUMBERS } from "../state/parameters/tools";
 import { reduce } from "../state/reduce";
 import { makeShape } from "../state/transfer_shapes";
 import { type PanelChange, START_VIEW } from "./controls";
-import type { KeyContext } from "./key";
+import { isRefusal, type KeyContext } from "./key";
 import { KEYS, wishOf } from "./keys";
 import { spokenFeedback } from "./spoken_feedback";
 
@@ -46,6 +46,26 @@ const CONTEXT: KeyContext = {
   focusTile: "r0_c2",
 };
 
+/** The same where volumes are marched, slices show and a tap measures. */
+const MARCHED: KeyContext = {
+  ...CONTEXT,
+  state: [
+    { type: "set", id: "mode", value: "disc" } as const,
+    { type: "set", id: "slice-pictures", value: true } as const,
+    { type: "set", id: "tool", value: "measure" } as const,
+    { type: "select", tile: "r0_c2" } as const,
+  ].reduce<KeyContext["state"]>(reduce, CONTEXT.state),
+};
+const CONTEXTS = [CONTEXT, MARCHED];
+
+/** What every key asks for where it does something. */
+const allWishes = () =>
+  CONTEXTS.flatMap((context) =>
+    ALL.flatMap(({ to, keys }) => keys.map((name) => to(context, name))),
+  ).filter((answer) => !isRefusal(answer));
+
+const REFUSED = { refusal: expect.stringMatching(/^[A-Z].*\.$/) };
+
 describe("the keys", () => {
   it("mean one thing each, and name it", () => {
     const names = ALL.flatMap(({ keys }) => keys);
@@ -54,7 +74,7 @@ describe("the keys", () => {
   });
 
   it("reach every action and every command", () => {
-    const wishes = ALL.map(({ to, keys }) => to(CONTEXT, keys[0]));
+    const wishes = allWishes();
     const actions = new Set(
       wishes.flatMap((wish) =>
         wish !== null && typeof wish !== "string" && "type" in wish ? [wish.type] : [],
@@ -88,6 +108,7 @@ describe("the keys", () => {
       reset: true,
       back: true,
       stereo: true,
+      room: true,
       undo: true,
       redo: true,
       split: true,
@@ -123,7 +144,7 @@ describe("the keys", () => {
   });
 
   it("reach every parameter, the light's and stereo's numbers by three keys", () => {
-    const wishes = ALL.flatMap(({ to, keys }) => keys.map((name) => to(CONTEXT, name)));
+    const wishes = allWishes();
     const set = new Set(
       wishes.flatMap((wish) =>
         wish !== null && typeof wish !== "string" && "id" in wish ? [wish.id] : [],
@@ -140,7 +161,7 @@ describe("the keys", () => {
   });
 
   it("reach what the panel keeps for itself, but for what is typed and what is folded", () => {
-    const wishes = ALL.map(({ to, keys }) => to(CONTEXT, keys[0]));
+    const wishes = allWishes();
     const changes = new Set(
       wishes.flatMap((wish) =>
         wish !== null && typeof wish !== "string" && "panel" in wish ? [wish.panel] : [],
@@ -178,10 +199,10 @@ describe("the keys", () => {
     const view = { ...START_VIEW, clipPart: "y-max" } as const;
     const inside = wishOf(",", { ...CONTEXT, view });
     expect(inside).toEqual(cut({ min, max: [max[0], -0.4, max[2]] }));
-    expect(wishOf(".", { ...CONTEXT, view })).toBeNull(); // there the specimen ends
+    expect(wishOf(".", { ...CONTEXT, view })).toEqual(REFUSED); // there the specimen ends
     const whole = reduce(CONTEXT.state, { type: "set-clip", clip: { box: null, plane: null } });
-    expect(wishOf(".", { ...CONTEXT, state: whole })).toBeNull();
-    expect(wishOf("N", { ...CONTEXT, state: whole })).toBeNull();
+    expect(wishOf(".", { ...CONTEXT, state: whole })).toEqual(REFUSED);
+    expect(wishOf("N", { ...CONTEXT, state: whole })).toEqual(REFUSED);
   });
 
   it("mean the channel with the open card, or the first one shown", () => {
@@ -214,13 +235,64 @@ describe("the keys", () => {
       value: false,
     });
     const marched = reduce(shown, { type: "set", id: "mode", value: "all" });
-    expect(wishOf("$", { ...CONTEXT, state: marched })).toBeNull();
+    expect(wishOf("$", { ...CONTEXT, state: marched })).toEqual(REFUSED);
   });
 
   it("do nothing where there is nothing to do", () => {
     expect(wishOf("F9", CONTEXT)).toBeNull();
     expect(wishOf("F12", CONTEXT)).toBeNull();
-    expect(wishOf("g", { ...CONTEXT, focusTile: null })).toBeNull();
+    expect(wishOf("g", { ...CONTEXT, focusTile: null })).toEqual(REFUSED);
+  });
+
+  it("change the state, or say why they don't", () => {
+    const start = initialState(sampleManifest(1));
+    const view = { ...START_VIEW, parameter: SLICE_NUMBERS[0].id };
+    const bare: KeyContext = { state: start, view, shown: SPECIMEN_BOX, focusTile: null };
+    const dark = reduce(start, { type: "show", channel: "c0", shown: false });
+    const atEnd = [
+      { type: "set", id: "slice-planes", value: true } as const,
+      { type: "set", id: "slice-x", value: 1 } as const,
+      { type: "set", id: "disc-radius", value: 40 } as const,
+      { type: "set", id: "switch-distance", value: 10 } as const,
+    ].reduce(reduce, start);
+    const contexts = {
+      traced: CONTEXT,
+      marched: MARCHED,
+      bare,
+      dark: { ...bare, state: dark },
+      atEnd: { ...bare, state: atEnd },
+    };
+    const silent: string[] = [];
+    for (const [where, context] of Object.entries(contexts)) {
+      for (const name of ALL.flatMap(({ keys }) => keys)) {
+        const wish = wishOf(name, context);
+        if (wish === null) throw new Error(name);
+        if (isRefusal(wish)) {
+          if (!/^[A-Z].*\.$/.test(wish.refusal)) silent.push(`${where} ${name}: ${wish.refusal}`);
+          continue;
+        }
+        if (typeof wish === "string" || "panel" in wish) continue; // the page's: see its test
+        const after = reduce(context.state, wish);
+        const text = spokenFeedback(wish, context.state, after, new Map());
+        const isSame = JSON.stringify(after) === JSON.stringify(context.state);
+        const isSaid =
+          "value" in wish && typeof wish.value !== "number"
+            ? text !== ""
+            : /: (it goes no further|the only one)$|^Slices: in the middle/.test(text);
+        if (isSame && !isSaid) {
+          silent.push(`${where} ${name}: ${text}`);
+        }
+      }
+    }
+    expect(silent).toEqual([]);
+    expect(wishOf("}", contexts.bare)).toEqual({ refusal: "No slices are shown." });
+    const said = (name: string) => {
+      const wish = wishOf(name, contexts.atEnd);
+      if (wish === null || isRefusal(wish)) throw new Error(name);
+      return spokenFeedback(wish, atEnd, atEnd, new Map());
+    };
+    expect(said("}")).toBe("Slices: x 100.0 %: it goes no further");
+    expect(said("D")).toBe("Disc 40°: it goes no further");
   });
 
   it("go to the next tile, also of those that are shown alone", () => {
@@ -243,9 +315,11 @@ describe("the keys", () => {
   it("are announced in words that name the new value", () => {
     const ranges = new Map([["c0", [100, 1120] as const]]);
     const after = (name: string) => {
-      const wish = wishOf(name, CONTEXT);
-      if (wish === null || typeof wish === "string" || "panel" in wish) throw new Error(name);
-      return spokenFeedback(wish, CONTEXT.state, reduce(CONTEXT.state, wish), ranges);
+      const wish = wishOf(name, MARCHED);
+      if (wish === null || typeof wish === "string" || "panel" in wish || isRefusal(wish)) {
+        throw new Error(name);
+      }
+      return spokenFeedback(wish, MARCHED.state, reduce(MARCHED.state, wish), ranges);
     };
     expect(after("o")).toBe("Marker 0: opacity 95 %");
     expect(after("e")).toBe("Marker 0: window 100 – 1104");

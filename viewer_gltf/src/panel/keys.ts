@@ -1,6 +1,6 @@
 /** Every key: the sections' lists, in the order of the list that `?` opens. Pure. */
 import type { Wish } from "./controls";
-import type { Key, KeyContext, KeyGroup } from "./key";
+import type { Key, KeyContext, KeyGroup, Refusal } from "./key";
 import { CHANNEL_KEYS } from "./sections/channel_keys";
 import { LIGHT_KEYS } from "./sections/path_trace_keys";
 import { SAVE_KEYS } from "./sections/save";
@@ -29,6 +29,7 @@ const BY_KEY: ReadonlyMap<string, Key> = new Map(
   ),
 );
 
-export function wishOf(name: string, context: KeyContext): Wish | null {
+/** What a key asks for, or why it does nothing now; null: there is no such key. */
+export function wishOf(name: string, context: KeyContext): Wish | Refusal | null {
   return BY_KEY.get(name)?.to(context, name) ?? null;
 }

@@ -27,6 +27,7 @@ const FACTS: Facts = {
   isStereo: false,
   stereo: { isAvailable: false, reason: "No headset was found." },
   split: null,
+  hasRoom: false,
   canScan: false,
   faultOfCode: () => "",
   frame_ms: 12.3,

@@ -11,7 +11,7 @@ import type { ViewerState } from "../state/viewer_state";
 import { clipPartName, cutText } from "./clip_by_key";
 import type { Wish } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
-import { intensityText, type Ranges } from "./sections/channels";
+import { type Ranges, windowTexts } from "./sections/channels";
 import { measuredText } from "./sections/measure";
 import { LENS_NAMES } from "./sections/stereo";
 
@@ -22,6 +22,34 @@ export function spokenFeedback(
   state: ViewerState,
   ranges: Ranges,
 ): string {
+  const text = spokenWish(wish, before, state, ranges);
+  if (typeof wish === "string" || "panel" in wish || !isSame(before, state)) return text;
+  return text === "" ? "That changes nothing." : `${text}${whyUnchanged(wish)}`;
+}
+
+/** Why an action has left all as it was: a step that has an end, or the next one of several. */
+function whyUnchanged(action: Action): string {
+  switch (action.type) {
+    case "set":
+      return typeof action.value === "number" ? ": it goes no further" : "";
+    case "window":
+    case "set-shapes":
+      return ": it goes no further";
+    case "choose-transfer-function":
+    case "select":
+    case "isolate":
+      return ": the only one";
+    default:
+      return "";
+  }
+}
+
+/** Tables of shapes are made anew by an edit that changes none of their numbers. */
+function isSame(before: ViewerState, after: ViewerState): boolean {
+  return before === after || JSON.stringify(before) === JSON.stringify(after);
+}
+
+function spokenWish(wish: Wish, before: ViewerState, state: ViewerState, ranges: Ranges): string {
   if (typeof wish === "string") return "";
   if (!("panel" in wish)) {
     if (wish.type === "set-clip") return cutText(before.clip, state.clip);
@@ -71,6 +99,8 @@ function spokenAction(action: Action, state: ViewerState, ranges: Ranges): strin
     }
     case "set-measurements":
       return `${state.measurements.length} measurements`;
+    case "move-slices":
+      return "Slices: in the middle, straight";
     case "move-lamp":
       return `Lamp ${action.lamp + 1}: moved`;
     default:
@@ -92,8 +122,7 @@ function spokenChannel(
     case "show":
       return `${name}: ${channel.shown ? "shown" : "hidden"}`;
     case "window": {
-      const ends = window.map((end) => intensityText(end, ranges.get(id)));
-      return `${name}: window ${ends.join(" – ")}`;
+      return `${name}: window ${windowTexts(window, ranges.get(id)).join(" – ")}`;
     }
     case "choose-transfer-function":
     case "set-shapes":

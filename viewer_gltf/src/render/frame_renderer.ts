@@ -146,6 +146,12 @@ export class Picture {
     this.show(isSmooth ? this.light : this.draft);
   }
 
+  /** Whether the user's own room shows behind. */
+  set isSeeThrough(is: boolean) {
+    this.room.isSeeThrough = is;
+    this.encode.isSeeThrough = is;
+  }
+
   /** Whether another frame of the view at rest would make the march's picture better. */
   get canGather(): boolean {
     return this.march.isShown && this.march.gathered < MOST_GATHERED;

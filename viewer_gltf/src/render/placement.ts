@@ -8,6 +8,13 @@ type Vec3 = readonly [number, number, number];
 export const LONGEST_EDGE_M = 1.2;
 /** From the eyes to the specimen's centre in a headset, m, at the eyes' height. */
 export const XR_DISTANCE_M = 1.1;
+/** In the user's own room: from the eyes, ahead, m; heights of its middle over the floor and under the eyes, m. */
+export const ROOM_DISTANCE_M = 0.9;
+export const OVER_FLOOR_M = 0.95;
+export const UNDER_EYES_M = 0.5;
+/** Its size there, as a factor to that in a headset: on a table, not round the user. */
+export const ROOM_SIZE = 0.4;
+
 /** Share of the picture that the specimen may fill at the start. */
 const FILL = 0.88;
 /** Least distance of the eye, as a multiple of the seen points' distance from the turning point. */

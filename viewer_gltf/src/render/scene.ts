@@ -25,11 +25,12 @@ export class Room {
   private readonly key = new DirectionalLight(colorOf(KEY), Math.PI);
   private readonly fill = new DirectionalLight(colorOf(FILL), Math.PI);
   private readonly outline: Box3Helper;
+  private readonly dark = new Color(BACKGROUND);
 
   constructor(private readonly manifest: Manifest) {
     this.specimen = new Specimen(manifest.specimen.bounds_um);
     const { group } = this.specimen;
-    this.scene.background = new Color(BACKGROUND);
+    this.scene.background = this.dark;
     this.scene.add(new HemisphereLight(colorOf(SKY), colorOf(GROUND), Math.PI));
     this.scene.add(this.key, this.key.target, this.fill, this.fill.target, group);
     this.outline = new Box3Helper(new Box3(), OUTLINE);
@@ -38,6 +39,11 @@ export class Room {
     material.opacity = 0.6;
     this.outline.visible = false;
     group.add(this.outline);
+  }
+
+  /** Whether it is the user's own room: nothing of ours is behind the specimen. */
+  set isSeeThrough(is: boolean) {
+    this.scene.background = is ? null : this.dark;
   }
 
   /** The lamp hangs over the viewer's left shoulder, wherever the viewer goes. */

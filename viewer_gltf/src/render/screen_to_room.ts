@@ -8,16 +8,23 @@ import { type HandPose, moveByOneHand, type SpecimenPose } from "../math/grab";
 /**
  * @param screen the point that the camera is turned about, and the camera's turn
  * @param ahead_m where that point comes to lie in the room
+ * @param facing of the eyes that look at it there
  */
-export function intoRoom(pose: SpecimenPose, screen: HandPose, ahead_m: Vector3): SpecimenPose {
-  return moveByOneHand(pose, screen, upright(ahead_m));
+export function intoRoom(
+  pose: SpecimenPose,
+  screen: HandPose,
+  ahead_m: Vector3,
+  facing = new Quaternion(),
+): SpecimenPose {
+  return moveByOneHand(pose, screen, { position: ahead_m, orientation: facing });
 }
 
 /** The inverse. */
-export function ontoScreen(pose: SpecimenPose, screen: HandPose, ahead_m: Vector3): SpecimenPose {
-  return moveByOneHand(pose, upright(ahead_m), screen);
-}
-
-function upright(position: Vector3): HandPose {
-  return { position, orientation: new Quaternion() };
+export function ontoScreen(
+  pose: SpecimenPose,
+  screen: HandPose,
+  ahead_m: Vector3,
+  facing = new Quaternion(),
+): SpecimenPose {
+  return moveByOneHand(pose, { position: ahead_m, orientation: facing }, screen);
 }

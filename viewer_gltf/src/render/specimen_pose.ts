@@ -23,6 +23,9 @@ export class Specimen {
   private way = 1;
   /** Where in the room the middle of what is shown is as long as nobody moves it. */
   readonly anchor = new Vector3();
+  /** As a factor to how large it opens. */
+  size = 1;
+  private readonly facing = new Quaternion();
   private readonly base: Matrix4;
   private focus: Bounds | null = null;
 
@@ -36,14 +39,27 @@ export class Specimen {
     this.apply();
   }
 
+  /** Its middle in the room, m. */
+  get middle(): [number, number, number] {
+    const [x, y, z] = place(this.bounds).center;
+    return new Vector3(x, y, z).applyMatrix4(this.group.matrixWorld).toArray();
+  }
+
   /** Metres of the room per um. */
   get scale(): number {
     return this.group.matrixWorld.getMaxScaleOnAxis();
   }
 
-  /** Put the middle of what is shown at a point of the room, at once. */
-  anchorAt(point: Vector3): void {
+  /**
+   * Put the middle of what is shown at a point of the room, at once.
+   *
+   * @param size as a factor to how large it opens
+   * @param facing where its z points to
+   */
+  anchorAt(point: Vector3, size = 1, facing = new Quaternion()): void {
     this.anchor.copy(point);
+    this.facing.copy(facing);
+    this.size = size;
     this.settle(this.home);
   }
 
@@ -59,16 +75,17 @@ export class Specimen {
 
   /** Where it is as long as nobody moves it. */
   get home(): SpecimenPose {
-    const orientation = new Quaternion();
-    const { focus } = this;
-    if (focus === null) return { position: this.anchor.clone(), orientation, scale: 1 };
+    const orientation = this.facing.clone();
+    const { focus, size } = this;
+    if (focus === null) return { position: this.anchor.clone(), orientation, scale: size };
     const whole = place(this.bounds);
     const tile = place(focus);
     const edge = ({ min, max }: Bounds, axis: 0 | 1) => Math.max(max[axis] - min[axis], 1e-9);
     const fits = ([0, 1] as const).map((axis) => edge(this.bounds, axis) / edge(focus, axis));
-    const scale = Math.min(...fits);
+    const scale = size * Math.min(...fits);
     const aside = new Vector3(...whole.center).sub(new Vector3(...tile.center));
-    const position = aside.multiplyScalar(scale * whole.scale).add(this.anchor);
+    const away = aside.multiplyScalar(scale * whole.scale).applyQuaternion(orientation);
+    const position = away.add(this.anchor);
     return { position, orientation, scale };
   }
 

@@ -5,6 +5,8 @@ export type Command =
   /** One step out: from an isolated tile to all, from a selected one to none. */
   | "back"
   | "stereo"
+  /** Stereo, or one picture on a phone, with the user's own room behind the specimen. */
+  | "room"
   /** One step of the history back, or on again. */
   | "undo"
   | "redo"
@@ -45,6 +47,23 @@ export type Command =
   | "pan-right"
   | "pan-up"
   | "pan-down";
+
+/** Why a command of the flat view has left it as it was. */
+export const STAYS: Partial<Record<Command, string>> = {
+  front: "It is seen from the front.",
+  side: "It is seen from the side.",
+  top: "It is seen from the top.",
+  reset: "The view is as it opened.",
+  "zoom-in": "It comes no nearer.",
+  "zoom-out": "It goes no farther.",
+  "turn-up": "It is seen from the top: it turns no further.",
+  "turn-down": "It is seen from below: it turns no further.",
+  "pan-left": "It moves no further: the middle of the view stays in the specimen.",
+  "pan-right": "It moves no further: the middle of the view stays in the specimen.",
+  "pan-up": "It moves no further: the middle of the view stays in the specimen.",
+  "pan-down": "It moves no further: the middle of the view stays in the specimen.",
+  "next-view": "That is the only kept view.",
+};
 
 /** The announcement where the viewer can't do what was asked for. */
 export const CANT = "This viewer can't do that here.";

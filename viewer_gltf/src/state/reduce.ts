@@ -15,7 +15,8 @@ function withChannel(
   id: string,
   change: (channel: ChannelState) => ChannelState,
 ): ViewerState {
-  return { ...state, channels: state.channels.map((c) => (c.id === id ? change(c) : c)) };
+  const channels = state.channels.map((c) => (c.id === id ? change(c) : c));
+  return channels.every((c, i) => c === state.channels[i]) ? state : { ...state, channels };
 }
 
 function withNotice(state: ViewerState, text: string): ViewerState {
@@ -68,11 +69,15 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "window": {
       const low = clamp(action.window[0], 0, 1 - NARROWEST_WINDOW);
       const high = clamp(action.window[1], low + NARROWEST_WINDOW, 1);
-      return withChannel(state, action.channel, (c) => ({ ...c, window: [low, high] }));
+      return withChannel(state, action.channel, (c) =>
+        c.window[0] === low && c.window[1] === high ? c : { ...c, window: [low, high] },
+      );
     }
     case "choose-transfer-function":
       return withChannel(state, action.channel, (c) =>
-        c.transferFunctions.includes(action.name) ? { ...c, transferFunction: action.name } : c,
+        c.transferFunctions.includes(action.name) && c.transferFunction !== action.name
+          ? { ...c, transferFunction: action.name }
+          : c,
       );
     case "set-shapes":
       return withChannel(state, action.channel, (c) => withShapes(c, action.name, action.shapes));

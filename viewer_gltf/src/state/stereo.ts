@@ -7,6 +7,8 @@ export type StereoSupport = Readonly<{
   stereo: XrSupport;
   /** null: there is none in this viewer. */
   split: XrSupport | null;
+  /** Whether the specimen can stand in the user's own room. */
+  hasRoom: boolean;
   /** Whether the browser reads QR codes. */
   canScan: boolean;
   /** The fault of the text of a phone viewer's code, in words; "": none. */

@@ -14,10 +14,9 @@ import {
   NormalBlending,
   type Object3D,
   OneFactor,
+  OneMinusSrcAlphaFactor,
   ReplaceStencilOp,
   ShaderMaterial,
-  SrcAlphaFactor,
-  ZeroFactor,
 } from "three";
 import {
   type BothEyes,
@@ -133,18 +132,17 @@ void main() {
 /** The picture of the volumes. */
 const MARCHED = `${includeChunks("#include <chunks/marched_light>", CHUNKS)}\n`;
 /**
- * Light, and in place of opacity the share that is left of what lies behind. In the disc both
- * pictures, of surface and of volume, are mixed: one laid over the other would be dark between.
+ * Light, times its opacity. In the disc both pictures, of surface and of volume, are mixed: one laid over
+ * the other would be dark between.
  */
 const BLENDED = `
 #ifndef OPAQUE
   float taken = shareTaken();
   float own = uOpacity * diffuseColor.a;
-  gl_FragColor = vec4(own * (1.0 - taken) * gl_FragColor.rgb, 1.0 - own * (1.0 - taken));
+  gl_FragColor = vec4(own * (1.0 - taken) * gl_FragColor.rgb, own * (1.0 - taken));
   if (uCrosses && taken > 0.0) {
     vec4 volume = marchedLight(gl_FragCoord.xy);
-    gl_FragColor.rgb += taken * volume.rgb;
-    gl_FragColor.a = (1.0 - taken) * (1.0 - own) + taken * (1.0 - volume.a);
+    gl_FragColor += taken * volume;
   }
 #endif
 `;
@@ -155,12 +153,10 @@ const AFTER_OPAQUE = 1;
 /** The layer in which only what writes the depth of translucent surfaces is; WebXR has 1 and 2. */
 export const PANES = 3;
 
-/** Blending of light with the share that is left of what lies behind, and the mark of it. */
-const LEAVES_A_SHARE = {
+/** Blending of light that has its opacity already, and the mark of it. */
+const LAID_OVER = {
   blendSrc: OneFactor,
-  blendDst: SrcAlphaFactor,
-  blendSrcAlpha: ZeroFactor,
-  blendDstAlpha: OneFactor,
+  blendDst: OneMinusSrcAlphaFactor,
   stencilRef: LAID,
   stencilFunc: AlwaysStencilFunc,
   stencilZPass: ReplaceStencilOp,
@@ -190,7 +186,7 @@ export class BlendedSurface {
       this.patch(material);
       both.adopt(material);
       material.forceSinglePass = true; // the depth that is written first sorts both sides
-      Object.assign(material, LEAVES_A_SHARE);
+      Object.assign(material, LAID_OVER);
     }
     this.depth = depthMaterial(this.uniforms, both, "if (isGone()) discard;");
     // A hair behind the colour that follows, whatever its rounding; not by slope, which would let

@@ -1,6 +1,6 @@
 import { CylinderGeometry, Mesh, MeshBasicMaterial } from "three";
 import { describe, expect, it } from "vitest";
-import { Hand } from "./controllers";
+import { Controllers, Hand } from "./controllers";
 
 /** Only what a hand reads of its source. */
 function handOf(source: Partial<Record<keyof XRInputSource, unknown>>): Hand {
@@ -31,5 +31,30 @@ describe("an input source", () => {
     const isTracked = (targetRayMode: string) => handOf({ targetRayMode }).isTracked;
     expect(["gaze", "screen"].map(isTracked)).toEqual([false, false]);
     expect(["tracked-pointer", "transient-pointer"].map(isTracked)).toEqual([true, true]);
+  });
+});
+
+describe("a finger on a screen", () => {
+  /** A tap that points along -z from (1, 2, 3), in a session of such a screen. */
+  function rayOfTap(interactionMode: XRInteractionMode) {
+    const session = Object.assign(new EventTarget(), { interactionMode, inputSources: [] });
+    const controllers = new Controllers();
+    controllers.begin(session as unknown as XRSession, {} as XRReferenceSpace);
+    const matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1];
+    const frame = { getPose: () => ({ transform: { matrix } }) };
+    const inputSource = { targetRayMode: "screen", targetRaySpace: {} };
+    session.dispatchEvent(Object.assign(new Event("select"), { inputSource, frame }));
+    const [event] = controllers.take();
+    return event.ray;
+  }
+
+  it("points at what it touches where the phone is held in a hand", () => {
+    const ray = rayOfTap("screen-space");
+    expect(ray?.origin.toArray()).toEqual([1, 2, 3]);
+    expect(ray?.direction.toArray()).toEqual([0, 0, -1]);
+  });
+
+  it("is the button of a phone in a viewer, which points as the head does", () => {
+    expect(rayOfTap("world-space")).toBeNull();
   });
 });

@@ -181,7 +181,10 @@ export class Controllers {
   }
 
   private rayOf(source: XRInputSource, frame: XRFrame): RoomRay | null {
-    if (source.targetRayMode === "gaze" || source.targetRayMode === "screen") return null;
+    if (source.targetRayMode === "gaze") return null;
+    // a finger on the one picture of a handheld screen points; in a Cardboard it is the button
+    const isHandheld = this.session?.interactionMode === "screen-space";
+    if (source.targetRayMode === "screen" && !isHandheld) return null;
     const pose = matrixOf(frame, source.targetRaySpace, this.space);
     if (pose === null) return null;
     return {

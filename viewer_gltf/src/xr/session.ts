@@ -1,4 +1,4 @@
-/** The immersive session: two eyes, the specimen in front of them. */
+/** The immersive session: two eyes, the specimen in front of them; in the user's own room a phone's one, too. */
 import { PerspectiveCamera, type WebGLRenderer } from "three";
 
 /** Wanted frames a second: 72 even ones look better than 90 or 120 of which some come late. */
@@ -6,10 +6,22 @@ const RATE_HZ = 72;
 /** Foveation, 0..1, where the layer offers it: the panel's text stays legible at the side. */
 const FOVEATION = 0.67;
 
+export type ImmersiveMode = "immersive-vr" | "immersive-ar";
+
+async function hasSpace(session: XRSession, type: XRReferenceSpaceType): Promise<boolean> {
+  return session.requestReferenceSpace(type).then(
+    () => true,
+    () => false,
+  );
+}
+
 export class XrSession {
   /** three moves it with the head; its clip planes hold for both eyes. Metres. */
   readonly camera = new PerspectiveCamera(70, 1, 0.05, 20);
   private session: XRSession | null = null;
+  private mode: ImmersiveMode = "immersive-vr";
+  /** Whether heights are from the floor; else from where the eyes are when it starts. */
+  hasFloor = false;
 
   constructor(
     private readonly renderer: WebGLRenderer,
@@ -17,8 +29,6 @@ export class XrSession {
     private readonly onEnd: () => void,
   ) {
     renderer.xr.enabled = true;
-    // The origin is where the eyes are when the session starts, whatever the body's height.
-    renderer.xr.setReferenceSpaceType("local");
   }
 
   get isRunning(): boolean {
@@ -35,18 +45,25 @@ export class XrSession {
     return this.session?.frameRate;
   }
 
+  /** Whether the user's own room shows behind the specimen. */
+  get isInUsersRoom(): boolean {
+    return this.session !== null && this.mode === "immersive-ar";
+  }
+
   /** Must be called from a click or a tap. Rejects if the browser or the user refuses. */
-  async start(xr: XRSystem): Promise<void> {
+  async start(xr: XRSystem, mode: ImmersiveMode = "immersive-vr"): Promise<void> {
     if (this.session !== null) return;
-    const session = await xr.requestSession("immersive-vr", {
-      optionalFeatures: ["local-floor"],
-    });
+    const session = await xr.requestSession(mode, { optionalFeatures: ["local-floor"] });
     this.session = session;
+    this.mode = mode;
     session.addEventListener("end", () => {
       this.session = null;
       this.onEnd();
     });
     try {
+      // the origin is where the eyes are when it starts, whatever the body's height; a table has its own
+      this.hasFloor = mode === "immersive-ar" && (await hasSpace(session, "local-floor"));
+      this.renderer.xr.setReferenceSpaceType(this.hasFloor ? "local-floor" : "local");
       await this.renderer.xr.setSession(session);
     } catch (error) {
       this.session = null; // so that it can be tried again

@@ -53,6 +53,8 @@ export class Stereo {
   /** A split screen that is being asked for. */
   private starting: Promise<readonly string[]> | null = null;
   private readonly between = new Matrix4();
+  /** In the user's own room, before the first frame with a head. */
+  private isArriving = false;
 
   constructor(
     private readonly renderer: WebGLRenderer,
@@ -61,7 +63,11 @@ export class Stereo {
     this.hands = new Hands({ ...options, xr: renderer.xr, onLeave: () => this.end() });
     this.headset = new XrSession(
       renderer,
-      () => this.begin(this.headset.current),
+      () => {
+        // where the head is in the user's own room the first frame tells
+        if (this.headset.isInUsersRoom) this.isArriving = true;
+        else this.begin(this.headset.current);
+      },
       () => this.leave(),
     );
   }
@@ -129,12 +135,21 @@ export class Stereo {
     if (this.renderer.xr.isPresenting) {
       spreadEyes(this.renderer.xr.getCamera().cameras, this.eyes.strength);
       eyes.followHeadset(this.renderer, this.headset.camera);
+      if (this.isArriving && eyes.all.length > 0) {
+        this.isArriving = false;
+        this.begin(this.headset.current);
+      }
       return this.headset.camera;
     }
     if (!this.split?.isRunning) return null;
     this.split.update();
     eyes.follow(this.split.eyes.map(({ camera, viewport }) => [camera, viewport]));
     return this.split.camera;
+  }
+
+  /** Whether the user's own room shows behind the specimen. */
+  get isInUsersRoom(): boolean {
+    return this.headset.isInUsersRoom;
   }
 
   /** The camera that sees what both eyes see. */
@@ -208,12 +223,14 @@ export class Stereo {
   }
 
   private begin(session: XRSession | null): void {
+    this.hands.panel.isTableBelow = this.isInUsersRoom;
     this.options.onStart();
     this.hands.start(session);
     if (isToBeTold()) this.hands.announce(HOW_IT_WORKS);
   }
 
   private leave(): void {
+    this.isArriving = false;
     this.hands.stop();
     this.options.onEnd();
   }

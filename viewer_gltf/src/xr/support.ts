@@ -7,6 +7,20 @@ export function wayToStereo({ isAvailable }: XrSupport, isPhone: boolean) {
   return isPhone ? "split" : null;
 }
 
+/** Whether the specimen can stand in the user's own room, by camera or through glass. */
+export async function showsUsersRoom(
+  xr: Pick<XRSystem, "isSessionSupported"> | undefined,
+  isSecure: boolean,
+): Promise<boolean> {
+  if (!isSecure || xr === undefined) return false;
+  try {
+    return await xr.isSessionSupported("immersive-ar");
+  } catch (error) {
+    if (!(error instanceof DOMException)) throw error;
+    return false;
+  }
+}
+
 /** @param xr `navigator.xr`, absent in browsers without WebXR or outside a secure context */
 export async function findXrSupport(
   xr: Pick<XRSystem, "isSessionSupported"> | undefined,

@@ -131,3 +131,44 @@ describeInChromium("what the page saves", () => {
     expect(csv.split("\r\n")[1]).toBe("Distance 1,distance,12,,8,-8,12,20,-8,12");
   });
 });
+
+describeInChromium("a traced picture that the page saves", () => {
+  const stand = prepareStand({ viewport: { width: 200, height: 160 }, pixelRatio: 0.5 });
+  const page = () => stand.viewer.page;
+  const said = () => page().locator("[data-said]").textContent();
+
+  it("gathers light until it is clear, part by part, and says so", async () => {
+    await stand.open("&mode=traced&quality=low#v=1&light=many:false");
+    await stand.viewer.settled();
+    await page().evaluate(() => {
+      const words = new Set<string>();
+      const line = document.querySelector("[data-said]");
+      if (line === null) throw new Error("nothing says anything");
+      new MutationObserver(() => words.add(line.textContent ?? "")).observe(line, {
+        childList: true,
+        characterData: true,
+        subtree: true,
+      });
+      Object.assign(window, { words });
+    });
+    await Promise.all([
+      page().waitForEvent("download", { timeout: 150_000 }),
+      page().keyboard.press('"'),
+    ]);
+    const words = await page().evaluate(() => [
+      ...(window as unknown as { words: Set<string> }).words,
+    ]);
+    for (const part of [1, 2, 3, 4]) {
+      expect(words).toContain(`Picture: part ${part} of 4, 192 of 192 samples of light`);
+    }
+  });
+
+  it("is left by the same key", async () => {
+    await stand.open("&mode=traced#v=1&light=many:false");
+    await stand.viewer.settled();
+    await page().keyboard.press('"');
+    await expect.poll(said).toContain("samples of light");
+    await page().keyboard.press('"');
+    await expect.poll(said).toBe("The picture was left.");
+  });
+});

@@ -103,6 +103,22 @@ describeInChromium("without a network", () => {
     expect(host.requests.length).toBe(asked);
   });
 
+  it("the file for iOS's own viewer is kept where it is small, and only there", async () => {
+    const hash = await hashOf(join(root, "specimen.usdz"));
+    const isThere = async () => (await keptFiles(viewer.page)).includes(hash);
+    await open("?mode=off");
+    await viewer.page.waitForFunction(isReady);
+    expect(await isThere()).toBe(false);
+    await viewer.page.addInitScript(() => {
+      const { supports } = DOMTokenList.prototype;
+      DOMTokenList.prototype.supports = function (token) {
+        return token === "ar" || supports.call(this, token);
+      };
+    });
+    await open("?mode=off");
+    await expect.poll(isThere).toBe(true);
+  });
+
   it("parts of files are kept as parts, by what they hold", async () => {
     await open();
     await viewer.drawVolume("Block", true);

@@ -100,3 +100,55 @@ describeInChromium("slices", () => {
     if (SHOTS) await page().screenshot({ path: `${SHOTS}/planes.png` });
   });
 });
+
+describeInChromium("slices whose code does not come", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 320 }, pixelRatio: 0.5 });
+
+  it("are asked for again, after a notice", async () => {
+    const { page } = stand.viewer;
+    const CODE = "**/assets/slices-*.js";
+    await page.route(CODE, (route) => route.abort());
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    await page.keyboard.press("|");
+    const notice = () => page.locator("[data-notices]").textContent();
+    await expect.poll(notice).toContain("that shows slices could not be loaded");
+    expect(await page.locator(".slices").count()).toBe(0);
+    await page.unroute(CODE);
+    await page.keyboard.press("R");
+    await stand.viewer.settled();
+    expect(await page.locator(".slices").count()).toBe(1);
+    expect(await notice()).toBe("");
+  });
+});
+
+describeInChromium("slices of a CT", () => {
+  const stand = prepareStand({ viewport: { width: 640, height: 420 }, pixelRatio: 0.5 });
+
+  it("have the patient's sides, and values and windows in Hounsfield units", async () => {
+    const { manifest, host, viewer } = stand;
+    const [first, ...others] = manifest.channels;
+    const sides = { left: [1, 0, 0], posterior: [0, 0, -1], superior: [0, 1, 0] };
+    const scan = {
+      ...manifest,
+      specimen: { ...manifest.specimen, modality: "CT", sides },
+      channels: [{ ...first, window: [-1024, 2000] }, ...others],
+    };
+    host.overrides.set("/bundle/manifest.json", { status: 200, body: JSON.stringify(scan) });
+    await stand.open("&mode=off#v=1&slices=on");
+    await viewer.settled();
+    const { page } = viewer;
+    const texts = (part: string) => page.locator(`.slices ${part}`).allTextContents();
+    expect(await texts("figcaption")).toEqual(["axial", "coronal", "sagittal"]);
+    // as a radiologist sees them: from the feet, from the front
+    expect(await texts(".end")).toEqual([..."RLAPRLSIAPSI"]);
+    for (const text of await texts(".values")) expect(text).toMatch(/-?\d+ HU/);
+    await page.keyboard.press("e");
+    const said = () => page.locator("[data-said]").textContent();
+    expect(await said()).toBe("F body: window -1024 – 1953 HU");
+    await viewer.openCard("F_x20_body");
+    expect(await page.locator('[data-channel="F_x20_body"]').textContent()).toContain(
+      "-1024 – 1953 HU",
+    );
+  });
+});

@@ -94,23 +94,6 @@ export class FirstHint {
   }
 }
 
-/** The way into stereo, on the picture itself; hidden where there is none. */
-export class StereoButton {
-  readonly root = element(
-    "button",
-    { type: "button", className: "to-stereo", textContent: "Stereo", hidden: true },
-    { overlay: "stereo" },
-  );
-
-  /** @param onClick called within the click, as browsers want it */
-  offer(way: "stereo" | "split" | null, onClick: () => void): void {
-    this.root.hidden = way === null;
-    this.root.title =
-      way === "split" ? "Split the screen for a phone viewer (P)" : "Enter stereo (V)";
-    this.root.onclick = onClick;
-  }
-}
-
 /** What a key or a button has just done, where nothing else shows it; it goes by itself. */
 export class Said {
   readonly root = element("p", { className: "said", role: "status" }, { said: "" });

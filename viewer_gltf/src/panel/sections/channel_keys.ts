@@ -4,7 +4,7 @@ import { CHANNEL, COLOR, VOLUME } from "../../state/parameters/channel";
 import { setTo } from "../../state/parameters/kinds";
 import type { ChannelState } from "../../state/viewer_state";
 import type { Wish } from "../controls";
-import { type Key, key, keysOfChannel, neighbour, ofChannel } from "../key";
+import { type Key, key, keysOfChannel, neighbour, no, ofChannel } from "../key";
 import { nextColour } from "../palettes";
 import { pagesOf } from "./channels";
 
@@ -14,7 +14,7 @@ function pick(by: number): Key["to"] {
   return ({ state, view }) => {
     const shown = state.channels.filter((each) => each.shown).map(({ id }) => id);
     const channel = neighbour(shown, view.picked ?? undefined, by);
-    return channel === null ? null : { panel: "pick", channel };
+    return channel === null ? no("No channel is shown.") : { panel: "pick", channel };
   };
 }
 
@@ -31,13 +31,15 @@ const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"] as const;
 export const CHANNEL_KEYS: readonly Key[] = [
   key(DIGITS, "Show or hide this channel of the bundle", ({ state }, name) => {
     const channel = state.channels[Number(name) - 1];
-    if (channel === undefined) return null;
+    if (channel === undefined) return no(`There is no channel ${name}.`);
     return { type: "show", channel: channel.id, shown: !channel.shown };
   }),
   key("/", "Find a channel that is not shown", "find"),
   key("A", "Next page of the channels that are not shown", ({ state, view }) => {
     const pages = pagesOf(state, view.search);
-    return pages === 1 ? null : { panel: "page", page: (view.page + 1) % pages };
+    return pages === 1
+      ? no("There is one page alone.")
+      : { panel: "page", page: (view.page + 1) % pages };
   }),
   key("c", "Next channel: the keys below mean it", pick(1)),
   key("C", "Previous channel", pick(-1)),
@@ -45,7 +47,9 @@ export const CHANNEL_KEYS: readonly Key[] = [
   ...keysOfChannel(VOLUME),
   ofChannel("f", "Next transfer function", ({ id, transferFunction, transferFunctions }) => {
     const name = neighbour(transferFunctions, transferFunction, 1);
-    return name === null ? null : { type: "choose-transfer-function", channel: id, name };
+    return name === null
+      ? no("It has no transfer function.")
+      : { type: "choose-transfer-function", channel: id, name };
   }),
   ofChannel("k", "Next colour of the palettes", ({ id, color }) =>
     setTo(COLOR, fromHex(nextColour(toHex(color))), id),

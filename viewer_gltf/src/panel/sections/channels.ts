@@ -17,8 +17,10 @@ export const PAGE = 6;
 /** Steps of a window's slider: the volumes have 8 bits. */
 const WINDOW_STEPS = 255;
 
-/** The voxel values of the source that are 0 and 255 in the volumes, by channel. */
-export type Ranges = ReadonlyMap<string, readonly [number, number]>;
+/** The voxel values of the source that are 0 and 255 in a volume, and their unit, where there is one. */
+export type Range = readonly [start: number, end: number, unit?: string];
+/** By channel. */
+export type Ranges = ReadonlyMap<string, Range>;
 
 function tagsOf({ hasSurface, surfaceReason }: ChannelState): string[] {
   if (surfaceReason !== "") return [surfaceReason.split(":", 1)[0]];
@@ -37,9 +39,19 @@ function shownToggle({ id, name, shown }: ChannelState): Control {
 }
 
 /** A share of the intensities as the source counts them. */
-export function intensityText(share: number, range: readonly [number, number] | undefined): string {
+export function intensityText(share: number, range: Range | undefined): string {
   if (range === undefined) return `${Math.round(100 * share)} %`;
-  return valueText(range[0] + (range[1] - range[0]) * share, range);
+  const [start, end] = range;
+  return valueText(start + (end - start) * share, [start, end]);
+}
+
+/** Both ends of a window, the unit behind the upper one. */
+export function windowTexts(
+  [low, high]: readonly [number, number],
+  range: Range | undefined,
+): readonly [string, string] {
+  const unit = range?.[2] ?? "";
+  return [intensityText(low, range), `${intensityText(high, range)} ${unit}`.trim()];
 }
 
 function cardOf(
@@ -91,7 +103,7 @@ function cardOf(
         name: `Window of ${name}`,
         value: channel.window,
         steps: WINDOW_STEPS,
-        texts: [intensityText(channel.window[0], range), intensityText(channel.window[1], range)],
+        texts: windowTexts(channel.window, range),
         to: toWindow,
       },
       paletteOf(COLOR, channel, `${id}/palette`, id),

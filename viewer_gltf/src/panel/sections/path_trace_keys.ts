@@ -7,11 +7,12 @@ import {
   LIGHT_NUMBERS,
   MEDIUM,
   ROOM,
+  TRACED_ALONE,
 } from "../../state/parameters/light";
 import { STEREO_NUMBERS } from "../../state/parameters/tools";
 import { isTraced, MODE } from "../../state/parameters/volumes";
 import type { ViewerState } from "../../state/viewer_state";
-import { type Key, key, keysOf, neighbour } from "../key";
+import { type Key, key, keysOf, neighbour, no, refusalOf } from "../key";
 
 /** The keys that switch the lamps. */
 const LAMP_KEYS: readonly string[] = ["!", "@", "#"];
@@ -22,7 +23,7 @@ function nextNumber(by: number): Key["to"] {
   return ({ view }) => {
     const ids = NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, by);
-    return parameter === null ? null : { panel: "parameter", parameter };
+    return parameter === null ? no("There is no number.") : { panel: "parameter", parameter };
   };
 }
 
@@ -30,6 +31,8 @@ function turn(steps: number): Key["to"] {
   return ({ state, view }) => {
     const row = NUMBERS.find(({ id }) => id === view.parameter) ?? NUMBERS[0];
     const at = shareOf(row, row.get(state)) + (2 * steps) / row.steps;
+    const refused = refusalOf(row, state);
+    if (refused !== null) return refused;
     return setTo(row, valueAtShare(row, Math.min(1, Math.max(0, at))));
   };
 }
@@ -43,10 +46,12 @@ export const LIGHT_KEYS: readonly Key[] = [
   key("[", "Less of it", turn(-1)),
   key("]", "More of it", turn(1)),
   ...[...MEDIUM, ...ROOM].flatMap(keysOf),
-  key("U", "Light of a .hdr or .exr file", "own-light"),
+  key("U", "Light of a .hdr or .exr file", ({ state }) =>
+    isTraced(state) ? "own-light" : no(TRACED_ALONE),
+  ),
   key(LAMP_KEYS, "Lamp 1, 2 or 3 on or off", ({ state }, name) => {
     const { isOn } = LAMP[LAMP_KEYS.indexOf(name)];
-    return setTo(isOn, !isOn.get(state));
+    return refusalOf(isOn, state) ?? setTo(isOn, !isOn.get(state));
   }),
   ...keysOf(LAMPS_SHOWN),
   ...AFTER.flatMap(keysOf),

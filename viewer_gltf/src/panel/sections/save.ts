@@ -3,7 +3,7 @@ import { PICTURE_PARAMETERS } from "../../state/parameters/tools";
 import type { ViewerState } from "../../state/viewer_state";
 import { command, controlsOf } from "../control_templates";
 import type { Control } from "../controls";
-import { type Key, key, keysOf } from "../key";
+import { type Key, key, keysOf, no } from "../key";
 
 export function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
   const { length } = state.keptViews;
@@ -11,21 +11,23 @@ export function saveItems(state: ViewerState, isFilming: boolean): readonly Cont
   const none = length === 0 ? "No view is kept." : "";
   return [
     ...controlsOf(PICTURE_PARAMETERS, state),
-    command("save-picture", "Save the picture"),
-    command("save-video", isFilming ? "Leave the video" : `Save a video, ${path}`),
+    command("save-picture", isFilming ? "Leave it" : "Save the picture"),
+    command("save-video", isFilming ? "Leave it" : `Save a video, ${path}`),
     command("keep-view", length === 0 ? "Keep this view" : `Keep this view (${length} kept)`),
     { ...command("next-view", "Next kept view"), refusal: none },
     { ...command("forget-views", "Forget them"), name: "Forget the kept views", refusal: none },
   ];
 }
 
+const NO_VIEW = no("No view is kept: ' keeps this one.");
+
 export const SAVE_KEYS: readonly Key[] = [
   ...PICTURE_PARAMETERS.flatMap(keysOf),
-  key('"', "Save the picture", "save-picture"),
+  key('"', "Save the picture; again: leave it", "save-picture"),
   key(")", "Save a video: once round, or through the kept views; again: leave it", "save-video"),
   key("'", "Keep this view for a video", "keep-view"),
-  key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? null : "next-view")),
+  key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? NO_VIEW : "next-view")),
   key("End", "Forget the kept views", ({ state }) =>
-    state.keptViews.length === 0 ? null : "forget-views",
+    state.keptViews.length === 0 ? NO_VIEW : "forget-views",
   ),
 ];

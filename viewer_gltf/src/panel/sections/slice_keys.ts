@@ -1,7 +1,13 @@
 /** The keys of the slice planes: one chooses a number of them, two turn it. Pure. */
 import { setTo, shareOf, valueAtShare } from "../../state/parameters/kinds";
-import { SLICE_NUMBERS, SLICE_PICTURES, SLICE_PLANES } from "../../state/parameters/slices";
-import { type Key, key, keysOf, neighbour } from "../key";
+import {
+  isSliced,
+  NO_SLICES,
+  SLICE_NUMBERS,
+  SLICE_PICTURES,
+  SLICE_PLANES,
+} from "../../state/parameters/slices";
+import { type Key, key, keysOf, neighbour, no, refusalOf } from "../key";
 import { STRAIGHT } from "./slices";
 
 /** Steps of a number's slider by one press. */
@@ -11,6 +17,8 @@ function turn(steps: number): Key["to"] {
   return ({ state, view }) => {
     const row = SLICE_NUMBERS.find(({ id }) => id === view.parameter) ?? SLICE_NUMBERS[0];
     const at = shareOf(row, row.get(state)) + steps / row.steps;
+    const refused = refusalOf(row, state);
+    if (refused !== null) return refused;
     return setTo(row, valueAtShare(row, Math.min(1, Math.max(0, at))));
   };
 }
@@ -21,9 +29,11 @@ export const SLICE_KEYS: readonly Key[] = [
   key("^", "Next number of the slices: where they meet, how they are turned", ({ view }) => {
     const ids = SLICE_NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, 1);
-    return parameter === null ? null : { panel: "parameter", parameter };
+    return parameter === null ? no("There is no number.") : { panel: "parameter", parameter };
   }),
   key("{", "Less of it", turn(-STEPS)),
   key("}", "More of it", turn(STEPS)),
-  key("~", "Slices to the middle, straight", STRAIGHT),
+  key("~", "Slices to the middle, straight", ({ state }) =>
+    isSliced(state) ? STRAIGHT : no(NO_SLICES),
+  ),
 ];

@@ -24,6 +24,7 @@ export function stereoItems(
 ): readonly Control[] {
   return [
     { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },
+    ...(facts.hasRoom ? [command("room", "In your room (AR)")] : []),
     ...(facts.split === null ? [] : splitItems(facts.split, facts, view)),
     ...controlsOf(STEREO_PARAMETERS, state),
   ];

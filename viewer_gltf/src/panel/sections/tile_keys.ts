@@ -1,12 +1,12 @@
 /** The keys of the tiles. Pure. */
-import { type Key, key, neighbour } from "../key";
+import { type Key, key, neighbour, no } from "../key";
 import { chosenTile } from "./tiles";
 
 function nextTile(by: number): Key["to"] {
   return ({ state }) => {
     const ids = state.tiles.map(({ id }) => id);
     const tile = neighbour(ids, state.isolated ?? state.selected ?? undefined, by);
-    if (tile === null) return null;
+    if (tile === null) return no("There is no tile.");
     return state.isolated === null ? { type: "select", tile } : { type: "isolate", tile };
   };
 }
@@ -18,10 +18,13 @@ export const TILE_KEYS: readonly Key[] = [
     const { state, focusTile } = context;
     if (state.isolated !== null) return { type: "isolate", tile: null };
     const tile = state.selected ?? focusTile;
-    return tile === null ? null : { type: "isolate", tile };
+    if (tile === null) return no("Choose a tile, or look at one.");
+    return { type: "isolate", tile };
   }),
   key("g", "Choose the tile that is looked at", ({ state, focusTile }) =>
-    focusTile === null ? null : chosenTile(state, focusTile),
+    focusTile === null ? no("No tile is looked at.") : chosenTile(state, focusTile),
   ),
-  key(["Escape", "Backspace"], "Back: all tiles, then none chosen", "back"),
+  key(["Escape", "Backspace"], "Back: all tiles, then none chosen", ({ state }) =>
+    state.isolated === null && state.selected === null ? no("No tile is chosen.") : "back",
+  ),
 ];

@@ -3,34 +3,43 @@
 import { allOf, missing } from "../../state/measurements";
 import { groupNotices } from "../../state/notice_groups";
 import { MEASURE_PARAMETERS } from "../../state/parameters/tools";
-import { chosenClipPart, clipPartsOf, moveClipPart } from "../clip_by_key";
-import { type Key, key, keysOf, neighbour } from "../key";
+import { chosenClipPart, clipPartName, clipPartsOf, moveClipPart } from "../clip_by_key";
+import { type Key, key, keysOf, neighbour, no } from "../key";
 import { middleBox, middlePlane } from "../layout";
 import { clearMeasured } from "./measure";
+
+const NOT_CUT = no("Nothing is cut: b cuts by a box, n by a plane.");
+const NOT_MEASURED = no("Nothing is measured.");
 
 function nextClipPart(by: number): Key["to"] {
   return ({ state: { clip }, view }) => {
     const clipPart = neighbour(clipPartsOf(clip), view.clipPart ?? undefined, by);
-    return clipPart === null ? null : { panel: "clip-part", clipPart };
+    return clipPart === null ? NOT_CUT : { panel: "clip-part", clipPart };
   };
 }
 
 function push(steps: number): Key["to"] {
   return ({ state: { clip }, view, shown }) => {
     const clipPart = chosenClipPart(clip, view.clipPart);
-    return clipPart === undefined ? null : moveClipPart(clipPart, steps, clip, shown);
+    if (clipPart === undefined) return NOT_CUT;
+    return (
+      moveClipPart(clipPart, steps, clip, shown) ??
+      no(`${clipPartName(clipPart)}: it goes no further.`)
+    );
   };
 }
 
 export const TOOL_KEYS: readonly Key[] = [
   ...MEASURE_PARAMETERS.flatMap(keysOf),
   key("Enter", "Tap in the middle of the view", "press"),
-  key("_", "The measurement is done: it goes to the list", ({ state }) =>
-    missing(state.measuredAs, state.measured) > 0 ? null : { type: "finish-measuring" },
-  ),
-  key("u", "Clear the newest measurement", ({ state }) => clearMeasured(state)),
+  key("_", "The measurement is done: it goes to the list", ({ state }) => {
+    if (state.measured.length === 0) return no("No measurement is being made.");
+    if (missing(state.measuredAs, state.measured) > 0) return no("It needs more points.");
+    return { type: "finish-measuring" };
+  }),
+  key("u", "Clear the newest measurement", ({ state }) => clearMeasured(state) ?? NOT_MEASURED),
   key("(", "Save the measurements as CSV", ({ state }) =>
-    allOf(state).length === 0 ? null : "save-csv",
+    allOf(state).length === 0 ? NOT_MEASURED : "save-csv",
   ),
   key("b", "Cut by a box: on or off", ({ state: { clip }, shown }) => ({
     type: "set-clip",
@@ -47,10 +56,10 @@ export const TOOL_KEYS: readonly Key[] = [
   key("l", "Copy a link to this view", "share"),
   key("Delete", "Dismiss the newest notice", ({ state }) => {
     const newest = groupNotices(state.notices).at(-1);
-    return newest === undefined ? null : { type: "dismiss", texts: newest.of };
+    return newest === undefined ? no("There is no notice.") : { type: "dismiss", texts: newest.of };
   }),
   key("R", "Try again what the network failed to bring", ({ state }) =>
-    state.mendable.length === 0 ? null : "retry",
+    state.mendable.length === 0 ? no("Nothing has failed to come.") : "retry",
   ),
   key("h", "Hide or show the panel", { panel: "hide" }),
   key("?", "This list", { panel: "help" }),

@@ -15,6 +15,7 @@ import {
   START_VIEW,
   type Wish,
 } from "../controls";
+import { isRefusal } from "../key";
 import { wishOf } from "../keys";
 import { spokenFeedback } from "../spoken_feedback";
 import { transferFunction2dItems } from "./transfer_function_2d";
@@ -78,7 +79,8 @@ class Controller {
 
   press(name: string): void {
     const { state, view } = this;
-    this.grant(wishOf(name, { state, view, shown: SPECIMEN_BOX, focusTile: null }));
+    const wish = wishOf(name, { state, view, shown: SPECIMEN_BOX, focusTile: null });
+    this.grant(wish === null || isRefusal(wish) ? null : wish);
   }
 }
 

@@ -5,18 +5,22 @@ import { removeShape, replaceShape } from "../../state/transfer_shapes";
 import type { ChannelState } from "../../state/viewer_state";
 import type { PanelView, Wish } from "../controls";
 import { editedShapes, meantShape, SHAPE_NUMBERS, withNewShape } from "../edit_shapes";
-import { type Key, key, meantChannel, neighbour, ofChannel } from "../key";
+import { type Key, key, neighbour, no, ofChannel, type Refusal, withChannel } from "../key";
 import { nextColour } from "../palettes";
 import { refusalOf, setShapes } from "./transfer_function_2d";
 
 /** One step of a shape's number, 0..1: five cells of its table. */
 const SHAPE_STEP = 5 / 255;
 
+const NO_SHAPE = no("There is no shape: Q adds a rectangle, Y a triangle.");
+
 function addShapeOf(kind: Shape["kind"]) {
-  return (channel: ChannelState): Wish | null => {
-    if (refusalOf(channel) !== "") return null;
+  return (channel: ChannelState): Wish | Refusal => {
+    const reason = refusalOf(channel);
+    if (reason !== "") return no(reason);
     const shapes = withNewShape(channel, kind);
-    return shapes.length > MAX_SHAPES ? null : setShapes(channel, shapes);
+    if (shapes.length > MAX_SHAPES) return no(`There are ${MAX_SHAPES} shapes: no more.`);
+    return setShapes(channel, shapes);
   };
 }
 
@@ -26,18 +30,20 @@ function ofShape(
   label: string,
   to: (shape: Shape, view: PanelView) => Shape | null,
 ): Key {
-  return key(name, label, (context) => {
-    const channel = meantChannel(context);
-    if (channel === undefined || refusalOf(channel) !== "") return null;
-    const shapes = editedShapes(channel);
-    const index = meantShape(context.view.shape, shapes);
-    if (index === null) return null;
-    const changed = to(shapes[index], context.view);
-    return setShapes(
-      channel,
-      changed === null ? removeShape(shapes, index) : replaceShape(shapes, index, changed),
-    );
-  });
+  return key(name, label, (context) =>
+    withChannel(context, (channel) => {
+      const reason = refusalOf(channel);
+      if (reason !== "") return no(reason);
+      const shapes = editedShapes(channel);
+      const index = meantShape(context.view.shape, shapes);
+      if (index === null) return NO_SHAPE;
+      const changed = to(shapes[index], context.view);
+      return setShapes(
+        channel,
+        changed === null ? removeShape(shapes, index) : replaceShape(shapes, index, changed),
+      );
+    }),
+  );
 }
 
 function changeNumber(steps: number) {
@@ -55,18 +61,19 @@ export const SHAPE_KEYS: readonly Key[] = [
   })),
   ofChannel("Q", "Add a rectangle", addShapeOf("rectangle")),
   ofChannel("Y", "Add a triangle", addShapeOf("triangle")),
-  key("J", "Next shape: the keys below mean it", (context) => {
-    const channel = meantChannel(context);
-    const shapes = channel === undefined ? [] : editedShapes(channel);
-    const present = meantShape(context.view.shape, shapes);
-    if (present === null) return null;
-    const { length: count } = shapes;
-    return { panel: "shape", shape: { index: (present + 1) % count, count }, grasp: null };
-  }),
+  key("J", "Next shape: the keys below mean it", (context) =>
+    withChannel(context, (channel) => {
+      const shapes = editedShapes(channel);
+      const present = meantShape(context.view.shape, shapes);
+      if (present === null) return NO_SHAPE;
+      const { length: count } = shapes;
+      return { panel: "shape", shape: { index: (present + 1) % count, count }, grasp: null };
+    }),
+  ),
   key(";", "Next number of the shape", ({ view }) => {
     const ids = SHAPE_NUMBERS.map(({ id }) => id);
     const id = neighbour(ids, view.shapeNumber ?? ids[0], 1);
-    return id === null ? null : { panel: "shape-number", id };
+    return id === null ? NO_SHAPE : { panel: "shape-number", id };
   }),
   ofShape("<", "Less of it", changeNumber(-1)),
   ofShape(">", "More of it", changeNumber(1)),

@@ -1,6 +1,6 @@
 /** The keys of the view, on the screen and in stereo. Pure. */
 import { STEREO_PARAMETERS } from "../../state/parameters/tools";
-import { type Key, key, keysOf, neighbour } from "../key";
+import { type Key, key, keysOf, neighbour, no } from "../key";
 import { LENSES } from "./stereo";
 
 export const VIEW_KEYS: readonly Key[] = [
@@ -21,9 +21,10 @@ export const VIEW_KEYS: readonly Key[] = [
   key("Ctrl+z", "Undo the last change of the view", "undo"),
   key(["Ctrl+Z", "Ctrl+y"], "Redo what was undone", "redo"),
   key("V", "Enter stereo (VR), or leave it", "stereo"),
+  key("Home", "The specimen in your room (AR), or leave it", "room"),
   key("L", "Next phone viewer", ({ view }) => {
     const lenses = neighbour(LENSES, view.lenses, 1);
-    return lenses === null ? null : { panel: "lenses", lenses };
+    return lenses === null ? no("There is no phone viewer.") : { panel: "lenses", lenses };
   }),
   key("P", "Split screen for a phone viewer", "split"),
   key("K", "Scan the phone viewer's code", "scan"),

@@ -22,8 +22,6 @@ type Row<On, T extends Value> = Readonly<{
   refusal?: (on: On) => string;
   /** What it does, in a sentence, where its name can't say it. */
   about?: string;
-  /** Whether there is anything that it changes; absent: always. */
-  isShown?: (on: On) => boolean;
   get: (on: On) => T;
   /** The announcement once a key has set it. */
   spoken: (on: On) => string;

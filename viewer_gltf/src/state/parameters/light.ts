@@ -35,6 +35,10 @@ export type LightSettings = Readonly<typeof START_LIGHT>;
 
 type Light = LightSettings & Pick<VolumeSettings, "mode">;
 
+/** Why nothing of the light can be set: nothing is drawn by it. */
+export const TRACED_ALONE = "Only paths of light have it: G begins them.";
+const refusal = (on: Light) => (isTraced(on) ? "" : TRACED_ALONE);
+
 const lens = lensesOf<Light>();
 const traceLens = lensesOf<TraceSettings>();
 const lampLens = lensesOf<Lamp>();
@@ -86,6 +90,7 @@ function numbersOf<K extends string & keyof TraceSettings>(
       kind: "number",
       id: `trace/${name}`,
       link: name,
+      refusal,
       steps: 100,
       rounded,
       ...numbers[name],
@@ -101,6 +106,7 @@ const MULTIPLE: SwitchParameter<Light> = {
   id: "trace/multiple",
   label: "Scattered many times",
   link: "many",
+  refusal,
   ...ofTrace("isMultiple"),
   key: ["M", "Scattered once or many times"],
   spoken: ({ trace }) => `Scattered ${trace.isMultiple ? "many times" : "once"}`,
@@ -111,6 +117,7 @@ export const ENVIRONMENT: ChoiceParameter<Light, EnvironmentName> = {
   id: "trace-room",
   label: "Room",
   link: "room",
+  refusal,
   ...ofTrace("environment"),
   values: ENVIRONMENTS,
   names: { studio: "Studio", sky: "Sky", own: "Own" },
@@ -127,8 +134,8 @@ export const LAMPS_SHOWN: SwitchParameter<Light> = {
   label: "Show lamps",
   name: () => "Show the lamps, to be dragged",
   link: "lamps",
+  refusal,
   ...lens("areLampsShown"),
-  isShown: isTraced,
   key: ["$", "Show or hide the lamps, to be dragged"],
   spoken: ({ areLampsShown, trace }) => {
     if (!areLampsShown) return "Lamps hidden";
@@ -142,6 +149,7 @@ const POST: SwitchParameter<Light> = {
   label: "After (off: before)",
   name: () => "Show the picture after these changes",
   link: "after",
+  refusal,
   ...ofTrace("isPostOn"),
   key: ["Z", "Before or after what comes after the light"],
   spoken: ({ trace }) => (trace.isPostOn ? "After" : "Before"),
@@ -152,6 +160,7 @@ const TONE_MAP: ChoiceParameter<Light, TraceSettings["toneMap"]> = {
   id: "trace-tone-map",
   label: "Tone map",
   link: "tone",
+  refusal,
   ...ofTrace("toneMap"),
   values: TONE_MAPS,
   names: { filmic: "Film", none: "None" },
@@ -179,6 +188,7 @@ function lampOf(lamp: number): LampParameters {
       kind: "number",
       id: `trace/${id}/${name}`,
       link: `${id}/${name}`,
+      refusal,
       rounded,
       ...LAMP_NUMBERS[name],
       get,
@@ -195,6 +205,7 @@ function lampOf(lamp: number): LampParameters {
       label: "On",
       name: () => `${title} on`,
       link: id,
+      refusal,
       ...ofLamp(lamp, "isOn"),
       spoken: ({ trace }) => `${title}: ${trace.lamps[lamp].isOn ? "on" : "off"}`,
     },
@@ -204,6 +215,7 @@ function lampOf(lamp: number): LampParameters {
       label: "Colour",
       name: () => `Colour of ${title}`,
       link: `${id}/color`,
+      refusal,
       ...ofLamp(lamp, "color"),
       spoken: () => `${title}: another colour`,
     },

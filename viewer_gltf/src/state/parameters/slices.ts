@@ -45,7 +45,8 @@ export const SLICE_PLANES: SwitchParameter<SliceSettings> = {
 export const isSliced = ({ hasSlicePictures, hasSlicePlanes }: SliceSettings) =>
   hasSlicePictures || hasSlicePlanes;
 
-const IDLE = "No slices are shown.";
+/** Why nothing of the slices can be set. */
+export const NO_SLICES = "No slices are shown.";
 const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 const degrees = (angle: number) => `${Number(angle.toFixed(1))}°`;
 
@@ -67,7 +68,7 @@ export const SLICE_AT: readonly NumberParameter<SliceSettings>[] = (
   steps: 200,
   rounded: (share) => Number(share.toFixed(4)),
   text: percent,
-  refusal: (on) => (isSliced(on) ? "" : IDLE),
+  refusal: (on) => (isSliced(on) ? "" : NO_SLICES),
   spoken: (on) => `Slices: ${axis} ${percent(on[field])}`,
 }));
 
@@ -89,7 +90,7 @@ export const SLICE_TURN: readonly NumberParameter<SliceSettings>[] = (
   steps: 144,
   rounded: (angle) => Number(angle.toFixed(2)),
   text: degrees,
-  refusal: (on) => (isSliced(on) ? "" : IDLE),
+  refusal: (on) => (isSliced(on) ? "" : NO_SLICES),
   spoken: (on) => `Slices: turned about ${axis} by ${degrees(on[field])}`,
 }));
 

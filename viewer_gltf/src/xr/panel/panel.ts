@@ -109,6 +109,9 @@ export class RoomPanel {
   }
 
   /** Stereo has begun, or has ended. */
+  /** The specimen stands on a table: where the button hangs else it would be before it. */
+  isTableBelow = false;
+
   setShown(isShown: boolean): void {
     this.group.visible = isShown;
     this.openerYaw = null;
@@ -138,7 +141,11 @@ export class RoomPanel {
     const eye = new Vector3().setFromMatrixPosition(head);
     const bearing = headBearing(head);
     this.openerYaw = followHead(this.openerYaw ?? bearing.yaw, bearing, dt_s);
-    const at = pointAt({ yaw: this.openerYaw, pitch: openerPitch(this.isOpen) }, eye, OPENER_M);
+    const at = pointAt(
+      { yaw: this.openerYaw, pitch: openerPitch(this.isOpen || this.isTableBelow) },
+      eye,
+      OPENER_M,
+    );
     this.opener.place(at, eye);
     let isChanged = false;
     if (this.wantsPlace) {

@@ -22,7 +22,8 @@ const COMFORT = -15 * DEG;
  * the panel is open it hangs under that, which may be straight below the specimen.
  */
 const OPENER_PITCH = -30 * DEG;
-const OPENER_PITCH_WHILE_OPEN = -52 * DEG;
+/** The same below a panel, or below a specimen on a table. */
+const OPENER_PITCH_LOW = -52 * DEG;
 /** The head turns this far, radians, before the button follows. */
 const SLACK = 35 * DEG;
 /** Pitch of the head, radians: a user who looks down further looks for the button, so it waits. */
@@ -38,8 +39,8 @@ export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
   return { yaw, pitch: Math.max(pitch - NOTICE_BELOW, Math.min(pitch, NOTICE_LOWEST)) };
 }
 
-export function openerPitch(isPanelOpen: boolean): number {
-  return isPanelOpen ? OPENER_PITCH_WHILE_OPEN : OPENER_PITCH;
+export function openerPitch(isLow: boolean): number {
+  return isLow ? OPENER_PITCH_LOW : OPENER_PITCH;
 }
 
 export function bearingOf(direction: Vector3): Bearing {

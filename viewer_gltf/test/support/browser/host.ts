@@ -14,6 +14,7 @@ const TYPES: Readonly<Record<string, string>> = {
   ".ktx2": "image/ktx2",
   ".png": "image/png",
   ".svg": "image/svg+xml",
+  ".usdz": "model/vnd.usdz+zip",
   ".webmanifest": "application/manifest+json",
 };
 

@@ -44,6 +44,7 @@ const FACTS: Facts = {
   isStereo: true,
   stereo: { isAvailable: true, reason: "" },
   split: null,
+  hasRoom: false,
   canScan: false,
   faultOfCode: () => "",
   frame_ms: null,

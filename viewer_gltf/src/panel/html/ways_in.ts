@@ -1,0 +1,63 @@
+/** On the picture itself, in its corner: the ways out of the flat screen. Those that lead nowhere are hidden. */
+import { element } from "../../dom/element";
+
+const IN_ROOM = "View in your room";
+/** A box on a floor and the words: the link may hold no text. */
+const LABEL =
+  '<svg xmlns="http://www.w3.org/2000/svg" width="140" height="24"><g fill="none" stroke="#e6e9f0" ' +
+  'stroke-width="1.6" stroke-linejoin="round"><path d="M12 3l7 4v8l-7 4-7-4V7zM5 7l7 4 7-4M12 11v8"/>' +
+  '<path d="M2 20l10 3 10-3" opacity=".5"/></g><text x="30" y="17" fill="#e6e9f0" font-size="13" ' +
+  `font-family="system-ui, sans-serif" textLength="108">${IN_ROOM}</text></svg>`;
+
+/** Whether a link opens a viewer of augmented reality here: on iOS it does. */
+export function opensAr(): boolean {
+  const { relList } = document.createElement("a");
+  return relList?.supports?.("ar") === true;
+}
+
+export class WaysIn {
+  private readonly stereo = button("Stereo", "stereo");
+  private readonly room = button("In your room", "room");
+  /** Quick Look wants one image in it, and nothing else. */
+  private readonly link = element(
+    "a",
+    { rel: "ar", hidden: true, className: "way", title: IN_ROOM },
+    { overlay: "ar" },
+    element("img", {
+      src: `data:image/svg+xml,${encodeURIComponent(LABEL)}`,
+      alt: IN_ROOM,
+      width: 140,
+      height: 24,
+    }),
+  );
+  readonly root = element("div", { className: "ways-in" }, {}, this.link, this.room, this.stereo);
+
+  /** @param onClick called within the click, as browsers want it */
+  offerStereo(way: "stereo" | "split" | null, onClick: () => void): void {
+    this.stereo.hidden = way === null;
+    this.stereo.title =
+      way === "split" ? "Split the screen for a phone viewer (P)" : "Enter stereo (V)";
+    this.stereo.onclick = onClick;
+  }
+
+  /** @param onClick called within the click */
+  offerRoom(onClick: () => void): void {
+    this.room.hidden = false;
+    this.room.title = "The specimen in your room, by this device's camera (Home)";
+    this.room.onclick = onClick;
+  }
+
+  /** @param address of a .usdz file */
+  offerLink(address: string): void {
+    this.link.href = address;
+    this.link.hidden = false;
+  }
+}
+
+function button(text: string, overlay: string): HTMLButtonElement {
+  return element(
+    "button",
+    { type: "button", className: "way", textContent: text, hidden: true },
+    { overlay },
+  );
+}

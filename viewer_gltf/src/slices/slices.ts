@@ -1,0 +1,66 @@
+/** All of the slices: their pictures, in the page and as planes in the scene. A part of the code by itself. */
+import "./slices.css";
+import type { Sight } from "../annotations/style";
+import { sharesOf, turnedBy } from "../math/slice_frame";
+import type { Action } from "../state/actions";
+import type { ViewerState } from "../state/viewer_state";
+import { type SlicesOptions as ImagesOptions, SliceImages } from "./slice_images";
+import { SlicePlanes } from "./slice_planes";
+import { SliceView } from "./slice_view";
+
+export type SlicesOptions = ImagesOptions &
+  Readonly<{
+    /** The part of the page with the stage, which makes room. */
+    view: HTMLElement;
+    state: ViewerState;
+    dispatch: (action: Action) => void;
+  }>;
+
+export class Slices {
+  readonly images: SliceImages;
+  readonly planes: SlicePlanes;
+  private readonly pictures: SliceView;
+  private state: ViewerState;
+
+  constructor(private readonly options: SlicesOptions) {
+    this.state = options.state;
+    this.images = new SliceImages(options);
+    this.planes = new SlicePlanes(this.images);
+    const { bounds_um } = options.manifest.specimen;
+    this.pictures = new SliceView(options.view, this.images, {
+      move: (point) => options.dispatch({ type: "move-slices", at: sharesOf(point, bounds_um) }),
+      turn: (about, by_deg) => {
+        const { sliceTurnX_deg, sliceTurnY_deg, sliceTurnZ_deg } = this.state;
+        const turned = turnedBy([sliceTurnX_deg, sliceTurnY_deg, sliceTurnZ_deg], about, by_deg);
+        options.dispatch({ type: "move-slices", turn_deg: turned });
+      },
+      window: (wider, higher) => this.shiftWindow(wider, higher),
+    });
+  }
+
+  follow(state: ViewerState): void {
+    this.state = state;
+    this.images.follow(state);
+    this.planes.follow(state.hasSlicePlanes);
+    this.pictures.update(state.hasSlicePictures);
+  }
+
+  update(sight: Sight): void {
+    this.planes.update(sight);
+  }
+
+  /** Of the first channel that is shown. */
+  private shiftWindow(wider: number, higher: number): void {
+    const channel = this.state.channels.find(({ shown }) => shown);
+    if (channel === undefined) return;
+    const [low, high] = channel.window;
+    const window = [low - wider / 2 - higher, high + wider / 2 - higher] as const;
+    this.options.dispatch({ type: "window", channel: channel.id, window });
+  }
+
+  dispose(): void {
+    this.pictures.dispose();
+    this.planes.dispose();
+    this.images.dispose();
+  }
+}

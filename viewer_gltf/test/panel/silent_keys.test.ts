@@ -1,0 +1,81 @@
+/** Every key in headless Chromium, in several states: something is seen to change, or is said. */
+import { expect, it } from "vitest";
+import { KEYS } from "../../src/panel/keys";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+const SCREEN = { viewport: { width: 320, height: 240 }, pixelRatio: 0.5 };
+/** They open a dialog of the browser's own, save a file or take long: tests of their own have them. */
+const LEFT_OUT: readonly string[] = ["U", "K", "(", '"', ")", "l", "P"];
+const NAMES = KEYS.flatMap(({ keys }) => keys.flatMap(({ keys }) => keys)).filter(
+  (name) => !LEFT_OUT.includes(name),
+);
+
+const STATES: Readonly<Record<string, readonly string[]>> = {
+  "as it opens": [],
+  "with everything off": ["m", "m", "m", "m", "1", "2", "3"],
+  "after the same key": [],
+  "with slices, cuts and the tool": ["\\", "b", "n", "p", "t", "i"],
+};
+
+describeInChromium("every key", () => {
+  const stand = prepareStand(SCREEN);
+
+  /** All that a person can perceive of the page, but for what changes by itself. */
+  const perceived = () =>
+    stand.viewer.page.evaluate(() => {
+      const { state, look } = window.stereocell?.snapshot() ?? {};
+      const dialogs = document.querySelectorAll("dialog[open]").length;
+      const panel = document.querySelector(".panel");
+      const isBodyShown = (panel?.querySelector(".body") as HTMLElement | null)?.checkVisibility();
+      const marks = [...(panel?.querySelectorAll("[aria-expanded], [aria-pressed]") ?? [])].map(
+        (each) => `${each.ariaExpanded}${each.ariaPressed}`,
+      );
+      const focused = (document.activeElement as HTMLElement | null)?.dataset.control;
+      return JSON.stringify({ state, look, dialogs, isBodyShown, marks, focused });
+    });
+
+  it.each(Object.entries(STATES))("says or shows something: %s", async (where, before) => {
+    const { viewer } = stand;
+    await stand.open();
+    const { page } = viewer;
+    for (const key of before) await page.keyboard.press(key);
+    const silent: string[] = [];
+    for (const name of NAMES) {
+      if (where === "after the same key" && name !== "?") {
+        for (let i = 0; i < 3; i++) await page.keyboard.press(name.replace("Ctrl", "Control"));
+      }
+      await page.evaluate(() => {
+        const said = document.querySelector("[data-said]");
+        if (said !== null) said.textContent = "";
+        if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+        for (const open of document.querySelectorAll("dialog")) open.close();
+      });
+      const was = await perceived();
+      await page.keyboard.press(name.replace("Ctrl", "Control"));
+      await page.evaluate(() => new Promise(requestAnimationFrame));
+      const said = await page.locator("[data-said]").textContent();
+      if (said === "" && (await perceived()) === was) silent.push(name);
+    }
+    expect(silent).toEqual([]);
+  });
+
+  it("says of a key that there is none, and how to find all", async () => {
+    await stand.open();
+    const { page } = stand.viewer;
+    const said = () => page.locator("[data-said]").textContent();
+    await page.evaluate(() => dispatchEvent(new KeyboardEvent("keydown", { key: "§" })));
+    expect(await said()).toBe("No key §: ? lists the keys.");
+    await page.keyboard.press("}");
+    expect(await said()).toBe("No slices are shown.");
+    await page.keyboard.press("]");
+    expect(await said()).toBe("Only paths of light have it: G begins them.");
+    await page.keyboard.press("u");
+    expect(await said()).toBe("Nothing is measured.");
+    await page.keyboard.press("z");
+    await page.keyboard.press("z");
+    expect(await said()).toBe("It is seen from the front.");
+    for (let i = 0; i < 30; i++) await page.keyboard.press("+");
+    expect(await said()).toBe("It comes no nearer.");
+  });
+});

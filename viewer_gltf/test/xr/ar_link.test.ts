@@ -1,0 +1,57 @@
+/** The link into iOS's own viewer of augmented reality. */
+import { join } from "node:path";
+import { expect, it } from "vitest";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+const SHOTS = process.env.STEREOCELL_SHOTS;
+
+describeInChromium("the link to the specimen in the user's room", () => {
+  const stand = prepareStand({ viewport: { width: 390, height: 844 }, hasTouch: true });
+  const link = () => stand.viewer.page.locator('[data-overlay="ar"]');
+
+  const pretendIos = () =>
+    stand.viewer.page.addInitScript(() => {
+      const { supports } = DOMTokenList.prototype;
+      DOMTokenList.prototype.supports = function (token) {
+        return token === "ar" || supports.call(this, token);
+      };
+    });
+
+  it("is not there where the browser has no such viewer", async () => {
+    await stand.open("&mode=off");
+    expect(await link().isVisible()).toBe(false);
+  });
+
+  it("is one image in a link, as Quick Look wants it", async () => {
+    await pretendIos();
+    await stand.open("&mode=off");
+    expect(await link().isVisible()).toBe(true);
+    const about = await link().evaluate((a: HTMLAnchorElement) => ({
+      rel: a.rel,
+      path: new URL(a.href).pathname,
+      nodes: [...a.childNodes].map(({ nodeName }) => nodeName),
+      words: a.querySelector("img")?.alt,
+      isDrawn: (a.querySelector("img")?.naturalWidth ?? 0) > 0,
+    }));
+    expect(about).toEqual({
+      rel: "ar",
+      path: "/bundle/specimen.usdz",
+      nodes: ["IMG"],
+      words: "View in your room",
+      isDrawn: true,
+    });
+    if (SHOTS) await stand.viewer.page.screenshot({ path: join(SHOTS, "ar_link.png") });
+  });
+
+  it("is not there where the bundle has no such file", async () => {
+    await pretendIos();
+    const manifest = { ...stand.manifest, usdz: null, usdz_reason: "no surface is drawn" };
+    stand.host.overrides.set("/bundle/manifest.json", {
+      status: 200,
+      body: JSON.stringify(manifest),
+    });
+    await stand.open("&mode=off");
+    expect(await link().isVisible()).toBe(false);
+  });
+});
