@@ -15,6 +15,7 @@ import { Cuts } from "../gpu/clip_planes";
 import { EncodePass } from "../gpu/encode_pass";
 import { Eyes } from "../gpu/eyes";
 import { linearTarget } from "../gpu/linear_target";
+import { KEY_AT, towards } from "../gpu/room_light";
 import type { Clip } from "../math/clip";
 import type { TracedVolume } from "../pathtrace/traced_volume";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "../surfaces/blend_material";
@@ -83,6 +84,7 @@ export class Picture {
   /** The volumes of the march that stands in for what is traced; "": it has to be made. */
   private stoodIn = "";
   private readonly point = new Vector3();
+  private readonly lamp = new Vector3();
   private readonly corner = new Vector3();
   private readonly toSpecimen = new Matrix4();
 
@@ -136,7 +138,9 @@ export class Picture {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
       volumes.placeAs(specimen);
-      volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march);
+      const lamp = this.lamp.set(...towards(KEY_AT)).transformDirection(head);
+      lamp.transformDirection(toSpecimen);
+      volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march, lamp);
       const hasPane = panes.some(({ isPane }) => isPane);
       this.marchFrame.uHasPane.value = hasPane;
       if (hasPane) this.depth.renderPanes(renderer, room.scene, this.eyes);

@@ -33,6 +33,7 @@ import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
 import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
+import type { Vec3 } from "../math/vec3";
 import type { Compositing } from "../state/parameters/volumes";
 import { distanceInGrid } from "./blend_order";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
@@ -70,6 +71,9 @@ export type MarchFrame = Readonly<{
   /** Whether all that is marched shows in the disc alone: then its picture is mixed with the surfaces'. */
   uIsCrossing: { value: boolean };
   uSteps: { value: number };
+  /** Light that comes to each cell of a coarse grid, and by how much it counts, 0..1. */
+  uReached: { value: Data3DTexture | null };
+  uDepthShading: { value: number };
 }>;
 
 /** Depth of what is opaque, and of the nearest that is translucent. */
@@ -90,6 +94,8 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
     uReach: { value: -1 },
     uIsCrossing: { value: false },
     uSteps: { value: MAX_STEPS },
+    uReached: { value: null },
+    uDepthShading: { value: 0 },
   };
 }
 
@@ -151,6 +157,8 @@ export class TileMarch {
   private tables2d: DataArrayTexture | null = null;
   /** The content of each layer; null: a table that knows no gradients. */
   private readonly layers: (Uint8Array | null)[] = [];
+  /** Goes up with each change of the tables. */
+  looks = 0;
   private readonly low: Vector3;
   private readonly toTile: Matrix4;
   /** Between the world and the box from its low corner. */
@@ -203,6 +211,8 @@ export class TileMarch {
         uSkyLight: { value: new Vector3(...SKY) },
         uGroundLight: { value: new Vector3(...GROUND) },
         uGloss: { value: GLOSS },
+        uToShading: { value: new Matrix4() },
+        uShadingCell: { value: 0 },
         uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },
         uInDisc: { value: [false, false, false, false] },
         uAllInDisc: { value: false },
@@ -261,6 +271,54 @@ export class TileMarch {
     uniforms.uSpare.value = Math.min(tiles - 1, MAX_STEPS / 2);
   }
 
+  /** Texture coordinates at the box's low and high corner. */
+  get corners(): { low: Vector3; high: Vector3 } {
+    return textureCorners(this.volume);
+  }
+
+  /** The path that opacities hold for. */
+  get voxel_um(): number {
+    return this.mesh.material.uniforms.uVoxel.value;
+  }
+
+  /** The table of a channel as it is drawn. */
+  tableOf(channel: number): Uint8Array {
+    const rows = this.lut.image.data as Uint8Array;
+    return rows.subarray(channel * ENTRIES * 4, (channel + 1) * ENTRIES * 4);
+  }
+
+  /** From the world, um, to texture coordinates. */
+  get worldToTexture(): Matrix4 {
+    const { uTexLow, uTexHigh, uSize } = this.mesh.material.uniforms;
+    const scale = uTexHigh.value.clone().sub(uTexLow.value).divide(uSize.value);
+    return new Matrix4()
+      .makeTranslation(uTexLow.value)
+      .multiply(new Matrix4().makeScale(scale.x, scale.y, scale.z))
+      .multiply(this.toBox);
+  }
+
+  /** Grow a box of the world, um, round this one. */
+  growBox(min: Vector3, max: Vector3): void {
+    const { x, y, z } = this.mesh.material.uniforms.uSize.value;
+    const at = new Vector3();
+    for (let i = 0; i < 8; i++) {
+      at.set(i & 1 ? x : 0, i & 2 ? y : 0, i & 4 ? z : 0).applyMatrix4(this.fromBox);
+      min.min(at);
+      max.max(at);
+    }
+  }
+
+  /** Where the grid of the shading lies: its low corner, um, world, cells, and a cell's edge, um. */
+  placeShading(low: Vec3, size: readonly [number, number, number], edge_um: number): void {
+    const { uToShading, uShadingCell } = this.mesh.material.uniforms;
+    const [x, y, z] = size.map((n) => 1 / (n * edge_um));
+    uToShading.value
+      .makeScale(x, y, z)
+      .multiply(new Matrix4().makeTranslation(-low[0], -low[1], -low[2]))
+      .multiply(this.fromBox);
+    uShadingCell.value = edge_um;
+  }
+
   clip(clip: MarchClip): void {
     clipInto(clip, this.fromBox, this.toBox, this.mesh.material.uniforms as ClipUniforms);
   }
@@ -307,7 +365,10 @@ export class TileMarch {
       row.set(table);
       differs = true;
     });
-    if (differs) this.lut.needsUpdate = true;
+    if (differs) {
+      this.lut.needsUpdate = true;
+      this.looks++;
+    }
     this.fillTables2d(appearances);
     uniforms.uAllInDisc.value = appearances.every((appearance) => appearance.isInDisc);
     this.define("DISC", appearances.some((appearance) => appearance.isInDisc) ? 1 : null);

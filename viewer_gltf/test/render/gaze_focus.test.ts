@@ -194,7 +194,7 @@ describeInChromium("surface or volume", () => {
         });
       }
     });
-    await stand.open(`&mode=all`);
+    await stand.open(`&mode=all#v=1&depth=0`);
     await stand.viewer.settled();
     const take = () =>
       stand.viewer.page.evaluate(() =>
@@ -202,14 +202,37 @@ describeInChromium("surface or volume", () => {
       );
     expect(Math.max(...(await take()))).toBeGreaterThan(100_000);
     await stand.viewer.chooseTransferFunction("Block", "soft");
-    const requests = stand.host.requests.length;
+    const asked = () =>
+      stand.host.requests.filter(({ path }) => path.startsWith("/bundle/")).length;
+    const requests = asked();
     const tables = await take();
     expect(tables.length).toBeGreaterThan(0);
     // rows of the table, and the table of skips
     expect(Math.max(...tables)).toBeLessThanOrEqual(4 * 1024);
     await stand.viewer.recolor("Block", "#ff00ff");
     expect((await take()).filter((bytes) => bytes > 0)).toEqual([]);
-    expect(stand.host.requests.length).toBe(requests);
+    expect(asked()).toBe(requests);
+    // and for other shadows one coarse grid, from what is there already
+    await stand.viewer.slide("depth-shading", 0.5);
+    expect(Math.max(...(await take()))).toBeLessThanOrEqual(2 * 64 ** 3);
+    await stand.viewer.chooseTransferFunction("Block", "default");
+    const shaded = await take();
+    expect(Math.max(...shaded)).toBeGreaterThan(4 * 1024);
+    expect(Math.max(...shaded)).toBeLessThanOrEqual(2 * 64 ** 3);
+    expect(asked()).toBe(requests);
+  });
+
+  it("is shaded by what encloses it and by what stands before it, each time alike", async () => {
+    const at = (depth: number) => pictureOf(`${modeAt("all", "high")}#v=1&depth=${depth}`);
+    const [none, half, whole, again] = [await at(0), await at(0.5), await at(1), await at(1)];
+    expect(apart(whole, again, 0, 90, 0)).toBe(0);
+    const mean = (picture: Picture) => {
+      const drawn = picture.where((pixel) => !isBackground(pixel));
+      return drawn.reduce((sum, place) => sum + picture.at(...place)[1], 0) / drawn.length;
+    };
+    expect(mean(whole)).toBeLessThan(mean(half));
+    expect(mean(half)).toBeLessThan(mean(none) + 2); // open places are a little brighter
+    expect(mean(whole)).toBeGreaterThan(0.7 * mean(none));
   });
 
   it("looks alike at fewer pixels and steps", async () => {

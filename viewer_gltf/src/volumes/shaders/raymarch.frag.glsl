@@ -55,6 +55,10 @@ uniform vec3 uFillLight;  // ... the weaker one ...
 uniform vec3 uSkyLight;  // ... the sky, and the ground
 uniform vec3 uGroundLight;
 uniform float uGloss;  // of the lamp's light, at most
+uniform sampler3D uReached;  // light that comes to each cell round all volumes: around, and the lamp's
+uniform mat4 uToShading;  // from the box, um, to its texture coordinates
+uniform float uShadingCell;  // um
+uniform float uDepthShading;  // 0..1: by how much it counts
 uniform sampler2D uNoise;  // blue noise
 uniform float uPhase;  // 0..1: by how much it is shifted in this frame
 uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
@@ -88,6 +92,7 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/classify_2d>
 #endif
 #include <chunks/gradient>
+#include <chunks/depth_shading>
 #include <chunks/shade>
 #include <chunks/jitter>
 
@@ -217,9 +222,9 @@ void main() {
 #else
       if (s.a > 0.0) {
 #ifdef TWO_D
-        s.rgb = shadeBy(s.rgb, gradientOf(around, shares) * sign(texPerUm), dir);
+        s.rgb = shadeBy(s.rgb, gradientOf(around, shares) * sign(texPerUm), dir, start + at * dir);
 #else
-        s.rgb = shade(s.rgb, p, texPerUm, dir, shares);
+        s.rgb = shade(s.rgb, p, texPerUm, dir, start + at * dir, shares);
 #endif
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }
