@@ -159,6 +159,8 @@ export class TileMarch {
   private readonly layers: (Uint8Array | null)[] = [];
   /** Goes up with each change of the tables. */
   looks = 0;
+  /** Of each channel, whether it shows in the disc alone. */
+  private inDisc: readonly boolean[] = [];
   private readonly low: Vector3;
   private readonly toTile: Matrix4;
   /** Between the world and the box from its low corner. */
@@ -346,7 +348,17 @@ export class TileMarch {
 
   /** Whether all of its channels show in the disc alone. */
   get isInDisc(): boolean {
-    return this.mesh.material.uniforms.uAllInDisc.value;
+    return this.inDisc.length > 0 && this.inDisc.every((is) => is);
+  }
+
+  /** Whether any of its channels does. */
+  get isPartlyInDisc(): boolean {
+    return this.inDisc.includes(true);
+  }
+
+  /** March what lies in the disc's cone alone, whatever the channels. */
+  endAtDisc(ends: boolean): void {
+    this.mesh.material.uniforms.uAllInDisc.value = ends || this.isInDisc;
   }
 
   /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
@@ -370,8 +382,9 @@ export class TileMarch {
       this.looks++;
     }
     this.fillTables2d(appearances);
-    uniforms.uAllInDisc.value = appearances.every((appearance) => appearance.isInDisc);
-    this.define("DISC", appearances.some((appearance) => appearance.isInDisc) ? 1 : null);
+    this.inDisc = appearances.map(({ isInDisc }) => isInDisc);
+    this.endAtDisc(false);
+    this.define("DISC", this.isPartlyInDisc ? 1 : null);
     return differs;
   }
 

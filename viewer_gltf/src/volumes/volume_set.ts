@@ -100,6 +100,16 @@ export class VolumeSet {
     return drawn.length > 0 && drawn.every(({ march }) => march.isInDisc);
   }
 
+  /** Whether of what is marched some shows in the disc alone, and some beyond it too. */
+  get isPartlyInDisc(): boolean {
+    return !this.isInDisc && this.drawn().some(({ march }) => march.isPartlyInDisc);
+  }
+
+  /** March what lies in the disc's cone alone, whatever the channels; false: as each shows. */
+  endAtDisc(ends: boolean): void {
+    for (const { march } of this.drawn()) march.endAtDisc(ends);
+  }
+
   /** Bytes on the GPU. */
   get bytes(): number {
     return this.residents.bytes;

@@ -15,6 +15,41 @@ const NEAR = "&switch=9";
 /** Through soft volumes one sees, so that they look unlike the surfaces whose place they take. */
 const SOFT = "#v=1&l=Balls:tsoft,F_x20_body:tsoft";
 
+/** Pixels of a disc's picture outside those within and without it, by more than 5, and between both. */
+function rimOf(disc: Picture, within: Picture, without: Picture) {
+  let [outside, between] = [0, 0];
+  for (let y = 0; y < disc.height; y++) {
+    for (let x = 0; x < disc.width; x++) {
+      const [a, b, found] = [within.at(x, y), without.at(x, y), disc.at(x, y)];
+      if (found.some((v, i) => v < Math.min(a[i], b[i]) - 5 || v > Math.max(a[i], b[i]) + 5))
+        outside++;
+      if (found.some((v, i) => Math.abs(v - a[i]) > 2 && Math.abs(v - b[i]) > 2)) between++;
+    }
+  }
+  return { outside, between };
+}
+
+describeInChromium("a channel without a surface", () => {
+  const stand = prepareStand({ viewport: VIEWPORT, fixture: { hasReason: true } });
+
+  for (const quality of ["high", "low"]) {
+    it(`is a volume on both sides of the rim, which is nowhere outside both: ${quality}`, async () => {
+      const at = async (query: string) => {
+        await stand.open(`${query}&disc=${DISC_DEG}&quality=${quality}#v=1&depth=0`);
+        await stand.viewer.settled();
+        return takePicture(stand.viewer.page);
+      };
+      const within = await at(`&mode=all${NEAR}`);
+      const without = await at("&mode=disc&switch=0.1");
+      const shown = (await stand.viewer.snapshot()).volumes.map(({ channel }) => channel);
+      expect(new Set(shown)).toEqual(new Set(["Block"]));
+      const { outside, between } = rimOf(await at(`&mode=disc${NEAR}`), within, without);
+      expect(outside).toBe(0);
+      expect(between).toBeGreaterThan(50);
+    });
+  }
+});
+
 describeInChromium("surface or volume", () => {
   const stand = prepareStand({ viewport: VIEWPORT });
 
@@ -73,15 +108,7 @@ describeInChromium("surface or volume", () => {
     it(`has a rim that is nowhere outside both pictures, quality ${quality}`, async () => {
       const at = (mode: Mode) => pictureOf(modeAt(mode, quality));
       const [disc, all, off] = [await at("disc"), await at("all"), await at("off")];
-      let [outside, between] = [0, 0];
-      for (let y = 0; y < disc.height; y++) {
-        for (let x = 0; x < disc.width; x++) {
-          const [a, b, found] = [all.at(x, y), off.at(x, y), disc.at(x, y)];
-          if (found.some((v, i) => v < Math.min(a[i], b[i]) - 5 || v > Math.max(a[i], b[i]) + 5))
-            outside++;
-          if (found.some((v, i) => Math.abs(v - a[i]) > 2 && Math.abs(v - b[i]) > 2)) between++;
-        }
-      }
+      const { outside, between } = rimOf(disc, all, off);
       expect(outside).toBe(0);
       expect(between).toBeGreaterThan(50); // there is a rim
     });
