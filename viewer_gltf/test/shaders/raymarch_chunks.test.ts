@@ -189,6 +189,25 @@ describeInChromium("the shader's chunks", () => {
     expect((await normal("vec3(9.0, 0.0, 9.0)")).slice(0, 3)).toEqual([1, 0, 0]);
   });
 
+  it("return the face by which a ray comes in, of the box round all tiles or of a cut", async () => {
+    const face = async (start: number[], plane = [0, 0, 0, 1]) => {
+      const head = `const float uVoxel = 1.0; const vec4 uClipPlane = ${vec(...plane)};
+        const vec3 uAllLow = vec3(-10.0, 0.0, 0.0); const vec3 uAllHigh = vec3(10.0);
+        const vec3 uClipLow = vec3(-1e9); const vec3 uClipHigh = vec3(1e9, 1e9, 8.0);`;
+      const body = `oColor = vec4(cutFace(${vec(...start)}), 1.0);`;
+      return (await run(["cut_face"], head, body)).slice(0, 3);
+    };
+    expect(await face([10, 5, 5])).toEqual([1, 0, 0]);
+    expect(await face([3, 0, 5])).toEqual([0, -1, 0]);
+    expect(await face([3, 4, 8])).toEqual([0, 0, 1]); // the cut's, within the box
+    expect(await face([0, 5, 5])).toEqual([0, 0, 0]); // where two tiles meet
+    expect(await face([3, 4, 5], [0.6, 0.8, 0, 5])).toEqual([
+      expect.closeTo(0.6),
+      expect.closeTo(0.8),
+      0,
+    ]);
+  });
+
   describe("find where the opaque scene ends a ray", () => {
     const [NEAR, FAR] = [1, 100];
     /** Of a fragment's point on the ray, as the eye sees it: its distance, and its view z. */
@@ -370,7 +389,7 @@ describeInChromium("the shader's chunks", () => {
           return vec4(0.5 + v, 0.5 - v, 0.5 + v, 0.0);
         }`;
       const shares = "vec4(0.25, 0.0, 0.75, 0.0)"; // the second channel has no say
-      const call = `shade(vec3(1.0), vec3(0.5), ${vec(...perUm)}, ${vec(...unit(dir))}, vec3(0.0), ${shares})`;
+      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${vec(...perUm)}, ${shares}), ${vec(...unit(dir))}, vec3(0.0))`;
       const body = `oColor = vec4(${call}, 1.0);`;
       return run(["gradient", "shade"], head, body).then(([found]) => found);
     }
@@ -491,7 +510,7 @@ describeInChromium("the shader's chunks", () => {
       // voxels of 1 um each; rows run against y
       const perUm = vec(1 / 8, -1 / 8, 1 / 4);
       const shares = "vec4(1.0, 0.0, 0.0, 0.0)";
-      const call = `shade(vec3(1.0), vec3(0.5), ${perUm}, vec3(0.6, -0.8, 0.0), vec3(0.0), ${shares})`;
+      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${perUm}, ${shares}), vec3(0.6, -0.8, 0.0), vec3(0.0))`;
       const textures = { uVolume };
       const [found] = await run(
         ["sample_intensities", "gradient", "shade"],

@@ -36,8 +36,3 @@ vec3 shadeBy(vec3 color, vec3 gradient, vec3 dir, vec3 um) {
   vec3 facing = color * lightOn(normal, reaches) + reaches.y * uGloss * gloss * uKeyLight;
   return mix(unlit, facing, lit);
 }
-
-// `shares`: of each channel in what is seen here.
-vec3 shade(vec3 color, vec3 p, vec3 texPerUm, vec3 dir, vec3 um, vec4 shares) {
-  return shadeBy(color, gradientAt(p, texPerUm, shares), dir, um);
-}

@@ -92,6 +92,7 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/classify_2d>
 #endif
 #include <chunks/gradient>
+#include <chunks/cut_face>
 #include <chunks/depth_shading>
 #include <chunks/shade>
 #include <chunks/jitter>
@@ -160,6 +161,7 @@ void main() {
   vec4 front = vec4(0.0);  // the sum in front of the pane
   bool isBehind = false;
   float shift = jitter(gl_FragCoord.xy - uPart.xy);
+  vec3 face = span.x > 0.0 ? cutFace(start) : vec3(0.0);
   float t = 0.0;
   float exit = 0.0;  // of the bricks that are known
   int i = 0;
@@ -222,10 +224,13 @@ void main() {
 #else
       if (s.a > 0.0) {
 #ifdef TWO_D
-        s.rgb = shadeBy(s.rgb, gradientOf(around, shares) * sign(texPerUm), dir, start + at * dir);
+        vec3 gradient = gradientOf(around, shares) * sign(texPerUm);
+        if (t < uVoxel && face != vec3(0.0)) gradient = -face;
 #else
-        s.rgb = shade(s.rgb, p, texPerUm, dir, start + at * dir, shares);
+        vec3 gradient = -face;
+        if (t >= uVoxel || face == vec3(0.0)) gradient = gradientAt(p, texPerUm, shares);
 #endif
+        s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }
 #endif
