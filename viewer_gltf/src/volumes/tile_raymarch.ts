@@ -40,7 +40,7 @@ import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 import { brickCounts } from "./skip_bricks";
 import { textureCorners } from "./texture_space";
 import type { Packed } from "./tile_texture";
-import { ENTRIES } from "./transfer_luts";
+import { ENTRIES, opacities } from "./transfer_luts";
 import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
 /** Most steps of a ray while anything moves, for any size of the volume and any number of tiles. */
@@ -165,7 +165,7 @@ export class TileMarch {
   private readonly toTile: Matrix4;
   /** Between the world and the box from its low corner. */
   private readonly fromBox: Matrix4;
-  private readonly toBox: Matrix4;
+  readonly toBox: Matrix4;
 
   constructor(
     readonly volume: TileVolume,
@@ -273,30 +273,14 @@ export class TileMarch {
     uniforms.uSpare.value = Math.min(tiles - 1, MAX_STEPS / 2);
   }
 
-  /** Texture coordinates at the box's low and high corner. */
-  get corners(): { low: Vector3; high: Vector3 } {
-    return textureCorners(this.volume);
-  }
-
   /** The path that opacities hold for. */
   get voxel_um(): number {
     return this.mesh.material.uniforms.uVoxel.value;
   }
 
-  /** The table of a channel as it is drawn. */
-  tableOf(channel: number): Uint8Array {
-    const rows = this.lut.image.data as Uint8Array;
-    return rows.subarray(channel * ENTRIES * 4, (channel + 1) * ENTRIES * 4);
-  }
-
-  /** From the world, um, to texture coordinates. */
-  get worldToTexture(): Matrix4 {
-    const { uTexLow, uTexHigh, uSize } = this.mesh.material.uniforms;
-    const scale = uTexHigh.value.clone().sub(uTexLow.value).divide(uSize.value);
-    return new Matrix4()
-      .makeTranslation(uTexLow.value)
-      .multiply(new Matrix4().makeScale(scale.x, scale.y, scale.z))
-      .multiply(this.toBox);
+  /** The opacities of a channel's table, as it is drawn. */
+  opacitiesOf(channel: number): Uint8Array {
+    return opacities((this.lut.image.data as Uint8Array).subarray(channel * ENTRIES * 4));
   }
 
   /** Grow a box of the world, um, round this one. */

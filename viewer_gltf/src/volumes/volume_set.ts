@@ -13,7 +13,8 @@ import { BrickTile } from "./bricks/brick_atlas";
 import type { BrickService } from "./bricks/brick_service";
 import { ChannelLists } from "./channel_volumes";
 import { OccupancyClient } from "./empty_space_client";
-import { DepthShading, type Marched } from "./light/depth_shading";
+import { CoarseTexels } from "./light/coarse_texels";
+import type { DepthShading, Marched } from "./light/depth_shading";
 import { LoadQueue } from "./load_queue";
 import { levelsToFetch, type VolumeLimits } from "./mip_levels";
 import { Residency, type Resident } from "./residency";
@@ -50,7 +51,9 @@ export class VolumeSet {
   private readonly occupancy = new OccupancyClient();
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
-  private readonly shading: DepthShading;
+  /** What shades; its code comes with the first volumes that are shaded. */
+  private shading: DepthShading | null = null;
+  private shadingIs: "none" | "coming" | "there" | "failed" = "none";
   /** The last table of each channel: all tiles ask for the same. */
   private readonly tables2d = new Map<string, MadeTable2d>();
   private state: ViewerState | null = null;
@@ -70,7 +73,6 @@ export class VolumeSet {
     private readonly bricks: BrickService | null = null,
   ) {
     this.residents = new Residency(limits.bytes);
-    this.shading = new DepthShading(frame, onChange, onError);
     const onList = () => {
       if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
       this.onChange();
@@ -83,7 +85,8 @@ export class VolumeSet {
   get isLoading(): boolean {
     return (
       this.skipsUnderWay > 0 ||
-      this.shading.isLoading ||
+      this.shadingIs === "coming" ||
+      this.shading?.isLoading === true ||
       this.channels.isLoading ||
       this.residents.all.some(({ texture }) => texture.isLoading)
     );
@@ -182,14 +185,39 @@ export class VolumeSet {
     const boxes = new Bounds();
     const drawn = this.drawn();
     for (const { march } of drawn) boxes.add(march);
-    this.shading.follow(this.state?.compositing === "over" ? drawn : [], clip, lamp);
+    this.shade(drawn, clip, lamp);
     for (const { march } of drawn) {
-      this.shading.place(march);
+      this.shading?.place(march);
       march.sortBy(eye);
       march.aim(apex, axis);
       march.clip(clip);
       march.shareWith(boxes.min, boxes.max, boxes.count);
     }
+  }
+
+  private shade(drawn: readonly Marched[], clip: MarchClip, lamp: Vector3): void {
+    const { state, frame, onChange, onError } = this;
+    const strength = state?.compositing === "over" ? state.depthShading : 0;
+    if (strength > 0 && drawn.length > 0 && this.shadingIs === "none") {
+      this.shadingIs = "coming";
+      import("./light/depth_shading")
+        .then(({ DepthShading }) => {
+          this.shading = new DepthShading(
+            frame,
+            new CoarseTexels(onChange, onError),
+            onChange,
+            onError,
+          );
+          this.shadingIs = "there";
+        })
+        .catch((error: unknown) => {
+          this.shadingIs = "failed"; // volumes are drawn without
+          onError(error);
+        })
+        .finally(onChange);
+    }
+    this.shading?.set(strength);
+    this.shading?.follow(drawn, clip, lamp);
   }
 
   /** Go on with all fades; whether any is still under way. */
@@ -206,7 +234,6 @@ export class VolumeSet {
     this.state = state;
     this.wanted = wanted;
     this.mayRefine = mayRefine;
-    this.shading.set(state.depthShading);
     this.residents.unwantAll();
     for (const each of wanted) this.want(each);
     this.channels.forgetFailed(wanted.flatMap(({ channels }) => channels));
@@ -418,13 +445,13 @@ export class VolumeSet {
   /** Drop all that is on the GPU; what is wanted comes anew. */
   forget(): void {
     this.residents.dropAll();
-    this.shading.forget();
+    this.shading?.forget();
   }
 
   dispose(): void {
     this.forget();
     this.occupancy.dispose();
-    this.shading.dispose();
+    this.shading?.dispose();
   }
 }
 

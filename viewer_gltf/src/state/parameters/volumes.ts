@@ -141,9 +141,8 @@ export const DEPTH_SHADING: NumberParameter<Volumes> = {
   rounded: (value) => Number(value.toFixed(2)),
   text: percent,
   refusal: ({ mode, compositing }) => {
-    if (mode === "traced") return "Paths of light have shadows of their own.";
-    if (mode === "off") return "Only volumes that are marched have it.";
-    return compositing === "over" ? "" : "Only opacity along a ray has it.";
+    if (mode === "traced" || mode === "off") return "Only volumes that are marched have one.";
+    return compositing === "over" ? "" : "Only opacity along a ray has one.";
   },
   keys: {
     less: ["PageDown", "Less depth shading"],

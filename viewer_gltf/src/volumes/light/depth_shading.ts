@@ -8,6 +8,7 @@ import {
   ClampToEdgeWrapping,
   Data3DTexture,
   LinearFilter,
+  Matrix4,
   RGFormat,
   UnsignedByteType,
   Vector3,
@@ -17,12 +18,12 @@ import type { TileVolume } from "../../bundle/generated/volumes";
 import type { MarchClip } from "../../gpu/clip_uniforms";
 import type { Vec3 } from "../../math/vec3";
 import type { Resident } from "../residency";
+import { textureCorners } from "../texture_space";
 import type { MarchFrame, TileMarch } from "../tile_raymarch";
 import type { Packed } from "../tile_texture";
-import { opacities } from "../transfer_luts";
 import type { VolumeSource } from "../volume_source";
 import { type Cut, type Grid, gridRound, type TileMatter } from "./coarse_matter";
-import { CoarseTexels } from "./coarse_texels";
+import type { CoarseTexels } from "./coarse_texels";
 import { type Shading, ShadingClient } from "./shading_client";
 
 /** Of the coarse levels of all volumes together. */
@@ -37,7 +38,6 @@ export type Marched = Readonly<{ march: TileMarch; packed: Packed; resident: Res
 
 export class DepthShading {
   private readonly client: ShadingClient;
-  private readonly coarse: CoarseTexels;
   private texture: Data3DTexture | null = null;
   private grid: Grid | null = null;
   private strength = 0;
@@ -47,10 +47,10 @@ export class DepthShading {
 
   constructor(
     private readonly frame: MarchFrame,
+    private readonly coarse: CoarseTexels,
     private readonly onChange: () => void,
     onError: (error: unknown) => void,
   ) {
-    this.coarse = new CoarseTexels(onChange, onError);
     this.client = new ShadingClient((shading) => this.show(shading), onError);
   }
 
@@ -105,12 +105,12 @@ export class DepthShading {
     let isWhole = true;
     const tiles = marched.map(({ march, packed, resident }): TileMatter => {
       const { volume } = march;
-      const { low, high } = march.corners;
+      const { low, high } = textureCorners(volume);
       const sources = packed.channels.flatMap((id) => resident.texture.kept.get(id) ?? []);
       const isStreamed = packed.index !== null;
       const level = isStreamed ? null : levelFor(sources, edge, MOST_TEXELS / count);
       const channels = packed.channels.map((_, c) => {
-        const alphas = opacities(march.tableOf(c));
+        const alphas = march.opacitiesOf(c);
         if (level === null) return { texels: middles(packed, c), opacities: alphas };
         used.add(sources[c]);
         const texels = this.coarse.get(sources[c], level);
@@ -126,7 +126,7 @@ export class DepthShading {
         whole: [whole[0], whole[1], whole[2]],
         low: asVec3(low.clone().min(high)),
         high: asVec3(low.clone().max(high)),
-        toTexture: march.worldToTexture.elements,
+        toTexture: worldToTexture(march).elements,
         voxel_um: march.voxel_um,
       };
     });
@@ -219,6 +219,18 @@ function cutOf({ min, max, plane }: MarchClip): Cut {
     box: { min: asVec3(min), max: asVec3(max) },
     plane: [plane.x, plane.y, plane.z, plane.w],
   };
+}
+
+/** From the world, um, to texture coordinates. */
+function worldToTexture({ volume, toBox }: TileMarch): Matrix4 {
+  const { low, high } = textureCorners(volume);
+  const { min, max } = volume.bounds_um;
+  const size = new Vector3(...max).sub(new Vector3(...min));
+  const scale = high.sub(low).divide(size);
+  return new Matrix4()
+    .makeTranslation(low)
+    .multiply(new Matrix4().makeScale(scale.x, scale.y, scale.z))
+    .multiply(toBox);
 }
 
 /** A direction on a lattice: a head that trembles asks for nothing, and a view has one lamp. */
