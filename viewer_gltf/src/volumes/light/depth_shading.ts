@@ -209,10 +209,16 @@ function coarsestSpacing({ bounds_um, size, apron }: TileVolume): number {
 /** Half-way between the extremes of each brick: of what is streamed, all that is at hand. */
 function middles({ bricks }: Packed, channel: number): Uint8Array {
   const ranges = bricks[channel];
-  return Uint8Array.from({ length: ranges.length / 2 }, (_, i) =>
+  const made = MIDDLES.get(ranges);
+  if (made !== undefined) return made;
+  const found = Uint8Array.from({ length: ranges.length / 2 }, (_, i) =>
     Math.round((ranges[2 * i] + ranges[2 * i + 1]) / 2),
   );
+  MIDDLES.set(ranges, found);
+  return found;
 }
+/** The same ones for the same ranges: others ask for other shades. */
+const MIDDLES = new WeakMap<Uint8Array, Uint8Array>();
 
 function cutOf({ min, max, plane }: MarchClip): Cut {
   return {
