@@ -208,20 +208,34 @@ def _march(
     steps = np.ceil(length / (step_voxels * voxel)).astype(np.int64)
     step = np.divide(length, steps, out=np.zeros_like(length), where=steps > 0)
     sums = np.zeros((len(start), 4))
+    faces = _faces(block, start + near[:, None] * direction) * (near > 0)[:, None]
     rays = np.flatnonzero(steps)  # those that go on
     for k in range(int(steps.max(initial=0))):
         rays = rays[(k < steps[rays]) & (sums[rays, 3] < 1 - CLEAR)]
         points = start[rays] + (near[rays] + (k + 0.5) * step[rays])[:, None] * direction[rays]
+        in_face = np.clip(voxel / step[rays] - k, 0.0, 1.0)  # share of the step in the first voxel
         color, opacity, shares = _classify(block, block.intensities(points), step[rays] / voxel)
         seen = opacity > 0
         rays_seen, opacity = rays[seen], opacity[seen]
         color = color[seen]
         if light is not None:
-            color = _shade(block, points[seen], direction[rays_seen], light, color, shares[:, seen])
+            cut = in_face[seen, None] * faces[rays_seen]
+            toward = direction[rays_seen]
+            color = _shade(block, points[seen], toward, light, color, shares[:, seen], cut)
         weight = (1 - sums[rays_seen, 3]) * opacity
         sums[rays_seen, :3] += weight[:, None] * color
         sums[rays_seen, 3] += weight
     return sums
+
+
+def _faces(block: Block, points: Values) -> Values:
+    """Return the normals (n, 3) of the faces on which points (n, 3) lie, world um; 0 for others."""
+    slack = 0.05 * float(block.spacing_um().min())
+    low = np.abs(points - np.asarray(block.low_um)) < slack
+    high = np.abs(points - np.asarray(block.high_um)) < slack
+    normals = high.astype(np.float64) - low
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
 
 
 def _classify(block: Block, intensities: Values, voxels: Values) -> tuple[Values, Values, Values]:
@@ -253,12 +267,14 @@ def _shade(
     lamps: Values,
     color: Values,
     shares: Values,
+    cut: Values,
 ) -> Values:
     """Return the light (n, 3) that is seen at points (n, 3) of a colour (n, 3).
 
     lamps: (2, 3), towards the lamp and the weaker one. Central differences of the intensities, each
     channel by its share. Lit from both sides (Levoy, Display of Surfaces from Volume Data, 1988);
-    what has no direction is lit as if it faced the eye.
+    what has no direction is lit as if it faced the eye. cut: (n, 3), the normal of the face
+    by which the ray came in, times the share of the light that is as on the face.
     """
     h = float(block.spacing_um().min())
     gradient = np.stack(
@@ -279,7 +295,12 @@ def _shade(
     unlit = SCATTERED * color * _light_on(-direction, lamps)
     fade = np.clip((steepness - NOISE_STEP) / (BOUNDARY_STEP - NOISE_STEP), 0.0, 1.0)
     fade = np.where(flat, 0.0, fade**2 * (3 - 2 * fade))
-    return unlit + fade[:, None] * (lit - unlit)
+    shaded = unlit + fade[:, None] * (lit - unlit)
+    share = np.linalg.norm(cut, axis=1, keepdims=True)
+    face = np.divide(cut, share, out=np.zeros_like(cut), where=share > 0)
+    gloss = GLOSS * np.maximum((face * half).sum(axis=1), 0.0) ** EXPONENT
+    on_face = color * _light_on(face, lamps) + gloss[:, None] * np.asarray(LIGHT_COLOR)
+    return shaded + share * (on_face - shaded)
 
 
 def _light_on(normal: Values, lamps: Values) -> Values:

@@ -33,6 +33,8 @@ const brotlied = (bytes: Buffer) =>
   promisify(brotliCompress)(bytes, {
     params: { [constants.BROTLI_PARAM_SIZE_HINT]: bytes.length },
   });
+/** Characters of a file in which its imports are. */
+const HEAD = 4000;
 const hashOf = (text: string) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
 
 /** The code as it runs from anywhere: its own address is the one that the page says. */
@@ -57,6 +59,9 @@ async function splitCode(folder: string, entry: string, exports: readonly string
   const code = movable(await readFile(join(folder, entry), "utf8"), basename(entry));
   const plain = entry.replace(/index(-[^/]*)$/, "viewer$1");
   if (plain === entry) throw new Error(`${entry}: expected a name with index-`);
+  const [, needed] = /\bfrom\s*["'`]\.\/([^"'`]+)/.exec(code.slice(0, HEAD)) ?? [];
+  if (needed !== undefined)
+    throw new Error(`${entry}: needs ${needed} as it starts: it can't move`);
   await writeFile(join(folder, plain), code);
   await writeFile(join(folder, entry), handOn(exports));
   return { plain, code: Buffer.from(code) };

@@ -2,13 +2,23 @@
  * One frame: depth of the surfaces, volumes marched up to it, the scene, the volumes over it. All of
  * it is linear light until the end, when it is encoded once.
  */
-import { Matrix4, type Object3D, Vector3, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import {
+  Matrix4,
+  type Object3D,
+  Scene,
+  Vector3,
+  type WebGLRenderer,
+  type WebGLRenderTarget,
+} from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import { BothEyes } from "../gpu/both_eyes";
 import { Cuts } from "../gpu/clip_planes";
+import { LAST, Overlay } from "../gpu/composite_pass";
 import { EncodePass } from "../gpu/encode_pass";
 import { Eyes } from "../gpu/eyes";
+import { drawWhole } from "../gpu/float_targets";
 import { linearTarget } from "../gpu/linear_target";
+import { KEY_AT, towards } from "../gpu/room_light";
 import type { Clip } from "../math/clip";
 import type { TracedVolume } from "../pathtrace/traced_volume";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "../surfaces/blend_material";
@@ -44,6 +54,9 @@ export type FramePace = Readonly<{
   gathers: boolean;
 }>;
 
+/** Cosines of a disc that is all of the picture, and of one that is nowhere. */
+const EVERYWHERE = [-2, -3] as const;
+const NOWHERE = [3, 2] as const;
 /** Most frames of a view at rest that are averaged. */
 const MOST_GATHERED = 64;
 /** Multiples of it fill 0..1 evenly, however many there are. */
@@ -73,11 +86,17 @@ export class Picture {
   /** The same where edges aren't smoothed. */
   private readonly draft: WebGLRenderTarget;
   private readonly encode = new EncodePass();
+  /** Where a channel is a volume beyond the disc too: the picture within it, and its march. */
+  private readonly within: WebGLRenderTarget;
+  private readonly marchWithin: MarchPass;
+  private readonly overWithin: Overlay;
+  private readonly mixed = new Scene();
   /** Frames of moving views. */
   private moved = 0;
   /** The volumes of the march that stands in for what is traced; "": it has to be made. */
   private stoodIn = "";
   private readonly point = new Vector3();
+  private readonly lamp = new Vector3();
   private readonly corner = new Vector3();
   private readonly toSpecimen = new Matrix4();
 
@@ -92,7 +111,13 @@ export class Picture {
     this.surfaceFrame = makeSurfaceFrame(disc, this.march.picture, this.cuts, this.both);
     this.light = linearTarget(renderer, { hasDepth: true, isMultisampled: true });
     this.draft = linearTarget(renderer, { hasDepth: true });
-    room.scene.add(...this.march.overlays);
+    this.within = linearTarget(renderer, { hasDepth: true, isMultisampled: true });
+    this.marchWithin = new MarchPass(renderer, this.marchFrame);
+    const { uSceneDepth } = this.marchFrame;
+    const whole = { ...disc, uIsCrossing: { value: true } };
+    this.overWithin = new Overlay(this.within.texture, uSceneDepth, { order: LAST, disc: whole });
+    this.mixed.add(this.overWithin.mesh);
+    room.scene.add(...this.march.overlays, ...this.marchWithin.overlays);
   }
 
   /**
@@ -109,33 +134,53 @@ export class Picture {
     const { renderer, room, hybrid } = this;
     const { volumes, traced, panes, overlays, bounds, solids } = drawn;
     const specimen = room.specimen.group.matrixWorld;
-    const blended = panes.map(({ scene }) => scene);
     renderer.info.reset();
     room.light(head);
     this.cuts.follow(clip, specimen);
     this.aim(bounds, resolution);
     this.marchFrame.uIsCrossing.value = volumes.isInDisc;
     this.march.hide();
+    this.marchWithin.hide();
     traced.hide();
-    const opaque = () =>
+    const opaque = (blended = panes) =>
       this.depth.render(renderer, room.scene, this.eyes, [
         ...room.overlays,
         ...overlays,
-        ...blended,
+        ...blended.map(({ scene }) => scene),
       ]);
     const isTraced = traced.isShown;
     if (isTraced || !volumes.isEmpty) opaque();
     const isMarched = !volumes.isEmpty && !(isTraced && this.needsNoMarch(drawn, isMoving));
+    const isMixed = isMarched && !isTraced && hybrid.outer_rad > 0 && volumes.isPartlyInDisc;
     if (isMarched) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
       volumes.placeAs(specimen);
-      volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march);
-      const hasPane = panes.some(({ isPane }) => isPane);
-      this.marchFrame.uHasPane.value = hasPane;
-      if (hasPane) this.depth.renderPanes(renderer, room.scene, this.eyes);
+      const lamp = this.lamp.set(...towards(KEY_AT)).transformDirection(head);
+      lamp.transformDirection(toSpecimen);
+      volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march, lamp);
       this.shiftNoise(isMoving, gathers);
-      this.march.render(volumes.scene, this.eyes, resolution, gathers);
+      const marchBy = (pass: MarchPass, blended = panes) => {
+        const hasPane = blended.some(({ isPane }) => isPane);
+        this.marchFrame.uHasPane.value = hasPane;
+        if (hasPane) this.depth.renderPanes(renderer, room.scene, this.eyes);
+        pass.render(volumes.scene, this.eyes, resolution, gathers);
+      };
+      if (isMixed) {
+        this.marchFrame.uDisc.value.set(...EVERYWHERE);
+        volumes.endAtDisc(true);
+        marchBy(this.marchWithin);
+        renderer.setRenderTarget(this.drawInto(this.within));
+        this.marchWithin.hide();
+        volumes.endAtDisc(false);
+        this.marchFrame.uDisc.value.set(...NOWHERE);
+        const translucent = panes.filter(({ isSolid }) => !isSolid);
+        opaque(translucent); // beyond the disc the others are whole
+        marchBy(this.march, translucent);
+      } else {
+        this.within.setSize(1, 1); // it is as large as the picture
+        marchBy(this.march);
+      }
     }
     if (isTraced) {
       const scene = { specimen, clip: this.cuts.march, bounds, solids };
@@ -143,7 +188,7 @@ export class Picture {
       traced.render(renderer, this.eyes, scene, resolution, isMoving, passes, standIn);
       if (traced.isOnScreen) this.march.hide();
     }
-    this.show(isSmooth ? this.light : this.draft);
+    this.show(isSmooth ? this.light : this.draft, isMixed);
   }
 
   /** Whether the user's own room shows behind. */
@@ -199,8 +244,23 @@ export class Picture {
     marchFrame.uReach.value = hybrid.reach((MIXED_PX * pixel_rad) / resolution);
   }
 
-  /** Draw the room's light, and encode it for the present target. */
-  private show(light: WebGLRenderTarget): void {
+  /** Draw the room's light, and encode it for the present target; `isMixed`: with that within the disc. */
+  private show(light: WebGLRenderTarget, isMixed: boolean): void {
+    const { renderer, eyes, hybrid, marchFrame } = this;
+    const before = this.drawInto(light);
+    if (isMixed) {
+      marchFrame.uDisc.value.set(...hybrid.cosines);
+      this.overWithin.show(eyes, 1);
+      const { autoClear } = renderer;
+      renderer.autoClear = false;
+      drawWhole(renderer, this.mixed, light, eyes.width_px, eyes.height_px);
+      renderer.autoClear = autoClear;
+    }
+    this.encode.render(renderer, light, before);
+  }
+
+  /** Draw the room's light; the target before. */
+  private drawInto(light: WebGLRenderTarget): WebGLRenderTarget | null {
     const { renderer, eyes, both } = this;
     const before = renderer.getRenderTarget();
     const { enabled } = renderer.xr; // else three would draw the headset's eyes by itself
@@ -209,7 +269,7 @@ export class Picture {
     renderer.setRenderTarget(light);
     renderer.render(this.room.scene, both.cameraOf(eyes));
     renderer.xr.enabled = enabled;
-    this.encode.render(renderer, light, before);
+    return before;
   }
 
   /** What is laid over the scene. */
@@ -220,6 +280,9 @@ export class Picture {
   dispose(): void {
     this.depth.dispose();
     this.march.dispose();
+    this.marchWithin.dispose();
+    this.overWithin.dispose();
+    this.within.dispose();
     this.light.dispose();
     this.draft.dispose();
     this.encode.dispose();

@@ -55,8 +55,11 @@ export function makeSurfaceFrame(
   return { uniforms: { ...shared, ...picture, ...both.uniforms }, both };
 }
 
-/** A surface that is not opaque now; a pane: the march has to know what lies behind it. */
-export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean }>;
+/**
+ * A surface that is not opaque now; a pane: the march has to know what lies behind it. `isSolid`: but for
+ * what its volume takes in the disc it is opaque.
+ */
+export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean; isSolid: boolean }>;
 
 /** How much of a surface is left. */
 export type Share = Readonly<{
@@ -169,6 +172,7 @@ export class BlendedSurface {
   private readonly twins: readonly Mesh[];
   isBlended = false;
   isPane = false;
+  isSolid = false;
 
   constructor(
     private readonly scene: Object3D,
@@ -245,6 +249,7 @@ export class BlendedSurface {
     this.uniforms.uCrosses.value = crosses;
     this.isBlended = opacity < 1 || taken > 0;
     this.isPane = this.isBlended && !crosses;
+    this.isSolid = isInDisc && opacity === 1;
     this.scene.visible = opacity > 0 && (taken < 1 || isInDisc);
     for (const material of this.materials) {
       material.stencilWrite = crosses && this.isBlended;

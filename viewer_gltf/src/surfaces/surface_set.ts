@@ -79,8 +79,8 @@ export class SurfaceSet {
   /** Those that are not opaque now. */
   get blended(): readonly BlendedScene[] {
     return this.shown().flatMap(([, { surfaces }]) =>
-      [...surfaces.values()].flatMap(({ scene, blend: { isBlended, isPane } }) =>
-        isBlended ? [{ scene, isPane }] : [],
+      [...surfaces.values()].flatMap(({ scene, blend: { isBlended, isPane, isSolid } }) =>
+        isBlended ? [{ scene, isPane, isSolid }] : [],
       ),
     );
   }

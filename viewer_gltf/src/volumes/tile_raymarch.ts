@@ -33,13 +33,14 @@ import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
 import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
+import type { Vec3 } from "../math/vec3";
 import type { Compositing } from "../state/parameters/volumes";
 import { distanceInGrid } from "./blend_order";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 import { brickCounts } from "./skip_bricks";
 import { textureCorners } from "./texture_space";
 import type { Packed } from "./tile_texture";
-import { ENTRIES } from "./transfer_luts";
+import { ENTRIES, opacities } from "./transfer_luts";
 import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
 /** Most steps of a ray while anything moves, for any size of the volume and any number of tiles. */
@@ -72,6 +73,9 @@ export type MarchFrame = Readonly<{
   /** Whether all that is marched shows in the disc alone: then its picture is mixed with the surfaces'. */
   uIsCrossing: { value: boolean };
   uSteps: { value: number };
+  /** Light that comes to each cell of a coarse grid, and by how much it counts, 0..1. */
+  uReached: { value: Data3DTexture | null };
+  uDepthShading: { value: number };
 }>;
 
 /** Depth of what is opaque, and of the nearest that is translucent. */
@@ -93,6 +97,8 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
     uReach: { value: -1 },
     uIsCrossing: { value: false },
     uSteps: { value: MAX_STEPS },
+    uReached: { value: null },
+    uDepthShading: { value: 0 },
   };
 }
 
@@ -154,11 +160,15 @@ export class TileMarch {
   private tables2d: DataArrayTexture | null = null;
   /** The content of each layer; null: a table that knows no gradients. */
   private readonly layers: (Uint8Array | null)[] = [];
+  /** Goes up with each change of the tables. */
+  looks = 0;
+  /** Of each channel, whether it shows in the disc alone. */
+  private inDisc: readonly boolean[] = [];
   private readonly low: Vector3;
   private readonly toTile: Matrix4;
   /** Between the world and the box from its low corner. */
   private readonly fromBox: Matrix4;
-  private readonly toBox: Matrix4;
+  readonly toBox: Matrix4;
 
   constructor(
     readonly volume: TileVolume,
@@ -206,6 +216,8 @@ export class TileMarch {
         uSkyLight: { value: new Vector3(...SKY) },
         uGroundLight: { value: new Vector3(...GROUND) },
         uGloss: { value: GLOSS },
+        uToShading: { value: new Matrix4() },
+        uShadingCell: { value: 0 },
         uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },
         uInDisc: { value: [false, false, false, false] },
         uAllInDisc: { value: false },
@@ -264,6 +276,38 @@ export class TileMarch {
     uniforms.uSpare.value = Math.min(tiles - 1, MAX_STEPS / 2);
   }
 
+  /** The path that opacities hold for. */
+  get voxel_um(): number {
+    return this.mesh.material.uniforms.uVoxel.value;
+  }
+
+  /** The opacities of a channel's table, as it is drawn. */
+  opacitiesOf(channel: number): Uint8Array {
+    return opacities((this.lut.image.data as Uint8Array).subarray(channel * ENTRIES * 4));
+  }
+
+  /** Grow a box of the world, um, round this one. */
+  growBox(min: Vector3, max: Vector3): void {
+    const { x, y, z } = this.mesh.material.uniforms.uSize.value;
+    const at = new Vector3();
+    for (let i = 0; i < 8; i++) {
+      at.set(i & 1 ? x : 0, i & 2 ? y : 0, i & 4 ? z : 0).applyMatrix4(this.fromBox);
+      min.min(at);
+      max.max(at);
+    }
+  }
+
+  /** Where the grid of the shading lies: its low corner, um, world, cells, and a cell's edge, um. */
+  placeShading(low: Vec3, size: readonly [number, number, number], edge_um: number): void {
+    const { uToShading, uShadingCell } = this.mesh.material.uniforms;
+    const [x, y, z] = size.map((n) => 1 / (n * edge_um));
+    uToShading.value
+      .makeScale(x, y, z)
+      .multiply(new Matrix4().makeTranslation(-low[0], -low[1], -low[2]))
+      .multiply(this.fromBox);
+    uShadingCell.value = edge_um;
+  }
+
   clip(clip: MarchClip): void {
     clipInto(clip, this.fromBox, this.toBox, this.mesh.material.uniforms as ClipUniforms);
   }
@@ -291,7 +335,17 @@ export class TileMarch {
 
   /** Whether all of its channels show in the disc alone. */
   get isInDisc(): boolean {
-    return this.mesh.material.uniforms.uAllInDisc.value;
+    return this.inDisc.length > 0 && this.inDisc.every((is) => is);
+  }
+
+  /** Whether any of its channels does. */
+  get isPartlyInDisc(): boolean {
+    return this.inDisc.includes(true);
+  }
+
+  /** March what lies in the disc's cone alone, whatever the channels. */
+  endAtDisc(ends: boolean): void {
+    this.mesh.material.uniforms.uAllInDisc.value = ends || this.isInDisc;
   }
 
   /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
@@ -310,10 +364,14 @@ export class TileMarch {
       row.set(table);
       differs = true;
     });
-    if (differs) this.lut.needsUpdate = true;
+    if (differs) {
+      this.lut.needsUpdate = true;
+      this.looks++;
+    }
     this.fillTables2d(appearances);
-    uniforms.uAllInDisc.value = appearances.every((appearance) => appearance.isInDisc);
-    this.define("DISC", appearances.some((appearance) => appearance.isInDisc) ? 1 : null);
+    this.inDisc = appearances.map(({ isInDisc }) => isInDisc);
+    this.endAtDisc(false);
+    this.define("DISC", this.isPartlyInDisc ? 1 : null);
     return differs;
   }
 

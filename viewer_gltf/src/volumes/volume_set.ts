@@ -1,5 +1,5 @@
 /** All volumes on screen: shows and hides them, loads missing ones, drops unused ones. */
-import { Group, Matrix4, Scene, Vector3 } from "three";
+import { Group, type Matrix4, Scene, Vector3 } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
@@ -13,6 +13,8 @@ import { BrickTile } from "./bricks/brick_atlas";
 import type { BrickService } from "./bricks/brick_service";
 import { ChannelLists } from "./channel_volumes";
 import { OccupancyClient } from "./empty_space_client";
+import { CoarseTexels } from "./light/coarse_texels";
+import type { DepthShading, Marched } from "./light/depth_shading";
 import { LoadQueue } from "./load_queue";
 import { levelsToFetch, type VolumeLimits } from "./mip_levels";
 import { Residency, type Resident } from "./residency";
@@ -49,6 +51,9 @@ export class VolumeSet {
   private readonly occupancy = new OccupancyClient();
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
+  /** What shades; its code comes with the first volumes that are shaded. */
+  private shading: DepthShading | null = null;
+  private shadingIs: "none" | "coming" | "there" | "failed" = "none";
   /** The last table of each channel: all tiles ask for the same. */
   private readonly tables2d = new Map<string, MadeTable2d>();
   private state: ViewerState | null = null;
@@ -80,6 +85,8 @@ export class VolumeSet {
   get isLoading(): boolean {
     return (
       this.skipsUnderWay > 0 ||
+      this.shadingIs === "coming" ||
+      this.shading?.isLoading === true ||
       this.channels.isLoading ||
       this.residents.all.some(({ texture }) => texture.isLoading)
     );
@@ -94,6 +101,16 @@ export class VolumeSet {
   get isInDisc(): boolean {
     const drawn = this.drawn();
     return drawn.length > 0 && drawn.every(({ march }) => march.isInDisc);
+  }
+
+  /** Whether of what is marched some shows in the disc alone, and some beyond it too. */
+  get isPartlyInDisc(): boolean {
+    return !this.isInDisc && this.drawn().some(({ march }) => march.isPartlyInDisc);
+  }
+
+  /** March what lies in the disc's cone alone, whatever the channels; false: as each shows. */
+  endAtDisc(ends: boolean): void {
+    for (const { march } of this.drawn()) march.endAtDisc(ends);
   }
 
   /** Bytes on the GPU. */
@@ -163,16 +180,44 @@ export class VolumeSet {
     this.group.matrixWorldNeedsUpdate = true;
   }
 
-  /** Before every frame. `eye` and the disc's cone in um, world. */
-  aim(eye: Vector3, apex: Vector3, axis: Vector3, clip: MarchClip): void {
+  /** Before every frame. `eye` and the disc's cone in um, world; `lamp`: the direction towards it. */
+  aim(eye: Vector3, apex: Vector3, axis: Vector3, clip: MarchClip, lamp: Vector3): void {
     const boxes = new Bounds();
-    for (const { march } of this.drawn()) boxes.add(march);
-    for (const { march } of this.drawn()) {
+    const drawn = this.drawn();
+    for (const { march } of drawn) boxes.add(march);
+    this.shade(drawn, clip, lamp);
+    for (const { march } of drawn) {
+      this.shading?.place(march);
       march.sortBy(eye);
       march.aim(apex, axis);
       march.clip(clip);
       march.shareWith(boxes.min, boxes.max, boxes.count);
     }
+  }
+
+  private shade(drawn: readonly Marched[], clip: MarchClip, lamp: Vector3): void {
+    const { state, frame, onChange, onError } = this;
+    const strength = state?.compositing === "over" ? state.depthShading : 0;
+    if (strength > 0 && drawn.length > 0 && this.shadingIs === "none") {
+      this.shadingIs = "coming";
+      import("./light/depth_shading")
+        .then(({ DepthShading }) => {
+          this.shading = new DepthShading(
+            frame,
+            new CoarseTexels(onChange, onError),
+            onChange,
+            onError,
+          );
+          this.shadingIs = "there";
+        })
+        .catch((error: unknown) => {
+          this.shadingIs = "failed"; // volumes are drawn without
+          onError(error);
+        })
+        .finally(onChange);
+    }
+    this.shading?.set(strength);
+    this.shading?.follow(drawn, clip, lamp);
   }
 
   /** Go on with all fades; whether any is still under way. */
@@ -390,18 +435,23 @@ export class VolumeSet {
     march.show(packed, texture.old, texture.fresh, presence);
   }
 
-  private drawn(): { march: TileMarch }[] {
-    return this.residents.all.flatMap(({ march }) => (march?.mesh.visible ? [{ march }] : []));
+  private drawn(): Marched[] {
+    return this.residents.all.flatMap((resident) => {
+      const { march, packed } = resident;
+      return march?.mesh.visible && packed !== null ? [{ march, packed, resident }] : [];
+    });
   }
 
   /** Drop all that is on the GPU; what is wanted comes anew. */
   forget(): void {
     this.residents.dropAll();
+    this.shading?.forget();
   }
 
   dispose(): void {
     this.forget();
     this.occupancy.dispose();
+    this.shading?.dispose();
   }
 }
 
@@ -421,17 +471,8 @@ class Bounds {
   readonly max = new Vector3().setScalar(Number.NEGATIVE_INFINITY);
   count = 0;
 
-  add({ volume }: TileMarch): void {
-    const matrix = new Matrix4().fromArray(volume.matrix);
-    const { min, max } = volume.bounds_um;
-    for (let i = 0; i < 8; i++) {
-      const x = i & 1 ? max[0] : min[0];
-      const y = i & 2 ? max[1] : min[1];
-      const z = i & 4 ? max[2] : min[2];
-      const at = new Vector3(x, y, z).applyMatrix4(matrix);
-      this.min.min(at);
-      this.max.max(at);
-    }
+  add(march: TileMarch): void {
+    march.growBox(this.min, this.max);
     this.count++;
   }
 }

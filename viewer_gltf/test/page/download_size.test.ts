@@ -17,11 +17,11 @@ const ON_THE_WIRE_BYTES = 500_000;
 const FIRST_PICTURE_BYTES = 300_000;
 const DEMO_TILES = 10;
 /**
- * Fetched where they are wanted: textures, bricks from a server, paths of light, pictures and videos, the
- * split screen, the benchmark, the slices.
+ * Fetched where they are wanted: textures, bricks from a server, paths of light, what shades volumes, pictures
+ * and videos, the split screen, the benchmark, the slices.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {

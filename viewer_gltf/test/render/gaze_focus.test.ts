@@ -15,6 +15,41 @@ const NEAR = "&switch=9";
 /** Through soft volumes one sees, so that they look unlike the surfaces whose place they take. */
 const SOFT = "#v=1&l=Balls:tsoft,F_x20_body:tsoft";
 
+/** Pixels of a disc's picture outside those within and without it, by more than 5, and between both. */
+function rimOf(disc: Picture, within: Picture, without: Picture) {
+  let [outside, between] = [0, 0];
+  for (let y = 0; y < disc.height; y++) {
+    for (let x = 0; x < disc.width; x++) {
+      const [a, b, found] = [within.at(x, y), without.at(x, y), disc.at(x, y)];
+      if (found.some((v, i) => v < Math.min(a[i], b[i]) - 5 || v > Math.max(a[i], b[i]) + 5))
+        outside++;
+      if (found.some((v, i) => Math.abs(v - a[i]) > 2 && Math.abs(v - b[i]) > 2)) between++;
+    }
+  }
+  return { outside, between };
+}
+
+describeInChromium("a channel without a surface", () => {
+  const stand = prepareStand({ viewport: VIEWPORT, fixture: { hasReason: true } });
+
+  for (const quality of ["high", "low"]) {
+    it(`is a volume on both sides of the rim, which is nowhere outside both: ${quality}`, async () => {
+      const at = async (query: string) => {
+        await stand.open(`${query}&disc=${DISC_DEG}&quality=${quality}#v=1&depth=0`);
+        await stand.viewer.settled();
+        return takePicture(stand.viewer.page);
+      };
+      const within = await at(`&mode=all${NEAR}`);
+      const without = await at("&mode=disc&switch=0.1");
+      const shown = (await stand.viewer.snapshot()).volumes.map(({ channel }) => channel);
+      expect(new Set(shown)).toEqual(new Set(["Block"]));
+      const { outside, between } = rimOf(await at(`&mode=disc${NEAR}`), within, without);
+      expect(outside).toBe(0);
+      expect(between).toBeGreaterThan(50);
+    });
+  }
+});
+
 describeInChromium("surface or volume", () => {
   const stand = prepareStand({ viewport: VIEWPORT });
 
@@ -73,15 +108,7 @@ describeInChromium("surface or volume", () => {
     it(`has a rim that is nowhere outside both pictures, quality ${quality}`, async () => {
       const at = (mode: Mode) => pictureOf(modeAt(mode, quality));
       const [disc, all, off] = [await at("disc"), await at("all"), await at("off")];
-      let [outside, between] = [0, 0];
-      for (let y = 0; y < disc.height; y++) {
-        for (let x = 0; x < disc.width; x++) {
-          const [a, b, found] = [all.at(x, y), off.at(x, y), disc.at(x, y)];
-          if (found.some((v, i) => v < Math.min(a[i], b[i]) - 5 || v > Math.max(a[i], b[i]) + 5))
-            outside++;
-          if (found.some((v, i) => Math.abs(v - a[i]) > 2 && Math.abs(v - b[i]) > 2)) between++;
-        }
-      }
+      const { outside, between } = rimOf(disc, all, off);
       expect(outside).toBe(0);
       expect(between).toBeGreaterThan(50); // there is a rim
     });
@@ -194,7 +221,7 @@ describeInChromium("surface or volume", () => {
         });
       }
     });
-    await stand.open(`&mode=all`);
+    await stand.open(`&mode=all#v=1&depth=0`);
     await stand.viewer.settled();
     const take = () =>
       stand.viewer.page.evaluate(() =>
@@ -202,14 +229,37 @@ describeInChromium("surface or volume", () => {
       );
     expect(Math.max(...(await take()))).toBeGreaterThan(100_000);
     await stand.viewer.chooseTransferFunction("Block", "soft");
-    const requests = stand.host.requests.length;
+    const asked = () =>
+      stand.host.requests.filter(({ path }) => path.startsWith("/bundle/")).length;
+    const requests = asked();
     const tables = await take();
     expect(tables.length).toBeGreaterThan(0);
     // rows of the table, and the table of skips
     expect(Math.max(...tables)).toBeLessThanOrEqual(4 * 1024);
     await stand.viewer.recolor("Block", "#ff00ff");
     expect((await take()).filter((bytes) => bytes > 0)).toEqual([]);
-    expect(stand.host.requests.length).toBe(requests);
+    expect(asked()).toBe(requests);
+    // and for other shadows one coarse grid, from what is there already
+    await stand.viewer.slide("depth-shading", 0.5);
+    expect(Math.max(...(await take()))).toBeLessThanOrEqual(2 * 64 ** 3);
+    await stand.viewer.chooseTransferFunction("Block", "default");
+    const shaded = await take();
+    expect(Math.max(...shaded)).toBeGreaterThan(4 * 1024);
+    expect(Math.max(...shaded)).toBeLessThanOrEqual(2 * 64 ** 3);
+    expect(asked()).toBe(requests);
+  });
+
+  it("is shaded by what encloses it and by what stands before it, each time alike", async () => {
+    const at = (depth: number) => pictureOf(`${modeAt("all", "high")}#v=1&depth=${depth}`);
+    const [none, half, whole, again] = [await at(0), await at(0.5), await at(1), await at(1)];
+    expect(apart(whole, again, 0, 90, 0)).toBe(0);
+    const mean = (picture: Picture) => {
+      const drawn = picture.where((pixel) => !isBackground(pixel));
+      return drawn.reduce((sum, place) => sum + picture.at(...place)[1], 0) / drawn.length;
+    };
+    expect(mean(whole)).toBeLessThan(mean(half));
+    expect(mean(half)).toBeLessThan(mean(none) + 2); // open places are a little brighter
+    expect(mean(whole)).toBeGreaterThan(0.7 * mean(none));
   });
 
   it("looks alike at fewer pixels and steps", async () => {

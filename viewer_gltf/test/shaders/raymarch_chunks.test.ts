@@ -189,6 +189,25 @@ describeInChromium("the shader's chunks", () => {
     expect((await normal("vec3(9.0, 0.0, 9.0)")).slice(0, 3)).toEqual([1, 0, 0]);
   });
 
+  it("return the face by which a ray comes in, of the box round all tiles or of a cut", async () => {
+    const face = async (start: number[], plane = [0, 0, 0, 1]) => {
+      const head = `const float uVoxel = 1.0; const vec4 uClipPlane = ${vec(...plane)};
+        const vec3 uAllLow = vec3(-10.0, 0.0, 0.0); const vec3 uAllHigh = vec3(10.0);
+        const vec3 uClipLow = vec3(-1e9); const vec3 uClipHigh = vec3(1e9, 1e9, 8.0);`;
+      const body = `oColor = vec4(cutFace(${vec(...start)}), 1.0);`;
+      return (await run(["cut_face"], head, body)).slice(0, 3);
+    };
+    expect(await face([10, 5, 5])).toEqual([1, 0, 0]);
+    expect(await face([3, 0, 5])).toEqual([0, -1, 0]);
+    expect(await face([3, 4, 8])).toEqual([0, 0, 1]); // the cut's, within the box
+    expect(await face([0, 5, 5])).toEqual([0, 0, 0]); // where two tiles meet
+    expect(await face([3, 4, 5], [0.6, 0.8, 0, 5])).toEqual([
+      expect.closeTo(0.6),
+      expect.closeTo(0.8),
+      0,
+    ]);
+  });
+
   describe("find where the opaque scene ends a ray", () => {
     const [NEAR, FAR] = [1, 100];
     /** Of a fragment's point on the ray, as the eye sees it: its distance, and its view z. */
@@ -342,8 +361,9 @@ describeInChromium("the shader's chunks", () => {
   });
 
   describe("light a sample", () => {
-    /** A lamp and a sky of even light, in grey. */
-    const lights = (key: number, even: number, gloss = 0) => `
+    /** A lamp and a sky of even light, in grey, and how much of both comes to the place. */
+    const lights = (key: number, even: number, gloss = 0, reaches = "1.0") => `
+      vec2 reached(vec3 um, vec3 outwards) { return vec2(${reaches}); }
       const vec3 uKeyLight = vec3(${key.toFixed(4)}); const vec3 uFillLight = vec3(0.0);
       const vec3 uSkyLight = vec3(${even.toFixed(4)}); const vec3 uGroundLight = uSkyLight;
       const vec3 vFill = vec3(1.0, 0.0, 0.0); const vec3 vUp = vec3(0.0, 1.0, 0.0);
@@ -369,7 +389,7 @@ describeInChromium("the shader's chunks", () => {
           return vec4(0.5 + v, 0.5 - v, 0.5 + v, 0.0);
         }`;
       const shares = "vec4(0.25, 0.0, 0.75, 0.0)"; // the second channel has no say
-      const call = `shade(vec3(1.0), vec3(0.5), ${vec(...perUm)}, ${vec(...unit(dir))}, ${shares})`;
+      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${vec(...perUm)}, ${shares}), ${vec(...unit(dir))}, vec3(0.0))`;
       const body = `oColor = vec4(${call}, 1.0);`;
       return run(["gradient", "shade"], head, body).then(([found]) => found);
     }
@@ -428,6 +448,56 @@ describeInChromium("the shader's chunks", () => {
       expect(await facing(60)).toBeCloseTo(AMBIENT + DIFFUSE * (0.5 + 0.5 * half), 4);
     });
 
+    it("by as much as comes to its place: of the sky, and of the lamp", async () => {
+      const lit = async (reaches: string) => {
+        const head = `const float uVoxel = 1.0; const vec3 vLight = vec3(0.0, 0.0, 1.0);
+          ${lights(DIFFUSE, AMBIENT, 0, reaches)}
+          vec4 sampleIntensities(vec3 p) { return vec4(0.0); }`;
+        // a boundary that faces lamp and eye, and what has none
+        const call = (slope: string) =>
+          `shadeBy(vec3(1.0), vec3(0.0, 0.0, ${slope}), vec3(0.0, 0.0, -1.0), vec3(0.0)).r`;
+        const body = `oColor = vec4(${call("-0.5")}, ${call("0.0")}, 0.0, 1.0);`;
+        return (await run(["gradient", "shade"], head, body)).slice(0, 2);
+      };
+      for (const [sky, lamp] of [
+        [1, 1],
+        [0.25, 1],
+        [1, 0.25],
+        [0.5, 0],
+      ]) {
+        const expected = sky * AMBIENT + lamp * DIFFUSE;
+        const [boundary, even] = await lit(`${sky.toFixed(2)}, ${lamp.toFixed(2)}`);
+        expect(boundary).toBeCloseTo(expected, 4);
+        expect(even).toBeCloseTo(1.2 * expected, 4);
+      }
+    });
+
+    it("by what the grid of the shading says a cell further out, as far as it counts", async () => {
+      // 4 cells of 2 um along x; sky and lamp in the first two channels
+      const uReached: Texture = {
+        size: [4, 1, 1],
+        channels: 4,
+        texels: [0, 255, 0, 0, 51, 204, 0, 0, 102, 153, 0, 0, 255, 255, 0, 0],
+        isLinear: true,
+      };
+      const reached = async (x: number, outwards: string, strength: number) => {
+        const head = `uniform sampler3D uReached; const float uShadingCell = 2.0;
+          const mat4 uToShading = mat4(0.125, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0,
+                                       0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+          const float uDepthShading = ${strength.toFixed(2)};`;
+        const body = `oColor = reached(vec3(${x.toFixed(1)}, 0.5, 0.5), ${outwards}).xyxy;`;
+        return (await run(["depth_shading"], head, body, { uReached })).slice(0, 2);
+      };
+      const expectAt = (found: readonly number[], sky: number, lamp: number) => {
+        expect(found[0]).toBeCloseTo(sky, 2);
+        expect(found[1]).toBeCloseTo(lamp, 2);
+      };
+      expectAt(await reached(3, "vec3(0.0)", 1), 1.1 * 0.2, 1.1 * 0.8);
+      expectAt(await reached(3, "vec3(1.0, 0.0, 0.0)", 1), 1.1 * 0.4, 1.1 * 0.6);
+      expectAt(await reached(3, "vec3(0.0)", 0.5), 0.5 + 0.55 * 0.2, 0.5 + 0.55 * 0.8);
+      expect(await reached(3, "vec3(0.0)", 0)).toEqual([1, 1]); // exactly as without
+    });
+
     it("by the volume's own texels too", async () => {
       // 8 x 8 x 4 voxels: rises by 16 of 255 a voxel along x, and by half of it along the rows
       const texels = Array.from({ length: 256 }, (_, i) => 16 * (i % 8) + 8 * ((i >> 3) % 8));
@@ -440,7 +510,7 @@ describeInChromium("the shader's chunks", () => {
       // voxels of 1 um each; rows run against y
       const perUm = vec(1 / 8, -1 / 8, 1 / 4);
       const shares = "vec4(1.0, 0.0, 0.0, 0.0)";
-      const call = `shade(vec3(1.0), vec3(0.5), ${perUm}, vec3(0.6, -0.8, 0.0), ${shares})`;
+      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${perUm}, ${shares}), vec3(0.6, -0.8, 0.0), vec3(0.0))`;
       const textures = { uVolume };
       const [found] = await run(
         ["sample_intensities", "gradient", "shade"],

@@ -27,6 +27,8 @@ const STEREOCELL =
   new URL("../../../.venv/bin/stereocell", import.meta.url).pathname;
 const VIEWPORT = { width: 240, height: 160 }; // small: software draws it
 const QUERY = "?mode=all&quality=high";
+/** Bricks shade by the middles of their ranges, files by their levels. */
+const UNSHADED = "#v=1&depth=0";
 
 /** `stereocell serve OUT` on a free port, and its address. */
 async function serve(out: string): Promise<Readonly<{ address: string; stop: () => void }>> {
@@ -114,19 +116,19 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
     }
 
     it("draw what files draw, and are kept for the next visit", async () => {
-      const files = await open(`${host.address}/${QUERY}`);
+      const files = await open(`${host.address}/${QUERY}${UNSHADED}`);
       const expected = await takePicture(files.page);
       expect(files.counted.sockets).toBe(0);
       expect(files.counted.files.length).toBeGreaterThan(0);
       await files.page.close();
 
-      const first = await open(`${server.address}${QUERY}`);
+      const first = await open(`${server.address}${QUERY}${UNSHADED}`);
       expect(difference(await takePicture(first.page), expected)).toBeLessThan(0.005);
       expect(first.counted.files).toEqual([]);
       expect(first.counted.bricks).toBeGreaterThan(0);
       await first.page.close();
 
-      const second = await open(`${server.address}${QUERY}`);
+      const second = await open(`${server.address}${QUERY}${UNSHADED}`);
       expect(difference(await takePicture(second.page), expected)).toBeLessThan(0.005);
       expect(second.counted.sockets).toBe(1);
       expect(second.counted.bricks).toBe(0);
@@ -141,7 +143,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
         values: [0.4, 1],
         gradients: [0.1, 1],
       };
-      const link = `#v=1&c=Balls&only=r0_c1&l=Balls:sown_${writeShapes([slope])}:town&light=many:false`;
+      const link = `#v=1&depth=0&c=Balls&only=r0_c1&l=Balls:sown_${writeShapes([slope])}:town&light=many:false`;
       for (const mode of ["all", "traced"]) {
         const drawn = async (address: string) => {
           const { page, viewer, counted } = await open(

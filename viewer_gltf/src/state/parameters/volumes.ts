@@ -24,6 +24,8 @@ export const START_VOLUMES = {
   /** Angle between the gaze and the disc's rim. */
   discRadius_deg: 12,
   compositing: "over" as Compositing,
+  /** By how much volumes shade one another, 0..1. */
+  depthShading: 0.5,
 };
 
 export type VolumeSettings = Readonly<typeof START_VOLUMES>;
@@ -125,12 +127,38 @@ export const COMPOSITING: ChoiceParameter<Volumes, Compositing> = {
   spoken: ({ compositing }) => `Along a ray: ${compositing}`,
 };
 
+const percent = (value: number) => `${Math.round(100 * value)} %`;
+
+export const DEPTH_SHADING: NumberParameter<Volumes> = {
+  kind: "number",
+  id: "depth-shading",
+  label: "Depth shading",
+  about: "What is enclosed is darker, and what lies before something throws a shadow on it.",
+  link: "depth",
+  ...lens("depthShading"),
+  limits: [0, 1],
+  steps: 20,
+  rounded: (value) => Number(value.toFixed(2)),
+  text: percent,
+  refusal: ({ mode, compositing }) => {
+    if (mode === "traced" || mode === "off") return "Only volumes that are marched have one.";
+    return compositing === "over" ? "" : "Only opacity along a ray has one.";
+  },
+  keys: {
+    less: ["PageDown", "Less depth shading"],
+    more: ["PageUp", "More depth shading"],
+    next: (value, direction) => Number((value + 0.1 * direction).toFixed(2)),
+  },
+  spoken: ({ depthShading }) => `Depth shading ${percent(depthShading)}`,
+};
+
 /** In the panel's order. */
 export const VOLUMES: readonly Parameter<Volumes>[] = [
   MODE,
   SWITCH_DISTANCE,
   DISC_RADIUS,
   COMPOSITING,
+  DEPTH_SHADING,
 ];
 
 /** Whether volumes are drawn by paths of light. */

@@ -55,6 +55,10 @@ uniform vec3 uFillLight;  // ... the weaker one ...
 uniform vec3 uSkyLight;  // ... the sky, and the ground
 uniform vec3 uGroundLight;
 uniform float uGloss;  // of the lamp's light, at most
+uniform sampler3D uReached;  // light that comes to each cell round all volumes: around, and the lamp's
+uniform mat4 uToShading;  // from the box, um, to its texture coordinates
+uniform float uShadingCell;  // um
+uniform float uDepthShading;  // 0..1: by how much it counts
 uniform sampler2D uNoise;  // blue noise
 uniform float uPhase;  // 0..1: by how much it is shifted in this frame
 uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
@@ -88,6 +92,8 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/classify_2d>
 #endif
 #include <chunks/gradient>
+#include <chunks/cut_face>
+#include <chunks/depth_shading>
 #include <chunks/shade>
 #include <chunks/jitter>
 #include <chunks/periphery>
@@ -158,6 +164,7 @@ void main() {
   vec4 front = vec4(0.0);  // the sum in front of the pane
   bool isBehind = false;
   float shift = jitter(gl_FragCoord.xy - uPart.xy);
+  vec3 face = span.x > 0.0 ? cutFace(start) : vec3(0.0);
   float t = 0.0;
   float exit = 0.0;  // of the bricks that are known
   int i = 0;
@@ -220,10 +227,13 @@ void main() {
 #else
       if (s.a > 0.0) {
 #ifdef TWO_D
-        s.rgb = shadeBy(s.rgb, gradientOf(around, shares) * sign(texPerUm), dir);
+        vec3 gradient = gradientOf(around, shares) * sign(texPerUm);
+        if (t < uVoxel && face != vec3(0.0)) gradient = -face;
 #else
-        s.rgb = shade(s.rgb, p, texPerUm, dir, shares);
+        vec3 gradient = -face;
+        if (t >= uVoxel || face == vec3(0.0)) gradient = gradientAt(p, texPerUm, shares);
 #endif
+        s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }
 #endif

@@ -1,0 +1,158 @@
+/**
+ * How much of the light goes through each cell of a coarse grid round all volumes, under the present
+ * transfer functions: what shades is made from it. Pure arrays.
+ *
+ * Cells are cubes of the world, at most MOST_CELLS, x fastest. Each is looked at in eight places.
+ */
+
+import type { Size3 } from "../../bundle/ktx2";
+import type { Box } from "../../math/box";
+import type { Vec3 } from "../../math/vec3";
+
+/** Of the grid: at a byte each for what is open and what is lit, 512 KiB of the GPU's memory. */
+export const MOST_CELLS = 64 ** 3;
+/** Cells beyond the volumes' box, so that a sample at its face looks up what lies before it. */
+const MARGIN = 1;
+/** Where a cell is looked at, in its edges from its middle. */
+const ASIDE = [-0.25, 0.25] as const;
+/** The most of a voxel's light that the march takes. */
+const MOST_OPACITY = 0.999;
+
+export type Grid = Readonly<{
+  /** The low corner, um, world. */
+  low: Vec3;
+  /** Of a cell, um. */
+  edge: number;
+  /** Cells along x, y, z. */
+  size: Size3;
+}>;
+
+/** The volumes of one tile, at a coarse mip level. */
+export type TileMatter = Readonly<{
+  /** Of each channel: intensities, x fastest, and the opacity (0..255) of a voxel at each of 256. */
+  channels: readonly Readonly<{ texels: Uint8Array; opacities: Uint8Array }>[];
+  /** Texels along x, y, z. */
+  size: Size3;
+  /** Texels to the whole of the finest level, which a last one may reach beyond. */
+  whole: Vec3;
+  /** Of the tile's box in the texture, 0..1. */
+  low: Vec3;
+  high: Vec3;
+  /** From the world, um, to places in the texture: column by column. */
+  toTexture: readonly number[];
+  /** The path that the opacities hold for, um. */
+  voxel_um: number;
+}>;
+
+/** What a cut leaves, um, world. */
+export type Cut = Readonly<{ box: Box; plane: readonly [number, number, number, number] }>;
+
+/** The finest grid round a box that has no more cells than there may be. */
+export function gridRound({ min, max }: Box, most = MOST_CELLS): Grid {
+  const sides = min.map((v, i) => Math.max(max[i] - v, 1e-6));
+  const cellsAt = (edge: number) => sides.map((side) => Math.ceil(side / edge - 1e-6) + 2 * MARGIN);
+  const count = (edge: number) => cellsAt(edge).reduce((all, n) => all * n, 1);
+  let edge = Math.cbrt((sides[0] * sides[1] * sides[2]) / most);
+  edge = Math.max(edge, Math.max(...sides) / most);
+  while (count(edge) > most) edge *= 1.002;
+  const [x, y, z] = cellsAt(edge);
+  const [cx, cy, cz] = min.map((v, i) => (v + max[i]) / 2);
+  const low: Vec3 = [cx - (x * edge) / 2, cy - (y * edge) / 2, cz - (z * edge) / 2];
+  return { low, edge, size: [x, y, z] };
+}
+
+/** The share of light, 0..1, that goes straight through each cell. */
+export function throughCells(
+  grid: Grid,
+  tiles: readonly TileMatter[],
+  cut: Cut | null,
+): Float32Array {
+  const [nx, ny, nz] = grid.size;
+  const through = new Float32Array(nx * ny * nz).fill(1);
+  for (const tile of tiles) addTile(through, grid, tile);
+  if (cut !== null) clear(through, grid, cut);
+  return through;
+}
+
+function addTile(through: Float32Array, grid: Grid, tile: TileMatter): void {
+  const { edge, low } = grid;
+  const [nx, ny, nz] = grid.size;
+  const m = tile.toTexture;
+  const tables = tile.channels.map(({ opacities }) =>
+    Float32Array.from(
+      opacities,
+      (a) => (1 - Math.min(a / 255, MOST_OPACITY)) ** (edge / tile.voxel_um),
+    ),
+  );
+  const texels = tile.channels.map((each) => each.texels);
+  const [sx, sy, sz] = tile.size;
+  const [wx, wy, wz] = tile.whole;
+  const [lowX, lowY, lowZ] = tile.low;
+  const [highX, highY, highZ] = tile.high;
+  const share = 1 / ASIDE.length ** 3;
+  for (let z = 0; z < nz; z++) {
+    for (const dz of ASIDE) {
+      const pz = low[2] + (z + 0.5 + dz) * edge;
+      for (let y = 0; y < ny; y++) {
+        for (const dy of ASIDE) {
+          const py = low[1] + (y + 0.5 + dy) * edge;
+          const u0 = m[4] * py + m[8] * pz + m[12];
+          const v0 = m[5] * py + m[9] * pz + m[13];
+          const w0 = m[6] * py + m[10] * pz + m[14];
+          const row = (z * ny + y) * nx;
+          for (let x = 0; x < nx; x++) {
+            for (const dx of ASIDE) {
+              const px = low[0] + (x + 0.5 + dx) * edge;
+              const u = m[0] * px + u0;
+              if (u < lowX || u >= highX) continue;
+              const v = m[1] * px + v0;
+              if (v < lowY || v >= highY) continue;
+              const w = m[2] * px + w0;
+              if (w < lowZ || w >= highZ) continue;
+              // between texels, whose middles lie at a half; beyond the last that one's own
+              const tx = Math.min(sx - 1, Math.max(0, u * wx - 0.5));
+              const ty = Math.min(sy - 1, Math.max(0, v * wy - 0.5));
+              const tz = Math.min(sz - 1, Math.max(0, w * wz - 0.5));
+              const [i, j, k] = [Math.trunc(tx), Math.trunc(ty), Math.trunc(tz)];
+              const [fx, fy, fz] = [tx - i, ty - j, tz - k];
+              const at = (k * sy + j) * sx + i;
+              const right = i + 1 < sx ? 1 : 0;
+              const down = j + 1 < sy ? sx : 0;
+              const back = k + 1 < sz ? sx * sy : 0;
+              let clear = 1;
+              for (let c = 0; c < tables.length; c++) {
+                const t = texels[c];
+                const a = t[at] + fx * (t[at + right] - t[at]);
+                const b = t[at + down] + fx * (t[at + down + right] - t[at + down]);
+                const there = at + back;
+                const d = t[there] + fx * (t[there + right] - t[there]);
+                const e = t[there + down] + fx * (t[there + down + right] - t[there + down]);
+                const near = a + fy * (b - a);
+                const value = near + fz * (d + fy * (e - d) - near);
+                clear *= tables[c][Math.round(value)];
+              }
+              through[row + x] -= share * (1 - clear);
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+/** What is cut away lets all light through. */
+function clear(through: Float32Array, { low, edge, size: [nx, ny, nz] }: Grid, cut: Cut): void {
+  const { min, max } = cut.box;
+  const [a, b, c, d] = cut.plane;
+  for (let z = 0, at = 0; z < nz; z++) {
+    const pz = low[2] + (z + 0.5) * edge;
+    for (let y = 0; y < ny; y++) {
+      const py = low[1] + (y + 0.5) * edge;
+      const isOut = pz < min[2] || pz > max[2] || py < min[1] || py > max[1];
+      for (let x = 0; x < nx; x++, at++) {
+        const px = low[0] + (x + 0.5) * edge;
+        if (isOut || px < min[0] || px > max[0] || a * px + b * py + c * pz > d) through[at] = 1;
+      }
+    }
+  }
+}

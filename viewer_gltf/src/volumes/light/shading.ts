@@ -1,0 +1,124 @@
+/**
+ * What of the light reaches each cell of a coarse grid: of the surroundings (ambient occlusion, within a
+ * radius), and of a lamp (shadows). Pure arrays.
+ *
+ * The surroundings as local ambient occlusion (Hernell, Ljung & Ynnerman 2010), with the meshes' own
+ * weights: a hit counts less the farther it is. The lamp plane by plane, as half-angle slicing does it
+ * (Kniss et al. 2003): each plane across the lamp's way takes over what the one before lets through.
+ */
+import type { Size3 } from "../../bundle/ktx2";
+import type { Vec3 } from "../../math/vec3";
+
+/** Of 26 directions on a sphere, those along axes, edges and corners: Lebedev's, of degree 7. */
+const WEIGHTS = [0, 1 / 21, 4 / 105, 9 / 280] as const;
+/** The share of the surroundings that a point before a flat wall sees, a cell away: it counts as open. */
+const OPEN = 0.72;
+
+/**
+ * The share of the surroundings, 0..1, that is seen from each cell; before a flat wall it is 1.
+ *
+ * @param through share of the light that goes through each cell, x fastest
+ * @param radius in cells
+ */
+export function openness(through: Float32Array, size: Size3, radius: number): Float32Array {
+  const [nx, ny, nz] = size;
+  const pad = Math.ceil(radius);
+  const row = nx + 2 * pad;
+  const plane = row * (ny + 2 * pad);
+  // a border that lets all through spares every test for the grid's end; by length of a step
+  const padded = [1, Math.SQRT2, Math.sqrt(3)].map((length) => {
+    const cells = new Float32Array(plane * (nz + 2 * pad)).fill(1);
+    for (let z = 0, from = 0; z < nz; z++) {
+      for (let y = 0; y < ny; y++) {
+        const to = (z + pad) * plane + (y + pad) * row + pad;
+        for (let x = 0; x < nx; x++, from++) cells[to + x] = through[from] ** length;
+      }
+    }
+    return cells;
+  });
+  const seen = new Float32Array(through.length);
+  for (let dz = -1; dz <= 1; dz++) {
+    for (let dy = -1; dy <= 1; dy++) {
+      for (let dx = -1; dx <= 1; dx++) {
+        const kind = dx * dx + dy * dy + dz * dz;
+        if (kind === 0) continue;
+        const length = Math.sqrt(kind);
+        const cells = padded[kind - 1];
+        const step = dz * plane + dy * row + dx;
+        const count = Math.floor(radius / length);
+        // a hit counts by how near the cell's front is
+        const near = Float32Array.from({ length: count }, (_, k) =>
+          Math.max(0, 1 - ((k + 0.5) * length) / radius),
+        );
+        const weight = WEIGHTS[kind];
+        for (let z = 0, to = 0; z < nz; z++) {
+          for (let y = 0; y < ny; y++) {
+            let at = (z + pad) * plane + (y + pad) * row + pad;
+            for (let x = 0; x < nx; x++, at++, to++) {
+              let left = 1;
+              let hidden = 0;
+              for (let k = 0, there = at + step; k < count; k++, there += step) {
+                const clear = cells[there];
+                hidden += near[k] * left * (1 - clear);
+                left *= clear;
+              }
+              seen[to] += weight * (1 - hidden);
+            }
+          }
+        }
+      }
+    }
+  }
+  for (let i = 0; i < seen.length; i++) seen[i] = Math.min(1, seen[i] / OPEN);
+  return seen;
+}
+
+/**
+ * The share of a far lamp's light, 0..1, that comes to the middle of each cell.
+ *
+ * @param towards the lamp, of unit length
+ */
+export function lampLight(through: Float32Array, size: Size3, towards: Vec3): Float32Array {
+  const strides = [1, size[0], size[0] * size[1]] as const;
+  const along = [0, 1, 2].reduce((a, b) => (Math.abs(towards[b]) > Math.abs(towards[a]) ? b : a));
+  const [p, q] = [0, 1, 2].filter((axis) => axis !== along);
+  const [np, nq, planes] = [size[p], size[q], size[along]];
+  const forward = towards[along] > 0; // then the last plane is lit first
+  // where the way to the lamp meets the plane before, in cells aside
+  const length = 1 / Math.abs(towards[along]);
+  const [aside, up] = [towards[p] * length, towards[q] * length];
+  const [di, dj] = [Math.floor(aside), Math.floor(up)];
+  const [fi, fj] = [aside - di, up - dj];
+  const lit = new Float32Array(through.length);
+  let before = new Float32Array(np * nq).fill(1); // what leaves the cells of the plane before
+  let leaving = new Float32Array(np * nq);
+  const at = (i: number, j: number) =>
+    i < 0 || j < 0 || i >= np || j >= nq ? 1 : before[j * np + i];
+  for (let k = 0; k < planes; k++) {
+    const start = (forward ? planes - 1 - k : k) * strides[along];
+    for (let j = 0; j < nq; j++) {
+      for (let i = 0; i < np; i++) {
+        const [a, b] = [i + di, j + dj];
+        const low = (1 - fi) * at(a, b) + fi * at(a + 1, b);
+        const high = (1 - fi) * at(a, b + 1) + fi * at(a + 1, b + 1);
+        const coming = (1 - fj) * low + fj * high;
+        const cell = start + i * strides[p] + j * strides[q];
+        const half = through[cell] ** (length / 2);
+        lit[cell] = coming * half;
+        leaving[j * np + i] = coming * half * half;
+      }
+    }
+    [before, leaving] = [leaving, before];
+  }
+  return lit;
+}
+
+/** Both, interleaved, as bytes. */
+export function asTexels(open: Float32Array, lit: Float32Array): Uint8Array<ArrayBuffer> {
+  const texels = new Uint8Array(2 * open.length);
+  for (let i = 0; i < open.length; i++) {
+    texels[2 * i] = Math.round(255 * open[i]);
+    texels[2 * i + 1] = Math.round(255 * lit[i]);
+  }
+  return texels;
+}
