@@ -8,7 +8,6 @@ import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
 import type { Action } from "../state/actions";
-import { isTraced } from "../state/parameters/volumes";
 import { wantedTiles } from "../state/representation";
 import { isTwoD } from "../state/transfer_functions_2d";
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
@@ -116,9 +115,7 @@ export class Contents {
   }
 
   follow(state: ViewerState, { focusTiles, mayRefine }: Hybrid): void {
-    // a host that sends bricks sends those of a tile to one place
-    const isMarched = this.hasOverview && !(isTraced(state) && this.bricks !== null);
-    const wanted = isMarched ? wantedTiles(state, focusTiles) : [];
+    const wanted = this.hasOverview ? wantedTiles(state, focusTiles) : [];
     for (const channel of volumeChannels(state))
       if (isTwoD(channel)) this.transferFunctions2d.want(channel.id);
     this.volumes.follow(state, wanted, mayRefine);

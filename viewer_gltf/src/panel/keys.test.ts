@@ -56,7 +56,12 @@ const MARCHED: KeyContext = {
     { type: "select", tile: "r0_c2" } as const,
   ].reduce<KeyContext["state"]>(reduce, CONTEXT.state),
 };
-const CONTEXTS = [CONTEXT, MARCHED];
+/** The same where nothing but volumes shows. */
+const EVERYWHERE: KeyContext = {
+  ...MARCHED,
+  state: reduce(MARCHED.state, { type: "set", id: "mode", value: "all" } as const),
+};
+const CONTEXTS = [CONTEXT, MARCHED, EVERYWHERE];
 
 /** What every key asks for where it does something. */
 const allWishes = () =>

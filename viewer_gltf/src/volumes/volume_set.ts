@@ -5,7 +5,7 @@ import type { Bundle } from "../bundle/load";
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { MarchClip } from "../gpu/clip_uniforms";
 import type { ShownVolume } from "../state/on_screen";
-import { isTraced } from "../state/parameters/volumes";
+import { canBeShaded, isTraced } from "../state/parameters/volumes";
 import { isInDisc, type WantedTile } from "../state/representation";
 import { isTwoD, shapesOf } from "../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
@@ -197,7 +197,7 @@ export class VolumeSet {
 
   private shade(drawn: readonly Marched[], clip: MarchClip, lamp: Vector3): void {
     const { state, frame, onChange, onError } = this;
-    const strength = state?.compositing === "over" ? state.depthShading : 0;
+    const strength = state !== null && canBeShaded(state) ? state.depthShading : 0;
     if (strength > 0 && drawn.length > 0 && this.shadingIs === "none") {
       this.shadingIs = "coming";
       import("./light/depth_shading")
@@ -231,6 +231,11 @@ export class VolumeSet {
    * @param mayRefine false while the gaze wanders: then nothing finer is begun
    */
   follow(state: ViewerState, wanted: readonly WantedTile[], mayRefine: boolean): void {
+    // a host that sends bricks sends those of a tile to one place: to what is traced, while the march
+    // only stands in
+    if (this.bricks !== null && this.state !== null && isTraced(this.state) !== isTraced(state)) {
+      this.residents.dropAll();
+    }
     this.state = state;
     this.wanted = wanted;
     this.mayRefine = mayRefine;
@@ -300,8 +305,9 @@ export class VolumeSet {
       this.onChange();
     };
     const limits = { ...this.limits, bytes: this.share };
+    const bricks = this.state !== null && isTraced(this.state) ? null : this.bricks;
     const texture =
-      this.bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
+      bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
       new TileTexture(this.queue, onChange, this.onError);
     return this.residents.add(tile, texture);
   }

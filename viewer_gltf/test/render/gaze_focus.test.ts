@@ -13,7 +13,7 @@ const FIELD_OF_VIEW_DEG = 40;
 const DISC_DEG = 10;
 const NEAR = "&switch=9";
 /** Through soft volumes one sees, so that they look unlike the surfaces whose place they take. */
-const SOFT = "#v=1&l=Balls:tsoft,F_x20_body:tsoft";
+const SOFT = "#v=1&depth=0&l=Balls:tsoft,F_x20_body:tsoft";
 
 /** Pixels of a disc's picture outside those within and without it, by more than 5, and between both. */
 function rimOf(disc: Picture, within: Picture, without: Picture) {
@@ -106,7 +106,7 @@ describeInChromium("surface or volume", () => {
 
   for (const quality of ["high", "low"]) {
     it(`has a rim that is nowhere outside both pictures, quality ${quality}`, async () => {
-      const at = (mode: Mode) => pictureOf(modeAt(mode, quality));
+      const at = (mode: Mode) => pictureOf(`${modeAt(mode, quality)}#v=1&depth=0`);
       const [disc, all, off] = [await at("disc"), await at("all"), await at("off")];
       const { outside, between } = rimOf(disc, all, off);
       expect(outside).toBe(0);
@@ -260,6 +260,11 @@ describeInChromium("surface or volume", () => {
     expect(mean(whole)).toBeLessThan(mean(half));
     expect(mean(half)).toBeLessThan(mean(none) + 2); // open places are a little brighter
     expect(mean(whole)).toBeGreaterThan(0.7 * mean(none));
+  });
+
+  it("has the light of surfaces beside them, whatever the depth shading", async () => {
+    const disc = (depth: number) => pictureOf(`${modeAt("disc", "high")}#v=1&depth=${depth}`);
+    expect(apart(await disc(1), await disc(0), 0, 90, 0)).toBe(0);
   });
 
   it("looks alike at fewer pixels and steps", async () => {

@@ -142,6 +142,7 @@ export const DEPTH_SHADING: NumberParameter<Volumes> = {
   text: percent,
   refusal: ({ mode, compositing }) => {
     if (mode === "traced" || mode === "off") return "Only volumes that are marched have one.";
+    if (mode !== "all") return "Beside surfaces volumes are lit as those are: choose All.";
     return compositing === "over" ? "" : "Only opacity along a ray has one.";
   },
   keys: {
@@ -151,6 +152,14 @@ export const DEPTH_SHADING: NumberParameter<Volumes> = {
   },
   spoken: ({ depthShading }) => `Depth shading ${percent(depthShading)}`,
 };
+
+/**
+ * Whether volumes throw shadows on one another. Surfaces get none: beside them a volume would look like
+ * something else.
+ */
+export function canBeShaded({ mode, compositing }: Volumes): boolean {
+  return mode === "all" && compositing === "over";
+}
 
 /** In the panel's order. */
 export const VOLUMES: readonly Parameter<Volumes>[] = [
