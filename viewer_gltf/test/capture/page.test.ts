@@ -46,7 +46,11 @@ describeInChromium("what the page saves", () => {
       4 * (stage?.width ?? 0),
       4 * (stage?.height ?? 0),
     ]);
-    // shrunk again it is what the screen shows
+    // shrunk again it is what the screen shows, but for what is said over it
+    await page().evaluate(() => {
+      const said = document.querySelector<HTMLElement>(".said");
+      if (said !== null) said.style.visibility = "hidden";
+    });
     const screen = await page().screenshot({ clip: stage ?? undefined });
     const differing = await page().evaluate(
       async ([a, b]) => {

@@ -50,6 +50,9 @@ function centerOf(tile: string): Vec3 {
 const plus = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 
 /** Show one channel alone; the others go first, so that few are drawn on the way. */
+/** Tiles that are volumes beside surfaces have no depth shading, those of a specimen all of volumes do. */
+const UNSHADED = "#v=1&depth=0";
+
 async function only(stand: Stand, id: string, as: "surface" | "volume"): Promise<Picture> {
   for (const channel of stand.manifest.channels) {
     if (channel.id !== id) await stand.viewer.show(channel.id, false);
@@ -105,7 +108,7 @@ describeInChromium("an artist's layer over the stage", () => {
     const stand = prepareStand({ bundle: BUILT, viewport: VIEWPORT });
 
     it("shows a ball in each tile, and blocks that are opaque", async () => {
-      await stand.open();
+      await stand.open(UNSHADED);
       const balls = await only(stand, "Balls", "surface");
       for (const { id } of stand.manifest.tiles) {
         const { x, y } = spot(balls, stand.manifest, centerOf(id));
@@ -137,7 +140,7 @@ describeInChromium("an artist's layer over the stage", () => {
     let isOpen = false;
     /** The page as an earlier test left it: each chooses all that it looks at. */
     async function openOnce(): Promise<void> {
-      if (!isOpen) await stand.open();
+      if (!isOpen) await stand.open(UNSHADED);
       isOpen = true;
     }
 
@@ -174,7 +177,7 @@ describeInChromium("an artist's layer over the stage", () => {
     }
 
     it("opens with a tile as its volume and no surface, one as both, the others as surfaces", async () => {
-      await stand.open(); // anew: this is of how it opens
+      await stand.open(UNSHADED); // anew: this is of how it opens
       isOpen = true;
       await stand.viewer.show("Slab", false);
       await stand.viewer.show("Sheet", false);
