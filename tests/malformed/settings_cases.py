@@ -23,6 +23,7 @@ _TOML: dict[str, bytes] = {
     "percentile NaN": b"[window]\nlow_percentile = nan", "percentile 101": b"[window]\nhigh_percentile = 101.0", "percentiles turned": b"[window]\nlow_percentile = 90.0\nhigh_percentile = 10.0",
     "smoothing inf": b"[surface]\nsmoothing_um = inf", "smoothing below 0": b"[surface]\nsmoothing_um = -1.0", "smoothing 1e300": b"[surface]\nsmoothing_um = 1e300",
     "alpha in words": b'[surface]\nalpha_um = "wide"', "alpha 1e9": b"[surface]\nalpha_um = 1e9", "grid_um 1e9": b"[surface]\ngrid_um = 1e9", "grid_um below 0": b"[surface]\ngrid_um = -1.0",
+    "max_faces 0": b"[surface]\nmax_faces = 0", "max_faces in words": b'[surface]\nmax_faces = "few"', "max_faces NaN": b"[surface]\nmax_faces = nan", "max_faces 1": b"[surface]\nmax_faces = 1",
     "offset 100": b"[surface]\noffset_um = 100.0", "background 1e-9": b"[surface]\nbackground_um = 1e-9", "wrap odd": b'[surface]\nwrap = "../x"', "closed_tiles 1": b"[surface]\nclosed_tiles = 1",
     "criterion odd": b'[isovalue]\ncriterion = "\\n"', "iso value of nobody": b"[iso_values]\nZZZ = 3.0", "iso value NaN": b"[iso_values]\nF = nan", "iso value in words": b'[iso_values]\nF = "x"',
     "iso value of the empty name": b'[iso_values]\n"" = 1.0', "paint itself": b'[paint]\nF = "F"', "paint nobody": b'[paint]\nF = "Z"', "paint a number": b"[paint]\nF = 7",

@@ -92,17 +92,20 @@ class Plan:
         """Return how far apart planes lie, um, that carry a surface of at most surface.max_faces.
 
         Of a smooth surface every k-th plane along each axis leaves a k^2-th of the faces, of noise
-        less. Thinned are the axes whose planes lie nearest, as long as a tile keeps LEAST_PLANES.
+        less. Thinned are the axes whose planes lie nearest, as long as a tile keeps LEAST_PLANES
+        and what a unit reads around it stays in proportion.
 
         faces  of voxels, of the surface in one tile
         """
         surface = self.settings.surface
-        grid, size = surface.grid_um, self.settings.plan.tile_size
+        grid = surface.grid_um
         while faces / math.prod(_step_of(grid, self.spacing_um)) ** (2 / 3) > surface.max_faces:
             step = _step_of(grid, self.spacing_um)
             wider = min((k + 1) * h for k, h in zip(step, self.spacing_um, strict=True))
-            steps = _step_of(wider, self.spacing_um)
-            if any(-(-n // k) < LEAST_PLANES for n, k in zip(size, steps, strict=True) if k > 1):
+            try:
+                thinner = self.with_grid(wider)
+                _require_planes(thinner.settings, self.spacing_um)
+            except UsageError:
                 break
             grid = wider
         return grid

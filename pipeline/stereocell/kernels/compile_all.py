@@ -44,8 +44,9 @@ def compile_all() -> None:
     command = [sys.executable, "-m", __package__, OF_MESHES]
     with subprocess.Popen(command) as other:
         compile_others()
-    if other.returncode == 0:
-        mark_compiled()
+    if other.returncode:
+        raise SystemExit(other.returncode)  # it has said why
+    mark_compiled()
 
 
 def compile_of_meshes() -> None:

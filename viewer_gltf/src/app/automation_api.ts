@@ -13,9 +13,9 @@ import type { VolumeStatus } from "../volumes/volume_set";
 
 export type Snapshot = Readonly<{
   state: ViewerState;
-  /** Whether all tiles show, in the first channel. */
   /** From where the flat camera sees the specimen, m of the room. */
   look: Look;
+  /** Whether all tiles show, in the first channel. */
   hasFirstPicture: boolean;
   /** Of all shown channels. */
   overview: Progress;
