@@ -12,6 +12,7 @@ from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse
 from stereocell.kernels.crossings import find_doubtful, find_maybe_flat
+from stereocell.kernels.depth_buffer import find_visible
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
 from stereocell.kernels.grid import bound_boxes, count_entries, list_by_cell
@@ -81,6 +82,9 @@ def compile_others() -> None:
 
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
     find_downhill(voxels, points.astype(np.float64), np.ones(3))
+    pixel = np.zeros((1, 2), np.int64)
+    near, which = np.full((1, 1), -np.inf), np.zeros((1, 1), np.int64)
+    find_visible(np.ones((1, 10)), np.ones((1, 3)), pixel, pixel, near, which, np.ones((1, 1, 3)))
     one = np.ones(1, np.float32)
     cast_rays(voxels > 0, points, points, points, points, one, one)
 

@@ -14,6 +14,7 @@ import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
 import { MAX_STEPS } from "../volumes/tile_raymarch";
 import type { Stereo } from "../xr/stereo";
+import { Pulse } from "./pulse";
 import type { Contents } from "./scene_contents";
 
 /** Most frames of a picture that is saved that are averaged, where it is marched. */
@@ -55,6 +56,7 @@ export type Still = Readonly<{
 
 export class FrameLoop {
   readonly picture: Picture;
+  private readonly pulse: Pulse;
   /** Frames drawn so far. */
   frames = 0;
   private readonly gl: WebGL2RenderingContext;
@@ -75,6 +77,7 @@ export class FrameLoop {
   constructor(private readonly options: FrameOptions) {
     const { renderer, room, hybrid } = options;
     this.gl = renderer.getContext() as WebGL2RenderingContext;
+    this.pulse = new Pulse(renderer, (time_ms) => this.frame(time_ms));
     this.picture = new Picture(renderer, room, hybrid);
     this.pace = new Pace(this.gl);
     this.gathering = new GatherPace(this.gl);
@@ -82,17 +85,19 @@ export class FrameLoop {
   }
 
   start(): void {
-    this.options.renderer.setAnimationLoop((time_ms) => this.frame(time_ms));
+    this.pulse.start();
   }
 
   /** What is looked at, or from where, is another: the picture has to follow at once. */
   change(): void {
     this.isStale = true;
+    this.pulse.wake();
   }
 
   /** Something has come for the picture, which may be at rest. */
   come(): void {
     this.hasCome = true;
+    this.pulse.wake();
   }
 
   setLevel(level: QualityLevel): void {
@@ -111,6 +116,7 @@ export class FrameLoop {
 
   /** Resolves when nothing loads any more and the picture shows all of it. */
   settled(): Promise<void> {
+    this.pulse.wake();
     return new Promise((resolve) => this.waiting.push(resolve));
   }
 
@@ -136,9 +142,10 @@ export class FrameLoop {
     return stereo.head ?? navigation.camera.matrixWorld;
   }
 
-  private frame(time_ms: number): void {
+  /** Whether nothing more is to be drawn until something changes. */
+  private frame(time_ms: number): boolean {
     const { renderer, hybrid, onFollow, onFrame } = this.options;
-    if (renderer.getContext().isContextLost()) return; // there is nothing to draw on
+    if (renderer.getContext().isContextLost()) return true; // there is nothing to draw on
     const { contents, stereo } = this.options.shown();
     const interval_ms = time_ms - this.last_ms;
     const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
@@ -157,14 +164,13 @@ export class FrameLoop {
     // a picture that came to rest is drawn once more, as well as can be
     const isWanted = isMoving || this.wasMoving || isGathering || isDue;
     // "High" and "low" are alike in all frames
-    const gathers =
-      !isWanted &&
-      this.options.shown().state.quality === "auto" &&
-      this.picture.canGather &&
-      this.resting.isDue(time_ms);
+    const canGather = this.options.shown().state.quality === "auto" && this.picture.canGather;
+    const gathers = !isWanted && canGather && this.resting.isDue(time_ms);
     // someone waits: what is missing is looked for, and a picture that shows all is not drawn again
     const isAwaited = this.waiting.length > 0;
-    if (!isWanted && !gathers && !wasLoading && !this.hasCome && !isAwaited) return;
+    if (!isWanted && !gathers && !wasLoading && !this.hasCome && !isAwaited) {
+      return !canGather && !contents.traced.isGathering;
+    }
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
     this.picture.marchFrame.uSteps.value = settings.steps;
     hybrid.radiusShare = settings.discShare;
@@ -193,6 +199,7 @@ export class FrameLoop {
     if (this.waiting.length > 0 && !contents.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
     }
+    return false;
   }
 
   /** Keep from drawing while a job draws by `drawStill`. */
@@ -308,7 +315,7 @@ export class FrameLoop {
   }
 
   stop(): void {
-    this.options.renderer.setAnimationLoop(null);
+    this.pulse.stop();
   }
 
   dispose(): void {
