@@ -11,6 +11,8 @@ import numpy as np
 from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse
+from stereocell.kernels.collapse_walls import collapse_walls
+from stereocell.kernels.critical import find_critical
 from stereocell.kernels.crossings import find_doubtful, find_maybe_flat
 from stereocell.kernels.depth_buffer import find_visible
 from stereocell.kernels.flips import flip_edges
@@ -76,6 +78,8 @@ def compile_others() -> None:
     count_entries(low, high, origin, edge)
     first, listed = list_by_cell(low, high, origin, edge, shape)
     find_maybe_flat(at, triangles)
+    collapse_walls(at, triangles, flags, np.full(4, 0.1), 3.0, 0.9)
+    find_critical(np.zeros((3, 3, 3), np.int32), 1)
     find_doubtful(at, triangles, flags, low, high, first, listed, origin, edge, shape)
     _, nearest, parts = find_nearest(at, at, triangles, first, listed, origin, edge, shape)
     find_sides(at, nearest, parts, at, triangles, twins)
