@@ -46,26 +46,31 @@ def find_texels(
 
 
 def find_pixels(
-    corners: NDArray[np.float64], depth: NDArray[np.float64], size: tuple[int, int]
+    corners: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    size: tuple[int, int],
+    nearest: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Return the visible points of triangles in a view.
 
     corners  float64 (m, 3, 2), pixels, x right, y down
     depth    float64 (m, 3), larger is nearer
     size     (height, width), pixels
+    nearest  float64 (height, width), the depth of what is drawn already; it becomes that of both
     result   pixel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
              float64 (k, 3)
     """
     height, width = size
-    nearest = np.full(size, -np.inf)
-    triangle_of = np.zeros(size, np.int64)
+    if nearest is None:
+        nearest = np.full(size, -np.inf)
+    triangle_of = np.full(size, -1)
     weights_of = np.zeros((height, width, 3))
     low, high = _boxes(corners, size, 0.0)
     frames, is_flat = _frames(corners)
     drawn = np.flatnonzero(~is_flat)
     kept = np.ascontiguousarray(frames.T[drawn])
     find_visible(kept, depth[drawn], low[drawn], high[drawn], nearest, triangle_of, weights_of)
-    found = np.flatnonzero(np.isfinite(nearest))
+    found = np.flatnonzero(triangle_of >= 0)
     return found, drawn[triangle_of.ravel()[found]], weights_of.reshape(-1, 3)[found]
 
 
