@@ -214,8 +214,8 @@ void main() {
 #endif
       vec4 shares;
 #ifdef TWO_D
-      Steps around = stepsAt(p, uVoxel * abs(texPerUm));
-      vec4 s = classify2d(v, steepnessOf(around), voxels, shares);
+      vec4 steepness = steepnessOf(stepsAt(p, uVoxel * abs(texPerUm)));
+      vec4 s = classify2d(v, steepness, voxels, shares);
 #else
       vec4 s = classify(v, voxels, shares);
 #endif
@@ -226,13 +226,8 @@ void main() {
       sum.rgb += SUM_LIGHT * s.a * s.rgb;
 #else
       if (s.a > 0.0) {
-#ifdef TWO_D
-        vec3 gradient = gradientOf(around, shares) * sign(texPerUm);
-        if (t < uVoxel && face != vec3(0.0)) gradient = -face;
-#else
         vec3 gradient = -face;
         if (t >= uVoxel || face == vec3(0.0)) gradient = gradientAt(p, texPerUm, shares);
-#endif
         s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }
