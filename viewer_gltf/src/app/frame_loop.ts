@@ -1,8 +1,9 @@
 /** Draws frames, only when something has changed, each as well as its budget allows. */
-import type { Camera, Matrix4, WebGLRenderer } from "three";
+import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import type { Navigation } from "../interaction/orbit_camera";
 import { rayAhead } from "../interaction/rays";
+import type { Vec3 } from "../math/vec3";
 import { type FramePace, Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
 import { Pace } from "../render/pacing/frame_budget";
@@ -70,6 +71,8 @@ export class FrameLoop {
   private wasMoving = false;
   private waiting: (() => void)[] = [];
   private readonly pixel = new Uint8Array(4);
+  private readonly eye = new Vector3();
+  private readonly toSpecimen = new Matrix4();
   private drawn: (() => void)[] = [];
 
   constructor(private readonly options: FrameOptions) {
@@ -304,7 +307,15 @@ export class FrameLoop {
       bounds: this.options.bounds,
       solids: surfaces.triangles + slices.solid,
     };
-    stereo.present(() => picture.draw(head, drawn, state.clip, pace));
+    const clip = { ...state.clip, corner: slices.cornerTowards(this.eyeOnSpecimen(head)) };
+    stereo.present(() => picture.draw(head, drawn, clip, pace));
+  }
+
+  /** um, world. */
+  private eyeOnSpecimen(head: Matrix4): Vec3 {
+    const { matrixWorld } = this.options.room.specimen.group;
+    this.toSpecimen.copy(matrixWorld).invert();
+    return this.eye.setFromMatrixPosition(head).applyMatrix4(this.toSpecimen).toArray();
   }
 
   stop(): void {

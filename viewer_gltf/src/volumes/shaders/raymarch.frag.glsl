@@ -38,6 +38,7 @@ uniform float uPresence;  // 0..1: volumes fade in once they have come
 uniform vec3 uClipLow;  // um: nothing outside is drawn
 uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;  // xyz unit normal, w um: nothing with dot(normal, p) > w is drawn
+uniform vec4 uCorner[3];  // nothing with that for all three is drawn
 uniform sampler3D uVolume;
 uniform usampler3D uIndex;  // with STREAM_BRICK
 uniform sampler3D uOldVolume;  // what the volume takes the place of, at another mip level
