@@ -1,8 +1,9 @@
 /** Draws frames, only when something has changed, each as well as its budget allows. */
-import type { Camera, Matrix4, WebGLRenderer } from "three";
+import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import type { Navigation } from "../interaction/orbit_camera";
 import { rayAhead } from "../interaction/rays";
+import type { Vec3 } from "../math/vec3";
 import { type FramePace, Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
 import { Pace } from "../render/pacing/frame_budget";
@@ -25,6 +26,8 @@ export const TRACED_SAMPLES = 192;
 const POLL_MS = 20;
 /** Longest time that a frame counts, s: nobody looked at a page that slept. */
 const LONGEST_FRAME_S = 0.1;
+/** The same for fades, after a frame that was drawn and took as long: what fades out is not drawn for ever. */
+const LONGEST_FADE_S = 1;
 
 export type FrameOptions = Readonly<{
   renderer: WebGLRenderer;
@@ -70,8 +73,12 @@ export class FrameLoop {
   private hasCome = false;
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
   private wasMoving = false;
+  /** Whether the last turn of the page drew a frame. */
+  private hasDrawn = false;
   private waiting: (() => void)[] = [];
   private readonly pixel = new Uint8Array(4);
+  private readonly eye = new Vector3();
+  private readonly toSpecimen = new Matrix4();
   private drawn: (() => void)[] = [];
 
   constructor(private readonly options: FrameOptions) {
@@ -148,8 +155,11 @@ export class FrameLoop {
     if (renderer.getContext().isContextLost()) return true; // there is nothing to draw on
     const { contents, stereo } = this.options.shown();
     const interval_ms = time_ms - this.last_ms;
-    const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
+    const passed_s = Math.max(0, interval_ms / 1000);
+    const dt_s = Math.min(LONGEST_FRAME_S, passed_s);
+    const fade_s = Math.min(this.hasDrawn ? LONGEST_FADE_S : LONGEST_FRAME_S, passed_s);
     this.last_ms = time_ms;
+    this.hasDrawn = false;
     const wasLoading = contents.isLoading;
     if (contents.hasJustBegun()) onFollow();
     const inRoom = stereo.pose(this.picture.eyes);
@@ -157,7 +167,7 @@ export class FrameLoop {
     const isStereo = inRoom !== null;
     const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
     if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state);
-    const { isChanging, isFading } = this.advance(dt_s);
+    const { isChanging, isFading } = this.advance(dt_s, fade_s);
     const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
     const isDue = this.resting.isDue(time_ms) && this.hasCome;
     const isMoving = isStereo || this.isStale;
@@ -190,6 +200,7 @@ export class FrameLoop {
       if (isGathering) this.gathering.submit(time_ms);
       if (!isMoving) this.resting.submit(time_ms);
       this.frames++;
+      this.hasDrawn = true;
       onFrame();
       for (const resolve of this.drawn.splice(0)) resolve();
     }
@@ -270,7 +281,10 @@ export class FrameLoop {
   }
 
   /** Follow the gaze, and go on with what moves and with what fades; whether it goes on. */
-  private advance(dt_s: number): Readonly<{ isChanging: boolean; isFading: boolean }> {
+  private advance(
+    dt_s: number,
+    fade_s = dt_s,
+  ): Readonly<{ isChanging: boolean; isFading: boolean }> {
     const { head } = this;
     const { hybrid, room, stage, onFollow } = this.options;
     const { contents, stereo, navigation, state } = this.options.shown();
@@ -284,7 +298,7 @@ export class FrameLoop {
       height_px: stage.clientHeight,
       focus: navigation.controls.target,
     };
-    const isFading = contents.advance({
+    const seen = {
       head,
       specimen: group.matrixWorld,
       screen: stereo.kind === null ? screen : null,
@@ -292,7 +306,8 @@ export class FrameLoop {
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
       isPanelOpen: stereo.hands.panel.isOpen,
       dt_s,
-    });
+    };
+    const isFading = contents.advance(seen, fade_s);
     const isChanging = isMoving || hybrid.isChanging(state);
     if (isChanging) this.isStale = true;
     if (isFading) this.hasCome = true;
@@ -311,7 +326,15 @@ export class FrameLoop {
       bounds: this.options.bounds,
       solids: surfaces.triangles + slices.solid,
     };
-    stereo.present(() => picture.draw(head, drawn, state.clip, pace));
+    const clip = { ...state.clip, corner: slices.cornerTowards(this.eyeOnSpecimen(head)) };
+    stereo.present(() => picture.draw(head, drawn, clip, pace));
+  }
+
+  /** um, world. */
+  private eyeOnSpecimen(head: Matrix4): Vec3 {
+    const { matrixWorld } = this.options.room.specimen.group;
+    this.toSpecimen.copy(matrixWorld).invert();
+    return this.eye.setFromMatrixPosition(head).applyMatrix4(this.toSpecimen).toArray();
   }
 
   stop(): void {

@@ -69,7 +69,17 @@ export type Share = Readonly<{
   isInDisc: boolean;
   /** Whether the volumes' picture is mixed with the surfaces' in the disc. */
   isCrossing: boolean;
+  /** Of the shown channels: where two surfaces lie in one place, as where the data end, the first shows. */
+  rank: number;
 }>;
+
+/**
+ * Of depth, between one channel and the next: more than coordinates differ by that are quantized apart; about
+ * a millimetre of a specimen that is 1.2 m long in the room.
+ */
+const UNITS_APART = 32;
+/** Of depth, between a translucent surface's colour and what writes its depth before. */
+const UNITS_BEHIND = 2;
 
 const VARYINGS = "varying vec3 vRoom;\nvarying float vEye;\n";
 const DECLARED = includeChunks(
@@ -195,9 +205,10 @@ export class BlendedSurface {
     this.depth = depthMaterial(this.uniforms, both, "if (isGone()) discard;");
     // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
     // what lies behind a rim through.
-    this.depth.polygonOffset = true;
-    this.depth.polygonOffsetFactor = 0;
-    this.depth.polygonOffsetUnits = 2;
+    for (const material of [...materials, this.depth]) {
+      material.polygonOffset = true;
+      material.polygonOffsetFactor = 0;
+    }
     const meshes: Mesh[] = [];
     scene.traverse((object) => {
       if (object instanceof Mesh) meshes.push(object);
@@ -241,7 +252,7 @@ export class BlendedSurface {
     material.customProgramCacheKey = () => "blended";
   }
 
-  set({ opacity, taken, isInDisc, isCrossing }: Share): void {
+  set({ opacity, taken, isInDisc, isCrossing, rank }: Share): void {
     const crosses = isInDisc && isCrossing;
     this.uniforms.uOpacity.value = opacity;
     this.uniforms.uTaken.value = taken;
@@ -251,7 +262,9 @@ export class BlendedSurface {
     this.isPane = this.isBlended && !crosses;
     this.isSolid = isInDisc && opacity === 1;
     this.scene.visible = opacity > 0 && (taken < 1 || isInDisc);
+    this.depth.polygonOffsetUnits = rank * UNITS_APART + UNITS_BEHIND;
     for (const material of this.materials) {
+      material.polygonOffsetUnits = rank * UNITS_APART;
       material.stencilWrite = crosses && this.isBlended;
       if (material.transparent === this.isBlended) continue;
       material.transparent = this.isBlended;
