@@ -541,7 +541,10 @@ export class Viewer {
     if (clientWidth === 0 || clientHeight === 0) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.renderer.setSize(clientWidth, clientHeight);
-    this.navigation.fit(clientWidth / clientHeight);
+    const style = getComputedStyle(this.stage);
+    const share = (name: string) => Number.parseFloat(style.getPropertyValue(name)) / clientHeight;
+    const covered = { top: share("--over-top") || 0, bottom: share("--over-bottom") || 0 };
+    this.navigation.fit(clientWidth / clientHeight, covered);
     this.loop.change();
   }
 
