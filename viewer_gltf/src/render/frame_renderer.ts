@@ -136,6 +136,7 @@ export class Picture {
     const specimen = room.specimen.group.matrixWorld;
     renderer.info.reset();
     room.light(head);
+    this.both.takeIn(room.scene);
     this.cuts.follow(clip, specimen);
     this.aim(bounds, resolution);
     this.marchFrame.uIsCrossing.value = volumes.isInDisc;

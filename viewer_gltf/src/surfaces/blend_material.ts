@@ -21,10 +21,8 @@ import {
 import {
   type BothEyes,
   type BothEyesUniforms,
-  forBoth,
   NOT_THE_OTHERS,
   NOT_THE_OTHERS_DECLARED,
-  SOLIDS,
   TO_EACH_EYE,
   TO_EACH_EYE_DECLARED,
 } from "../gpu/both_eyes";
@@ -81,7 +79,7 @@ const UNITS_APART = 32;
 /** Of depth, between a translucent surface's colour and what writes its depth before. */
 const UNITS_BEHIND = 2;
 
-const VARYINGS = "varying vec3 vRoom;\nvarying float vEye;\n";
+const VARYINGS = "varying vec3 vRoom;\n";
 const DECLARED = includeChunks(
   `${VARYINGS}${NOT_THE_OTHERS_DECLARED}
 #include <chunks/clip_planes>
@@ -121,7 +119,7 @@ export function depthMaterial(
     colorWrite: false,
     side: DoubleSide,
     uniforms,
-    vertexShader: `${VARYINGS.replaceAll("varying", "out")}${TO_EACH_EYE_DECLARED}
+    vertexShader: `${VARYINGS}${TO_EACH_EYE_DECLARED}
 void main() {
   vec3 transformed = position;
   vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
@@ -129,7 +127,7 @@ void main() {
   gl_Position = projectionMatrix * mvPosition;
   ${TO_EACH_EYE}
 }`,
-    fragmentShader: `${DECLARED.replaceAll("varying", "in")}
+    fragmentShader: `${DECLARED}
 out vec4 oColor;
 void main() {
   ${NOT_THE_OTHERS}
@@ -178,7 +176,6 @@ const LAID_OVER = {
 export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
-  private readonly meshes: readonly Mesh[];
   private readonly twins: readonly Mesh[];
   isBlended = false;
   isPane = false;
@@ -213,11 +210,6 @@ export class BlendedSurface {
     scene.traverse((object) => {
       if (object instanceof Mesh) meshes.push(object);
     });
-    for (const mesh of meshes) {
-      mesh.geometry = forBoth(mesh.geometry);
-      mesh.layers.set(SOLIDS);
-    }
-    this.meshes = meshes;
     this.twins = meshes.map((mesh) => {
       const twin = new Mesh(mesh.geometry, this.depth);
       twin.renderOrder = AFTER_OPAQUE;
@@ -271,7 +263,6 @@ export class BlendedSurface {
       material.blending = this.isBlended ? CustomBlending : NormalBlending;
       material.needsUpdate = true; // an opaque surface's shader leaves its alpha out
     }
-    for (const mesh of this.meshes) mesh.layers.set(this.isBlended ? 0 : SOLIDS);
     for (const twin of this.twins) {
       twin.visible = this.isBlended;
       if (this.isPane) twin.layers.enable(PANES);
