@@ -15,6 +15,7 @@ from stereocell.formats.vdb import write_vdb
 from stereocell.model.channel import PaintColors
 from stereocell.model.errors import StereoCellError
 from stereocell.model.mesh import Baked, Lod
+from stereocell.storage.file_list import measure
 from stereocell.usd.read_stage import loaded, open_stage
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support import spheres
@@ -127,7 +128,7 @@ def test_a_window_edited_over_measured_voxels_loses_nothing(measured_stage, tmp_
         assert len(np.unique(texels(data))) > 20
 
 
-def test_measured_voxels_change_no_byte_of_a_bundle_whose_window_was_not_edited(
+def test_a_bundle_whose_window_was_not_edited_only_names_the_measured_voxels(
     measured_stage, tmp_path
 ):
     tiles = [spheres.tile(column, measured=True) for column in (0, 1)]
@@ -137,7 +138,13 @@ def test_measured_voxels_change_no_byte_of_a_bundle_whose_window_was_not_edited(
     ]
     write_bundle(measured_stage, tmp_path / "with", None, run=Engine(0).run)
     write_bundle(write_tiles(tmp_path / "s", bare), tmp_path / "bare", None, run=Engine(0).run)
-    assert files(tmp_path / "with") == files(tmp_path / "bare")
+    kept, alone = files(tmp_path / "with"), files(tmp_path / "bare")
+    changed = {path.name for path in kept if kept[path] != alone[path]}
+    assert changed == {"volumes.json", "files.json", "manifest.json"}
+    for entry in volumes(tmp_path / "with"):
+        file = measured_stage.parent / f"tiles/{entry['tile']}/CD31.vdb"
+        assert entry.pop("measured") == measure(file)
+        assert entry in volumes(tmp_path / "bare")
 
 
 def test_measured_voxels_that_are_damaged_or_gone_are_named(measured_stage, tmp_path):

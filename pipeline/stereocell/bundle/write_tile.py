@@ -31,6 +31,7 @@ from stereocell.formats.tiles3d import TileLod
 from stereocell.model.errors import OutputError, StageError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.atomic_write import replacing_folder, write_bytes
+from stereocell.storage.file_list import measure
 from stereocell.storage.json_files import read_json, write_json
 from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd.layer import move_box
@@ -297,6 +298,7 @@ def _export_volume(
         "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
         # row by row for row vectors is column by column for column vectors
         "matrix": [float(n) for n in volume.matrix.ravel()],
+        **({} if volume.measured is None else {"measured": measure(volume.measured)}),
         "levels": [
             {
                 "size": list(level.size),
