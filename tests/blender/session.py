@@ -91,6 +91,38 @@ def step_import(arguments):
     return describe(import_stage(arguments))
 
 
+def step_measured(arguments):
+    """Return what Blender's OpenVDB finds in the grid `measured` of a .vdb, at points."""
+    bpy.ops.object.volume_import(filepath=arguments["vdb"])
+    volume = bpy.context.object
+    mesh = bpy.data.meshes.new("points")
+    mesh.from_pydata(arguments["points"], [], [])
+    points = bpy.data.objects.new("points", mesh)
+    bpy.context.collection.objects.link(points)
+    tree = bpy.data.node_groups.new("sample", "GeometryNodeTree")
+    for in_out in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    names = ("ObjectInfo", "GetNamedGrid", "SampleGrid", "InputPosition", "StoreNamedAttribute")
+    read, named, sample, position, store = (tree.nodes.new(f"GeometryNode{name}") for name in names)
+    given, made = (tree.nodes.new(f"NodeGroup{name}") for name in ("Input", "Output"))
+    read.inputs["Object"].default_value = volume
+    named.inputs["Name"].default_value = "measured"
+    sample.inputs["Interpolation"].default_value = "Nearest Neighbor"
+    store.inputs["Name"].default_value = "value"
+    for source, target in (
+        (read.outputs["Geometry"], named.inputs["Volume"]),
+        (named.outputs["Grid"], sample.inputs["Grid"]),
+        (position.outputs[0], sample.inputs["Position"]),
+        (given.outputs[0], store.inputs["Geometry"]),
+        (sample.outputs["Value"], store.inputs["Value"]),
+        (store.outputs[0], made.inputs[0]),
+    ):
+        tree.links.new(source, target)
+    points.modifiers.new("sample", "NODES").node_group = tree
+    found = points.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return {"values": [one.value for one in found.data.attributes["value"].data]}
+
+
 def step_refuse(arguments):
     """Return the one line that a user sees."""
     chosen = {key: arguments[key] for key in _FIELDS if key in arguments}

@@ -19,6 +19,7 @@ from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
+from stereocell.formats.vdb import write_vdb
 from stereocell.usd.validate import validate_stage
 from support.bundles import load
 from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, leaf, write_whole
@@ -116,6 +117,24 @@ def test_volumes_have_their_grid_place_and_transfer_function(
     assert [box["low"][2], box["high"][2]] == pytest.approx([-0.5 * 0.5, 15.5 * 0.5], abs=0.251)
     assert np.allclose(found["functions"][F_ID], FUNCTIONS["default"])
     assert found["colors"][F_ID] == pytest.approx(COLORS[0])
+
+
+def test_measured_voxels_are_read_to_the_bit(tmp_path: Path) -> None:
+    """By OpenVDB itself: floats in frames of Blosc, indices below 0, a background below 0."""
+    measured = np.random.default_rng(1).integers(-1024, 60000, (12, 23, 40)).astype(np.float32)
+    measured[:, :9] = -1024
+    write_vdb(
+        tmp_path / "a.vdb",
+        np.full((9, 20, 37), 255, np.uint8),
+        first_um=(1.0, 2.0, 3.0),
+        spacing_um=(1.0, 0.5, 0.25),
+        measured=measured,
+        apron=1,
+    )
+    z, y, x = (n - 1 for n in np.indices(measured.shape))
+    points = np.stack([3 + 0.25 * x, -(2 + 0.5 * y), 1.0 + z], axis=-1).reshape(-1, 3)
+    found = run("measured", tmp_path, vdb=tmp_path / "a.vdb", points=points.tolist())
+    np.testing.assert_array_equal(found["values"], measured.ravel())
 
 
 def test_cameras_are_a_stereo_pair(stage_path: Path, tmp_path: Path) -> None:

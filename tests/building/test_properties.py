@@ -23,7 +23,8 @@ from stereocell.building.plan_file import from_json, to_json
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.brick_stream import content_hash, decode_brick, encode_tree, parse_table
 from stereocell.formats.ktx2 import decode_finest, encode_2d, encode_3d
-from stereocell.formats.vdb import check_vdb, read_vdb_head, write_vdb
+from stereocell.formats.vdb import check_vdb, write_vdb
+from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.formats.voxel_bvh import build
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import from_identifier, to_identifier

@@ -25,6 +25,7 @@ WRONG = [
     (["--wrap", "film"], "--wrap is 'film', expected one of voxels"),
     (["--iso-value", "F=1+c"], "--iso-value F is '1+c', expected a voxel value"),
     (["--window", "F=9:1"], "--window F is '9:1', expected"),
+    (["--bits", "12"], "--bits is 12, expected 8 or 16"),
     (["--level", "7"], "--level is 7, expected 0 to 0"),
 ]
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, build_unit, to_eight_bit
+from stereocell.building.settings import Settings, VolumeOptions
+from stereocell.building.unit import UnitInput, build_unit
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
@@ -45,9 +45,27 @@ def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end(
     voxels = np.arange(np.prod(SHAPE), dtype=np.float32).reshape(SHAPE) % 251
     lattice = Lattice(BOX, Box((0, 10, 20), (10, 20, 40)), BOX, SPACING, (0.0, 0.0, 0.0))
     given = replace(_given(1.0), lattice=lattice, intensity_window=(0.0, 255.0))
-    eight_bit = to_eight_bit(voxels, given)
+    unit = build_unit(Volume(voxels, SPACING), replace(given, iso=None))
     padded = np.pad(voxels, APRON, mode="edge")
-    np.testing.assert_array_equal(eight_bit, padded[0:12, 10:22, 20:42])
+    np.testing.assert_array_equal(unit.volume, padded[0:12, 10:22, 20:42])
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int16, np.float32])
+@pytest.mark.parametrize("window", [(0.0, 255.0), (20.0, 90.0)])
+@pytest.mark.parametrize("bits", [16, 8])
+def test_voxels_stay_as_measured_where_8_bits_lose_something_and_not_if_8_are_asked_for(
+    dtype: type, window: tuple[float, float], bits: int
+) -> None:
+    voxels = np.random.default_rng(3).integers(0, 127, SHAPE).astype(dtype)
+    given = replace(_given(1.0), iso=None, intensity_window=window)
+    settings = replace(given.settings, volume=VolumeOptions(bits))
+    unit = build_unit(Volume(voxels, SPACING), replace(given, settings=settings))
+    if bits == 8 or (dtype == np.uint8 and window == (0, 255)):
+        assert unit.measured is None
+        return
+    assert unit.measured is not None
+    assert unit.measured.dtype == dtype
+    np.testing.assert_array_equal(unit.measured, np.pad(voxels, APRON, mode="edge"))
 
 
 def test_texels_are_held_against_the_voxels_not_against_the_planes_that_carry_the_surface() -> None:

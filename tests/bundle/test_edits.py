@@ -11,9 +11,11 @@ from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 from stereocell.bundle.edited_meshes import shown_lods
 from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
+from stereocell.formats.vdb import write_vdb
 from stereocell.model.channel import PaintColors
 from stereocell.model.errors import StereoCellError
 from stereocell.model.mesh import Baked, Lod
+from stereocell.storage.file_list import measure
 from stereocell.usd.read_stage import loaded, open_stage
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support import spheres
@@ -91,6 +93,69 @@ def test_window_edited_over_the_stage_reaches_manifest_voxels_and_bricks(bundle,
         assert new.max() == 255
     blue = "Hoechst 33342"
     assert channel(edited, blue) == channel(bundle, blue)
+
+
+@pytest.fixture(scope="module")
+def measured_stage(tmp_path_factory):
+    """The two tiles' stage with CD31 as measured, to be read only."""
+    tiles = tuple(spheres.tile(column, measured=True) for column in (0, 1))
+    return write_tiles(tmp_path_factory.mktemp("measured"), tiles)
+
+
+def edited_over(stage, folder, window):
+    """Return the bundle of a layer over a stage that sets the window of CD31."""
+    path = folder / "window.usda"
+    layer = Sdf.Layer.CreateNew(str(path))
+    layer.subLayerPaths = [str(stage)]
+    over = Usd.Stage.Open(layer)
+    over.GetAttributeAtPath(f"{CD31}.stereocell:window").Set(Gf.Vec2f(*window))
+    layer.Save()
+    write_bundle(path, folder / "bundle", None, run=Engine(0).run)
+    return folder / "bundle"
+
+
+@pytest.mark.parametrize("window", [(490, 2050), (1200, 1230), (-5000, 100000)])
+def test_a_window_edited_over_measured_voxels_loses_nothing(measured_stage, tmp_path, window):
+    low, high = window
+    edited = edited_over(measured_stage, tmp_path, window)
+    for column, entry in enumerate(volumes(edited)):
+        width, height, depth = entry["size"]
+        kept = spheres.counts((-1, -1, 20 * column - 1), (depth, height, width)).astype(float)
+        wanted = np.rint(np.clip((kept - low) / (high - low), 0, 1) * 255)
+        data = (edited / entry["file"]["path"]).read_bytes()
+        np.testing.assert_array_equal(texels(data).reshape(wanted.shape), wanted)
+    if window == (1200, 1230):  # of which 8 bits of 3900 counts have three
+        assert len(np.unique(texels(data))) > 20
+
+
+def test_a_bundle_whose_window_was_not_edited_only_names_the_measured_voxels(
+    measured_stage, tmp_path
+):
+    tiles = [spheres.tile(column, measured=True) for column in (0, 1)]
+    bare = [
+        replace(tile, channels=tuple(replace(c, measured=None) for c in tile.channels))
+        for tile in tiles
+    ]
+    write_bundle(measured_stage, tmp_path / "with", None, run=Engine(0).run)
+    write_bundle(write_tiles(tmp_path / "s", bare), tmp_path / "bare", None, run=Engine(0).run)
+    kept, alone = files(tmp_path / "with"), files(tmp_path / "bare")
+    changed = {path.name for path in kept if kept[path] != alone[path]}
+    assert changed == {"volumes.json", "files.json", "manifest.json"}
+    for entry in volumes(tmp_path / "with"):
+        file = measured_stage.parent / f"tiles/{entry['tile']}/CD31.vdb"
+        assert entry.pop("measured") == measure(file)
+        assert entry in volumes(tmp_path / "bare")
+
+
+def test_measured_voxels_that_are_damaged_or_gone_are_named(measured_stage, tmp_path):
+    shutil.copytree(measured_stage.parent, tmp_path / "own")
+    file = tmp_path / "own/tiles/r0_c0/CD31.vdb"
+    file.write_bytes(file.read_bytes()[:-1])
+    with pytest.raises(StereoCellError, match=r"CD31\.vdb: can't be read as OpenVDB"):
+        edited_over(tmp_path / "own/stage.usda", tmp_path, (490, 2050))
+    write_vdb(file, np.zeros((9, 20, 20), np.uint8), first_um=(0, 0, 0), spacing_um=(1, 1, 1))
+    with pytest.raises(StereoCellError, match=r"CD31\.vdb: no grid 'measured' of floats"):
+        edited_over(tmp_path / "own/stage.usda", tmp_path, (490, 2050))
 
 
 def test_window_edit_survives_flattening(edit, tmp_path):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from stereocell.formats.vdb import check_vdb, write_vdb
+from stereocell.formats.vdb_read import VdbValues
 from stereocell.model.errors import OutputError, StageError
 from support.vdb_reader import read_vdb, value_at
 
@@ -91,6 +92,84 @@ def test_a_file_that_was_cut_short_or_is_another_is_one_clear_line(tmp_path: Pat
     path.unlink()
     with pytest.raises(StageError, match=r"a\.vdb: can't be read: No such file"):
         check_vdb(path)
+
+
+def write_measured(path: Path, measured: np.ndarray, shape: tuple[int, int, int]) -> None:
+    density = np.random.default_rng(5).integers(0, 256, shape, dtype=np.uint8)
+    write_vdb(
+        path,
+        density,
+        first_um=(5.0, 7.0, 9.0),
+        spacing_um=SPACING_UM,
+        measured=measured,
+        apron=1,
+    )
+
+
+def lowest_um(shape: tuple[int, ...]) -> tuple[float, float, float]:
+    """Return the centre of the lowest voxel of an apron, (x, y, z)."""
+    return 9.0 - 0.15, -(7.0 + 0.14 * (shape[1] - 2)), 5.0 - 0.28
+
+
+@pytest.mark.parametrize(
+    ("dtype", "low", "high"),
+    [(np.uint8, 0, 256), (np.uint16, 0, 65536), (np.int16, -1024, 3072), (np.float32, -2, 2)],
+)
+def test_measured_voxels_come_back_to_the_bit(
+    tmp_path: Path, dtype: type, low: int, high: int
+) -> None:
+    rng = np.random.default_rng(7)
+    drawn = rng.uniform(low, high, (14, 21, 28))
+    measured = (drawn if dtype == np.float32 else np.floor(drawn)).astype(dtype)
+    measured[:, :9] = measured.min()  # leaves that are background, and are left out
+    path = tmp_path / "a.vdb"
+    write_measured(path, measured, (11, 18, 26))  # planes and columns are shared with neighbours
+    found = VdbValues(path, "measured").box(lowest_um(measured.shape), measured.shape[::-1])
+    assert found.dtype == np.float32
+    np.testing.assert_array_equal(found, measured.astype(np.float32))
+    vdb = read_vdb(path, "measured")  # the tests' own reader, by OpenVDB's layout
+    assert vdb.metadata["class"] == "unknown"
+    assert vdb.background == measured.min()
+    assert len(vdb.voxels) == np.count_nonzero(measured != measured.min())
+    for z, y, x in np.ndindex(*(n - 2 for n in measured.shape)):
+        world = (9.0 + 0.15 * x, -(7.0 + 0.14 * y), 5.0 + 0.28 * z)
+        assert value_at(vdb, world) == measured[z + 1, y + 1, x + 1]
+    density = read_vdb(path)
+    assert (density.offset_um, density.scale_um) == (vdb.offset_um, vdb.scale_um)
+
+
+def test_a_part_of_measured_voxels_is_read_by_its_place(tmp_path: Path) -> None:
+    measured = np.random.default_rng(2).integers(0, 9999, (20, 40, 300)).astype(np.uint16)
+    write_measured(tmp_path / "a.vdb", measured, (18, 38, 298))
+    x, y, z = lowest_um(measured.shape)
+    corner = (x + 0.15 * 120, y + 0.14 * 3, z + 0.28 * 5)
+    found = VdbValues(tmp_path / "a.vdb", "measured").box(corner, (60, 20, 9))
+    np.testing.assert_array_equal(found, measured[5:14, 17:37, 120:180])
+
+
+def test_measured_voxels_of_a_damaged_file_are_one_clear_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.vdb"
+    measured = np.random.default_rng(2).integers(0, 9999, (12, 20, 30)).astype(np.uint16)
+    write_measured(path, measured, (10, 18, 28))
+    whole = path.read_bytes()
+    start = VdbValues(path, "measured").grid.start
+    low, size = lowest_um(measured.shape), measured.shape[::-1]
+    rng = np.random.default_rng(0)
+    refused = 0
+    for place in rng.integers(start, len(whole), 300).tolist():
+        spoilt = bytearray(whole)
+        spoilt[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(spoilt)
+        try:  # a value is another one, or the file is refused: nothing else
+            found = VdbValues(path, "measured").box(low, size)
+        except StageError:
+            refused += 1
+        else:
+            assert found.shape == measured.shape
+    assert 20 < refused < 300
+    write_vdb(path, np.zeros((4, 4, 4), np.uint8), first_um=(0, 0, 0), spacing_um=SPACING_UM)
+    with pytest.raises(StageError, match=r"a\.vdb: no grid 'measured' of floats"):
+        VdbValues(path, "measured")
 
 
 def test_a_folder_that_is_a_file_is_one_clear_line(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ _TOML: dict[str, bytes] = {
     "offset 100": b"[surface]\noffset_um = 100.0", "background 1e-9": b"[surface]\nbackground_um = 1e-9", "wrap odd": b'[surface]\nwrap = "../x"', "closed_tiles 1": b"[surface]\nclosed_tiles = 1",
     "criterion odd": b'[isovalue]\ncriterion = "\\n"', "iso value of nobody": b"[iso_values]\nZZZ = 3.0", "iso value NaN": b"[iso_values]\nF = nan", "iso value in words": b'[iso_values]\nF = "x"',
     "iso value of the empty name": b'[iso_values]\n"" = 1.0', "paint itself": b'[paint]\nF = "F"', "paint nobody": b'[paint]\nF = "Z"', "paint a number": b"[paint]\nF = 7",
-    "LOD errors": b"[lod]\nlevels = -3", "date": b"[plan]\nlevel = 2020-01-01", "dots in keys": b'["plan.level"]\nx = 1', "control characters in a key": b'["pl\\u0007an"]\nx = 1',
+    "bits 12": b"[volume]\nbits = 12", "bits in words": b'[volume]\nbits = "all"', "LOD errors": b"[lod]\nlevels = -3", "date": b"[plan]\nlevel = 2020-01-01", "dots in keys": b'["plan.level"]\nx = 1', "control characters in a key": b'["pl\\u0007an"]\nx = 1',
     "array of tables": b"[[plan]]\nlevel = 1", "section of dates": b"plan = 1979-05-27T07:32:00Z",
 }  # fmt: skip
 _FLAGS: dict[str, list[str]] = {

@@ -1,7 +1,6 @@
 """The local server: byte ranges, types, nothing outside the bundle, nobody from elsewhere."""
 
 import gzip
-import http.client
 import socket
 import time
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from stereocell.model.errors import StereoCellError
 from stereocell.serve import server as serve_module
 from stereocell.serve.server import LOCALHOST, BundleServer
 from stereocell.serve.static_files import accepted_encodings, parse_range
+from support.server.requests import ask
 from support.server.timeouts import PATIENCE_S, connect
 
 DATA = bytes(range(256)) * 1000
@@ -50,18 +50,6 @@ def port(bundle: Path) -> Iterator[int]:
     yield server.port
     server.stop()
     thread.join()
-
-
-def ask(
-    port: int, path: str, method: str = "GET", **headers: str
-) -> tuple[http.client.HTTPResponse, bytes]:
-    connection = http.client.HTTPConnection(LOCALHOST, port, timeout=PATIENCE_S)
-    try:
-        connection.request(method, path, headers=headers)
-        response = connection.getresponse()
-        return response, response.read()
-    finally:
-        connection.close()
 
 
 def test_a_range_is_answered_with_its_bytes(port: int) -> None:

@@ -1,5 +1,6 @@
 """Two tiles side by side, a sphere across their border: tiny content for stage and bundle."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from stereocell.model.channel import Appearance
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tile_content import ChannelContent, TileContent
+from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 
 SPACING = (1.0, 0.5, 0.5)  # um, (z, y, x)
@@ -75,12 +77,24 @@ def ball(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[n
     return np.clip(128 + 60 * (RADIUS - distance), 0, 255).astype(np.uint8)
 
 
-def tile(column: int, appearances: tuple[Appearance, ...] = (RED, BLUE)) -> TileContent:
-    """Return tile r0_c0 (x 0 to 10 um) or r0_c1 (10 to 19.5 um); only CD31 has a surface."""
+def counts(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[np.uint16]:
+    """Return the same window as a camera of 12 bits counts it: finer than RED's window in 8."""
+    z, y, x = np.indices(shape) + np.reshape(origin, (3, 1, 1, 1))
+    return (100 + (977 * z + 131 * y + 29 * x) % 3901).astype(np.uint16)
+
+
+def tile(
+    column: int, appearances: tuple[Appearance, ...] = (RED, BLUE), *, measured: bool = False
+) -> TileContent:
+    """Return tile r0_c0 (x 0 to 10 um) or r0_c1 (10 to 19.5 um); only CD31 has a surface.
+
+    measured  whether CD31's voxels are those of `counts`, and kept as such
+    """
     lattice = (9, 20, 21) if column == 0 else OWN_SHAPE
     first = (0.0, 0.0, 10.0 * column)
     last = tuple(a + (n - 1) * s for a, n, s in zip(first, lattice, SPACING, strict=True))
-    volume = ball((-1, -1, 20 * column - 1), tuple(n + 2 for n in lattice))
+    origin, shape = (-1, -1, 20 * column - 1), tuple(n + 2 for n in lattice)
+    volume = ball(origin, shape)
     flat = np.full((32, 32, 3), (128, 128, 255), np.uint8)
     lods = []
     for level, (rings, distance) in enumerate(LEVELS):
@@ -91,6 +105,10 @@ def tile(column: int, appearances: tuple[Appearance, ...] = (RED, BLUE)) -> Tile
         ChannelContent(appearance.id, tuple(lods) if appearance.iso_value else (), volume)
         for appearance in appearances
     )
+    if measured:
+        kept = counts(origin, shape)
+        own = replace(contents[0], volume=to_eight_bits(kept, RED.window), measured=kept)
+        contents = (own, *contents[1:])
     return TileContent(f"r0_c{column}", SPACING, first, last, OWN_SHAPE, contents)
 
 

@@ -162,10 +162,13 @@ def test_a_vdb_in_metres_is_found(stage_path: Path, tmp_path: Path) -> None:
     assert "expected [0.25, 0.25, 0.5]" in text
 
 
-def test_a_volume_with_two_fields_is_found(stage_path: Path, tmp_path: Path) -> None:
+def test_a_volume_of_two_files_is_found(stage_path: Path, tmp_path: Path) -> None:
     path = leaf("r0_c0", F_ID, "_volume") + "/density"
     findings = edit_volume(stage_path, tmp_path, f"rel field:second = <{path}>")
-    assert any("2 fields, expected 1" in text for text in findings)
+    assert not any("expected 1: clients read one" in text for text in findings)
+    path = leaf("r0_c1", F_ID, "_volume") + "/density"
+    findings = edit_volume(stage_path, tmp_path, f"rel field:second = <{path}>")
+    assert any("2 files, expected 1: clients read one" in text for text in findings)
 
 
 def test_two_things_of_one_name_are_found(stage_path: Path, tmp_path: Path) -> None:

@@ -264,7 +264,10 @@ def test_what_was_built_is_as_it_says(built: Path, capsys: pytest.CaptureFixture
     assert main(["check", str(built), "--deep", "--workers", "0"]) == 0
     told = capsys.readouterr().out
     assert "ok   F lod0 against source: 2 surfaces within " in told
-    assert "ok   F against source: 2 units: surfaces as stated, volumes equal to 8 bits" in told
+    assert (
+        "ok   F against source: 2 units: surfaces as stated, volumes equal, also as measured"
+        in told
+    )
     assert "2 volumes, every voxel of every level" in told
     found = lines_of(built)["F lod3 against source"].detail.split()
     within, stated = float(found[3]), float(found[5])

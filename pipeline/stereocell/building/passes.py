@@ -147,6 +147,7 @@ def _unit_task(
         [asdict(options) for options in (given.repair, plan.settings.lod)],
         given.step,
         asdict(plan.settings.unwrap),
+        plan.settings.volume.bits,
         painted,
         given.holder and given.holder.to_json(),
     ]

@@ -26,6 +26,7 @@ from stereocell.transfer.windows import parse_window
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
+EIGHT_BITS = 8
 INTENSITY = "intensity"  # what voxels may be taken for, whatever they look like
 NO_PRESET = "none"  # names the defaults
 PRESETS = Path(__file__).parent / "presets"
@@ -155,11 +156,31 @@ class PlanOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class VolumeOptions:
+    """What the stage keeps of the voxels, beside the surfaces."""
+
+    bits: int = setting(
+        16,
+        "16: the stage has the voxels as measured beside those of 8 bits; 8: these alone",
+        Flag(
+            "--bits",
+            "16 (default): the stage keeps the voxels as measured, so that another window loses "
+            "nothing; 8: those of 8 bits alone, about half the size",
+        ),
+    )
+
+    def __post_init__(self) -> None:
+        if self.bits not in (EIGHT_BITS, 16):
+            raise UsageError(f"volume.bits is {self.bits}, expected 8 or 16")
+
+
+@dataclass(frozen=True, slots=True)
 class Settings:
     """Every setting of a build."""
 
     plan: PlanOptions = field(default_factory=PlanOptions)
     window: WindowOptions = field(default_factory=WindowOptions)
+    volume: VolumeOptions = field(default_factory=VolumeOptions)
     isovalue: IsoValueOptions = field(default_factory=IsoValueOptions)
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     lod: LodOptions = field(default_factory=LodOptions)

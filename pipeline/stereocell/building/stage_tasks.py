@@ -10,7 +10,15 @@ from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.unit_files import find_closed, is_whole, load_lods, load_volume
+from stereocell.building.unit_files import (
+    find_closed,
+    is_whole,
+    load_lods,
+    load_measured,
+    load_volume,
+)
+from stereocell.formats.vdb import MEASURED_NAME
+from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.model.channel import PaintColors
 from stereocell.model.tile_content import ChannelContent, TileContent
 from stereocell.model.tiling import Tile
@@ -55,10 +63,13 @@ class TileTask:
         are_whole = all(is_whole(folder) for _, folder, _ in self.units)
         return are_whole and written_files.is_kept(self.folder, found["files"], since=self.record)
 
-    def listed(self) -> FileList:
-        """Return the files of a finished tile, by their paths from the stage's folder."""
+    def listed(self) -> tuple[FileList, int]:
+        """Return the files of a finished tile, by their paths from the stage's folder, and the
+        bytes of its voxels as measured.
+        """
         found = read_sealed(self.record, _RECORD, written_files.REMEDY)
-        return {f"tiles/{self.content.id}/{name}": one for name, one in found["files"].items()}
+        files = {f"tiles/{self.content.id}/{name}": one for name, one in found["files"].items()}
+        return files, found["measured_bytes"]
 
 
 def tile_task(
@@ -106,8 +117,11 @@ def run_tile(task: TileTask) -> None:
                 None if channel_id in task.shared else load_volume(folder),
                 paint,
                 find_closed(folder),
+                None if channel_id in task.shared else load_measured(folder),
             )
             for channel_id, folder, paint in task.units
         )
         files = stage_writer.write_tile(task.stage_dir, replace(task.content, channels=channels))
-    write_sealed(task.record, {"key": task.key, "files": files})
+        grids = [grid for file in task.folder.glob("*.vdb") for grid in read_vdb_head(file)]
+    measured = sum(grid.end - grid.start for grid in grids if grid.name == MEASURED_NAME)
+    write_sealed(task.record, {"key": task.key, "files": files, "measured_bytes": measured})

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.building.closed_copy import close_tile
-from stereocell.building.settings import Settings
+from stereocell.building.settings import EIGHT_BITS, Settings
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.distance_field import to_distance
 from stereocell.isosurface.extract import extract_surface
@@ -68,9 +68,12 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
     """
     clock = Clock()
     with clock("volume"):
-        eight_bit = to_eight_bit(volume.voxels, given)
+        kept = cut_voxels(volume.voxels, given)
+        eight_bit = to_eight_bits(kept, given.intensity_window)
+        measured = find_measured(kept, given)
     if given.iso is None:
-        return Unit((), None, eight_bit, "the channel has no iso-value", 0, 0, clock.seconds)
+        reason = "the channel has no iso-value"
+        return Unit((), None, eight_bit, reason, 0, 0, clock.seconds, measured)
 
     lattice = given.lattice.thinned(given.step)
     repaired, by_triangles = _repaired(volume, given, lattice, given.iso, clock)
@@ -78,7 +81,7 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
     dropped, filled = repaired.fragments_dropped, repaired.cavities_filled
     if not len(fine.triangles):
         reason = "no voxel crosses the iso-value"
-        return Unit((), None, eight_bit, reason, dropped, filled, clock.seconds)
+        return Unit((), None, eight_bit, reason, dropped, filled, clock.seconds, measured)
     closed = None
     if given.settings.surface.closed_tiles:
         with clock("close"):
@@ -95,7 +98,7 @@ def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) 
         box=lattice.own_box(),
         get_texturer=shading.texturer,
     )
-    return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds)
+    return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds, measured)
 
 
 def find_surface(volume: Volume, given: UnitInput) -> Mesh:
@@ -203,8 +206,8 @@ class _Shading:
         )
 
 
-def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
-    """Return the lattice's voxels and an apron (z, y, x), windowed; the region's ends repeat."""
+def cut_voxels(voxels: NDArray[Any], given: UnitInput) -> NDArray[Any]:
+    """Return the lattice's voxels and an apron (z, y, x); the region's ends repeat."""
     lattice = given.lattice
     index = [
         np.clip(np.arange(a - APRON, b + APRON), low, high - 1) - w
@@ -217,4 +220,15 @@ def to_eight_bit(voxels: NDArray[Any], given: UnitInput) -> NDArray[np.uint8]:
             strict=True,
         )
     ]
-    return to_eight_bits(voxels[np.ix_(*index)], given.intensity_window)
+    return voxels[np.ix_(*index)]
+
+
+def find_measured(kept: NDArray[Any], given: UnitInput) -> NDArray[Any] | None:
+    """Return the voxels that the stage keeps as they were measured; None where it does not.
+
+    kept  as `cut_voxels` returns them
+    """
+    if given.settings.volume.bits == EIGHT_BITS:
+        return None
+    is_same = kept.dtype == np.uint8 and given.intensity_window == (0, 255)
+    return None if is_same else kept

@@ -31,7 +31,8 @@ from stereocell.storage.json_files import (
 from stereocell.storage.workspace import fetch, is_file
 
 SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
-_RECORD, _VOLUME, _CLOSED, _SECONDS = "unit.json", "volume.npy", "closed.stl", "seconds.json"
+_RECORD, _CLOSED, _SECONDS = "unit.json", "closed.stl", "seconds.json"
+_VOLUME, _MEASURED = "volume.npy", "measured.npy"
 
 
 def save_unit(directory: Path, unit: Unit) -> None:
@@ -47,10 +48,12 @@ def save_unit(directory: Path, unit: Unit) -> None:
         for lod in unit.lods
     ]
     with replacing_folder(directory) as folder:
-        # numpy's own file writer reports no full disk
-        buffer = io.BytesIO()
-        np.save(buffer, unit.volume)
-        (folder / _VOLUME).write_bytes(buffer.getbuffer())
+        for name, voxels in ((_VOLUME, unit.volume), (_MEASURED, unit.measured)):
+            if voxels is not None:
+                # numpy's own file writer reports no full disk
+                buffer = io.BytesIO()
+                np.save(buffer, voxels)
+                (folder / name).write_bytes(buffer.getbuffer())
         for level, lod in enumerate(unit.lods):
             np.savez(lod_file(folder, level), **_arrays(lod))
         if unit.closed is not None:
@@ -142,12 +145,22 @@ def load_quality(stored: Mapping[str, Any]) -> Quality:
 
 def load_volume(directory: Path) -> NDArray[np.uint8]:
     """Return the 8-bit voxels (z, y, x), uint8, mapped from the file. Raises OutputError."""
-    file = _as_written(directory, directory / _VOLUME)
+    return _load_voxels(directory, _VOLUME)
+
+
+def load_measured(directory: Path) -> NDArray[Any] | None:
+    """Return the same voxels as they were read, mapped; None: not kept. Raises OutputError."""
+    has_any = _MEASURED in load_record(directory)["files"]
+    return _load_voxels(directory, _MEASURED) if has_any else None
+
+
+def _load_voxels(directory: Path, name: str) -> NDArray[Any]:
+    file = _as_written(directory, directory / name)
     try:
-        volume: NDArray[np.uint8] = np.load(file, mmap_mode="r")
+        voxels: NDArray[Any] = np.load(file, mmap_mode="r")
     except (OSError, ValueError, EOFError) as error:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
-    return volume
+    return voxels
 
 
 def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:

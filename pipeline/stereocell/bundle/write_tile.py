@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from stereocell.bundle.edited_meshes import shown_lods
+from stereocell.bundle.windowed_voxels import read_windowed
 from stereocell.bundle.write_transfer2d import count_tile
 from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
-from stereocell.formats.exr import read_atlas
 from stereocell.formats.gltf import Glb, Textures, encode_glb
 from stereocell.formats.ktx2 import (
     encode_3d,
@@ -30,6 +31,7 @@ from stereocell.formats.tiles3d import TileLod
 from stereocell.model.errors import OutputError, StageError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.atomic_write import replacing_folder, write_bytes
+from stereocell.storage.file_list import measure
 from stereocell.storage.json_files import read_json, write_json
 from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd.layer import move_box
@@ -202,8 +204,8 @@ def _export_channel(
         lods.append(TileLod(uri, file.sha256, lod.largest_um, glb.min_m, glb.max_m))
     entry = joint = None
     if volume is not None:
-        as_written.require(volume.atlas)
-        entry, written, joint = _export_volume(root, tile.GetName(), appearance, volume)
+        voxels = read_windowed(volume, appearance, as_written)
+        entry, written, joint = _export_volume(root, tile.GetName(), appearance, volume, voxels)
         files += written
     return TileChannel(
         channel_id,
@@ -274,13 +276,12 @@ def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) ->
 
 
 def _export_volume(
-    root: Path, tile_id: str, appearance: ComposedAppearance, volume: ComposedVolume
+    root: Path,
+    tile_id: str,
+    appearance: ComposedAppearance,
+    volume: ComposedVolume,
+    voxels: NDArray[np.uint8],
 ) -> tuple[dict[str, Any], list[FileRef], bytes]:
-    voxels = read_atlas(volume.atlas)
-    if voxels.shape != volume.size[::-1]:
-        found = tuple(voxels.shape[::-1])
-        raise StageError(f"{volume.atlas}: {found} voxels, the stage says {volume.size}")
-    voxels = appearance.window_voxels(voxels)
     texture = encode_3d(mip_levels(voxels))
     bricks = encode_3d([min_max_bricks(voxels)])
     path = f"volumes/{tile_id}/{appearance.id}"
@@ -297,6 +298,7 @@ def _export_volume(
         "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
         # row by row for row vectors is column by column for column vectors
         "matrix": [float(n) for n in volume.matrix.ravel()],
+        **({} if volume.measured is None else {"measured": measure(volume.measured)}),
         "levels": [
             {
                 "size": list(level.size),

@@ -23,6 +23,7 @@ class ChannelContent:
             is a further surface of another channel's voxels
     paint   colours of the channel that is sampled on the surface; None: no channel
     closed  STL file of a closed copy of the surface; None: no file
+    measured  the volume's voxels as they were read; None: they are not kept
     """
 
     channel_id: str
@@ -30,6 +31,7 @@ class ChannelContent:
     volume: NDArray[np.uint8] | None
     paint: PaintColors | None = None
     closed: Path | None = None
+    measured: NDArray[Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)

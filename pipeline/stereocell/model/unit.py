@@ -1,6 +1,7 @@
 """The result of a unit: the surface and the volume of one (tile, channel)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ class Unit:
     volume   uint8 (z, y, x): the lattice's voxels, window applied, and APRON voxels on every side
     reason   why there is no surface; empty if there is one
     seconds  time spent, by step
+    measured  the same voxels as they were read; None: not kept, or `volume` is no different
     """
 
     lods: tuple[Lod, ...]
@@ -38,3 +40,4 @@ class Unit:
     fragments_dropped: int
     cavities_filled: int
     seconds: dict[str, float]
+    measured: NDArray[Any] | None = None

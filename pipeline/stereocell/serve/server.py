@@ -1,7 +1,8 @@
 """Serve a built bundle and its bricks: `stereocell view` and `stereocell serve`.
 
-A static bundle works on any web host. This server answers byte ranges of its files, and its
-websocket `/bricks` sends volumes by view (serve/brick_session.py). It serves localhost or, with
+A static bundle works on any web host. This server answers byte ranges of its files, its websocket
+`/bricks` sends volumes by view (serve/brick_session.py), and `/values` tells voxels as they were
+measured, from the stage beside the bundle (serve/measured_values.py). It serves localhost or, with
 `--lan`, the network: then by TLS, and only to holders of a token (serve/access.py). It logs only
 faults of the program and of the bundle: no request, so no token, and no name that a client sent.
 docs/brick-stream.md lists the requests that the other modules refuse.
@@ -32,7 +33,8 @@ from stereocell.serve.http_protocol import GuardedHttp
 from stereocell.serve.lan import draw_qr, explain, find_addresses, find_names, make_certificate
 from stereocell.serve.lifetime import Lifetime
 from stereocell.serve.limits import MESSAGE_BYTES, STOP_S
-from stereocell.serve.static_files import BundleFiles, ShrunkError
+from stereocell.serve.measured_values import VALUES_HEADER, MeasuredValues
+from stereocell.serve.static_files import BRICKS_HEADER, BundleFiles, ShrunkError
 from stereocell.serve.websocket_protocol import GuardedSocket
 
 LOCALHOST = "127.0.0.1"
@@ -68,16 +70,26 @@ def serve(
 
 
 def make_app(
-    bundle: Path, library: BrickLibrary | None, *, names: tuple[str, ...], gate: Gate | None
+    bundle: Path,
+    library: BrickLibrary | None,
+    stage: Path | None,
+    *,
+    names: tuple[str, ...],
+    gate: Gate | None,
 ) -> ASGIApp:
-    """Return the application: the bundle's files, and `/bricks`.
+    """Return the application: the bundle's files, `/bricks` and `/values`.
 
     library  of the bundle; None: there is no `/bricks`
+    stage    the folder of the stage beside the bundle in OUT; None: there is no `/values`
     names    the hosts that it answers to, in lower case
     gate     tokens and sessions on the LAN; None: all clients of this machine have access
     """
-    files = BundleFiles(bundle, library is not None)
+    values = None if library is None or stage is None else MeasuredValues(library, stage)
     endpoint = None if library is None else BrickEndpoint(library)
+    announced = ({} if endpoint is None else BRICKS_HEADER) | (
+        {} if values is None else VALUES_HEADER
+    )
+    files = BundleFiles(bundle, announced)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -88,6 +100,8 @@ def make_app(
     routes: list[BaseRoute] = [Route("/{path:path}", files.answer, methods=["GET"])]
     if endpoint is not None:
         routes.insert(0, WebSocketRoute("/bricks", endpoint.talk))
+    if values is not None:
+        routes.insert(0, Route("/values/{tile}/{channel}", values.answer, methods=["GET"]))
     app = Starlette(routes=routes, lifespan=lifespan)
     app.router.redirect_slashes = False  # paths with a line break match no route
     return Access(app, names, gate)
@@ -113,7 +127,9 @@ class BundleServer:
     def __init__(self, out: Path, port: int, lan: bool, for_program: bool = False) -> None:
         """Raises StereoCellError where there is no bundle, the port is taken, or no network."""
         bundle, bricks = _places(out)
-        library = None if bricks is None else BrickLibrary(bundle, bricks)
+        library = stage = None
+        if bricks is not None:
+            library, stage = BrickLibrary(bundle, bricks), bricks.parent / "stage"
         self.bundle, self.has_bricks = bundle, bricks is not None
         self.for_program = for_program
         for name in (MANIFEST, "index.html"):
@@ -137,7 +153,7 @@ class BundleServer:
         self.port: int = self._socket.getsockname()[1]
         self.address = f"{scheme}://{host}:{self.port}/"
         config = uvicorn.Config(
-            make_app(bundle, library, names=names, gate=self.gate),
+            make_app(bundle, library, stage, names=names, gate=self.gate),
             log_config=None,
             log_level="error",
             access_log=False,

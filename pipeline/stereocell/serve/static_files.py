@@ -12,6 +12,7 @@ References: RFC 9110, sections 14 (range requests) and 12.5.3 (Accept-Encoding).
 
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from urllib.parse import quote
 
@@ -56,11 +57,11 @@ class _SentFile(FileResponse):
 
 
 class BundleFiles:
-    """The served folder, and a header that announces bricks."""
+    """The served folder, and headers that announce what else the server has."""
 
-    def __init__(self, folder: Path, has_bricks: bool) -> None:
+    def __init__(self, folder: Path, announced: Mapping[str, str]) -> None:
         self._root = folder.resolve()
-        self._headers = _HEADERS | (BRICKS_HEADER if has_bricks else {})
+        self._headers = {**_HEADERS, **announced}
 
     async def answer(self, request: Request) -> Response:
         """Answer a GET or HEAD."""

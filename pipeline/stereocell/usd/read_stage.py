@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdVol
 
 from stereocell.formats.gltf import Material
+from stereocell.formats.vdb import GRID_NAME, MEASURED_NAME
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.location import Location, require_own
@@ -95,6 +96,7 @@ class ComposedVolume:
     """One volume: the file with its voxels, and its place.
 
     field       the .vdb that other programs draw; None: the stage names none
+    measured    the .vdb with the voxels as they were measured; None: they are not kept
     size        voxels (x, y, z) with the apron
     apron       voxels on each side
     low, high   corners (x, y, z) in um of the box inside the apron, before `matrix`
@@ -103,6 +105,7 @@ class ComposedVolume:
 
     atlas: Path
     field: Path | None
+    measured: Path | None
     size: tuple[int, int, int]
     apron: int
     low: Point
@@ -387,7 +390,8 @@ def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
         )
     return ComposedVolume(
         file_of(prim.GetAttribute("stereocell:atlas")),
-        _field_of(prim),
+        _field_of(prim, GRID_NAME),
+        _field_of(prim, MEASURED_NAME),
         (width, height, depth),
         apron,
         point_of(prim, "stereocell:boundsMin"),
@@ -396,12 +400,12 @@ def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
     )
 
 
-def _field_of(volume: Usd.Prim) -> Path | None:
-    """Return the file of a volume's one field; None where there is none."""
-    for prim in UsdVol.Volume(volume).GetFieldPaths().values():
-        asset = UsdVol.FieldAsset(volume.GetStage().GetPrimAtPath(prim)).GetFilePathAttr().Get()
-        return Path(asset.resolvedPath) if asset and asset.resolvedPath else None
-    return None
+def _field_of(volume: Usd.Prim, name: str) -> Path | None:
+    """Return the file of a field of a volume; None where there is none."""
+    path = UsdVol.Volume(volume).GetFieldPath(name)
+    prim = volume.GetStage().GetPrimAtPath(path) if path else None
+    asset = UsdVol.FieldAsset(prim).GetFilePathAttr().Get() if prim else None
+    return Path(asset.resolvedPath) if asset and asset.resolvedPath else None
 
 
 def _check_composition(stage: Usd.Stage) -> None:

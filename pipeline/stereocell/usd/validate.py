@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdValidation, UsdVol
 
-from stereocell.formats.vdb import read_vdb_head
+from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.model.errors import StageError
 from stereocell.usd.layer import CHANNEL_API, METERS_PER_UNIT, UP_AXIS
 from stereocell.usd.read_attributes import one_line
@@ -244,14 +244,19 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
     prim = volume.GetPrim()
     where = _place(prim)
     fields = volume.GetFieldPaths()
-    if len(fields) != 1:
-        yield Finding("volume", where, f"{len(fields)} fields, expected 1: clients read one file")
+    if not fields:
+        yield Finding("volume", where, "0 fields, expected one or more of one file")
+    files: set[str] = set()
     for name, path in sorted(fields.items()):
         asset = UsdVol.OpenVDBAsset(prim.GetStage().GetPrimAtPath(path))
         if asset:
+            file = asset.GetFilePathAttr().Get()
+            files.add(file.resolvedPath or file.path if file else "")
             yield from _check_grid(prim, asset)
         else:
             yield Finding("volume", where, f"field {name} is no OpenVDBAsset at {path}")
+    if len(files) > 1:
+        yield Finding("volume", where, f"{len(files)} files, expected 1: clients read one")
     names = ("boundsMin", "boundsMax", "atlasSize")
     low, high, size = (prim.GetAttribute(f"stereocell:{name}").Get() for name in names)
     if low is None or high is None or size is None:

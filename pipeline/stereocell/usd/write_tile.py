@@ -23,7 +23,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdVol, Vt
 from pxr import Kind as Kinds
 
 from stereocell.formats.exr import write_atlas
-from stereocell.formats.vdb import GRID_NAME, write_vdb
+from stereocell.formats.vdb import GRID_NAME, MEASURED_NAME, write_vdb
 from stereocell.model.color import to_srgb8
 from stereocell.model.errors import StageError
 from stereocell.model.identifiers import from_identifier
@@ -117,6 +117,9 @@ def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
     if channel.volume.shape != expected or channel.volume.dtype != np.uint8:
         found = f"{channel.volume.dtype} {channel.volume.shape}"
         raise ValueError(f"{tile.id}/{channel.channel_id}: {found}, expected uint8 {expected}")
+    if channel.measured is not None and channel.measured.shape != expected:
+        found = f"{channel.measured.shape} measured"
+        raise ValueError(f"{tile.id}/{channel.channel_id}: {found}, expected {expected}")
 
 
 def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> None:
@@ -126,6 +129,8 @@ def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> No
             channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)],
             first_um=tile.first_um,
             spacing_um=tile.spacing_um,
+            measured=channel.measured,
+            apron=APRON,
         )
         write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
     if channel.closed is not None:
@@ -181,16 +186,25 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
 def _define_volume(
     branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent, voxels: NDArray[np.uint8]
 ) -> None:
-    """Define the volume and its one field, nested below: clients read one file per volume."""
+    """Define the volume and its fields, nested below, of one file: clients read one per volume.
+
+    What lies around the tile is in `measured` too: a new window is applied to that, and the
+    bundle's volumes have an apron.
+    """
     stage = branch.GetPrim().GetStage()
     path = branch.GetPath().AppendChild(_leaf(tile, channel, "_volume"))
     volume = UsdVol.Volume.Define(stage, path)
-    field = UsdVol.OpenVDBAsset.Define(stage, path.AppendChild(GRID_NAME))
-    field.CreateFilePathAttr(f"./{channel.channel_id}.vdb")
-    field.CreateFieldNameAttr(GRID_NAME)
-    field.CreateFieldClassAttr(UsdVol.Tokens.fogVolume)
-    field.CreateFieldDataTypeAttr(UsdVol.Tokens.half)
-    volume.CreateFieldRelationship(GRID_NAME, field.GetPath())
+    tokens = UsdVol.Tokens
+    fields = [(GRID_NAME, tokens.fogVolume, tokens.half)]
+    if channel.measured is not None:
+        fields.append((MEASURED_NAME, tokens.unknown, tokens.float_))
+    for name, kind, numbers in fields:
+        field = UsdVol.OpenVDBAsset.Define(stage, path.AppendChild(name))
+        field.CreateFilePathAttr(f"./{channel.channel_id}.vdb")
+        field.CreateFieldNameAttr(name)
+        field.CreateFieldClassAttr(kind)
+        field.CreateFieldDataTypeAttr(numbers)
+        volume.CreateFieldRelationship(name, field.GetPath())
     _bind(volume, branch, _leaf(tile, channel, "_look"))
 
     first, spacing = np.asarray(tile.first_um), np.asarray(tile.spacing_um)

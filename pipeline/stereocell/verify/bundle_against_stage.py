@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stereocell.bundle.edited_meshes import shown_lods
+from stereocell.bundle.windowed_voxels import read_windowed
 from stereocell.bundle.write_tile import find_bounds
 from stereocell.bundle.write_transfer2d import count_tile
-from stereocell.formats.exr import read_atlas
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_stage import loaded, open_stage, read_volume
 from stereocell.verify.bundle_files import find_differences, read_manifest
@@ -82,7 +82,7 @@ def compare_tile(task: BundleTask) -> TileFinding:
                 problems.append(f"{name}: the {which[0]} has no volume, the {which[1]} has one")
             elif composed is not None and entry is not None:
                 problems += find_differences(name, entry, placement_of(composed))
-                voxels = appearance.window_voxels(read_atlas(composed.atlas))
+                voxels = read_windowed(composed, appearance)
                 problems += [
                     f"{name}: {fault}" for fault in compare_volume(task.bundle, entry, voxels)
                 ]

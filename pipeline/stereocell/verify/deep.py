@@ -155,7 +155,7 @@ def _channel_lines(
 
     def sum_up() -> str:
         raise_on(problems)
-        return f"{len(units)} units: surfaces as stated, volumes equal to 8 bits"
+        return f"{len(units)} units: surfaces as stated, volumes equal, also as measured"
 
     yield _line(f"{channel.name} against source", sum_up)
 

@@ -20,7 +20,7 @@ from PIL import Image
 
 from stereocell.building.open_source import open_source
 from stereocell.building.tasks.unit import UnitTask
-from stereocell.building.unit import UnitInput, find_surface, to_eight_bit
+from stereocell.building.unit import UnitInput, cut_voxels, find_measured, find_surface
 from stereocell.building.unit_files import load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas
 from stereocell.formats.vdb import write_vdb
@@ -32,6 +32,7 @@ from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.rigid_transform import Matrix
 from stereocell.model.tile_content import APRON
 from stereocell.storage.workspace import cached
+from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.usd.read_stage import (
     ComposedLod,
     ComposedVolume,
@@ -98,8 +99,7 @@ def compare_unit(task: SourceTask) -> UnitFinding:
         if composed is None and not task.shares_volume:
             problems.append("no volume in the stage")
         elif composed is not None:
-            eight_bit = to_eight_bit(volume.voxels, given)
-            problems += _compare_volume(eight_bit, composed, task)
+            problems += _compare_volume(cut_voxels(volume.voxels, given), composed, task)
     return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems))
 
 
@@ -255,8 +255,9 @@ def _slack(um: float) -> float:
     return um * (1 + _SHARE) + _HAIR_UM
 
 
-def _compare_volume(eight_bit: Any, composed: ComposedVolume, task: SourceTask) -> list[str]:
-    problems = []
+def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTask) -> list[str]:
+    problems, given = [], task.unit.given
+    eight_bit, measured = to_eight_bits(kept, given.intensity_window), find_measured(kept, given)
     atlas, vdb = composed.atlas, composed.field
     stored = read_atlas(atlas)
     if stored.shape != eight_bit.shape:
@@ -271,7 +272,14 @@ def _compare_volume(eight_bit: Any, composed: ComposedVolume, task: SourceTask) 
         return [*problems, "its volume has no field with a file"]
     with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
         anew = Path(folder) / vdb.name
-        write_vdb(anew, own, first_um=task.first_um, spacing_um=task.spacing_um)
+        write_vdb(
+            anew,
+            own,
+            first_um=task.first_um,
+            spacing_um=task.spacing_um,
+            measured=measured,
+            apron=APRON,
+        )
         try:
             if vdb.read_bytes() != anew.read_bytes():
                 problems.append(f"{vdb.name}: not the file that the source gives")

@@ -4,11 +4,13 @@ import type { Size3 } from "../bundle/ktx2";
 import { distanceBetween } from "../math/distance";
 import {
   distanceText,
+  measuredText,
   measurementText,
   sizeText,
   type VolumeLevel,
   valueAt,
   valueText,
+  voxelAt,
 } from "./measure";
 
 const IDENTITY: TileVolume["matrix"] = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
@@ -56,6 +58,20 @@ describe("the value at a point", () => {
   it("is on the source's scale", () => {
     const value = valueAt(tile(), ramp, [1000, 1510], [10, -10, 2]);
     expect(value).toBeCloseTo(1000 + 2 * 37);
+  });
+
+  it("is that of a voxel, by its centre, nearest to the point", () => {
+    expect(voxelAt(tile(), [10.24, -10.26, 2.4])).toEqual([10, -10.5, 2]);
+    expect(voxelAt(tile(), [13.5, -11.5, 4])).toEqual([13.5, -11.5, 4]);
+    expect(voxelAt(tile(), [13.6, -11.5, 4])).toBeNull();
+    // a quarter turn about z, then 100 um along x: the voxel is told in the tile's own place
+    const moved = tile([0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 100, 0, 0, 1]);
+    expect(voxelAt(moved, [100 + 10.9, 12.3, 3])).toEqual([12.5, -11, 3]);
+  });
+
+  it("is written as it was measured", () => {
+    expect(measuredText(-1023, "HU")).toBe("-1023 HU");
+    expect(measuredText(0.1)).toBe("0.1");
   });
 
   it("is none outside the tile", () => {

@@ -68,20 +68,43 @@ export function valueAt(
   window: Window,
   point_um: Vec3,
 ): number | null {
-  const { min, max } = volume.bounds_um;
-  const toTile = new Matrix4().fromArray(volume.matrix).invert();
-  const p = new Vector3(...point_um).applyMatrix4(toTile).toArray();
+  const shares = sharesIn(volume, point_um);
+  if (shares === null) return null;
   const { low, high } = textureCorners(volume);
   const [from, to] = [low.toArray(), high.toArray()];
-  const at: number[] = [];
-  for (let axis = 0; axis < 3; axis++) {
-    const edge = max[axis] - min[axis];
-    const share = edge > 0 ? (p[axis] - min[axis]) / edge : p[axis] === min[axis] ? 0 : -1;
-    if (!(share >= -RIM && share <= 1 + RIM)) return null;
-    at.push((from[axis] + (to[axis] - from[axis]) * share) * level.size[axis] - 0.5);
-  }
+  const at = shares.map(
+    (share, axis) => (from[axis] + (to[axis] - from[axis]) * share) * level.size[axis] - 0.5,
+  );
   const [start, end] = window;
   return start + ((end - start) * trilinear(level, at[0], at[1], at[2])) / 255;
+}
+
+/** The centre of the voxel in which a point (um, world) lies, in the volume's own um; null outside. */
+export function voxelAt(volume: TileVolume, point_um: Vec3): Vec3 | null {
+  const { min, max } = volume.bounds_um;
+  const centre = sharesIn(volume, point_um)?.map((share, axis) => {
+    const cells = volume.size[axis] - 2 * volume.apron - 1;
+    const index = Math.min(Math.max(Math.round(share * cells), 0), cells);
+    return cells > 0 ? min[axis] + ((max[axis] - min[axis]) * index) / cells : min[axis];
+  });
+  return centre === undefined ? null : [centre[0], centre[1], centre[2]];
+}
+
+/** Where a point (um, world) lies along the edges of a volume's box, 0 to 1; null outside. */
+function sharesIn({ bounds_um, matrix }: TileVolume, point_um: Vec3): number[] | null {
+  const { min, max } = bounds_um;
+  const toTile = new Matrix4().fromArray(matrix).invert();
+  const p = new Vector3(...point_um).applyMatrix4(toTile).toArray();
+  const shares = p.map((place, axis) => {
+    const edge = max[axis] - min[axis];
+    return edge > 0 ? (place - min[axis]) / edge : place === min[axis] ? 0 : -1;
+  });
+  return shares.every((share) => share >= -RIM && share <= 1 + RIM) ? shares : null;
+}
+
+/** A value as it was measured, and its unit. */
+export function measuredText(value: number, unit = ""): string {
+  return `${value} ${unit}`.trim();
 }
 
 /** The unit of the source's values; "": it states none. DICOM's CT values are Hounsfield units. */

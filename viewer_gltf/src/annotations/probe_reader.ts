@@ -2,6 +2,8 @@
 
 import { Box3, type Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
+import type { TileVolume } from "../bundle/generated/volumes";
+import type { ValuesHost } from "../bundle/values_host";
 import type { Box } from "../math/box";
 import type { Clip } from "../math/clip";
 import { pickTile, shownTiles } from "../math/pick";
@@ -10,7 +12,7 @@ import type { Ray, Vec3 } from "../math/vec3";
 import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
 import type { ViewerState } from "../state/viewer_state";
 import { VolumeSource } from "../volumes/volume_source";
-import { unitOf, valueAt, valueText } from "./measure";
+import { measuredText, unitOf, valueAt, valueText, voxelAt } from "./measure";
 import {
   type Cone,
   nearestIn,
@@ -37,6 +39,8 @@ export type ReadingOptions = Readonly<{
   source: (tile: string, channel: string) => LevelSource | null;
   /** The same, once it is known. */
   sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
+  /** Voxels as they were measured; null: the host has none. */
+  values: ValuesHost | null;
   /** The planes that cut through the specimen; null or absent: none show. */
   slices?: () => Readonly<{ frames: readonly SliceFrame[] | null; box: Box }> | null;
   onError: (error: unknown) => void;
@@ -88,14 +92,23 @@ export class Reading {
         const source = await this.options.sourceOf(tile, channel.id);
         const place = source && nearestIn(source.volume, point);
         if (source === null || place === null) return [];
+        const unit = unitOf(this.options.manifest);
+        const measured = await this.measuredAt(source.volume, channel.id, place);
+        if (measured !== null) return [`${channel.name} ${measuredText(measured, unit)}`];
         const level = await this.orReport(this.cache.best(source));
         const value = level && valueAt(source.volume, level, channel.window, place);
-        return value === null
-          ? []
-          : [`${channel.name} ${valueText(value, channel.window, unitOf(this.options.manifest))}`];
+        return value === null ? [] : [`${channel.name} ${valueText(value, channel.window, unit)}`];
       }),
     );
     return lines.flat();
+  }
+
+  /** The voxel's value where the host has the stage; null: it has not, or is out of reach. */
+  private async measuredAt(volume: TileVolume, channel: string, point: Vec3) {
+    const { values } = this.options;
+    const voxel = values === null || volume.measured === undefined ? null : voxelAt(volume, point);
+    if (values === null || voxel === null) return null;
+    return values.ask(volume.tile, channel, voxel).catch(() => null);
   }
 
   /** What these values depend on: they may differ only if this does. */

@@ -2,6 +2,7 @@
 import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import { Marks, type MarksView } from "../annotations/annotations";
 import type { Bundle } from "../bundle/load";
+import { ValuesHost } from "../bundle/values_host";
 import { memoryBudget } from "../gpu/memory_budget";
 import type { Box } from "../math/box";
 import { TracedVolume } from "../pathtrace/traced_volume";
@@ -84,7 +85,9 @@ export class Contents {
       onChange,
       onError,
     );
+    const values = bundle.values === undefined ? null : new ValuesHost(bundle.values);
     const reading = {
+      values,
       manifest: bundle.manifest,
       base: bundle.base,
       surfaces: () => this.surfaces.meshes,
@@ -99,7 +102,16 @@ export class Contents {
     const { manifest, base } = bundle;
     const { sourceOf } = reading;
     const { view, dispatch } = options;
-    this.slices = new SlicesPart({ manifest, base, sourceOf, view, dispatch, onChange, onError });
+    this.slices = new SlicesPart({
+      manifest,
+      base,
+      values,
+      sourceOf,
+      view,
+      dispatch,
+      onChange,
+      onError,
+    });
     this.marks = new Marks({ ...reading, slices: () => this.slices.standing }, options.state);
   }
 

@@ -8,12 +8,15 @@ import type { TileVolume } from "./generated/volumes";
 import { readLevel, readTexture } from "./ktx2";
 import { checkManifest, checkTransfer2d, checkVolumes } from "./schema_check";
 import { COLUMNS, ROWS } from "./transfer_2d";
+import { valuesAddress } from "./values_host";
 
 export type Bundle = Readonly<{
   base: string;
   manifest: Manifest;
   /** Address of the websocket that sends bricks by view; absent: volumes come as files. */
   bricks?: string;
+  /** Address of the values as measured; absent: the host has none. */
+  values?: string;
 }>;
 
 /** Load and check the bundle in the folder `base`. Throws BundleError. */
@@ -23,7 +26,13 @@ export async function loadBundle(base: string): Promise<Bundle> {
   const text = new TextDecoder().decode(await readBody(response, path));
   const manifest = checkManifest(parseJson(text, path));
   const bricks = bricksAddress(response.headers, base);
-  return bricks === null ? { base, manifest } : { base, manifest, bricks };
+  const values = valuesAddress(response.headers, base);
+  return {
+    base,
+    manifest,
+    ...(bricks === null ? {} : { bricks }),
+    ...(values === null ? {} : { values }),
+  };
 }
 
 /** The volumes of one channel, by tile. Throws BundleError. */

@@ -3,9 +3,10 @@
  * first, resampled and coloured. Page and scene show the same canvases.
  */
 
-import { unitOf, valueAt, valueText } from "../annotations/measure";
+import { measuredText, unitOf, valueAt, valueText, voxelAt } from "../annotations/measure";
 import { TexelCache } from "../annotations/texel_cache";
 import type { Manifest } from "../bundle/generated/bundle";
+import type { ValuesHost } from "../bundle/values_host";
 import type { Box } from "../math/box";
 import { shownBox, shownTiles } from "../math/pick";
 import { outlineOf, pointAt, type SliceFrame, sliceFrames } from "../math/slice_frame";
@@ -27,6 +28,8 @@ export type SlicesOptions = Readonly<{
   manifest: Manifest;
   /** Address of the bundle's manifest. */
   base: string;
+  /** Voxels as they were measured; null: the host has none. */
+  values: ValuesHost | null;
   sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
   /** The pictures differ now. */
   onChange: () => void;
@@ -83,18 +86,35 @@ export class SliceImages {
 
   /** Names and values of the shown channels at a point, in the source's units. */
   valuesAt(point: Vec3): readonly string[] {
-    const { manifest } = this.options;
+    const { manifest, values } = this.options;
+    const unit = unitOf(manifest);
     return this.layers.flatMap(({ channel, blocks }) => {
       const window = manifest.channels.find(({ id }) => id === channel.id)?.window;
       if (window === undefined) return [];
       for (const { volume, level } of blocks) {
         const value = valueAt(volume, level, window, point);
         if (value === null) continue;
-        const text = valueText(value, window, unitOf(manifest));
+        const voxel = voxelAt(volume, point);
+        const measured = voxel && values?.known(volume.tile, channel.id, voxel);
+        const text =
+          measured == null ? valueText(value, window, unit) : measuredText(measured, unit);
         return [`${channel.name} ${text}`];
       }
       return [];
     });
+  }
+
+  /** Resolves when `valuesAt` has what was measured at a point; null: the host has no such values. */
+  measureAt(point: Vec3): Promise<unknown> | null {
+    const { values } = this.options;
+    if (values === null) return null;
+    const asked = this.layers.flatMap(({ channel, blocks }) =>
+      blocks.flatMap(({ volume }) => {
+        const voxel = volume.measured === undefined ? null : voxelAt(volume, point);
+        return voxel === null ? [] : [values.ask(volume.tile, channel.id, voxel)];
+      }),
+    );
+    return Promise.allSettled(asked); // without an answer the value of 8 bits stays
   }
 
   retryFailed(): void {

@@ -33,6 +33,8 @@ class Picture {
   private frame: SliceFrame | null = null;
   /** Where the pointer is. */
   private pointed: Vec3 | null = null;
+  /** For what was measured. */
+  private isAsking = false;
 
   constructor(
     index: number,
@@ -75,8 +77,26 @@ class Picture {
     this.showValues();
   }
 
+  /** Those of 8 bits at once, then those that were measured: of the newest place alone. */
   private showValues(): void {
-    const at = this.pointed ?? this.images.point;
+    this.writeValues();
+    const at = this.place;
+    const answer = this.isAsking ? null : this.images.measureAt(at);
+    if (answer === null) return;
+    this.isAsking = true;
+    void answer.then(() => {
+      this.isAsking = false;
+      if (at.join() === this.place.join()) this.writeValues();
+      else this.showValues();
+    });
+  }
+
+  private get place(): Vec3 {
+    return this.pointed ?? this.images.point;
+  }
+
+  private writeValues(): void {
+    const at = this.place;
     const text = this.images.valuesAt(at).join(" · ");
     setText(this.values, text);
     const [left, right, top, bottom] = this.frame?.ends ?? [];

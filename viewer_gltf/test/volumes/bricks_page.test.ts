@@ -3,7 +3,6 @@
  * visit that asks the network for none; and files where bricks don't do. Skipped where the
  * repository has no .venv (`make setup`).
  */
-import { type ChildProcess, spawn } from "node:child_process";
 import { existsSync } from "node:fs";
 import { cp, mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -17,35 +16,16 @@ import type { Browser } from "../support/browser/chromium";
 import { Host } from "../support/browser/host";
 import { ViewerPage } from "../support/browser/page";
 import { difference, type Picture, type Pixel, takePicture } from "../support/browser/picture";
+import { STEREOCELL, serve } from "../support/browser/served";
 import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
 import { writeFixture } from "../support/fixture/bundle";
 
-const STEREOCELL =
-  process.env.STEREOCELL_COMMAND ??
-  new URL("../../../.venv/bin/stereocell", import.meta.url).pathname;
 const VIEWPORT = { width: 240, height: 160 }; // small: software draws it
 const QUERY = "?mode=all&quality=high";
 /** Bricks shade by the middles of their ranges, files by their levels. */
 const UNSHADED = "#v=1&depth=0";
-
-/** `stereocell serve OUT` on a free port, and its address. */
-async function serve(out: string): Promise<Readonly<{ address: string; stop: () => void }>> {
-  const child: ChildProcess = spawn(STEREOCELL, ["serve", out, "--port", "0"]);
-  const address = await new Promise<string>((resolve, reject) => {
-    let said = "";
-    const hear = (data: Buffer) => {
-      said += data.toString();
-      const [found] = /http:\/\/localhost:\d+\//.exec(said) ?? [];
-      if (found !== undefined) resolve(found);
-    };
-    child.stdout?.on("data", hear);
-    child.stderr?.on("data", hear);
-    child.on("exit", (code) => reject(new Error(`serve ended with ${code}: ${said}`)));
-  });
-  return { address, stop: () => child.kill("SIGKILL") };
-}
 
 /** What a page got by the websocket, and which volumes as files. */
 function count(page: Page) {

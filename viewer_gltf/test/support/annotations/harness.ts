@@ -143,6 +143,7 @@ class Bench {
     const options = {
       manifest: { ...MANIFEST, specimen: { ...MANIFEST.specimen, sides } },
       base: location.href,
+      values: null,
       surfaces: () => surfaces,
       volumes: () => [],
       source: (tile: string) => (this.isKnown && tile === "r0_c1" ? VOLUME : null),

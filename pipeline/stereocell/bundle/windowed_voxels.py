@@ -1,0 +1,48 @@
+"""The voxels of a composed volume in 8 bits, by the window of the composed stage.
+
+A window that was edited is applied to the voxels as they were measured, where the stage has them:
+the bundle is, to the bit, that of a build with this window. From a stage without them it is made of
+the 8 bits of the window that was built, and steps of these stay.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.formats.exr import read_atlas
+from stereocell.formats.vdb import MEASURED_NAME
+from stereocell.formats.vdb_read import VdbValues
+from stereocell.model.errors import StageError
+from stereocell.transfer.joint_histogram import to_eight_bits
+from stereocell.usd.read_appearances import ComposedAppearance
+from stereocell.usd.read_stage import ComposedVolume
+from stereocell.usd.written_files import AsWritten
+
+
+def read_windowed(
+    volume: ComposedVolume, appearance: ComposedAppearance, as_written: AsWritten | None = None
+) -> NDArray[np.uint8]:
+    """Return a volume with its apron, uint8 (z, y, x). Raises StageError.
+
+    as_written  the lists to compare the file with; None: no comparison
+    """
+    is_edited = appearance.window != appearance.volume_window
+    measured = volume.measured if is_edited else None
+    if as_written is not None:
+        as_written.require(measured or volume.atlas)
+    if measured is not None:
+        return to_eight_bits(read_measured(volume), appearance.window)
+    voxels = read_atlas(volume.atlas)
+    if voxels.shape != volume.size[::-1]:
+        found = tuple(voxels.shape[::-1])
+        raise StageError(f"{volume.atlas}: {found} voxels, the stage says {volume.size}")
+    return appearance.window_voxels(voxels)
+
+
+def read_measured(volume: ComposedVolume) -> NDArray[np.float32]:
+    """Return the voxels as measured, with the apron, (z, y, x). Raises StageError."""
+    assert volume.measured is not None
+    values = VdbValues(volume.measured, MEASURED_NAME)
+    low, high, size = (np.array(corner) for corner in (volume.low, volume.high, volume.size))
+    spacing = (high - low) / (size - 2 * volume.apron - 1)
+    x, y, z = (low - volume.apron * spacing).tolist()
+    return values.box((x, y, z), volume.size)

@@ -1,0 +1,97 @@
+"""Voxels as measured, from a source to a bundle: what an artist's window finds in the stage."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd
+
+from stereocell.bundle.write import write_bundle
+from stereocell.cli.__main__ import main
+from stereocell.engine.run import Engine
+from support.bundles import files
+from support.phantoms import f_phantom, write_ome_tiff
+
+SPACING_UM = (0.5, 0.25, 0.25)
+WINDOW = (-310, -290)  # within a step and a half of those that were built
+
+
+def counts() -> NDArray[np.int16]:
+    """Return an F of 600 in noise round -300, as a CT has values below 0."""
+    noise = np.random.default_rng(4).normal(-300, 8, f_phantom().shape)
+    return np.where(f_phantom() > 500, 600, np.rint(noise)).astype(np.int16)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("source") / "f.ome.tif"
+    return write_ome_tiff(path, counts(), spacing=SPACING_UM, names=["F"])
+
+
+def build(source: Path, out: Path, *flags: str) -> Path:
+    command = ["build", str(source), "--out", str(out), "--grid", "2x1", "--workers", "0"]
+    assert main([*command, "--iso-value", "F=150", "--preset", "none", *flags]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def built(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(source, tmp_path_factory.mktemp("built") / "out")
+
+
+def bundle_over(out: Path, folder: Path) -> Path:
+    """Return the bundle of a layer over the stage that sets the window."""
+    folder.mkdir(exist_ok=True)
+    layer = Sdf.Layer.CreateNew(str(folder / "edit.usda"))
+    layer.subLayerPaths = [str(out / "stage/stage.usda")]
+    stage = Usd.Stage.Open(layer)
+    stage.GetAttributeAtPath("/Specimen/Channels/F.stereocell:window").Set(Gf.Vec2f(*WINDOW))
+    layer.Save()
+    write_bundle(folder / "edit.usda", folder / "bundle", None, run=Engine(0).run)
+    return folder / "bundle"
+
+
+def volumes(bundle: Path) -> dict[Path, Any]:
+    return {path: data for path, data in files(bundle).items() if path.parts[0] == "volumes"}
+
+
+def test_an_edited_window_gives_the_volumes_of_a_build_with_it(
+    built: Path, source: Path, tmp_path: Path
+) -> None:
+    edited = bundle_over(built, tmp_path)
+    low, high = WINDOW
+    anew = build(source, tmp_path / "anew", "--window", f"F={low}:{high}") / "bundle"
+    assert len(volumes(edited)) == 4  # of two tiles, textures and bricks
+    assert volumes(edited) == volumes(anew)
+    assert volumes(edited) != volumes(built / "bundle")
+
+
+def test_8_bits_leave_the_measured_voxels_out_and_the_log_says_their_size(
+    built: Path, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = build(source, tmp_path / "small", "--bits", "8")
+    assert "voxels as measured" not in capsys.readouterr().err
+    assert not list(small.rglob("measured.npy"))
+    kept, alone = (
+        {path: data for path, data in files(out / "bundle").items() if path.suffix != ".json"}
+        for out in (built, small)
+    )
+    assert kept == alone  # and volumes.json names no file of the stage
+    edited = bundle_over(small, tmp_path)
+    assert volumes(edited) != volumes(bundle_over(built, tmp_path / "of_16"))
+    build(source, tmp_path / "whole")
+    told = capsys.readouterr().err
+    records = [json.loads(path.read_text()) for path in built.glob("units/*/stage.json")]
+    assert len(records) == 2
+    measured = sum(record["measured_bytes"] for record in records)
+    large, bare = (
+        sum(file.stat().st_size for file in out.glob("stage/tiles/*/F.vdb"))
+        for out in (built, small)
+    )
+    # but for what stands before each grid: its name, its type and offsets
+    assert 0 < large - bare - measured < 200
+    assert f"stage: {measured / 1e6:.1f} of " in told
+    assert "--bits 8 leaves them out" in told

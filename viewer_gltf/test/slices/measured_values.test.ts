@@ -1,0 +1,110 @@
+/**
+ * Values as they were measured, from `stereocell serve OUT`: exact under the pointer, where the 8 bits
+ * of a bundle alone round them. Skipped where the repository has no .venv (`make setup`).
+ */
+import { existsSync } from "node:fs";
+import { cp, mkdtemp, rm, symlink } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import type { Browser } from "../support/browser/chromium";
+import { Host } from "../support/browser/host";
+import { ViewerPage } from "../support/browser/page";
+import { STEREOCELL, serve } from "../support/browser/served";
+import { openBrowser } from "../support/browser/shared_browser";
+import { describeInChromium } from "../support/browser/skip";
+import { DEMO_BUNDLE, DIST } from "../support/browser/stand";
+
+const SHOTS = process.env.STEREOCELL_SHOTS;
+const QUERY = "?mode=off#v=1&slices=on&slice-x=0.31&slice-y=0.4&slice-z=0.6";
+const stage = DEMO_BUNDLE === undefined ? "" : join(dirname(DEMO_BUNDLE), "stage");
+
+describe.skipIf(!existsSync(STEREOCELL) || !existsSync(stage))("values as measured", () => {
+  describeInChromium("of a served build", () => {
+    let out: string;
+    let server: Awaited<ReturnType<typeof serve>>;
+    let host: Host;
+    let browser: Browser;
+
+    beforeAll(async () => {
+      out = await mkdtemp(join(tmpdir(), "stereocell-measured-"));
+      await cp(DEMO_BUNDLE as string, join(out, "bundle"), { recursive: true });
+      await cp(DIST, join(out, "bundle"), { recursive: true });
+      await symlink(stage, join(out, "stage"));
+      server = await serve(out);
+      host = await Host.start({ "/": join(out, "bundle") });
+      browser = await openBrowser({
+        viewport: { width: 720, height: 420 },
+        serviceWorkers: "block",
+      });
+    });
+    afterAll(async () => {
+      await browser?.close();
+      await host?.stop();
+      server?.stop();
+      await rm(out, { recursive: true, force: true });
+    });
+
+    async function open(address: string) {
+      const page = await browser.context.newPage();
+      const asked: string[] = [];
+      page.on("request", (request) => {
+        if (request.url().includes("/values/")) asked.push(request.url());
+      });
+      const viewer = new ViewerPage(page);
+      await viewer.open(address);
+      await viewer.settled();
+      const texts = () => page.locator(".slices .values").allTextContents();
+      return { page, asked, texts };
+    }
+
+    /** What the texts name, channel by channel. */
+    const numbers = (text: string) =>
+      text.split(" · ").map((part) => Number(part.split(" ").at(-1)));
+
+    it("are the host's under the crosshair and under the pointer, and nearly those of 8 bits", async () => {
+      const files = await open(`${host.address}/${QUERY}`);
+      const coarse = (await files.texts())[0];
+      expect(files.asked).toEqual([]);
+      await files.page.close();
+
+      const { page, asked, texts } = await open(`${server.address}${QUERY}`);
+      const told = async (address: string) => (await (await fetch(address)).json()).value;
+      await expect.poll(() => asked.length).toBe(numbers(coarse).length);
+      const exact = await Promise.all(asked.map(told));
+      expect(exact.every(Number.isInteger)).toBe(true); // counts of a camera
+      await expect
+        .poll(texts)
+        .toEqual([0, 1, 2].map(() => expect.stringContaining(` ${exact[0]}`)));
+      expect(numbers((await texts())[0])).toEqual(exact);
+      exact.forEach((value, i) => {
+        // between voxels the 8 bits are interpolated
+        expect(Math.abs(value - numbers(coarse)[i])).toBeLessThan(0.25 * Math.max(400, value));
+      });
+
+      const before = asked.length;
+      const box = await page.locator('[data-slice="0"]').boundingBox();
+      if (box === null) throw new Error("no picture");
+      await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
+      await expect.poll(() => asked.length).toBeGreaterThan(before);
+      const under = await Promise.all(asked.slice(before).map(told));
+      await expect.poll(async () => numbers((await texts())[0])).toEqual(under);
+      if (SHOTS) await page.screenshot({ path: `${SHOTS}/measured_values.png` });
+      await page.close();
+    });
+
+    it("are those of 8 bits where the host answers no more", async () => {
+      const { page, asked, texts } = await open(`${host.address}/${QUERY}`);
+      const coarse = await texts();
+      await page.close();
+      const broken = await browser.context.newPage();
+      await broken.route("**/values/**", (route) => route.abort());
+      const viewer = new ViewerPage(broken);
+      await viewer.open(`${server.address}${QUERY}`);
+      await viewer.settled();
+      expect(asked).toEqual([]);
+      await expect.poll(() => broken.locator(".slices .values").allTextContents()).toEqual(coarse);
+      await broken.close();
+    });
+  });
+});
