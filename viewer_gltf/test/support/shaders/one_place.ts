@@ -11,7 +11,7 @@ import {
   WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
-import { BothEyes, SOLIDS } from "../../../src/gpu/both_eyes";
+import { BothEyes } from "../../../src/gpu/both_eyes";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { marchedUniforms } from "../../../src/gpu/composite_pass";
 import { BlendedSurface, makeSurfaceFrame } from "../../../src/surfaces/blend_material";
@@ -27,7 +27,7 @@ function shownOfTwo(opacity: number): readonly [number, number] {
   const camera = new PerspectiveCamera(30, 1, 0.01, 20);
   camera.position.set(0.9, 0.4, 1.6);
   camera.lookAt(0, 0, 0);
-  camera.layers.enable(SOLIDS);
+  camera.layers.enableAll();
   const disc = {
     uDisc: { value: new Vector2(3, 2) },
     uApex: { value: new Vector3() },
