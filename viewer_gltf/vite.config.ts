@@ -23,7 +23,48 @@ function stripShaders(): Plugin {
   };
 }
 
-/** Schemas travel without their descriptions, which no check reads. */
+/** Materials of three that the page has none of. */
+const UNUSED = new Set([
+  ...[
+    "background",
+    "backgroundCube",
+    "cube",
+    "equirect",
+    "distance",
+    "shadow",
+    "points",
+    "linedashed",
+  ],
+  ...["meshlambert", "meshmatcap", "meshnormal", "meshphong", "meshtoon"],
+]);
+/** Parts of the others for what none of the page's materials does. */
+const UNUSED_PARTS = [
+  "transmission_fragment",
+  "transmission_pars_fragment",
+  "cube_uv_reflection_fragment",
+];
+
+/** Their shaders don't travel: three lists them all, so that no bundler sees that nobody asks for them. */
+function stripMaterials(): Plugin {
+  return {
+    name: "strip-materials",
+    apply: "build",
+    enforce: "pre",
+    transform(code, id) {
+      if (!id.endsWith("/three/build/three.module.js")) return;
+      const listed = code.matchAll(/^\t(\w+)_(?:vert|frag): (\w+\$\w+),?$/gm);
+      const left = new Set([...listed].flatMap(([, of, name]) => (UNUSED.has(of) ? [name] : [])));
+      if (left.size !== 2 * UNUSED.size) this.error(`found ${left.size} of three's shaders`);
+      for (const part of UNUSED_PARTS) left.add(part);
+      const text = /^(const|var) ([\w$]+) = ".*";$/gm;
+      return code.replace(text, (line, kind, name) =>
+        left.has(name) ? `${kind} ${name} = "";` : line,
+      );
+    },
+  };
+}
+
+/** Schemas travel without their descriptions and titles, which no check reads. */
 function stripSchemas(): Plugin {
   return {
     name: "strip-schemas",
@@ -32,7 +73,7 @@ function stripSchemas(): Plugin {
     transform(code, id) {
       if (!id.endsWith(".schema.json")) return;
       const bare = JSON.parse(code, (key, value) =>
-        key === "description" && typeof value === "string" ? undefined : value,
+        /^(description|title)$/.test(key) && typeof value === "string" ? undefined : value,
       );
       return { code: JSON.stringify(bare), map: null };
     },
@@ -42,7 +83,7 @@ function stripSchemas(): Plugin {
 export default defineConfig({
   // Relative addresses: the page works from any folder of any static host.
   base: "./",
-  plugins: [stripShaders(), stripSchemas(), finishBuild()],
+  plugins: [stripShaders(), stripMaterials(), stripSchemas(), finishBuild()],
   build: {
     target: "es2022",
     outDir: "dist",

@@ -3,7 +3,7 @@
  * that it fills the picture. Of such views one is taken in which it covers much: a long specimen lies
  * across a wide picture, and goes into the depth of a narrow one. Pure.
  */
-import type { Box } from "../math/box";
+import { type Box, centerOf } from "../math/box";
 import type { Vec3 } from "../math/vec3";
 
 /** Share of the picture that the specimen may fill. */
@@ -41,18 +41,33 @@ export function towardsEye(direction: Direction): Vec3 {
   return axesOf(direction)[2];
 }
 
-/** Distance of the eye from a box's middle at which the whole box is in the picture. */
-export function distanceToFrame({ min, max }: Box, direction: Direction, lens: Lens): number {
-  const half = FILL * Math.tan(lens.fov_rad / 2);
+/** A box's corners about its middle, along the eye's axes. */
+function cornersOf({ min, max }: Box, direction: Direction): readonly (readonly number[])[] {
   const axes = axesOf(direction);
   const edges = max.map((v, i) => (v - min[i]) / 2);
-  let needed = 0;
-  for (let corner = 0; corner < 8; corner++) {
+  return Array.from({ length: 8 }, (_, corner) => {
     const at = edges.map((edge, i) => ((corner >> i) & 1 ? edge : -edge));
-    const [x, y, z] = axes.map((axis) => axis.reduce((sum, v, i) => sum + v * at[i], 0));
-    needed = Math.max(needed, z + Math.max(Math.abs(y), Math.abs(x) / lens.aspect) / half);
-  }
-  return needed;
+    return axes.map((axis) => axis.reduce((sum, v, i) => sum + v * at[i], 0));
+  });
+}
+
+/** Distance of the eye from a box's middle at which the whole box is in the picture. */
+export function distanceToFrame(box: Box, direction: Direction, lens: Lens): number {
+  return distanceTo(cornersOf(box, direction), lens);
+}
+
+/** The same of corners, for an eye that looks so far right of their middle, and above it. */
+function distanceTo(
+  corners: ReturnType<typeof cornersOf>,
+  { fov_rad, aspect }: Lens,
+  right = 0,
+  up = 0,
+): number {
+  const half = FILL * Math.tan(fov_rad / 2);
+  const needed = corners.map(
+    ([x, y, z]) => z + Math.max(Math.abs(y - up), Math.abs(x - right) / aspect) / half,
+  );
+  return Math.max(...needed);
 }
 
 /** Rounds in which middle and distance find each other. */
@@ -65,25 +80,17 @@ const ROUNDS = 5;
  * @param up_tan how far above the picture's middle the box's is to be, a metre away
  */
 export function frameBox(
-  { min, max }: Box,
+  box: Box,
   direction: Direction,
   lens: Lens,
   up_tan = 0,
 ): Readonly<{ target: Vec3; distance: number }> {
-  const half = FILL * Math.tan(lens.fov_rad / 2);
   const axes = axesOf(direction);
-  const middle = max.map((v, i) => (v + min[i]) / 2);
-  const edges = max.map((v, i) => (v - min[i]) / 2);
-  const corners = Array.from({ length: 8 }, (_, corner) => {
-    const at = edges.map((edge, i) => ((corner >> i) & 1 ? edge : -edge));
-    return axes.map((axis) => axis.reduce((sum, v, i) => sum + v * at[i], 0));
-  });
+  const middle = centerOf(box);
+  const corners = cornersOf(box, direction);
   let [right, up, distance] = [0, 0, 0];
   for (let round = 0; round < ROUNDS; round++) {
-    const needs = corners.map(([x, y, z]) => {
-      return z + Math.max(Math.abs(y - up), Math.abs(x - right) / lens.aspect) / half;
-    });
-    distance = Math.max(...needs);
+    distance = distanceTo(corners, lens, right, up);
     const across = corners.map(([x, , z]) => (x - right) / (distance - z));
     const along = corners.map(([, y, z]) => (y - up) / (distance - z));
     right += ((Math.max(...across) + Math.min(...across)) / 2) * distance;

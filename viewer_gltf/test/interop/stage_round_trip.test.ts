@@ -49,15 +49,30 @@ function centerOf(tile: string): Vec3 {
 
 const plus = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 
-/** Show one channel alone; the others go first, so that few are drawn on the way. */
 /** Tiles that are volumes beside surfaces have no depth shading, those of a specimen all of volumes do. */
 const UNSHADED = "#v=1&depth=0";
 
+/** Show one channel alone: all of it at once, so that nothing is drawn on the way. */
 async function only(stand: Stand, id: string, as: "surface" | "volume"): Promise<Picture> {
-  for (const channel of stand.manifest.channels) {
-    if (channel.id !== id) await stand.viewer.show(channel.id, false);
-  }
-  await stand.viewer.showAs(id, as);
+  await stand.viewer.page.evaluate(
+    ([wanted, isVolume]) => {
+      const set = (name: string, channel: string, isOn: boolean) => {
+        const box = document.querySelector<HTMLInputElement>(
+          `[data-channel="${channel}"] [data-part="${name}"]`,
+        );
+        if (box === null) throw new Error(`no ${name} of ${channel}`);
+        if (box.checked !== isOn) box.click();
+      };
+      for (const { id } of window.stereocell?.snapshot().state.channels ?? []) {
+        set("shown", id, id === wanted);
+      }
+      set("volume", wanted, isVolume);
+      const all = document.querySelector<HTMLInputElement>('[data-mode="all"]');
+      if (isVolume && all?.checked === false) all.click();
+    },
+    [id, as === "volume"] as const,
+  );
+  await stand.viewer.settled();
   return takePicture(stand.viewer.page);
 }
 

@@ -69,14 +69,14 @@ describeInChromium("without a network", () => {
   });
 
   /** With a volume in every tile. */
-  async function open(query = "?mode=all"): Promise<void> {
-    await viewer.open(`${gate.address}${FOLDER}${query}`);
+  async function open(query = "&mode=all"): Promise<void> {
+    await viewer.open(`${gate.address}${FOLDER}?quality=low${query}`);
     await viewer.settled();
   }
 
   it("the page shows what it showed before: surfaces and volumes", async () => {
     const look = async () => {
-      await open("?mode=off");
+      await open("&mode=off");
       const { triangles } = await viewer.snapshot();
       const surfaces = await takePicture(viewer.page);
       await viewer.drawVolume("Block", true);
@@ -106,7 +106,7 @@ describeInChromium("without a network", () => {
   it("the file for iOS's own viewer is kept where it is small, and only there", async () => {
     const hash = await hashOf(join(root, "specimen.usdz"));
     const isThere = async () => (await keptFiles(viewer.page)).includes(hash);
-    await open("?mode=off");
+    await open("&mode=off");
     await viewer.page.waitForFunction(isReady);
     expect(await isThere()).toBe(false);
     await viewer.page.addInitScript(() => {
@@ -115,7 +115,7 @@ describeInChromium("without a network", () => {
         return token === "ar" || supports.call(this, token);
       };
     });
-    await open("?mode=off");
+    await open("&mode=off");
     await expect.poll(isThere).toBe(true);
   });
 
@@ -226,9 +226,9 @@ describeInChromium("without a network", () => {
       origin: gate.address,
       quotaSize: 1,
     });
-    await open("?mode=off");
+    await open("&mode=off");
     await expect.poll(() => viewer.page.evaluate(offlineState)).toBe("refused");
-    await open("?mode=off"); // now through the worker
+    await open("&mode=off"); // now through the worker
     await viewer.drawVolume("Block", true);
     await viewer.chooseMode("all");
     const { state, volumes } = await viewer.snapshot();
@@ -238,7 +238,7 @@ describeInChromium("without a network", () => {
   });
 
   it("nothing is kept of a bundle on another host", async () => {
-    await viewer.open(`${gate.address}${FOLDER}`);
+    await open("");
     await viewer.page.waitForFunction(isReady);
     const other = await browser.context.newPage();
     const workers = () =>
@@ -249,7 +249,7 @@ describeInChromium("without a network", () => {
   });
 
   it("the page can be installed", async () => {
-    await viewer.open(`${gate.address}${FOLDER}`);
+    await open("");
     const devtools = await browser.context.newCDPSession(viewer.page);
     const { errors, data } = await devtools.send("Page.getAppManifest");
     expect(errors).toEqual([]);

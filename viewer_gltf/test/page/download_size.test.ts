@@ -103,7 +103,11 @@ describe("the viewer's code", () => {
 });
 
 describeInChromium("the first picture", () => {
-  const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: { width: 640, height: 360 } });
+  const stand = prepareStand({
+    bundle: DEMO_BUNDLE,
+    viewport: { width: 640, height: 360 },
+    isBlind: true,
+  });
 
   /** Whether a surface of the overview has Basis Universal textures. */
   async function overviewHasMaps(): Promise<boolean> {

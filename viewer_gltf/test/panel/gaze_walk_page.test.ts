@@ -5,8 +5,7 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 
 describeInChromium("in a Cardboard, by gaze alone", () => {
-  // nobody looks at it, and software draws each frame
-  const stand = prepareStand({ viewport: { width: 96, height: 48 } });
+  const stand = prepareStand({ viewport: { width: 96, height: 48 }, isBlind: true });
 
   it("the panel is opened, each control of each page acts, and stereo is left", async () => {
     const { page } = stand.viewer;

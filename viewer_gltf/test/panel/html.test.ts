@@ -11,7 +11,7 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand, type Stand } from "../support/browser/stand";
 
 const SHOTS = process.env.STEREOCELL_SHOTS;
-const SCREEN = { viewport: { width: 640, height: 480 }, pixelRatio: 0.5 };
+const SCREEN = { viewport: { width: 640, height: 480 }, isBlind: SHOTS === undefined };
 const [FIRST, SECOND] = ["F_x20_body", "Balls"];
 
 /** The panel of a page that is open or will be. */

@@ -6,7 +6,7 @@ import { prepareStand } from "../support/browser/stand";
 const CODE = "https://g.co/cardboard";
 
 describeInChromium("the scanner", () => {
-  const stand = prepareStand({ viewport: { width: 640, height: 480 }, pixelRatio: 0.5 });
+  const stand = prepareStand({ viewport: { width: 640, height: 480 }, isBlind: true });
 
   /** A camera that shows nothing, and a detector that finds the code in it at its third look. */
   async function addCamera(isAllowed: boolean): Promise<void> {

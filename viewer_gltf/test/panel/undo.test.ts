@@ -6,7 +6,10 @@ import { prepareStand } from "../support/browser/stand";
 const SHOTS = process.env.STEREOCELL_SHOTS;
 
 describeInChromium("undo and redo", () => {
-  const stand = prepareStand({ viewport: { width: 640, height: 480 }, pixelRatio: 0.5 });
+  const stand = prepareStand({
+    viewport: { width: 640, height: 480 },
+    isBlind: SHOTS === undefined,
+  });
   const page = () => stand.viewer.page;
   const state = async () => (await stand.viewer.snapshot()).state;
   const axes = () => page().locator(".orientation-mark").getAttribute("aria-label");

@@ -39,11 +39,13 @@ describeInChromium("a channel without a surface", () => {
         await stand.viewer.settled();
         return takePicture(stand.viewer.page);
       };
-      const within = await at(`&mode=all${NEAR}`);
+      const disc = await at(`&mode=disc${NEAR}`);
+      await stand.viewer.chooseMode("all");
+      const within = await takePicture(stand.viewer.page);
       const without = await at("&mode=disc&switch=0.1");
       const shown = (await stand.viewer.snapshot()).volumes.map(({ channel }) => channel);
       expect(new Set(shown)).toEqual(new Set(["Block"]));
-      const { outside, between } = rimOf(await at(`&mode=disc${NEAR}`), within, without);
+      const { outside, between } = rimOf(disc, within, without);
       expect(outside).toBe(0);
       expect(between).toBeGreaterThan(50);
     });
@@ -62,12 +64,26 @@ describeInChromium("surface or volume", () => {
   const modeAt = (mode: Mode, quality: string) =>
     `&mode=${mode}${NEAR}&disc=${DISC_DEG}&quality=${quality}`;
 
+  /** Pictures of several modes, of a page that is opened once: that takes more than all of them. */
+  async function inModes(modes: readonly Mode[], quality: string, hash: string) {
+    await stand.open(`${modeAt(modes[0], quality)}${hash}`);
+    const pictures: Picture[] = [];
+    for (const mode of modes) {
+      await stand.viewer.chooseMode(mode);
+      pictures.push(await takePicture(stand.viewer.page));
+    }
+    return pictures;
+  }
+
   const drawn = new Map<Mode, Picture>();
-  /** Drawn once for all tests that look at it, with soft volumes. */
-  async function as(mode: Mode): Promise<Picture> {
-    const picture = drawn.get(mode) ?? (await pictureOf(`${modeAt(mode, "high")}${SOFT}`));
-    drawn.set(mode, picture);
-    return picture;
+  /** Drawn once for all tests that look at it, with soft volumes; the last one is on screen, if it is drawn now. */
+  async function as(...modes: Mode[]): Promise<Picture[]> {
+    const missing = modes.filter((mode) => !drawn.has(mode));
+    const made = missing.length > 0 ? await inModes(missing, "high", SOFT) : [];
+    missing.forEach((mode, i) => {
+      drawn.set(mode, made[i]);
+    });
+    return modes.flatMap((mode) => drawn.get(mode) ?? []);
   }
 
   /** How many pixels of a ring round the middle differ by more than `by`. */
@@ -89,12 +105,11 @@ describeInChromium("surface or volume", () => {
   }
 
   it("is a disc: volumes within, surfaces without, over the border of two tiles", async () => {
-    const disc = await as("disc");
+    const [all, off, disc] = await as("all", "off", "disc");
     const { volumes, gazed, discRadius_deg } = await stand.viewer.snapshot();
     expect(discRadius_deg).toBeCloseTo(DISC_DEG, 5);
     expect(gazed).not.toBeNull();
     expect(new Set(volumes.map(({ tile }) => tile))).toEqual(new Set(["r0_c0", "r0_c1"]));
-    const [all, off] = [await as("all"), await as("off")];
     const inner_deg = 0.55 * DISC_DEG;
     expect(apart(all, off, 0, inner_deg, 20)).toBeGreaterThan(25); // else this would show nothing
     // the same picture as where everything is a volume, so that no box edge shows
@@ -106,8 +121,7 @@ describeInChromium("surface or volume", () => {
 
   for (const quality of ["high", "low"]) {
     it(`has a rim that is nowhere outside both pictures, quality ${quality}`, async () => {
-      const at = (mode: Mode) => pictureOf(`${modeAt(mode, quality)}#v=1&depth=0`);
-      const [disc, all, off] = [await at("disc"), await at("all"), await at("off")];
+      const [disc, all, off] = await inModes(["disc", "all", "off"], quality, "#v=1&depth=0");
       const { outside, between } = rimOf(disc, all, off);
       expect(outside).toBe(0);
       expect(between).toBeGreaterThan(50); // there is a rim
@@ -187,10 +201,9 @@ describeInChromium("surface or volume", () => {
   });
 
   it("is exactly the gazed tile in the paper's mode", async () => {
-    const tile = await as("tile");
+    const [all, off, tile] = await as("all", "off", "tile");
     const { volumes, gazed } = await stand.viewer.snapshot();
     expect(new Set(volumes.map((each) => each.tile))).toEqual(new Set([gazed]));
-    const [all, off] = [await as("all"), await as("off")];
     const { specimen } = stand.manifest;
     const other = gazed === "r0_c0" ? BALLS[0] : BALLS[1];
     const own = gazed === "r0_c0" ? BALLS[1] : BALLS[0];
@@ -250,8 +263,13 @@ describeInChromium("surface or volume", () => {
   });
 
   it("is shaded by what encloses it and by what stands before it, each time alike", async () => {
-    const at = (depth: number) => pictureOf(`${modeAt("all", "high")}#v=1&depth=${depth}`);
-    const [none, half, whole, again] = [await at(0), await at(0.5), await at(1), await at(1)];
+    const open = (depth: number) => pictureOf(`${modeAt("all", "high")}#v=1&depth=${depth}`);
+    const slide = async (depth: number) => {
+      await stand.viewer.slide("depth-shading", depth);
+      return takePicture(stand.viewer.page);
+    };
+    const [none, half, whole] = [await open(0), await slide(0.5), await slide(1)];
+    const again = await open(1);
     expect(apart(whole, again, 0, 90, 0)).toBe(0);
     const mean = (picture: Picture) => {
       const drawn = picture.where((pixel) => !isBackground(pixel));

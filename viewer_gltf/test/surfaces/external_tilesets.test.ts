@@ -13,7 +13,7 @@ const COARSEST_TRIANGLES = BALLS.length * 4 * 6 * 6;
 describeInChromium("a bundle with external tilesets", () => {
   const stand = prepareStand({
     viewport: { width: 640, height: 360 },
-    pixelRatio: 0.5,
+    isBlind: true,
     fixture: { hasFinerApart: true },
   });
 

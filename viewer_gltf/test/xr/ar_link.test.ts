@@ -7,7 +7,11 @@ import { prepareStand } from "../support/browser/stand";
 const SHOTS = process.env.STEREOCELL_SHOTS;
 
 describeInChromium("the link to the specimen in the user's room", () => {
-  const stand = prepareStand({ viewport: { width: 390, height: 844 }, hasTouch: true });
+  const stand = prepareStand({
+    viewport: { width: 390, height: 844 },
+    hasTouch: true,
+    isBlind: SHOTS === undefined,
+  });
   const link = () => stand.viewer.page.locator('[data-overlay="ar"]');
 
   const pretendIos = () =>

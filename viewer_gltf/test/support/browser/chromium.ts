@@ -43,6 +43,8 @@ export type Surroundings = Readonly<{
   /** Of the device to one of CSS. */
   pixelRatio?: number;
   hasTouch?: boolean;
+  /** Nothing is drawn: where no picture is looked at, software's drawing is most of the time. */
+  isBlind?: boolean;
   serviceWorkers?: "allow" | "block";
 }>;
 
@@ -59,7 +61,13 @@ export function serveChromium(): Promise<BrowserServer> {
 /** Pages of their own in the browser at an address: nothing is kept of others, or for them. */
 export async function enter(
   endpoint: string,
-  { viewport, pixelRatio = 1, hasTouch = false, serviceWorkers = "allow" }: Surroundings,
+  {
+    viewport,
+    pixelRatio = 1,
+    hasTouch = false,
+    isBlind = false,
+    serviceWorkers = "allow",
+  }: Surroundings,
 ): Promise<Browser> {
   const browser = await chromium.connect(endpoint);
   const context = await browser.newContext({
@@ -73,6 +81,18 @@ export async function enter(
     // the card at the beginning of stereo lies over pictures: whoever has seen it gets none
     if (location.protocol.startsWith("http")) localStorage.setItem("stereocell-told", "3");
   });
+  if (isBlind) {
+    await context.addInitScript(() => {
+      const { prototype } = WebGL2RenderingContext;
+      const undrawn = [
+        "drawArrays",
+        "drawElements",
+        "drawArraysInstanced",
+        "drawElementsInstanced",
+      ];
+      for (const name of undrawn) Object.assign(prototype, { [name]: () => undefined });
+    });
+  }
   return { context, close: () => browser.close() };
 }
 

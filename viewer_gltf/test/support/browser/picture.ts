@@ -1,5 +1,6 @@
-/** Pixels of what the page shows, decoded by the page itself. */
+/** Pixels of what the page shows. */
 import type { Page } from "playwright-core";
+import { decodePng } from "./png";
 
 export type Pixel = readonly [number, number, number];
 export type Area = Readonly<{ x: number; y: number; width: number; height: number }>;
@@ -65,21 +66,8 @@ export async function withoutMarks<T>(page: Page, job: () => Promise<T>): Promis
 export async function takePicture(page: Page, area?: Area): Promise<Picture> {
   const clip = area ?? (await page.locator(".stage").boundingBox()) ?? undefined;
   const png = await withoutMarks(page, () => page.screenshot({ clip }));
-  const { width, height, data } = await page.evaluate(async (base64) => {
-    const blob = await (await fetch(`data:image/png;base64,${base64}`)).blob();
-    const bitmap = await createImageBitmap(blob);
-    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-    const context = canvas.getContext("2d");
-    if (context === null) throw new Error("no 2D canvas");
-    context.drawImage(bitmap, 0, 0);
-    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
-    let text = "";
-    for (let i = 0; i < data.length; i += 8192) {
-      text += String.fromCharCode(...data.subarray(i, i + 8192));
-    }
-    return { width: bitmap.width, height: bitmap.height, data: btoa(text) };
-  }, png.toString("base64"));
-  return new Picture(width, height, Buffer.from(data, "base64"));
+  const { width, height, rgba } = decodePng(png);
+  return new Picture(width, height, rgba);
 }
 
 /** The room's background. */

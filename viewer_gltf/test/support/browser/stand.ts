@@ -39,6 +39,8 @@ export type StandOptions = Readonly<{
   /** Of the device to one of CSS; less where no picture is looked at. */
   pixelRatio?: number;
   hasTouch?: boolean;
+  /** Nothing is drawn. */
+  isBlind?: boolean;
   /** The page stays open from test to test of the `describe`, none of which disturbs another. */
   sharesPage?: boolean;
   /** Served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
@@ -47,7 +49,7 @@ export type StandOptions = Readonly<{
 
 /** Set up and cleared away around the tests of one `describe`; to be used inside them. */
 export function prepareStand(options: StandOptions): Stand {
-  const { bundle: given, fixture, viewport, pixelRatio, hasTouch, mounts } = options;
+  const { bundle: given, fixture, viewport, pixelRatio, hasTouch, isBlind, mounts } = options;
   const { sharesPage = false } = options;
   let folder: string | undefined;
   let bundle: string;
@@ -65,7 +67,10 @@ export function prepareStand(options: StandOptions): Stand {
     manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
     host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });
     // its own requests would be counted with the page's
-    browser = await openBrowser({ viewport, pixelRatio, hasTouch, serviceWorkers: "block" });
+    browser = await openBrowser({
+      ...{ viewport, pixelRatio, hasTouch, isBlind },
+      serviceWorkers: "block",
+    });
     await openPage();
   });
 
