@@ -28,6 +28,9 @@ const LONGEST_FRAME_S = 0.1;
 /** The same for fades, after a frame that was drawn and took as long: what fades out is not drawn for ever. */
 const LONGEST_FADE_S = 1;
 
+/** Pixels of the volumes, as a share of the picture's along an edge: with fewer they are blocks. */
+const LEAST_TURNING = 0.5;
+
 export type FrameOptions = Readonly<{
   renderer: WebGLRenderer;
   stage: HTMLElement;
@@ -176,6 +179,8 @@ export class FrameLoop {
     const isAwaited = this.waiting.length > 0;
     if (!isWanted && !gathers && !wasLoading && !this.hasCome && !isAwaited) return;
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
+    // too slow a device to turn the specimen by itself shows it at rest, as well as can be
+    if (settings.resolution < LEAST_TURNING) this.options.shown().navigation.stopTurning();
     this.picture.marchFrame.uSteps.value = settings.steps;
     hybrid.radiusShare = settings.discShare;
     const [eye] = this.picture.eyes.all; // a headset has none before its first pose
