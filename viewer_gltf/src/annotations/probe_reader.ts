@@ -3,9 +3,9 @@
 import { Box3, type Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Box } from "../math/box";
-import type { Clip } from "../math/clip";
+import type { Clip, ClipPlane } from "../math/clip";
 import { pickTile, shownTiles } from "../math/pick";
-import { cornerTowards, meetSlices, type SliceFrame } from "../math/slice_frame";
+import { meetSlices, type SliceFrame } from "../math/slice_frame";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
 import type { ViewerState } from "../state/viewer_state";
@@ -39,6 +39,8 @@ export type ReadingOptions = Readonly<{
   sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
   /** The planes that cut through the specimen; null or absent: none show. */
   slices?: () => Readonly<{ frames: readonly SliceFrame[] | null; box: Box }> | null;
+  /** What is gone before them for an eye. */
+  corner?: (eye: Vec3) => readonly ClipPlane[] | undefined;
   onError: (error: unknown) => void;
 }>;
 
@@ -125,9 +127,7 @@ export class Reading {
 
   /** What is cut away, also by slices: the corner before them, as seen from where the ray begins. */
   private clipFor({ origin }: Ray): Clip {
-    const frames = this.options.slices?.()?.frames ?? null;
-    const { clip } = this.state;
-    return frames === null ? clip : { ...clip, corner: cornerTowards(origin, frames, []) };
+    return { ...this.state.clip, corner: this.options.corner?.(origin) };
   }
 
   private get tiles() {

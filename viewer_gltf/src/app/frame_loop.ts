@@ -1,5 +1,5 @@
 /** Draws frames, only when something has changed, each as well as its budget allows. */
-import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
+import { type Camera, type Matrix4, Vector3, type WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import type { Navigation } from "../interaction/orbit_camera";
 import { rayAhead } from "../interaction/rays";
@@ -79,7 +79,6 @@ export class FrameLoop {
   private waiting: (() => void)[] = [];
   private readonly pixel = new Uint8Array(4);
   private readonly eye = new Vector3();
-  private readonly toSpecimen = new Matrix4();
   private drawn: (() => void)[] = [];
 
   constructor(private readonly options: FrameOptions) {
@@ -330,9 +329,8 @@ export class FrameLoop {
 
   /** um, world. */
   private eyeOnSpecimen(head: Matrix4): Vec3 {
-    const { matrixWorld } = this.options.room.specimen.group;
-    this.toSpecimen.copy(matrixWorld).invert();
-    return this.eye.setFromMatrixPosition(head).applyMatrix4(this.toSpecimen).toArray();
+    const { group } = this.options.room.specimen;
+    return group.worldToLocal(this.eye.setFromMatrixPosition(head)).toArray();
   }
 
   stop(): void {

@@ -4,6 +4,7 @@ import { Marks, type MarksView } from "../annotations/annotations";
 import type { Bundle } from "../bundle/load";
 import { memoryBudget } from "../gpu/memory_budget";
 import type { Box } from "../math/box";
+import type { Vec3 } from "../math/vec3";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
@@ -100,7 +101,9 @@ export class Contents {
     const { sourceOf } = reading;
     const { view, dispatch } = options;
     this.slices = new SlicesPart({ manifest, base, sourceOf, view, dispatch, onChange, onError });
-    this.marks = new Marks({ ...reading, slices: () => this.slices.standing }, options.state);
+    const slices = () => this.slices.standing;
+    const corner = (eye: Vec3) => this.slices.cornerTowards(eye);
+    this.marks = new Marks({ ...reading, slices, corner }, options.state);
   }
 
   get isLoading(): boolean {
