@@ -174,16 +174,20 @@ def test_noise_of_the_air_does_not_veil_a_surface_just_above_it() -> None:
     sigma = 10.0
     air = x * np.exp(-(x**2) / (2 * sigma**2))  # Rayleigh: magnitudes of MR
     tissue = 0.3 * air.sum() * np.exp(-0.5 * ((x - 100) / 15) ** 2) / 37.6
-    iso = 3.6 * sigma / 255
-    functions = make_transfer_functions((1e6 * (air + tissue) / air.sum()).astype(np.int64), iso)
-    assert _veil(functions, air, 100) < 0.05
+    iso = 4.0 * sigma / 255
+    histogram = (1e6 * (air + tissue) / air.sum()).astype(np.int64)
+    functions = make_transfer_functions(histogram, iso, has_magnitudes=True)
+    assert _veil(functions, air, 100) < 0.02
+    assert _veil(make_transfer_functions(histogram, iso), air, 100) > 0.06  # of light: as it is
     assert evaluate(functions["default"])[int(iso * 255) + 1] > 0.1  # the surface itself shows
 
 
 def test_where_noise_ends_far_below_the_surface_what_is_between_shows() -> None:
     x = np.arange(256.0)
     air = np.exp(-0.5 * ((x - 10) / 4) ** 2)
-    start, opacity = make_transfer_functions((1e6 * air).astype(np.int64), 0.5)["default"][1]
+    start, opacity = make_transfer_functions(
+        (1e6 * air).astype(np.int64), 0.5, has_magnitudes=True
+    )["default"][1]
     assert start == pytest.approx((10 / 255 + 0.5) / 2, abs=0.005)
     assert opacity == 0
 
@@ -191,7 +195,9 @@ def test_where_noise_ends_far_below_the_surface_what_is_between_shows() -> None:
 def test_a_peak_that_is_no_background_moves_nothing() -> None:
     x = np.arange(256.0)
     tissue = np.exp(-0.5 * ((x - 150) / 30) ** 2)  # fills the picture: what is below is its flank
-    full = make_transfer_functions((1e6 * tissue).astype(np.int64), 0.3)["default"]
+    full = make_transfer_functions((1e6 * tissue).astype(np.int64), 0.3, has_magnitudes=True)[
+        "default"
+    ]
     assert full[1][0] == pytest.approx(0.9 * 0.3)
-    empty = make_transfer_functions(np.zeros(256, np.int64), 0.3)["default"]
+    empty = make_transfer_functions(np.zeros(256, np.int64), 0.3, has_magnitudes=True)["default"]
     assert len(empty) == len(full)

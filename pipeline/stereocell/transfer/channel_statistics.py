@@ -96,7 +96,7 @@ def make_appearance(
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
 
-    modality  DICOM's code; a CT has functions by tissue too
+    modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
     """
     iso_value, threshold = None, None
     if level is not None:
@@ -127,6 +127,7 @@ def make_appearance(
         np.asarray(statistics.histogram),
         appearance.iso_normalized,
         appearance.threshold_normalized,
+        has_magnitudes=modality == "MR",
     )
     if modality == "CT":
         functions |= tissue_functions(statistics.window)

@@ -22,16 +22,21 @@ def make_transfer_functions(
     histogram: NDArray[np.int64],
     iso_normalized: float | None,
     threshold_normalized: float | None = None,
+    *,
+    has_magnitudes: bool = False,
 ) -> dict[str, OpacityPoints]:
     """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
 
     histogram             int64 (bins,), voxel counts over 0..1 in equal bins
     iso_normalized        the iso-value, 0..1; None: the channel has no clear surface
     threshold_normalized  the adaptive threshold, 0..1; None: there is none
+    has_magnitudes        whether values are magnitudes, as of MR: the air is noise, voxel by voxel
 
     Opacity starts half-way between the median, since most voxels are background, and the level. The
-    level is the iso-value, or the 99th percentile in a channel without a clear surface. Noise shows
-    in front of no surface: opacity starts where it ends, but below the level.
+    level is the iso-value, or the 99th percentile in a channel without a clear surface. Noise of
+    magnitudes would be dust in front of a surface: opacity starts where it ends, but below the
+    level. (Of light the background has structure, and a foot so steep would show the steps of
+    rays: of the brain-cells stack 35 instead of over 40 dB.)
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)
@@ -40,14 +45,11 @@ def make_transfer_functions(
     level = float(np.clip(level, 0.02, 0.96))
     halfway = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
     floor = halfway
-    if iso_normalized is not None:
+    if has_magnitudes and iso_normalized is not None:
         floor = max(floor, min(_end_of_noise(histogram[: int(level * bins)]) / bins, FOOT * level))
     bright = max(level + 0.5 * (1 - level), level + 0.02)
-    # a body stays as dense as it is with the foot that noise has taken
-    rise = min(floor - halfway, 0.4 * (bright - level))
-    dense = [(level + rise, 0.3)] if rise > 0.005 else []
     functions = {
-        "default": _points((floor, 0.0), (level, 0.12), *dense, (bright, 0.45), (1.0, 0.6)),
+        "default": _points((floor, 0.0), (level, 0.12), (bright, 0.45), (1.0, 0.6)),
         "soft": _points((0.6 * floor, 0.0), (level, 0.04), (1.0, 0.2)),
         "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
         "surface": _points(

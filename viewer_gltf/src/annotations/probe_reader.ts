@@ -5,9 +5,9 @@ import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { ValuesHost } from "../bundle/values_host";
 import type { Box } from "../math/box";
-import type { Clip } from "../math/clip";
+import type { Clip, ClipPlane } from "../math/clip";
 import { pickTile, shownTiles } from "../math/pick";
-import { cornerTowards, meetSlices, type SliceFrame } from "../math/slice_frame";
+import { meetSlices, type SliceFrame } from "../math/slice_frame";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
 import type { ViewerState } from "../state/viewer_state";
@@ -43,6 +43,8 @@ export type ReadingOptions = Readonly<{
   values: ValuesHost | null;
   /** The planes that cut through the specimen; null or absent: none show. */
   slices?: () => Readonly<{ frames: readonly SliceFrame[] | null; box: Box }> | null;
+  /** What is gone before them for an eye. */
+  corner?: (eye: Vec3) => readonly ClipPlane[] | undefined;
   onError: (error: unknown) => void;
 }>;
 
@@ -138,9 +140,7 @@ export class Reading {
 
   /** What is cut away, also by slices: the corner before them, as seen from where the ray begins. */
   private clipFor({ origin }: Ray): Clip {
-    const frames = this.options.slices?.()?.frames ?? null;
-    const { clip } = this.state;
-    return frames === null ? clip : { ...clip, corner: cornerTowards(origin, frames, []) };
+    return { ...this.state.clip, corner: this.options.corner?.(origin) };
   }
 
   private get tiles() {

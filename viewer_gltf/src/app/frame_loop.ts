@@ -1,5 +1,5 @@
 /** Draws frames, only when something has changed, each as well as its budget allows. */
-import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
+import { type Camera, type Matrix4, Vector3, type WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import type { Navigation } from "../interaction/orbit_camera";
 import { rayAhead } from "../interaction/rays";
@@ -28,6 +28,9 @@ const POLL_MS = 20;
 const LONGEST_FRAME_S = 0.1;
 /** The same for fades, after a frame that was drawn and took as long: what fades out is not drawn for ever. */
 const LONGEST_FADE_S = 1;
+
+/** Pixels of the volumes, as a share of the picture's along an edge: with fewer they are blocks. */
+const LEAST_TURNING = 0.5;
 
 export type FrameOptions = Readonly<{
   renderer: WebGLRenderer;
@@ -78,7 +81,6 @@ export class FrameLoop {
   private waiting: (() => void)[] = [];
   private readonly pixel = new Uint8Array(4);
   private readonly eye = new Vector3();
-  private readonly toSpecimen = new Matrix4();
   private drawn: (() => void)[] = [];
 
   constructor(private readonly options: FrameOptions) {
@@ -182,6 +184,8 @@ export class FrameLoop {
       return !canGather && !contents.traced.isGathering;
     }
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
+    // too slow a device to turn the specimen by itself shows it at rest, as well as can be
+    if (settings.resolution < LEAST_TURNING) this.options.shown().navigation.stopTurning();
     this.picture.marchFrame.uSteps.value = settings.steps;
     hybrid.radiusShare = settings.discShare;
     const [eye] = this.picture.eyes.all; // a headset has none before its first pose
@@ -332,9 +336,8 @@ export class FrameLoop {
 
   /** um, world. */
   private eyeOnSpecimen(head: Matrix4): Vec3 {
-    const { matrixWorld } = this.options.room.specimen.group;
-    this.toSpecimen.copy(matrixWorld).invert();
-    return this.eye.setFromMatrixPosition(head).applyMatrix4(this.toSpecimen).toArray();
+    const { group } = this.options.room.specimen;
+    return group.worldToLocal(this.eye.setFromMatrixPosition(head)).toArray();
   }
 
   stop(): void {

@@ -5,6 +5,7 @@ import type { Bundle } from "../bundle/load";
 import { ValuesHost } from "../bundle/values_host";
 import { memoryBudget } from "../gpu/memory_budget";
 import type { Box } from "../math/box";
+import type { Vec3 } from "../math/vec3";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
@@ -112,7 +113,9 @@ export class Contents {
       onChange,
       onError,
     });
-    this.marks = new Marks({ ...reading, slices: () => this.slices.standing }, options.state);
+    const slices = () => this.slices.standing;
+    const corner = (eye: Vec3) => this.slices.cornerTowards(eye);
+    this.marks = new Marks({ ...reading, slices, corner }, options.state);
   }
 
   get isLoading(): boolean {

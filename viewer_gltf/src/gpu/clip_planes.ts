@@ -1,12 +1,14 @@
 /** The cuts of clip box and plane for the surfaces' shaders: planes in the room, by reference. */
 import { type Matrix4, Vector3, Vector4 } from "three";
-import type { Clip } from "../math/clip";
+import type { Clip, ClipPlane } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
-import { CORNER_PLANES, type MarchClip, NOWHERE, noCorner } from "./clip_uniforms";
+import { CORNER_PLANES, type MarchClip, noCorner } from "./clip_uniforms";
 
 const MOST = 7; // six faces of the box, and the plane
 /** um; beyond any specimen, within the precision of floats. */
 const FAR = 1e9;
+/** A plane beyond which nothing lies. */
+const NOWHERE: ClipPlane = { normal: [0, 0, 0], offset_um: 1 };
 
 export class Cuts {
   /**
@@ -14,7 +16,7 @@ export class Cuts {
    * the corner.
    */
   readonly uCuts = {
-    value: Array.from({ length: MOST + CORNER_PLANES }, () => new Vector4(...NOWHERE)),
+    value: Array.from({ length: MOST + CORNER_PLANES }, () => new Vector4()),
   };
   readonly uCutCount = { value: 0 };
   /** The same for the march, um. */
@@ -54,14 +56,9 @@ export class Cuts {
     }
     this.uCutCount.value = count;
     this.march.corner.forEach((each, i) => {
-      const side = corner?.[i];
-      if (side === undefined) {
-        each.set(...NOWHERE);
-        this.uCuts.value[MOST + i].set(...NOWHERE);
-      } else {
-        each.set(...side.normal, side.offset_um);
-        put(MOST + i, side.normal, side.offset_um);
-      }
+      const { normal, offset_um } = corner?.[i] ?? NOWHERE;
+      each.set(...normal, offset_um);
+      put(MOST + i, normal, offset_um);
     });
   }
 }

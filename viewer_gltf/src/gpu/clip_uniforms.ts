@@ -3,8 +3,6 @@ import { Matrix4, Vector3, Vector4 } from "three";
 
 /** The planes that bound the corner before the slices. */
 export const CORNER_PLANES = 3;
-/** A plane beyond which nothing lies. */
-export const NOWHERE = [0, 0, 0, 1] as const;
 
 /**
  * Of the specimen, um: what is left of it. `plane`: unit normal and offset. `corner`: as many such planes as
@@ -17,9 +15,9 @@ export type MarchClip = Readonly<{
   corner: readonly Vector4[];
 }>;
 
-/** Nothing is cut by them. */
+/** Planes beyond which nothing lies: three begins with 0, 0, 0, 1. */
 export function noCorner(): Vector4[] {
-  return Array.from({ length: CORNER_PLANES }, () => new Vector4(...NOWHERE));
+  return Array.from({ length: CORNER_PLANES }, () => new Vector4());
 }
 
 export type ClipUniforms = Readonly<{

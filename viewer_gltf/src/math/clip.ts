@@ -49,17 +49,15 @@ export function clipSpan(span: Span, ray: Ray, { box, plane, corner }: Clip): Sp
   return from < to ? [from, to] : null;
 }
 
-/** Where a ray that is in a corner at `from` leaves it; else `from`. */
+/** Where a ray that begins in a corner leaves it, if later than `from`; else `from`. */
 function cornerExit(from: number, ray: Ray, corner: readonly ClipPlane[]): number {
-  let [enters, leaves] = [Number.NEGATIVE_INFINITY, Number.POSITIVE_INFINITY];
-  for (const { normal, offset_um } of corner) {
+  const exits = corner.map(({ normal, offset_um }) => {
     const depth = offset_um - dot(normal, ray.origin);
     const rate = dot(normal, ray.direction);
-    if (rate > 0) enters = Math.max(enters, depth / rate);
-    else if (rate < 0) leaves = Math.min(leaves, depth / rate);
-    else if (depth >= 0) return from;
-  }
-  return enters <= from ? Math.max(from, leaves) : from;
+    if (rate < 0) return depth / rate;
+    return depth < 0 ? Number.POSITIVE_INFINITY : 0;
+  });
+  return Math.max(from, Math.min(...exits));
 }
 
 /** Whether a point is kept. */

@@ -19,7 +19,8 @@ import { leaveUncut } from "../gpu/unclipped_material";
 import { AHEAD, type Box, boxSpan } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { MOST_CORNERS } from "../math/plane_box_section";
-import { cornerTowards, outlineOf, placeIn, type SliceFrame } from "../math/slice_frame";
+import { cornerTowards } from "../math/slice_corner";
+import { outlineOf, placeIn, type SliceFrame } from "../math/slice_frame";
 import type { Vec3 } from "../math/vec3";
 import type { SliceImages } from "./slice_images";
 

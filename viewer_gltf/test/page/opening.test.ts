@@ -1,6 +1,7 @@
 /** The first half minute: the page before its code has come, the view that opens, its turn, its hint. */
 import { expect, it } from "vitest";
-import { isBackground, takePicture } from "../support/browser/picture";
+import { addClock, holdFrames, tick } from "../support/browser/clock";
+import { difference, isBackground, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, prepareStand } from "../support/browser/stand";
 
@@ -73,6 +74,24 @@ describeInChromium("the opening", () => {
     const filled = Math.max(extent(0, picture.width), extent(1, picture.height));
     expect(filled).toBeGreaterThan(0.7);
     expect(filled).toBeLessThan(1);
+  });
+
+  it("stops turning before volumes are blocks, where frames are late", async () => {
+    await page().emulateMedia({ reducedMotion: "no-preference" });
+    await addClock(page());
+    await stand.viewer.open(address("&quality=auto"));
+    await holdFrames(page());
+    const settings = async () => (await stand.viewer.snapshot()).settings;
+    const turned = [await takePicture(page())];
+    await tick(page(), 400, 3);
+    turned.push(await takePicture(page()));
+    expect(difference(turned[0], turned[1])).toBeGreaterThan(0.01);
+    await tick(page(), 400, 40);
+    expect(await settings()).toEqual({ steps: 100, resolution: 1, discShare: 1, errorFactor: 1 });
+    const still = await takePicture(page());
+    await tick(page(), 400, 3);
+    expect(difference(still, await takePicture(page()))).toBeLessThan(0.01);
+    await page().emulateMedia({ reducedMotion: "reduce" });
   });
 
   it("stands still where less motion is asked for, and where the address says from where", async () => {

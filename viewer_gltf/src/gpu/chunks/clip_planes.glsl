@@ -3,19 +3,14 @@
 uniform vec4 uCuts[10];
 uniform int uCutCount;
 
-bool isInCorner(vec3 p) {
+bool isCut(vec3 p) {
+  for (int i = 0; i < uCutCount; i++) {
+    if (dot(uCuts[i].xyz, p) > uCuts[i].w) return true;
+  }
   for (int i = 7; i < 10; i++) {
     if (dot(uCuts[i].xyz, p) <= uCuts[i].w) return false;
   }
   return true;
-}
-
-bool isCut(vec3 p) {
-  if (isInCorner(p)) return true;
-  for (int i = 0; i < uCutCount; i++) {
-    if (dot(uCuts[i].xyz, p) > uCuts[i].w) return true;
-  }
-  return false;
 }
 
 // The normal of the cut by which the ray from the eye to `p` came in; 0 if it met none.

@@ -1,14 +1,12 @@
-// Where a ray that is in the corner before the slices at `from` leaves it; else `from`.
+// Where a ray that begins in the corner before the slices leaves it, if later than `from`; else `from`.
 float cornerExit(float from, vec3 eye, vec3 dir) {
-  vec2 within = vec2(-1e30, 1e30);
+  float exit = 1e30;
   for (int i = 0; i < 3; i++) {
     float slope = dot(uCorner[i].xyz, dir);
     float above = dot(uCorner[i].xyz, eye) - uCorner[i].w;
-    if (abs(slope) < 1e-9) within.y = above > 0.0 ? within.y : -1e30;
-    else if (slope > 0.0) within.x = max(within.x, -above / slope);
-    else within.y = min(within.y, -above / slope);
+    exit = min(exit, slope < 0.0 ? -above / slope : above > 0.0 ? 1e30 : 0.0);
   }
-  return within.x <= from ? max(from, within.y) : from;
+  return max(from, exit);
 }
 
 // The part of a ray's span that the clip box, the clip plane and the corner before the slices leave.

@@ -98,9 +98,6 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/shade>
 #include <chunks/jitter>
 #include <chunks/periphery>
-#ifdef MAXIMUM
-#include <chunks/decode_srgb>
-#endif
 
 const float NOWHERE = 1e30;
 
@@ -115,7 +112,7 @@ const float SUM_LIGHT = 4.0;
 vec4 brightest(vec4 largest) {
   vec4 low = max(uWindowLow, uFloor);
   vec4 share = clamp((largest - low) / max(uWindowHigh - low, 1e-3), 0.0, 1.0);
-  share = vec4(decoded(share.xyz), decoded(share.www).x);
+  share = pow(share, vec4(2.2));  // the screen's
   vec3 color = vec3(0.0);
   // channels as tiles are blended: else a border would show where two tiles hold one each
   for (int c = 0; c < CHANNELS; c++) color = max(color, share[c] * uColor[c]);
