@@ -224,6 +224,7 @@ endif
 	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
 	out="$$PWD/out" && cd $(VIEWER) && STEREOCELL_TEST_BUNDLE="$$out/$(SHOWN)/bundle" \
 	  STEREOCELL_REAL_BUNDLE="$$out/brain-cells/bundle" \
+	  STEREOCELL_HEAD_BUNDLE="$$out/mri/bundle" \
 	  STEREOCELL_F_BUNDLES="$$out/f/of-f.ome.tif/bundle:$$out/f/of-f.ome.zarr/bundle:$$out/f/of-f.nii.gz/bundle:$$out/f/of-dicom/bundle" \
 	  STEREOCELL_EDIT_BUNDLES="$$out/edit/before:$$out/edit/built/bundle" \
 	  npm exec --silent -- vitest run --project browser

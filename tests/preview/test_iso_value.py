@@ -12,6 +12,7 @@ from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
 from stereocell.preview.iso_value import COLORS, Candidate, preview, table
 from support import phantoms
+from support.exhaustive import sweep
 
 SPACING = (1.0, 1.0, 1.0)
 CONSTANT = 100
@@ -60,20 +61,24 @@ def test_the_table_names_the_levels_with_shares_and_what_takes_them(
 
 
 @pytest.mark.parametrize(
-    "given",
-    [
-        (),
-        ("--iso-scope", "tile"),
-        ("--iso-criterion", "edges"),
-        ("--surfaces", "0=outer"),
-        ("--surfaces", "0=300+b"),
-        ("--iso-value", "0=300+b"),
-    ],
+    "flags",
+    sweep(
+        [
+            "",
+            "--iso-scope tile",
+            "--iso-criterion edges",
+            "--surfaces 0=outer",
+            "--surfaces 0=300+b",
+            "--iso-value 0=300+b",
+        ],
+        kept=["", "--iso-scope tile", "--surfaces 0=300+b"],
+    ),
 )
 def test_a_setting_of_the_table_takes_its_level(
-    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], given: tuple[str, ...]
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: str
 ) -> None:
     """Beside the settings that were given, but for the one that it is instead of."""
+    given = flags.split()
     where = ("--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / "ball.png"))
     assert _iso(source, *where, *given) == 0
     rows = capsys.readouterr().out.splitlines()[2:-2]
@@ -83,7 +88,7 @@ def test_a_setting_of_the_table_takes_its_level(
         flag, value = shlex.split(f"--{setting}")
         words = [word.removesuffix("+b") for word in row.split()]
         level = next(float(word) for word in words if word.replace(".", "").isdigit())
-        kept = () if given[:1] in ((flag,), ("--iso-value",)) else given
+        kept = [] if given[:1] in ([flag], ["--iso-value"]) else given
         assert _iso(source, *where, *kept, flag, value) == 0
         taken = next(line for line in capsys.readouterr().out.splitlines() if " * " in line)
         found = taken.split("*")[1].split()[0]

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.tasks import window as window_task
 from stereocell.cli.__main__ import main
-from stereocell.model.channel import SurfaceLevel
+from stereocell.model.channel import OpacityPoints, SurfaceLevel
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
 from stereocell.transfer.opacity import NAMES, evaluate, make_transfer_functions
@@ -160,3 +161,37 @@ def test_without_a_surface_nothing_begins_at_a_level_or_a_threshold() -> None:
     assert unsure.threshold is not None
     assert set(unsure.transfer_functions) - set(none.transfer_functions) == {"threshold"}
     assert none.transfer_functions["sharp"] != unsure.transfer_functions["sharp"]
+
+
+def _veil(functions: dict[str, OpacityPoints], noise: NDArray[np.float64], voxels: int) -> float:
+    """Return the opacity of a path of so many voxels through noise, by 'default'."""
+    absorbed = -np.log1p(-evaluate(functions["default"]))
+    return 1 - float(np.exp(-voxels * (absorbed * noise / noise.sum()).sum()))
+
+
+def test_noise_of_the_air_does_not_veil_a_surface_just_above_it() -> None:
+    x = np.arange(256.0)
+    sigma = 10.0
+    air = x * np.exp(-(x**2) / (2 * sigma**2))  # Rayleigh: magnitudes of MR
+    tissue = 0.3 * air.sum() * np.exp(-0.5 * ((x - 100) / 15) ** 2) / 37.6
+    iso = 3.6 * sigma / 255
+    functions = make_transfer_functions((1e6 * (air + tissue) / air.sum()).astype(np.int64), iso)
+    assert _veil(functions, air, 100) < 0.05
+    assert evaluate(functions["default"])[int(iso * 255) + 1] > 0.1  # the surface itself shows
+
+
+def test_where_noise_ends_far_below_the_surface_what_is_between_shows() -> None:
+    x = np.arange(256.0)
+    air = np.exp(-0.5 * ((x - 10) / 4) ** 2)
+    start, opacity = make_transfer_functions((1e6 * air).astype(np.int64), 0.5)["default"][1]
+    assert start == pytest.approx((10 / 255 + 0.5) / 2, abs=0.005)
+    assert opacity == 0
+
+
+def test_a_peak_that_is_no_background_moves_nothing() -> None:
+    x = np.arange(256.0)
+    tissue = np.exp(-0.5 * ((x - 150) / 30) ** 2)  # fills the picture: what is below is its flank
+    full = make_transfer_functions((1e6 * tissue).astype(np.int64), 0.3)["default"]
+    assert full[1][0] == pytest.approx(0.9 * 0.3)
+    empty = make_transfer_functions(np.zeros(256, np.int64), 0.3)["default"]
+    assert len(empty) == len(full)

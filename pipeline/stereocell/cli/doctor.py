@@ -123,14 +123,6 @@ def _temporary() -> Finding:
     return _finding("temporary folder", True, "can be written", "")
 
 
-def _opengl() -> Finding:
-    from stereocell.report.draw_scenes import can_draw
-
-    refusal = can_draw()
-    cost = "reports have slices and curves, but no pictures of meshes"
-    return _finding("OpenGL", not refusal, refusal or "draws off screen", cost)
-
-
 def _viewer() -> Finding:
     folder = viewer_dist()
     cost = "bundles get no page of their own: `make setup` builds it (Node 20.19), wheels bring it"
@@ -191,7 +183,6 @@ LOOKS: tuple[Callable[[], Finding], ...] = (
     _memory,
     _disk,
     _temporary,
-    _opengl,
     _viewer,
     _browser,
     _node,

@@ -43,7 +43,7 @@ VALENCE = 24  # most neighbours of two ends together
 
 
 @part
-def _price(quadrics: Points, u: int, at: Points, v: int) -> float:
+def price_of(quadrics: Points, u: int, at: Points, v: int) -> float:
     """Return the mean squared distance of v from u's planes, in squared errors."""
     x, y, z = at[v]
     q = quadrics[u]
@@ -53,7 +53,7 @@ def _price(quadrics: Points, u: int, at: Points, v: int) -> float:
 
 
 @part
-def _sum_planes(at: Points, corner: Ints, errors: Points, quadrics: Points) -> None:
+def sum_planes(at: Points, corner: Ints, errors: Points, quadrics: Points) -> None:
     for t in range(len(corner) // 3):
         a, b, c = corner[3 * t], corner[3 * t + 1], corner[3 * t + 2]
         x, y, z = doubled_area(at, a, b, c)
@@ -84,14 +84,14 @@ def _cheapest(
     """Return the least price of u's collapses; u is no vertex of a border."""
     best, h = np.inf, leaving[u]
     while True:
-        best = min(best, _price(quadrics, u, at, corner[following(h)]))
+        best = min(best, price_of(quadrics, u, at, corner[following(h)]))
         h = twins[preceding(h)]
         if h == leaving[u]:
             return best
 
 
 @part
-def _class_of(price: float) -> int:
+def class_of(price: float) -> int:
     return int(np.sqrt(price) * CLASSES) if price <= 1 else NEVER
 
 
@@ -223,11 +223,11 @@ def collapse(
     leaving, valence = count_fans(triangles, twins, n)
     stays = find_fixed(locked, corner, twins, valence)
     quadrics = np.zeros((n, 11))
-    _sum_planes(at, corner, errors, quadrics)
+    sum_planes(at, corner, errors, quadrics)
     cost, gone = np.full(n, NEVER, np.int16), np.zeros(m, np.bool_)
     for u in range(n):
         if not stays[u]:
-            cost[u] = _class_of(_cheapest(quadrics, u, at, leaving, twins, corner))
+            cost[u] = class_of(_cheapest(quadrics, u, at, leaving, twins, corner))
     away, stamp, tick = np.zeros(n), np.zeros(n, np.int32), 0
     touched, turn = np.zeros(n, np.int32), 0
     ring, out = np.empty(MOST, np.int32), np.empty(MOST, np.int32)
@@ -250,7 +250,7 @@ def collapse(
                 while size < MOST:
                     v = corner[following(h)]
                     ring[size], out[size] = v, h
-                    price[size] = _price(quadrics, u, at, v)
+                    price[size] = price_of(quadrics, u, at, v)
                     last = corner[preceding(h)]
                     worst = max(worst, smallest_angle_cosine(at, u, v, last))
                     x, y, z = doubled_area(at, u, v, last)
@@ -276,7 +276,7 @@ def collapse(
                 later = NEVER
                 for j in range(size):
                     o = order[j]
-                    c = _class_of(price[o])
+                    c = class_of(price[o])
                     if c > k:
                         later = c
                         break
@@ -298,13 +298,13 @@ def collapse(
                     later = NEVER
                     leaving[u] = -1
                     if not stays[v]:
-                        cost[v] = _class_of(_cheapest(quadrics, v, at, leaving, twins, corner))
+                        cost[v] = class_of(_cheapest(quadrics, v, at, leaving, twins, corner))
                     for p in range(size):
                         w = ring[p]
                         touched[w] = turn
                         if w == v or stays[w]:
                             continue
-                        c = max(_class_of(_price(quadrics, w, at, v)), k)
+                        c = max(class_of(price_of(quadrics, w, at, v)), k)
                         cost[w] = min(cost[w], c)
                         if cost[w] == NEVER:  # what was refused may be allowed now
                             cost[w] = min(k + 1, CLASSES)

@@ -11,7 +11,10 @@ import numpy as np
 from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse
+from stereocell.kernels.collapse_walls import collapse_walls
+from stereocell.kernels.critical import find_critical
 from stereocell.kernels.crossings import find_doubtful, find_maybe_flat
+from stereocell.kernels.depth_buffer import find_visible
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
 from stereocell.kernels.grid import bound_boxes, count_entries, list_by_cell
@@ -79,12 +82,17 @@ def compile_others() -> None:
     count_entries(low, high, origin, edge)
     first, listed = list_by_cell(low, high, origin, edge, shape)
     find_maybe_flat(at, triangles)
+    collapse_walls(at, triangles, flags, np.full(4, 0.1), 3.0, 0.9)
+    find_critical(np.zeros((3, 3, 3), np.int32), 1)
     find_doubtful(at, triangles, flags, low, high, first, listed, origin, edge, shape)
     _, nearest, parts = find_nearest(at, at, triangles, first, listed, origin, edge, shape)
     find_sides(at, nearest, parts, at, triangles, twins)
 
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
     find_downhill(voxels, points.astype(np.float64), np.ones(3))
+    pixel = np.zeros((1, 2), np.int64)
+    near, which = np.full((1, 1), -np.inf), np.zeros((1, 1), np.int64)
+    find_visible(np.ones((1, 10)), np.ones((1, 3)), pixel, pixel, near, which, np.ones((1, 1, 3)))
     one = np.ones(1, np.float32)
     cast_rays(voxels > 0, points, points, points, points, one, one)
 

@@ -1,28 +1,37 @@
-"""Pictures of meshes, drawn in a separate process: without OpenGL, VTK ends its process."""
+"""Pictures of meshes, drawn without OpenGL: alike on every machine.
 
-import json
-import signal
-import subprocess
-import sys
-import tempfile
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+Parallel projection from the front, above and the right. One lamp stands over the left shoulder, and
+a weaker one on the right; light comes from the sky and the ground as well.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
+from stereocell.model.color import to_srgb8
 from stereocell.preview.draw_slices import encode
+from stereocell.textures.rasterize import find_pixels
 
-# run by its path, with -P: it needs no other module of this package
-COMMAND = (sys.executable, "-P", str(Path(__file__).with_name("draw_meshes_process.py")))
-_SECONDS = 120.0, 30.0  # time limit: for the process, and in addition for each picture
-_REMEDY = "pictures of meshes need off-screen OpenGL, as Debian's libegl1 and libgl1-mesa-dri give"
+Vector = NDArray[np.float64]
+
+# Direction of the eye, from the front, above and the right: x right, y up, z towards the viewer.
+_EYE = np.array([0.42, 0.5, 1.0])
+_UP = np.array([0.0, 1.0, 0.0])
+# linear light
+_GROUND_LIGHT, _SKY_LIGHT = 0.06, 0.18
+_LAMPS = (((-0.5, 0.7, 1.0), 0.85), ((0.9, 0.1, 0.5), 0.2))  # right, up, towards the eye; light
+_GLOSS, _GLOSS_POWER = 0.12, 25.0
+_BACKGROUND = (0.0033, 0.0040, 0.0052)
+_LINES = (0.148, 0.171, 0.214)
+_FINE = 2  # factor by which a picture is drawn larger, then averaged down
+_MARGIN = 1.04  # factor by which the view exceeds the frame
 
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """A mesh as `save_unit` wrote it (.npz), and its colour, sRGB 0..1."""
+    """A mesh as `save_unit` wrote it (.npz), and its colour, linear RGB 0..1."""
 
     file: str
     color: tuple[float, float, float]
@@ -52,43 +61,103 @@ class Picture:
     height: int
 
 
-def draw_scenes(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
-    """Return a picture of each scene and "", or no picture and the reason why it can't draw.
+@dataclass(frozen=True, slots=True)
+class _View:
+    """Where points of the world lie in the picture; columns are to the right, up, and to the eye.
 
-    Raises RuntimeError where the drawing itself fails.
+    size  (height, width), pixels as they are drawn
     """
-    with tempfile.TemporaryDirectory(prefix="stereocell-") as name:
-        folder = Path(name)
-        (folder / "scenes.json").write_text(json.dumps([asdict(scene) for scene in scenes]))
-        allowed = _SECONDS[0] + _SECONDS[1] * len(scenes)
-        try:
-            ended = subprocess.run(
-                [*COMMAND, name], capture_output=True, text=True, timeout=allowed, check=False
+
+    axes: Vector
+    centre: Vector
+    scale: float
+    size: tuple[int, int]
+
+    def place(self, points: NDArray[np.floating]) -> tuple[Vector, Vector]:
+        """Return the pixels (n, 2), x right, y down, and depths (n,), larger is nearer."""
+        right, up, depth = ((points - self.centre) @ self.axes).T
+        height, width = self.size
+        return np.stack([width / 2 + self.scale * right, height / 2 - self.scale * up], 1), depth
+
+
+def draw_scene(scene: Scene) -> Picture:
+    """Return a picture of the scene."""
+    view = _look_at(scene)
+    picture = np.tile(np.array(_BACKGROUND), (view.size[0] * view.size[1], 1))
+    nearest = np.full(view.size, -np.inf)
+    for surface in scene.surfaces:
+        with np.load(surface.file) as arrays:
+            positions, triangles, normals = (
+                arrays[name] for name in ("positions", "triangles", "normals")
             )
-        except subprocess.TimeoutExpired:
-            return [], f"the drawing process had not ended after {allowed:g} s; {_REMEDY}"
-        if ended.returncode < 0:
-            how = signal.Signals(-ended.returncode).name
-            return [], f"the drawing process was ended by {how}; {_REMEDY}"
-        if ended.returncode:
-            raise RuntimeError(f"drawing the meshes failed:\n{ended.stderr}")
-        refusal = folder / "refused.txt"
-        if refusal.exists():
-            return [], f"{refusal.read_text()}; {_REMEDY}"
-        return [_read(folder / f"{i}.png") for i in range(len(scenes))], ""
+        places, depth = view.place(positions)
+        corners = places[triangles]
+        pixel, triangle, weights = find_pixels(corners, depth[triangles], view.size, nearest)
+        shaded = np.einsum("nk,nkj->nj", weights, normals[triangles[triangle]].astype(np.float64))
+        shaded = shaded @ view.axes
+        shaded[_are_turned_away(corners[triangle])] *= -1  # the inside is drawn, too
+        picture[pixel] = _light(shaded, np.array(surface.color))
+    for low, high in scene.boxes:
+        _outline(picture, nearest, view, np.array([low, high]))
+    height, width = view.size
+    fine = picture.reshape(height // _FINE, _FINE, width // _FINE, _FINE, 3).mean(axis=(1, 3))
+    image = Image.fromarray(to_srgb8(fine.astype(np.float32)))
+    return Picture(encode(image), *image.size)
 
 
-def can_draw() -> str:
-    """Return the reason why this machine can't draw meshes; empty: it can. Draws one triangle."""
-    with tempfile.TemporaryDirectory(prefix="stereocell-") as name:
-        file = Path(name) / "triangle.npz"
-        corners = np.eye(3, dtype=np.float32)
-        np.savez(file, positions=corners, triangles=np.array([[0, 1, 2]]), normals=corners)
-        unit = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-        triangle = Surface(str(file), (1.0, 1.0, 1.0))
-        return draw_scenes([Scene((triangle,), (), unit, (32, 32))])[1]
+def _look_at(scene: Scene) -> _View:
+    low, high = (np.array(corner) for corner in scene.frame)
+    to_eye = _EYE / np.linalg.norm(_EYE)
+    right = np.cross(_UP, to_eye)
+    right /= np.linalg.norm(right)
+    up = np.cross(to_eye, right)
+    # width and height of the frame's box from the eye
+    across, upright = float(np.abs(right) @ (high - low)), float(np.abs(up) @ (high - low))
+    width, most = scene.size
+    height = int(np.clip(width * upright / across, min(0.3 * width, most), most))
+    scale = _FINE * min(width / across, height / upright) / _MARGIN
+    axes = np.stack([right, up, to_eye], axis=1)
+    return _View(axes, (low + high) / 2, scale, (height * _FINE, width * _FINE))
 
 
-def _read(path: Path) -> Picture:
-    with Image.open(path) as picture:
-        return Picture(encode(picture.convert("RGB")), *picture.size)
+def _are_turned_away(corners: Vector) -> NDArray[np.bool_]:
+    """Return which triangles (n, 3, 2), in pixels, show their inside: clockwise, as y is down."""
+    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    turned: NDArray[np.bool_] = ax * by - ay * bx > 0
+    return turned
+
+
+def _light(normals: Vector, color: Vector) -> Vector:
+    """Return the linear light (n, 3) of points with such normals (n, 3), of any length."""
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+    sky = 0.5 + 0.5 * normals[:, 1]
+    diffuse = _GROUND_LIGHT * (1 - sky) + _SKY_LIGHT * sky
+    gloss = np.zeros(len(normals))
+    for direction, light in _LAMPS:
+        to_lamp = np.array(direction) / np.linalg.norm(direction)
+        halfway = to_lamp + np.array([0.0, 0.0, 1.0])
+        halfway /= np.linalg.norm(halfway)
+        diffuse += light * np.maximum(normals @ to_lamp, 0)
+        gloss += light * np.maximum(normals @ halfway, 0) ** _GLOSS_POWER
+    return diffuse[:, None] * color + _GLOSS * gloss[:, None]
+
+
+def _outline(picture: Vector, nearest: Vector, view: _View, ends: Vector) -> None:
+    """Draw a box's edges where nothing is nearer; ends: (2, 3), its corners."""
+    height, width = view.size
+    for axis in range(3):
+        beside, above = (axis + 1) % 3, (axis + 2) % 3
+        for i in (0, 1):
+            for j in (0, 1):
+                edge = ends.copy()
+                edge[:, beside], edge[:, above] = ends[i, beside], ends[j, above]
+                places, depth = view.place(edge)
+                steps = int(np.ceil(np.abs(places[1] - places[0]).max())) + 1
+                share = np.linspace(0, 1, steps)[:, None]
+                column, row = np.floor(places[0] + share * (places[1] - places[0])).T.astype(int)
+                here = depth[0] + share[:, 0] * (depth[1] - depth[0])
+                inside = (row >= 0) & (row < height - 1) & (column >= 0) & (column < width - 1)
+                row, column, here = row[inside], column[inside], here[inside]
+                for down, on in ((0, 0), (0, 1), (1, 0), (1, 1)):  # as wide as a pixel at last
+                    seen = here >= nearest[row + down, column + on]
+                    picture[(row[seen] + down) * width + column[seen] + on] = _LINES

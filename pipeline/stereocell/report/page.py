@@ -6,7 +6,6 @@ of units stays one that a phone opens; sums and remarks cover all units.
 
 import base64
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -33,7 +32,7 @@ from stereocell.model.volume import zyx_to_xyz
 from stereocell.preview.draw_slices import OUTLINE, Slice, cut_unit, draw_slices
 from stereocell.preview.views import View, views_of
 from stereocell.report import charts
-from stereocell.report.draw_scenes import Picture, Scene, Surface, draw_scenes
+from stereocell.report.draw_scenes import Picture, Scene, Surface, draw_scene
 from stereocell.report.facts import Facts, UnitFacts, gather, sum_up
 from stereocell.report.remarks import find_remarks
 from stereocell.report.select_units import choose_level, choose_units, thin_out
@@ -70,19 +69,15 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
     scenes = [_scene(facts, None), *(_scene(facts, tile) for tile in tiles)]
-    with ThreadPoolExecutor(1) as pool:  # the meshes are drawn by another process meanwhile
-        drawing = pool.submit(draw_scenes, scenes)
-        cards = [
-            [
-                _card(facts, units[key])
-                for channel in channels
-                if (key := (plan.tiles[tile].id, plan.channels[channel].id)) in units
-            ]
-            for tile, channels in chosen
+    cards = [
+        [
+            _card(facts, units[key])
+            for channel in channels
+            if (key := (plan.tiles[tile].id, plan.channels[channel].id)) in units
         ]
-        pictures, refusal = drawing.result()
-
-    pictured = [_inline(picture) for picture in pictures]
+        for tile, channels in chosen
+    ]
+    pictured = [_inline(draw_scene(scene)) for scene in scenes]
     environment = Environment(
         loader=FileSystemLoader(TEMPLATE.parent),
         autoescape=True,
@@ -96,9 +91,8 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         plan=plan,
         generator=GENERATOR,
         region_um=[n * s for n, s in zip(plan.region.shape, plan.spacing_um, strict=True)],
-        refusal=refusal,
         tissue=None if tissue is None else _tissue(tissue),
-        whole=pictured[0] if pictured else None,
+        whole=pictured[0],
         whole_note=_drawn_note(facts.units, _WHOLE_TRIANGLES),
         remarks=find_remarks(facts),
         channels=_channels(facts),
@@ -106,7 +100,7 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         tiles=[
             {
                 "id": tile.id,
-                "picture": pictured[i + 1] if pictured else None,
+                "picture": pictured[i + 1],
                 "voxels": tile.box.shape[::-1],
                 "cards": cards[i],
             }
@@ -327,7 +321,7 @@ def _scene(facts: Facts, tile: Tile | None) -> Scene:
         surfaces=tuple(
             Surface(
                 str(lod_file(u.directory, min(level, len(u.lods) - 1)).absolute()),
-                srgb(u.channel.color),
+                u.channel.color,
             )
             for u in (units[i] for i in thin_out(len(units), every))
         ),

@@ -1,9 +1,9 @@
 """Compare pictures of a coarser level with its baked maps and of the finest level, by SSIM.
 
-The pictures are drawn in plain numpy, so that the figures are equal on every machine, with OpenGL
-or without. Parallel projection, one light beside the viewer's eye, and ambient light that occlusion
-dims. Shading is per pixel, by the normal map in the frame of the interpolated tangents, as in glTF
-and USD renderers; without maps by the interpolated normals.
+The pictures are drawn without OpenGL, so that the figures are equal on every machine. Parallel
+projection, one light beside the viewer's eye, and ambient light that occlusion dims. Shading is per
+pixel, by the normal map in the frame of the interpolated tangents, as in glTF and USD renderers;
+without maps by the interpolated normals.
 
 A picture is as large as the surface in the viewer at the distance at which the viewer switches to
 the next finer level: there the level's distance from the iso-surface spans ERROR_PX.

@@ -1,9 +1,11 @@
-"""Rasterize triangles: texels of a map, pixels of a view. Plain numpy."""
+"""Rasterize triangles: texels of a map, pixels of a view."""
 
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+
+from stereocell.kernels.depth_buffer import find_visible
 
 _AT_ONCE = 1 << 20  # texels or pixels computed at once: about 0.2 GB
 
@@ -44,29 +46,32 @@ def find_texels(
 
 
 def find_pixels(
-    corners: NDArray[np.float64], depth: NDArray[np.float64], size: tuple[int, int]
+    corners: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    size: tuple[int, int],
+    nearest: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Return the visible points of triangles in a view.
 
     corners  float64 (m, 3, 2), pixels, x right, y down
     depth    float64 (m, 3), larger is nearer
     size     (height, width), pixels
+    nearest  float64 (height, width), the depth of what is drawn already; it becomes that of both
     result   pixel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
              float64 (k, 3)
     """
     height, width = size
-    nearest = np.full(height * width, -np.inf)
-    triangle_of = np.zeros(height * width, np.int64)
-    weights_of = np.zeros((height * width, 3))
-    for triangle, weights, pixel, _ in _cover(corners, size, 0.0):
-        here = np.einsum("nk,nk->n", depth[triangle], weights)
-        better = np.flatnonzero(here > nearest[pixel])
-        order = better[np.argsort(here[better], kind="stable")]
-        at = pixel[order]
-        nearest[at] = here[order]
-        triangle_of[at], weights_of[at] = triangle[order], weights[order]
-    found = np.flatnonzero(np.isfinite(nearest))
-    return found, triangle_of[found], weights_of[found]
+    if nearest is None:
+        nearest = np.full(size, -np.inf)
+    triangle_of = np.full(size, -1)
+    weights_of = np.zeros((height, width, 3))
+    low, high = _boxes(corners, size, 0.0)
+    frames, is_flat = _frames(corners)
+    drawn = np.flatnonzero(~is_flat)
+    kept = np.ascontiguousarray(frames.T[drawn])
+    find_visible(kept, depth[drawn], low[drawn], high[drawn], nearest, triangle_of, weights_of)
+    found = np.flatnonzero(triangle_of >= 0)
+    return found, drawn[triangle_of.ravel()[found]], weights_of.reshape(-1, 3)[found]
 
 
 def _cover(
@@ -78,10 +83,8 @@ def _cover(
 
     corners  (m, 3, 2) in pixels, x right, y down
     """
-    height, width = size
-    last = np.array([width - 1, height - 1])
-    low = np.clip(np.ceil(corners.min(axis=1) - 0.5 - beyond - 1e-6), 0, last + 1).astype(np.int64)
-    high = np.clip(np.floor(corners.max(axis=1) - 0.5 + beyond + 1e-6), -1, last).astype(np.int64)
+    _, width = size
+    low, high = _boxes(corners, size, beyond)
     extent = np.maximum(high - low + 1, 0)
     frames, is_flat = _frames(corners)
     count = np.where(is_flat, 0, extent.prod(axis=1))  # flat triangles have nothing near
@@ -101,6 +104,17 @@ def _cover(
         near = outside <= beyond + 1e-9
         yield triangle[near], weights[near], (row * width + column)[near], outside[near]
         first = stop
+
+
+def _boxes(
+    corners: NDArray[np.float64], size: tuple[int, int], beyond: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first and last pixel (x, y) near each triangle: (m, 2)."""
+    height, width = size
+    last = np.array([width - 1, height - 1])
+    low = np.clip(np.ceil(corners.min(axis=1) - 0.5 - beyond - 1e-6), 0, last + 1)
+    high = np.clip(np.floor(corners.max(axis=1) - 0.5 + beyond + 1e-6), -1, last)
+    return low.astype(np.int64), high.astype(np.int64)
 
 
 def _frames(

@@ -7,12 +7,15 @@ apart, so that a recoloured channel needs no new table.
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from stereocell.model.channel import OpacityPoints
 
 NAMES = ("default", "soft", "sharp", "surface")
 THRESHOLD = "threshold"  # name of the function of channels that have a threshold
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
+FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
+NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them
 
 
 def make_transfer_functions(
@@ -27,17 +30,24 @@ def make_transfer_functions(
     threshold_normalized  the adaptive threshold, 0..1; None: there is none
 
     Opacity starts half-way between the median, since most voxels are background, and the level. The
-    level is the iso-value, or the 99th percentile in a channel without a clear surface.
+    level is the iso-value, or the 99th percentile in a channel without a clear surface. Noise shows
+    in front of no surface: opacity starts where it ends, but below the level.
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)
     percentile = {p: (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, 0.99)}
     level = percentile[0.99] if iso_normalized is None else iso_normalized
     level = float(np.clip(level, 0.02, 0.96))
-    floor = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
+    halfway = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
+    floor = halfway
+    if iso_normalized is not None:
+        floor = max(floor, min(_end_of_noise(histogram[: int(level * bins)]) / bins, FOOT * level))
     bright = max(level + 0.5 * (1 - level), level + 0.02)
+    # a body stays as dense as it is with the foot that noise has taken
+    rise = min(floor - halfway, 0.4 * (bright - level))
+    dense = [(level + rise, 0.3)] if rise > 0.005 else []
     functions = {
-        "default": _points((floor, 0.0), (level, 0.12), (bright, 0.45), (1.0, 0.6)),
+        "default": _points((floor, 0.0), (level, 0.12), *dense, (bright, 0.45), (1.0, 0.6)),
         "soft": _points((0.6 * floor, 0.0), (level, 0.04), (1.0, 0.2)),
         "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
         "surface": _points(
@@ -49,6 +59,22 @@ def make_transfer_functions(
         top = start + min(RAMP, 0.9 * (1 - start))
         functions[THRESHOLD] = _points((start, 0.0), (top, 0.45), (1.0, 0.6))
     return functions
+
+
+def _end_of_noise(below: NDArray[np.int64]) -> float:
+    """Return where the noise of the background ends, in bins; 0: there is no peak of a background.
+
+    below  int64 (bins,), voxel counts below the surface
+
+    The peak's half-width is that of the upper side: on the lower one magnitudes (of MR, whose
+    noise is Rayleigh's) are cut off.
+    """
+    if not below.any():
+        return 0.0
+    smooth = ndimage.gaussian_filter1d(below.astype(np.float64), 2.0, mode="nearest")
+    mode = int(smooth.argmax())
+    beyond_half = np.flatnonzero(smooth[mode:] <= smooth[mode] / 2)
+    return mode + NOISE_REACH * float(beyond_half[0]) if beyond_half.size else 0.0
 
 
 def evaluate(points: OpacityPoints, size: int = 256) -> NDArray[np.float32]:

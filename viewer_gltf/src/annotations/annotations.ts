@@ -250,9 +250,10 @@ export class Marks {
     const probed = this.reading.glance(gaze);
     if (probed === null) return null;
     const channel = this.state.channels.find(({ id }) => id === probed.channel);
-    const tile = tileName(probed.tile);
-    const text = channel === undefined ? tile : `${tile} · ${channel.name}`;
-    return { probed, text };
+    const { length } = this.options.manifest.tiles;
+    const tile = length > 1 ? tileName(probed.tile) : ""; // of a single one there is nothing to tell
+    const text = [tile, channel?.name ?? ""].filter((part) => part !== "").join(" · ");
+    return text === "" ? null : { probed, text };
   }
 
   dispose(): void {

@@ -7,6 +7,7 @@ import {
   SRGBColorSpace,
   type Vector3,
 } from "three";
+import type { LabelBox } from "./keep_apart";
 import { LABEL_HEIGHT, lengthAt, MARKS_ORDER, type Sight } from "./style";
 
 /** Pixels of the canvas to a line: enough for a headset and for a phone's dense screen. */
@@ -71,10 +72,26 @@ export class Label {
     this.sprite.scale.set((height * this.canvas.width) / this.canvas.height, height, 1);
   }
 
-  turnTo(side: Side): void {
+  turnTo(side: Side, up_lines = 0): void {
     this.side = side;
     const { share, edge, lines } = POINTS[side];
-    this.sprite.center.set(share, edge + lines / Math.max(1, this.lines));
+    this.sprite.center.set(share, edge + (lines - up_lines) / Math.max(1, this.lines));
+  }
+
+  /** Where it was placed, to an eye with these axes. */
+  boxFrom({ eye_um }: Pick<Sight, "eye_um">, right: Vector3, up: Vector3): LabelBox {
+    const { position, scale, center } = this.sprite;
+    const line = scale.y / Math.max(1, this.lines);
+    const from = position.clone().sub(eye_um);
+    const [width, height] = [scale.x / line, this.lines];
+    const x = from.dot(right) / line - center.x * width;
+    const y = from.dot(up) / line - center.y * height;
+    return { x, y, width, height, isAbove: this.side !== "below" };
+  }
+
+  /** Farther from its point, by so many lines up. */
+  shift(up_lines: number): void {
+    this.turnTo(this.side, up_lines);
   }
 
   private draw(lines: readonly string[]): void {

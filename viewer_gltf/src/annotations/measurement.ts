@@ -3,6 +3,7 @@ import { CylinderGeometry, Object3D, SphereGeometry, Vector3 } from "three";
 import type { Vec3 } from "../math/vec3";
 import { type Measurement, missing } from "../state/measurements";
 import type { MeasureKind } from "../state/parameters/tools";
+import { keepApart } from "./keep_apart";
 import { Label } from "./label";
 import { measurementText } from "./measure";
 import {
@@ -109,6 +110,10 @@ export class MeasureMark {
   /** The channels' values at the newest one's points. */
   private readonly values: Label[] = [];
   private readonly stretched = new Vector3();
+  /** Of the eye, on the labels. */
+  private readonly ahead = new Vector3();
+  private readonly right = new Vector3();
+  private readonly up = new Vector3();
   private count = 0;
   private key = "";
 
@@ -170,6 +175,7 @@ export class MeasureMark {
   }
 
   update(sight: Sight): void {
+    for (const { label } of [this.newest, ...this.kept]) label.shift(0);
     this.newest.update(sight);
     for (const strand of this.kept) strand.update(sight);
     for (let i = 0; i < this.count; i++) {
@@ -181,6 +187,26 @@ export class MeasureMark {
       this.values[i].turnTo(isAbove ? "above" : "below");
       this.values[i].place(this.newest.placeOf(i), sight);
     }
+    this.keepLabelsApart(sight);
+  }
+
+  /** What the newest comes to and its values have their places, those that are done give way. */
+  private keepLabelsApart(sight: Sight): void {
+    const kept = this.kept.map(({ label }) => label);
+    const labels = [this.newest.label, ...this.values, ...kept].filter(
+      ({ sprite }) => sprite.visible,
+    );
+    if (labels.length < 2) return;
+    const { ahead, right, up } = this;
+    ahead.set(0, 0, 0);
+    for (const { sprite } of labels) ahead.add(sprite.position);
+    ahead.divideScalar(labels.length).sub(sight.eye_um).normalize();
+    right.crossVectors(ahead, sight.up).normalize();
+    up.crossVectors(right, ahead);
+    const shifts = keepApart(labels.map((label) => label.boxFrom(sight, right, up)));
+    labels.forEach((label, i) => {
+      label.shift(shifts[i]);
+    });
   }
 
   /** The text at a point. */

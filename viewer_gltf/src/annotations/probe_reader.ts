@@ -5,8 +5,9 @@ import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { ValuesHost } from "../bundle/values_host";
 import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
 import { pickTile, shownTiles } from "../math/pick";
-import { meetSlices, type SliceFrame } from "../math/slice_frame";
+import { cornerTowards, meetSlices, type SliceFrame } from "../math/slice_frame";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
 import type { ViewerState } from "../state/viewer_state";
@@ -66,7 +67,8 @@ export class Reading {
   async probe(ray: Ray): Promise<Probed | null> {
     const along = unitRay(ray);
     const surface = this.probeSurfaces(along);
-    const { clip, mode } = this.state;
+    const clip = this.clipFor(along);
+    const { mode } = this.state;
     const disc = mode === "disc" ? this.disc : null;
     const volume = probeVolumes(along, await this.volumesAlong(along), clip, disc);
     const met = [surface, volume, this.probeSlices(along)].filter((each) => each !== null);
@@ -77,8 +79,9 @@ export class Reading {
   /** The same, but at once and without volumes. */
   glance(ray: Ray): Probed | null {
     const along = unitRay(ray);
-    if (pickTile(along, this.tiles, this.state.clip) === null) return null;
-    return this.probeSurfaces(along) ?? probeBoxes(along, this.tiles, this.state.clip);
+    const clip = this.clipFor(along);
+    if (pickTile(along, this.tiles, clip) === null) return null;
+    return this.probeSurfaces(along) ?? probeBoxes(along, this.tiles, clip);
   }
 
   /** A line for each shown channel: its name and its value at a point, on the source's scale. */
@@ -133,18 +136,25 @@ export class Reading {
     };
   }
 
+  /** What is cut away, also by slices: the corner before them, as seen from where the ray begins. */
+  private clipFor({ origin }: Ray): Clip {
+    const frames = this.options.slices?.()?.frames ?? null;
+    const { clip } = this.state;
+    return frames === null ? clip : { ...clip, corner: cornerTowards(origin, frames, []) };
+  }
+
   private get tiles() {
     return shownTiles(this.options.manifest.tiles, this.state.isolated);
   }
 
   private probeSurfaces(along: Ray): Probed | null {
     if (this.specimen === null) return null;
-    const { clip } = this.state;
+    const clip = this.clipFor(along);
     return probeSurfaces(along, this.options.surfaces(), this.specimen, clip, this.tiles);
   }
 
   private async volumesAlong(along: Ray): Promise<readonly ProbedVolume[]> {
-    const { clip } = this.state;
+    const clip = this.clipFor(along);
     const met = this.tiles.filter((tile) => pickTile(along, [tile], clip) !== null);
     const found: ProbedVolume[] = [];
     for (const { source, ...shown } of this.options.volumes()) {

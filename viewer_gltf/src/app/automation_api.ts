@@ -10,6 +10,7 @@ import type { QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
 import type { Progress } from "../surfaces/overview_progress";
 import type { VolumeStatus } from "../volumes/volume_set";
+import type { MenuEntry } from "../xr/stereo";
 
 export type Snapshot = Readonly<{
   state: ViewerState;
@@ -46,8 +47,12 @@ export type Snapshot = Readonly<{
   isStereo: boolean;
   /** The specimen's middle in the room, m. */
   specimenAt: readonly [number, number, number];
+  /** Its turn there: a quaternion. */
+  specimenTurn: readonly [number, number, number, number];
   /** The notices before the eyes now, in stereo. */
   told: readonly string[];
+  /** The controls of the panel in the room now, its button first; none on a flat screen. */
+  menu: readonly MenuEntry[];
 }>;
 
 export interface StereoCellApi {

@@ -1,8 +1,9 @@
 /** Draws frames, only when something has changed, each as well as its budget allows. */
-import type { Camera, Matrix4, WebGLRenderer } from "three";
+import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import type { Navigation } from "../interaction/orbit_camera";
 import { rayAhead } from "../interaction/rays";
+import type { Vec3 } from "../math/vec3";
 import { type FramePace, Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
 import { Pace } from "../render/pacing/frame_budget";
@@ -14,6 +15,7 @@ import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
 import { MAX_STEPS } from "../volumes/tile_raymarch";
 import type { Stereo } from "../xr/stereo";
+import { Pulse } from "./pulse";
 import type { Contents } from "./scene_contents";
 
 /** Most frames of a picture that is saved that are averaged, where it is marched. */
@@ -24,6 +26,8 @@ export const TRACED_SAMPLES = 192;
 const POLL_MS = 20;
 /** Longest time that a frame counts, s: nobody looked at a page that slept. */
 const LONGEST_FRAME_S = 0.1;
+/** The same for fades, after a frame that was drawn and took as long: what fades out is not drawn for ever. */
+const LONGEST_FADE_S = 1;
 
 export type FrameOptions = Readonly<{
   renderer: WebGLRenderer;
@@ -55,6 +59,7 @@ export type Still = Readonly<{
 
 export class FrameLoop {
   readonly picture: Picture;
+  private readonly pulse: Pulse;
   /** Frames drawn so far. */
   frames = 0;
   private readonly gl: WebGL2RenderingContext;
@@ -68,13 +73,18 @@ export class FrameLoop {
   private hasCome = false;
   /** Whether the frame before was one of a moving picture, drawn in its budget. */
   private wasMoving = false;
+  /** Whether the last turn of the page drew a frame. */
+  private hasDrawn = false;
   private waiting: (() => void)[] = [];
   private readonly pixel = new Uint8Array(4);
+  private readonly eye = new Vector3();
+  private readonly toSpecimen = new Matrix4();
   private drawn: (() => void)[] = [];
 
   constructor(private readonly options: FrameOptions) {
     const { renderer, room, hybrid } = options;
     this.gl = renderer.getContext() as WebGL2RenderingContext;
+    this.pulse = new Pulse(renderer, (time_ms) => this.frame(time_ms));
     this.picture = new Picture(renderer, room, hybrid);
     this.pace = new Pace(this.gl);
     this.gathering = new GatherPace(this.gl);
@@ -82,17 +92,19 @@ export class FrameLoop {
   }
 
   start(): void {
-    this.options.renderer.setAnimationLoop((time_ms) => this.frame(time_ms));
+    this.pulse.start();
   }
 
   /** What is looked at, or from where, is another: the picture has to follow at once. */
   change(): void {
     this.isStale = true;
+    this.pulse.wake();
   }
 
   /** Something has come for the picture, which may be at rest. */
   come(): void {
     this.hasCome = true;
+    this.pulse.wake();
   }
 
   setLevel(level: QualityLevel): void {
@@ -111,6 +123,7 @@ export class FrameLoop {
 
   /** Resolves when nothing loads any more and the picture shows all of it. */
   settled(): Promise<void> {
+    this.pulse.wake();
     return new Promise((resolve) => this.waiting.push(resolve));
   }
 
@@ -136,13 +149,17 @@ export class FrameLoop {
     return stereo.head ?? navigation.camera.matrixWorld;
   }
 
-  private frame(time_ms: number): void {
+  /** Whether nothing more is to be drawn until something changes. */
+  private frame(time_ms: number): boolean {
     const { renderer, hybrid, onFollow, onFrame } = this.options;
-    if (renderer.getContext().isContextLost()) return; // there is nothing to draw on
+    if (renderer.getContext().isContextLost()) return true; // there is nothing to draw on
     const { contents, stereo } = this.options.shown();
     const interval_ms = time_ms - this.last_ms;
-    const dt_s = Math.min(LONGEST_FRAME_S, Math.max(0, interval_ms / 1000));
+    const passed_s = Math.max(0, interval_ms / 1000);
+    const dt_s = Math.min(LONGEST_FRAME_S, passed_s);
+    const fade_s = Math.min(this.hasDrawn ? LONGEST_FADE_S : LONGEST_FRAME_S, passed_s);
     this.last_ms = time_ms;
+    this.hasDrawn = false;
     const wasLoading = contents.isLoading;
     if (contents.hasJustBegun()) onFollow();
     const inRoom = stereo.pose(this.picture.eyes);
@@ -150,21 +167,20 @@ export class FrameLoop {
     const isStereo = inRoom !== null;
     const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
     if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state);
-    const { isChanging, isFading } = this.advance(dt_s);
+    const { isChanging, isFading } = this.advance(dt_s, fade_s);
     const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
     const isDue = this.resting.isDue(time_ms) && this.hasCome;
     const isMoving = isStereo || this.isStale;
     // a picture that came to rest is drawn once more, as well as can be
     const isWanted = isMoving || this.wasMoving || isGathering || isDue;
     // "High" and "low" are alike in all frames
-    const gathers =
-      !isWanted &&
-      this.options.shown().state.quality === "auto" &&
-      this.picture.canGather &&
-      this.resting.isDue(time_ms);
+    const canGather = this.options.shown().state.quality === "auto" && this.picture.canGather;
+    const gathers = !isWanted && canGather && this.resting.isDue(time_ms);
     // someone waits: what is missing is looked for, and a picture that shows all is not drawn again
     const isAwaited = this.waiting.length > 0;
-    if (!isWanted && !gathers && !wasLoading && !this.hasCome && !isAwaited) return;
+    if (!isWanted && !gathers && !wasLoading && !this.hasCome && !isAwaited) {
+      return !canGather && !contents.traced.isGathering;
+    }
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
     this.picture.marchFrame.uSteps.value = settings.steps;
     hybrid.radiusShare = settings.discShare;
@@ -184,6 +200,7 @@ export class FrameLoop {
       if (isGathering) this.gathering.submit(time_ms);
       if (!isMoving) this.resting.submit(time_ms);
       this.frames++;
+      this.hasDrawn = true;
       onFrame();
       for (const resolve of this.drawn.splice(0)) resolve();
     }
@@ -193,6 +210,7 @@ export class FrameLoop {
     if (this.waiting.length > 0 && !contents.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
     }
+    return false;
   }
 
   /** Keep from drawing while a job draws by `drawStill`. */
@@ -263,7 +281,10 @@ export class FrameLoop {
   }
 
   /** Follow the gaze, and go on with what moves and with what fades; whether it goes on. */
-  private advance(dt_s: number): Readonly<{ isChanging: boolean; isFading: boolean }> {
+  private advance(
+    dt_s: number,
+    fade_s = dt_s,
+  ): Readonly<{ isChanging: boolean; isFading: boolean }> {
     const { head } = this;
     const { hybrid, room, stage, onFollow } = this.options;
     const { contents, stereo, navigation, state } = this.options.shown();
@@ -277,7 +298,7 @@ export class FrameLoop {
       height_px: stage.clientHeight,
       focus: navigation.controls.target,
     };
-    const isFading = contents.advance({
+    const seen = {
       head,
       specimen: group.matrixWorld,
       screen: stereo.kind === null ? screen : null,
@@ -285,7 +306,8 @@ export class FrameLoop {
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
       isPanelOpen: stereo.hands.panel.isOpen,
       dt_s,
-    });
+    };
+    const isFading = contents.advance(seen, fade_s);
     const isChanging = isMoving || hybrid.isChanging(state);
     if (isChanging) this.isStale = true;
     if (isFading) this.hasCome = true;
@@ -304,11 +326,19 @@ export class FrameLoop {
       bounds: this.options.bounds,
       solids: surfaces.triangles + slices.solid,
     };
-    stereo.present(() => picture.draw(head, drawn, state.clip, pace));
+    const clip = { ...state.clip, corner: slices.cornerTowards(this.eyeOnSpecimen(head)) };
+    stereo.present(() => picture.draw(head, drawn, clip, pace));
+  }
+
+  /** um, world. */
+  private eyeOnSpecimen(head: Matrix4): Vec3 {
+    const { matrixWorld } = this.options.room.specimen.group;
+    this.toSpecimen.copy(matrixWorld).invert();
+    return this.eye.setFromMatrixPosition(head).applyMatrix4(this.toSpecimen).toArray();
   }
 
   stop(): void {
-    this.options.renderer.setAnimationLoop(null);
+    this.pulse.stop();
   }
 
   dispose(): void {

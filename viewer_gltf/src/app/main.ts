@@ -97,6 +97,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     (state) => {
       controller?.refresh();
       notices.update(state);
+      hint.update(state.mode);
     },
     () => {
       progress.update(viewer.snapshot().overview);
@@ -113,6 +114,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
   controller.followAddress(location.search, location.hash);
+  hint.update(viewer.state.mode);
   whenTouched(() => {
     viewer.stopTurning();
     hint.leave();

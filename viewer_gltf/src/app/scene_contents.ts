@@ -166,10 +166,10 @@ export class Contents {
     return true;
   }
 
-  /** Go on with what fades; whether it does. */
-  advance(view: MarksView): boolean {
-    const isFading = this.volumes.advance(view.dt_s);
-    this.traced.advance(view.dt_s);
+  /** Go on with what fades, by so long; whether it does. */
+  advance(view: MarksView, fade_s: number): boolean {
+    const isFading = this.volumes.advance(fade_s);
+    this.traced.advance(fade_s);
     this.marks.update(view);
     this.slices.update(this.marks.sight);
     return isFading;

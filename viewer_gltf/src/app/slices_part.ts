@@ -2,6 +2,8 @@
 import { Object3D } from "three";
 import type { Sight } from "../annotations/style";
 import { TemporaryError } from "../bundle/errors";
+import type { ClipPlane } from "../math/clip";
+import type { Vec3 } from "../math/vec3";
 import type { Slices, SlicesOptions } from "../slices/slices";
 import { isSliced } from "../state/parameters/slices";
 import type { ViewerState } from "../state/viewer_state";
@@ -65,6 +67,11 @@ export class SlicesPart {
   /** The pictures of the planes that stand in the scene; null: none do. */
   get standing() {
     return this.slices?.planes.group.visible ? this.slices.images : null;
+  }
+
+  /** What is gone before the planes for an eye, um, world: else it would hide them. */
+  cornerTowards(eye: Vec3): readonly ClipPlane[] | undefined {
+    return this.slices?.planes.cornerTowards(eye);
   }
 
   /** The channels' values where the slices meet, in the source's units; none: no slices show. */

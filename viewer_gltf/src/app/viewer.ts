@@ -151,7 +151,7 @@ export class Viewer {
         if (!this.run(command) && !this.onCommand(command)) this.stereo.announce(CANT);
       },
       onLenses: (lenses) => this.onLenses(lenses),
-      onChoose: (ray, tile) => this.choose(ray, tile),
+      onChoose: (ray, tile, isByGaze) => this.choose(ray, tile, isByGaze),
       onStart: () => this.enterStereo(),
       onEnd: () => this.leaveStereo(),
     });
@@ -198,14 +198,15 @@ export class Viewer {
     this.loop.start();
   }
 
-  dispatch(action: Action): void {
+  /** @param isStep whether undoing goes back to before it */
+  dispatch(action: Action, isStep = action.type !== "restore"): void {
     const next = reduce(this.state, action);
     if (next === this.state) return;
     const notice = newNotice(this.state, next);
     const announcement = announcementOf(this.state, next, this.bundle.manifest.tiles);
     const before = this.lamps.length;
     const larger = next.specimenSize_m / this.state.specimenSize_m;
-    if (action.type !== "restore" && !isSameView(this.state, next)) {
+    if (isStep && !isSameView(this.state, next)) {
       this.steps.add(nameOfChange(action, this.state), keyOfChange(action));
     }
     this.state = next;
@@ -454,7 +455,9 @@ export class Viewer {
       },
       isStereo: this.stereo.kind !== null,
       specimenAt: this.room.specimen.middle,
+      specimenTurn: this.room.specimen.pose.orientation.toArray(),
       told: this.stereo.hands.notice.texts,
+      menu: this.stereo.menu,
     };
   }
 
@@ -538,7 +541,10 @@ export class Viewer {
     if (clientWidth === 0 || clientHeight === 0) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.renderer.setSize(clientWidth, clientHeight);
-    this.navigation.fit(clientWidth / clientHeight);
+    const style = getComputedStyle(this.stage);
+    const share = (name: string) => Number.parseFloat(style.getPropertyValue(name)) / clientHeight;
+    const covered = { top: share("--over-top") || 0, bottom: share("--over-bottom") || 0 };
+    this.navigation.fit(clientWidth / clientHeight, covered);
     this.loop.change();
   }
 
@@ -583,12 +589,16 @@ export class Viewer {
     return this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
   }
 
-  /** Measure, or choose the tile; of one that is alone nothing is left to choose. */
-  private choose(ray: Ray, tile: string | null): boolean {
+  /**
+   * Measure, or choose the tile; of one that is alone nothing is left to choose. A gaze that rested there
+   * has chosen without being asked: undoing is for what a person sets.
+   */
+  private choose(ray: Ray, tile: string | null, isByGaze = false): boolean {
     const { state } = this;
     if (state.tool === "measure") void this.contents.marks.measure(ray);
-    else if (state.isolated === null && tile !== null) this.dispatch(chosenTile(state, tile));
-    else return false;
+    else if (state.isolated === null && tile !== null) {
+      this.dispatch(chosenTile(state, tile), !isByGaze);
+    } else return false;
     return true;
   }
 

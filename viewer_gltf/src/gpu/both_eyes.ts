@@ -1,6 +1,6 @@
 /**
- * Opaque surfaces are drawn once for both eyes: as two instances, of which each is put into its eye's
- * half of the picture. So a surface costs one draw call in stereo too, on any WebGL 2: multiview does
+ * What is in the room is drawn once for both eyes: as two instances, of which each is put into its eye's
+ * half of the picture. So a thing costs one draw call in stereo too, on any WebGL 2: multiview does
  * the same, but three has it only where it draws straight into a headset's layer, and this picture is
  * one of linear light that is encoded at the end.
  */
@@ -8,20 +8,25 @@ import {
   ArrayCamera,
   type BufferGeometry,
   InstancedBufferGeometry,
-  type Material,
+  Line,
+  Material,
   Matrix4,
+  Mesh,
+  type Object3D,
   PerspectiveCamera,
+  ShaderMaterial,
+  Sprite,
   Vector3,
   Vector4,
 } from "three";
 import type { Eyes } from "./eyes";
 
 /** The layer of what is drawn so; no other camera sees it. WebXR has 1 and 2. */
-export const SOLIDS = 4;
+const BOTH = 4;
 
 /**
- * By reference. `uEyeClip`: from the room to the clip space of the whole picture, in which each eye has
- * its part. `uMiddle`: where the right eye's part begins, pixels.
+ * By reference. `uEyeClip`: from what is seen between the eyes to the clip space of the whole picture, in
+ * which each eye has its part. `uMiddle`: where the right eye's part begins, pixels.
  */
 function makeUniforms() {
   return {
@@ -32,37 +37,52 @@ function makeUniforms() {
 }
 export type BothEyesUniforms = ReturnType<typeof makeUniforms>;
 
-/** In a vertex shader, after `gl_Position` is set; knows `vRoom`, sets `vEye`. */
+/** In a vertex shader, after `gl_Position` is set; knows `mvPosition`, sets `vEye`. */
 export const TO_EACH_EYE = `
   vEye = -1.0;
   if (uIsForBoth) {
     vEye = float(gl_InstanceID);
-    gl_Position = uEyeClip[gl_InstanceID] * vec4(vRoom, 1.0);
+    gl_Position = uEyeClip[gl_InstanceID] * mvPosition;
   }
 `;
-export const TO_EACH_EYE_DECLARED = `uniform bool uIsForBoth;
+export const TO_EACH_EYE_DECLARED = `varying float vEye;
+uniform bool uIsForBoth;
 uniform mat4 uEyeClip[2];
 `;
 /** In a fragment shader: what reaches into the other eye's part. */
 export const NOT_THE_OTHERS = `
   if (vEye >= 0.0 && (gl_FragCoord.x < uMiddle) != (vEye < 0.5)) discard;
 `;
-export const NOT_THE_OTHERS_DECLARED = "uniform float uMiddle;\n";
+export const NOT_THE_OTHERS_DECLARED = "varying float vEye;\nuniform float uMiddle;\n";
 
-/** A geometry that is drawn as often as there are eyes; it shares what it is made of. */
-export function forBoth({ attributes, index, groups, ...rest }: BufferGeometry): BufferGeometry {
-  const made = new InstancedBufferGeometry();
-  Object.assign(made, { attributes, index, groups, instanceCount: 1 });
-  made.boundingBox = rest.boundingBox;
-  made.boundingSphere = rest.boundingSphere;
-  return made;
+/** Made of each geometry, also of one that many share. */
+const made = new WeakMap<BufferGeometry, InstancedBufferGeometry>();
+
+/** A geometry that is drawn as often as there are eyes; it shares what it is made of, and goes with it. */
+function forBoth(geometry: BufferGeometry): InstancedBufferGeometry {
+  if (geometry instanceof InstancedBufferGeometry) return geometry;
+  const found = made.get(geometry);
+  if (found !== undefined) return found;
+  const { attributes, index, groups, drawRange, boundingBox, boundingSphere } = geometry;
+  const shared = { attributes, index, groups, drawRange, boundingBox, boundingSphere };
+  const both = Object.assign(new InstancedBufferGeometry(), { ...shared, instanceCount: 1 });
+  made.set(geometry, both);
+  geometry.addEventListener("dispose", () => both.dispose());
+  return both;
+}
+
+type Drawn = Mesh<BufferGeometry> | Line<BufferGeometry> | Sprite;
+
+function isDrawn(object: Object3D): object is Drawn {
+  return object instanceof Mesh || object instanceof Line || object instanceof Sprite;
 }
 
 export class BothEyes {
   readonly uniforms = makeUniforms();
   private readonly camera = new ArrayCamera();
-  /** Sees the opaque surfaces for all eyes, from between them. */
+  /** Sees for all eyes, from between them. */
   private readonly between = new PerspectiveCamera();
+  private readonly adopted = new WeakSet<Material>();
   private isStereo = false;
   private readonly part = new Matrix4();
   private readonly point = new Vector3();
@@ -73,12 +93,41 @@ export class BothEyes {
       camera.matrixAutoUpdate = false;
       camera.matrixWorldAutoUpdate = false;
     }
-    this.camera.layers.enable(SOLIDS);
-    this.between.layers.set(SOLIDS);
+  }
+
+  /** From now on all that is in a scene is drawn so: to be called before each frame, for what is new. */
+  takeIn(scene: Object3D): void {
+    scene.traverse((object) => {
+      if (!isDrawn(object)) return;
+      object.layers.disable(0);
+      object.layers.enable(BOTH);
+      const { material } = object;
+      if (!(material instanceof Material)) throw new TypeError(`${object.name} has many materials`);
+      if (!this.adopted.has(material)) {
+        if (material instanceof ShaderMaterial) return; // it covers the picture, whoever looks
+        this.patch(material);
+        this.adopt(material);
+      }
+      object.geometry = forBoth(object.geometry);
+    });
+  }
+
+  /** A material of three's own. */
+  private patch(material: Material): void {
+    const { uniforms } = this;
+    material.onBeforeCompile = (shader) => {
+      Object.assign(shader.uniforms, uniforms);
+      const end = shader.vertexShader.lastIndexOf("}");
+      shader.vertexShader = `${TO_EACH_EYE_DECLARED}${shader.vertexShader.slice(0, end)}${TO_EACH_EYE}}`;
+      shader.fragmentShader =
+        NOT_THE_OTHERS_DECLARED +
+        shader.fragmentShader.replace("void main() {", `void main() {${NOT_THE_OTHERS}`);
+    };
   }
 
   /** A material whose shaders have the parts above draws for whom the camera is. */
   adopt(material: Material): void {
+    this.adopted.add(material);
     const { uIsForBoth } = this.uniforms;
     material.onBeforeRender = (_renderer, _scene, camera, geometry) => {
       uIsForBoth.value = this.isStereo && camera === this.between;
@@ -88,10 +137,13 @@ export class BothEyes {
     };
   }
 
-  /** All of a frame's eyes in one. */
-  cameraOf(eyes: Eyes): ArrayCamera {
+  /** All of a frame's eyes in one; what is in another layer alone is not seen. */
+  cameraOf(eyes: Eyes, layer = BOTH): ArrayCamera {
     const { camera, between, uniforms } = this;
     const { all, width_px, height_px } = eyes;
+    camera.layers.set(layer);
+    camera.layers.enable(0); // the lights'
+    between.layers.set(layer);
     camera.cameras = [];
     const [first, second] = all;
     if (first === undefined) return camera; // before a headset's first pose
@@ -117,6 +169,7 @@ export class BothEyes {
       this.part.makeScale(z / width_px, w / height_px, 1).setPosition(right, up, 0);
       const clip = uniforms.uEyeClip.value[i].copy(this.part);
       clip.multiply(eye.projectionMatrix).multiply(eye.matrixWorldInverse);
+      clip.multiply(between.matrixWorld);
     });
     return camera;
   }

@@ -1,30 +1,39 @@
 /** The cuts of clip box and plane for the surfaces' shaders: planes in the room, by reference. */
 import { type Matrix4, Vector3, Vector4 } from "three";
 import type { Clip } from "../math/clip";
-import type { MarchClip } from "./clip_uniforms";
+import type { Vec3 } from "../math/vec3";
+import { CORNER_PLANES, type MarchClip, NOWHERE, noCorner } from "./clip_uniforms";
 
 const MOST = 7; // six faces of the box, and the plane
 /** um; beyond any specimen, within the precision of floats. */
 const FAR = 1e9;
 
 export class Cuts {
-  /** xyz unit normal, w offset, metres of the room: gone is where dot(xyz, p) > w. */
-  readonly uCuts = { value: Array.from({ length: MOST }, () => new Vector4()) };
+  /**
+   * xyz unit normal, w offset, metres of the room: gone is where dot(xyz, p) > w; after these the planes of
+   * the corner.
+   */
+  readonly uCuts = {
+    value: Array.from({ length: MOST + CORNER_PLANES }, () => new Vector4(...NOWHERE)),
+  };
   readonly uCutCount = { value: 0 };
   /** The same for the march, um. */
   readonly march: MarchClip = {
     min: new Vector3(),
     max: new Vector3(),
     plane: new Vector4(),
+    corner: noCorner(),
   };
 
-  follow({ box, plane }: Clip, specimen: Matrix4): void {
+  follow({ box, plane, corner }: Clip, specimen: Matrix4): void {
     let count = 0;
-    const add = (x: number, y: number, z: number, offset_um: number) => {
+    const put = (i: number, [x, y, z]: Vec3, offset_um: number) => {
       const normal = new Vector3(x, y, z).transformDirection(specimen);
       const on = new Vector3(x, y, z).multiplyScalar(offset_um).applyMatrix4(specimen);
-      this.uCuts.value[count++].set(normal.x, normal.y, normal.z, normal.dot(on));
+      this.uCuts.value[i].set(normal.x, normal.y, normal.z, normal.dot(on));
     };
+    const add = (x: number, y: number, z: number, offset_um: number) =>
+      put(count++, [x, y, z], offset_um);
     this.march.min.setScalar(-FAR);
     this.march.max.setScalar(FAR);
     this.march.plane.set(0, 0, 0, 1);
@@ -44,5 +53,15 @@ export class Cuts {
       this.march.plane.set(...plane.normal, plane.offset_um);
     }
     this.uCutCount.value = count;
+    this.march.corner.forEach((each, i) => {
+      const side = corner?.[i];
+      if (side === undefined) {
+        each.set(...NOWHERE);
+        this.uCuts.value[MOST + i].set(...NOWHERE);
+      } else {
+        each.set(...side.normal, side.offset_um);
+        put(MOST + i, side.normal, side.offset_um);
+      }
+    });
   }
 }

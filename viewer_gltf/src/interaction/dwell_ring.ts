@@ -13,6 +13,7 @@ import {
   RingGeometry,
   type Vector3,
 } from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 
 const DIAMETER_DEG = 1.5;
 const DOT_DEG = 0.3;
@@ -24,26 +25,33 @@ const WHITE = 0xffffff;
 const DARK = 0x0b0d12;
 const PARTS = 72;
 const INDICES_PER_PART = 6;
+const DOT_PARTS = 24;
+const DOT_INDICES = 3 * DOT_PARTS;
 /** Render order: after the volumes' picture, which covers all that is drawn before it. */
 const OVER_ALL = 2000;
 const RADIANS = Math.PI / 180;
 
 export class Ring {
   readonly group = new Group();
-  private readonly track = flat(new RingGeometry(HOLE - RIM, 1 + RIM, PARTS), DARK, 0.6);
+  /** Dot and ring of each colour are one thing to draw: the dot first, of the ring as much as shows. */
+  private readonly dark = flat(
+    new CircleGeometry(DOT_DEG / DIAMETER_DEG + RIM, DOT_PARTS),
+    new RingGeometry(HOLE - RIM, 1 + RIM, PARTS),
+    DARK,
+    0.6,
+  );
   /** Clockwise from the top, as a clock fills. */
-  private readonly fill = flat(
+  private readonly light = flat(
+    new CircleGeometry(DOT_DEG / DIAMETER_DEG, DOT_PARTS),
     new RingGeometry(HOLE, 1, PARTS, 1, Math.PI / 2, -2 * Math.PI),
     WHITE,
     1,
   );
-  private readonly rim = flat(new CircleGeometry(DOT_DEG / DIAMETER_DEG + RIM, 24), DARK, 0.6);
-  private readonly dot = flat(new CircleGeometry(DOT_DEG / DIAMETER_DEG, 24), WHITE, 1);
 
   constructor() {
     this.group.name = "ring";
     this.group.add(...this.parts);
-    // the dark ones first: they lie in one plane, so that nothing else gives their order
+    // the dark one first: they lie in one plane, so that nothing else gives their order
     this.parts.forEach((part, i) => {
       part.renderOrder = OVER_ALL + i;
     });
@@ -51,7 +59,7 @@ export class Ring {
   }
 
   private get parts() {
-    return [this.track, this.rim, this.fill, this.dot];
+    return [this.dark, this.light];
   }
 
   get isShown(): boolean {
@@ -65,10 +73,10 @@ export class Ring {
     this.group.scale.setScalar(radius_m);
     this.group.lookAt(eye);
     this.group.visible = true;
-    this.track.visible = canChoose;
-    const parts = Math.round(progress * PARTS);
-    this.fill.visible = parts > 0;
-    this.fill.geometry.setDrawRange(0, INDICES_PER_PART * parts);
+    const full = canChoose ? PARTS : 0;
+    this.dark.geometry.setDrawRange(0, DOT_INDICES + INDICES_PER_PART * full);
+    const filled = Math.round(progress * PARTS);
+    this.light.geometry.setDrawRange(0, DOT_INDICES + INDICES_PER_PART * filled);
   }
 
   hide(): void {
@@ -84,7 +92,8 @@ export class Ring {
 }
 
 function flat(
-  geometry: BufferGeometry,
+  dot: BufferGeometry,
+  ring: BufferGeometry,
   color: number,
   opacity: number,
 ): Mesh<BufferGeometry, MeshBasicMaterial> {
@@ -97,5 +106,5 @@ function flat(
     side: DoubleSide,
     toneMapped: false,
   });
-  return new Mesh(geometry, material);
+  return new Mesh(mergeGeometries([dot, ring]), material);
 }

@@ -46,6 +46,36 @@ describe("a glide", () => {
 const eye = ({ camera }: Navigation) => camera.position.toArray().map((v) => Number(v.toFixed(6)));
 
 describe("the opening", () => {
+  it("is framed in what is free of the picture, and in the middle of that", () => {
+    const [min, max] = [
+      [-0.6, -0.45, -0.225],
+      [0.6, 0.45, 0.225],
+    ];
+    for (const [aspect, top, bottom] of [
+      [1.5, 0, 0],
+      [0.84, 0.12, 0.24],
+      [1.5, 0.15, 0],
+    ]) {
+      const navigation = start();
+      navigation.fit(aspect, { top, bottom });
+      navigation.camera.updateMatrixWorld();
+      // from the left and from the upper edge of the picture, 0..1
+      const corners = Array.from({ length: 8 }, (_, i) => {
+        const corner = [0, 1, 2].map((axis) => ((i >> axis) & 1 ? max : min)[axis]);
+        const { x, y } = new Vector3(...corner).project(navigation.camera);
+        return [(1 + x) / 2, (1 - y) / 2] as const;
+      });
+      const across = corners.map(([x]) => x);
+      const down = corners.map(([, y]) => y);
+      const [first, last] = [Math.min(...down), Math.max(...down)];
+      expect(first).toBeGreaterThan(top);
+      expect(last).toBeLessThan(1 - bottom);
+      expect((first + last) / 2).toBeCloseTo((1 + top - bottom) / 2, 2);
+      expect((Math.min(...across) + Math.max(...across)) / 2).toBeCloseTo(0.5, 2);
+      expect(last - first).toBeGreaterThan(0.5 * (1 - top - bottom));
+    }
+  });
+
   it("turns slowly to and fro until someone moves, and stays where it is then", () => {
     const navigation = start();
     const still = azimuth(navigation);

@@ -6,8 +6,8 @@
  */
 import { PerspectiveCamera, Spherical, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { type Box, centerOf } from "../math/box";
-import { distanceToFrame, openingView, towardsEye } from "../render/opening_view";
+import type { Box } from "../math/box";
+import { frameBox, openingView, towardsEye } from "../render/opening_view";
 import { distanceToSee, framingDistance, type Placement } from "../render/placement";
 import type { Command } from "../state/commands";
 
@@ -38,6 +38,9 @@ export type Look = Readonly<{
   target: readonly [number, number, number];
 }>;
 
+/** Shares of the picture's height, at its edges, that something lies over. */
+export type Covered = Readonly<{ top: number; bottom: number }>;
+
 /** Largest difference of two numbers of a look that is the same, m. */
 const SAME_M = 1e-4;
 
@@ -59,6 +62,8 @@ export class Navigation {
   private readonly reach: Vector3;
   /** What is there of the specimen, room: the opening is framed on it. */
   private occupied: Box;
+  /** The opening is framed on what is free of the picture. */
+  private covered: Covered = { top: 0, bottom: 0 };
   /** The same as it was told. */
   private surrounded = "";
 
@@ -95,7 +100,8 @@ export class Navigation {
   }
 
   /** The window has this shape now. */
-  fit(aspect: number): void {
+  fit(aspect: number, covered: Covered = { top: 0, bottom: 0 }): void {
+    this.covered = covered;
     this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
     if (this.stand !== null) this.standAt(this.stand);
@@ -251,14 +257,18 @@ export class Navigation {
 
   /** The opening after so much of its turn. */
   private lookAround(swayed_s: number): Look {
-    const lens = { fov_rad: (FIELD_OF_VIEW_DEG * Math.PI) / 180, aspect: this.camera.aspect };
+    const { top, bottom } = this.covered;
+    const free = 1 - top - bottom;
+    const half = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360); // of the picture, a metre away
+    const lens = { fov_rad: 2 * Math.atan(free * half), aspect: this.camera.aspect / free };
     const still = openingView(this.occupied, lens);
     const sway_rad = SWAY_RAD * Math.sin((2 * Math.PI * swayed_s) / SWAY_S);
     const direction = { ...still, aside_rad: still.aside_rad + sway_rad };
-    const distance = Math.min(FARTHEST_M, distanceToFrame(this.occupied, direction, lens));
-    const middle = centerOf(this.occupied);
-    const [x, y, z] = towardsEye(direction).map((v, i) => middle[i] + v * distance);
-    return { position: [x, y, z], target: middle };
+    const framed = frameBox(this.occupied, direction, lens, (bottom - top) * half);
+    const target = new Vector3(...framed.target).clamp(this.reach.clone().negate(), this.reach);
+    const away_m = Math.min(FARTHEST_M, framed.distance);
+    const eye = target.clone().addScaledVector(new Vector3(...towardsEye(direction)), away_m);
+    return { position: eye.toArray(), target: target.toArray() };
   }
 
   /** Farthest distance of the eye from the middle during the opening's turn. */

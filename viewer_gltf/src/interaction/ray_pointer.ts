@@ -27,8 +27,8 @@ export interface Target {
   /** Drawn over what is nearer, so that it is met before it. */
   readonly isOnTop: boolean;
   meet(ray: RoomRay): Hit | null;
-  /** Chosen by dwell or button; what holds on to the ray is chosen before it is dragged. */
-  choose(hit: Hit, ray: RoomRay): void;
+  /** Chosen by dwell (`isByGaze`) or button; what holds on to the ray is chosen before it is dragged. */
+  choose(hit: Hit, ray: RoomRay, isByGaze: boolean): void;
   /** What holds on to the ray follows it, frame by frame; `key` is the hit's that was chosen. */
   drag?(key: string, ray: RoomRay): void;
 }

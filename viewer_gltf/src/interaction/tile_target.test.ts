@@ -14,17 +14,17 @@ describe("the tile along a ray", () => {
     specimen.matrixAutoUpdate = false;
     specimen.matrixWorld.makeScale(0.01, 0.01, 0.01).setPosition(-0.05, -0.05, -2);
     const chosen: unknown[] = [];
-    const target = new TileTarget(specimen, (ray, tile) => chosen.push([ray, tile]));
+    const target = new TileTarget(specimen, (...given) => chosen.push(given));
     target.tiles = TILES;
     const ray = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
     const hit = target.meet(ray);
     expect(hit?.key).toBe("tile:near");
     expect(hit?.distance_m).toBeCloseTo(1.8, 12);
-    if (hit !== null) target.choose(hit, ray);
-    const [[{ origin, direction }, tile]] = chosen as [
-      [{ origin: number[]; direction: number[] }, string],
+    if (hit !== null) target.choose(hit, ray, true);
+    const [[{ origin, direction }, ...named]] = chosen as [
+      [{ origin: number[]; direction: number[] }, string, boolean],
     ];
-    expect(tile).toBe("near");
+    expect(named).toEqual(["near", true]);
     expect(origin.map((v) => Math.round(v * 1e6) / 1e6)).toEqual([5, 5, 200]);
     expect(direction[2]).toBeCloseTo(-100, 9);
   });

@@ -18,7 +18,7 @@ export class TileTarget implements Target {
   /** @param onChoose the ray is in um of the specimen */
   constructor(
     private readonly specimen: Object3D,
-    private readonly onChoose: (ray: Ray, tile: string) => void,
+    private readonly onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void,
   ) {}
 
   meet(ray: RoomRay): Hit | null {
@@ -28,9 +28,9 @@ export class TileTarget implements Target {
     return met && { key: TILE + met.id, distance_m: met.distance };
   }
 
-  choose({ key }: Hit, ray: RoomRay): void {
+  choose({ key }: Hit, ray: RoomRay, isByGaze: boolean): void {
     if (key === null) return;
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
-    this.onChoose(rayAlong(ray, this.toSpecimen), key.slice(TILE.length));
+    this.onChoose(rayAlong(ray, this.toSpecimen), key.slice(TILE.length), isByGaze);
   }
 }

@@ -73,6 +73,26 @@ describe("a ray's span", () => {
   });
 });
 
+describe("a ray that begins in a corner that is gone", () => {
+  const corner = [
+    { normal: [1, 0, 0], offset_um: 10 },
+    { normal: [0, 1, 0], offset_um: 20 },
+    { normal: [0, 0, 1], offset_um: 30 },
+  ] as const;
+  const clip = { box: null, plane: null, corner };
+
+  it("meets what is kept from where it leaves the corner on", () => {
+    const ahead = (origin: Vec3, direction: Vec3) =>
+      clipSpan([0, 100], { origin, direction }, clip);
+    expect(ahead([50, 50, 50], [0, 0, -1])).toEqual([20, 100]);
+    expect(ahead([50, 50, 50], [-1, -1, 0])).toEqual([30, 100]); // by y, before x
+    expect(ahead([50, 50, 50], [0, 0, 1])).toBeNull(); // never leaves it
+    expect(ahead([50, 10, 50], [0, 0, -1])).toEqual([0, 100]); // beside it
+    expect(isKept([11, 21, 31], clip)).toBe(false);
+    expect(isKept([11, 21, 29], clip)).toBe(true);
+  });
+});
+
 describe("a box that is cut away", () => {
   const TILE: Box = { min: [10, -20, 0], max: [20, 0, 50] };
 

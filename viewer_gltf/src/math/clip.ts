@@ -8,8 +8,12 @@ import { AXES, along, dot, type Ray, type Vec3, withPart } from "./vec3";
 
 /** Kept is where normal · p <= offset_um; the normal, of unit length, leads to what is cut away. */
 export type ClipPlane = Readonly<{ normal: Vec3; offset_um: number }>;
-/** The kept part. null: not cut. */
-export type Clip = Readonly<{ box: Box | null; plane: ClipPlane | null }>;
+/** The kept part. null: not cut. `corner`: what lies beyond all of these planes is gone. */
+export type Clip = Readonly<{
+  box: Box | null;
+  plane: ClipPlane | null;
+  corner?: readonly ClipPlane[];
+}>;
 /** Nothing is cut. */
 export const WHOLE: Clip = { box: null, plane: null };
 
@@ -30,7 +34,7 @@ const THINNEST = 0.01;
 const PARALLEL = 1e-6;
 
 /** The part of a ray's span inside box and plane; null: nothing. */
-export function clipSpan(span: Span, ray: Ray, { box, plane }: Clip): Span | null {
+export function clipSpan(span: Span, ray: Ray, { box, plane, corner }: Clip): Span | null {
   const inBox = box === null ? span : boxSpan(span, ray, box);
   if (inBox === null) return null;
   let [from, to] = inBox;
@@ -41,14 +45,29 @@ export function clipSpan(span: Span, ray: Ray, { box, plane }: Clip): Span | nul
     else if (rate < 0) from = Math.max(from, depth / rate);
     else if (depth < 0) return null;
   }
+  if (corner !== undefined) from = cornerExit(from, ray, corner);
   return from < to ? [from, to] : null;
 }
 
+/** Where a ray that is in a corner at `from` leaves it; else `from`. */
+function cornerExit(from: number, ray: Ray, corner: readonly ClipPlane[]): number {
+  let [enters, leaves] = [Number.NEGATIVE_INFINITY, Number.POSITIVE_INFINITY];
+  for (const { normal, offset_um } of corner) {
+    const depth = offset_um - dot(normal, ray.origin);
+    const rate = dot(normal, ray.direction);
+    if (rate > 0) enters = Math.max(enters, depth / rate);
+    else if (rate < 0) leaves = Math.min(leaves, depth / rate);
+    else if (depth >= 0) return from;
+  }
+  return enters <= from ? Math.max(from, leaves) : from;
+}
+
 /** Whether a point is kept. */
-export function isKept(point: Vec3, { box, plane }: Clip): boolean {
+export function isKept(point: Vec3, { box, plane, corner }: Clip): boolean {
   const isInBox =
     box === null || AXES.every((i) => point[i] >= box.min[i] && point[i] <= box.max[i]);
-  return isInBox && (plane === null || dot(plane.normal, point) <= plane.offset_um);
+  const isBeyond = ({ normal, offset_um }: ClipPlane) => dot(normal, point) > offset_um;
+  return isInBox && !(plane !== null && isBeyond(plane)) && !corner?.every(isBeyond);
 }
 
 /** Whether nothing is left of a box. */

@@ -1,5 +1,7 @@
 import { describe, expect, it } from "vitest";
+import { isKept } from "./clip";
 import {
+  cornerTowards,
   meetSlices,
   outlineOf,
   placeIn,
@@ -94,6 +96,30 @@ describe("the slice planes", () => {
     const side = meetSlices({ origin: [99, -5, 12], direction: [-1, 0, 0] }, frames, BOX);
     expect(side?.point).toEqual([20, -5, 12]); // the plane yz
     expect(outlineOf(frames[0], BOX)).toHaveLength(4);
+  });
+
+  it("leave out the corner that faces the eye, and stay at it while the eye is about to pass one", () => {
+    const frames = sliceFrames({ point: [20, -10, 15], turn_deg: STRAIGHT }, BOX, null);
+    const clip = (eye: Vec3, before: ReturnType<typeof cornerTowards> = []) => ({
+      box: null,
+      plane: null,
+      corner: cornerTowards(eye, frames, before),
+    });
+    const all: Vec3[] = [-1, 1].flatMap((x) =>
+      [-1, 1].flatMap((y) => [-1, 1].map((z): Vec3 => [20 + 9 * x, -10 + 9 * y, 15 + 4 * z])),
+    );
+    for (const eye of all) {
+      expect(all.filter((p) => !isKept(p, clip(eye)))).toEqual([eye]);
+      expect(isKept([20, eye[1], eye[2]], clip(eye))).toBe(true); // on a plane
+    }
+    const [nearly, past, far]: Vec3[] = [
+      [20.1, -1, 19],
+      [19.9, -1, 19],
+      [19, -1, 19],
+    ];
+    const before = cornerTowards(nearly, frames, []);
+    expect(isKept(all[7], clip(past, before))).toBe(false);
+    expect(isKept(all[7], clip(far, before))).toBe(true);
   });
 
   it("turn about any direction, and back", () => {

@@ -6,6 +6,7 @@
  */
 import { Euler, Quaternion, Vector3 } from "three";
 import type { Box } from "./box";
+import type { ClipPlane } from "./clip";
 import { planeSection } from "./plane_box_section";
 import { AXES, dot, type Ray, type Vec3 } from "./vec3";
 
@@ -50,6 +51,31 @@ export function sharesOf(point: Vec3, { min, max }: Box): Vec3 {
     return edge > 0 ? Math.min(1, Math.max(0, (point[i] - min[i]) / edge)) : 0.5;
   };
   return [at(0), at(1), at(2)];
+}
+
+/** Of half a picture's longer edge: the corner ends so far before the planes, which lie in it by rounding else. */
+const BEFORE = 1e-5;
+/** Of the same: an eye that is nearer to a plane leaves the corner on the side where it was. */
+const LINGERS = 0.02;
+
+/**
+ * The corner between the planes that faces an eye: what it holds hides them. Normals lead to the eye.
+ *
+ * @param before the last one
+ */
+export function cornerTowards(
+  eye: Vec3,
+  frames: readonly SliceFrame[],
+  before: readonly ClipPlane[],
+): readonly ClipPlane[] {
+  return frames.map(({ origin, normal, half }, i) => {
+    const reach = Math.max(...half);
+    const away = dot(normal, eye) - dot(normal, origin);
+    const last = before[i] === undefined ? 0 : dot(before[i].normal, normal);
+    const side = Math.abs(away) < LINGERS * reach && last !== 0 ? last : away;
+    const towards = side < 0 ? negated(normal) : normal;
+    return { normal: towards, offset_um: dot(towards, origin) + BEFORE * reach };
+  });
 }
 
 const negated = ([x, y, z]: Vec3): Vec3 => [-x, -y, -z];

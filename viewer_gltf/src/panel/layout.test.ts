@@ -274,7 +274,11 @@ describe("the panel's layout", () => {
     for (const id of ["front", "side", "top", "reset", "share"] as const) {
       expect(find(layout, "button", id).to()).toBe(id);
     }
-    expect(layout.status).toBe("12 k triangles · volume level 1 · 12 ms");
+    expect(layout.status).toBe("12 k triangles · volumes at 1/2 detail · 12 ms");
+    const statusOf = (facts: Partial<Facts>) =>
+      laid(start(), START_VIEW, { ...FACTS, ...facts }).status;
+    expect(statusOf({ triangles: 0, volumeLevel: 0 })).toBe("volumes in full detail · 12 ms");
+    expect(statusOf({ triangles: 12, volumeLevel: null })).toBe("12 triangles · 12 ms");
     expect(find(layout, "text", "settings").value).toBe("64 steps a ray, 50 % resolution");
   });
 });

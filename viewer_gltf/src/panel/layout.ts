@@ -219,10 +219,21 @@ function samplesText(samples: number): string {
   return `${whole} of ${ENOUGH_SAMPLES} samples of light`;
 }
 
+function trianglesText(triangles: number): string {
+  if (triangles === 0) return "";
+  if (triangles < 1000) return `${triangles} triangles`;
+  return `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`;
+}
+
+/** Each level has half of the voxels along an edge. */
+function volumesText(level: number): string {
+  return level === 0 ? "volumes in full detail" : `volumes at 1/${2 ** level} detail`;
+}
+
 function statusOf({ triangles, volumeLevel, samples, frame_ms, isLoading }: Facts): string {
   return [
-    `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`,
-    volumeLevel === null ? "" : `volume level ${volumeLevel}`,
+    trianglesText(triangles),
+    volumeLevel === null ? "" : volumesText(volumeLevel),
     samples === null ? "" : samplesText(samples),
     frameText(frame_ms),
     isLoading ? "refining …" : "",

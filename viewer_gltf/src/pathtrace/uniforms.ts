@@ -2,7 +2,7 @@
 import { Matrix3, Matrix4, type Texture, Vector2, Vector3, Vector4 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import { SKIP_BRICK } from "../bundle/generated/constants";
-import { clipInto, type MarchClip } from "../gpu/clip_uniforms";
+import { clipInto, type MarchClip, noCorner } from "../gpu/clip_uniforms";
 import { nothing } from "../gpu/float_targets";
 import { LAMPS, type TraceSettings } from "../state/path_trace_settings";
 import { tableUniforms } from "../volumes/transfer_table_2d";
@@ -61,6 +61,7 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
     uClipLow: { value: new Vector3() },
     uClipHigh: { value: new Vector3() },
     uClipPlane: { value: new Vector4(0, 0, 0, 1) },
+    uCorner: { value: noCorner() },
     uToBox: { value: new Matrix4() },
     uSceneToBox: { value: new Matrix4() },
     uEyeAt: { value: new Vector3() },

@@ -17,7 +17,7 @@ import {
 import { BothEyes } from "../gpu/both_eyes";
 import type { Cuts } from "../gpu/clip_planes";
 import type { Eyes } from "../gpu/eyes";
-import { drawAllEyes, drawEyes } from "../gpu/offscreen_target";
+import { drawAllEyes } from "../gpu/offscreen_target";
 import { depthMaterial, PANES } from "../surfaces/blend_material";
 
 export class DepthPass {
@@ -58,9 +58,9 @@ export class DepthPass {
 
   /** Of translucent surfaces: they have their own way to write depth alone. */
   renderPanes(renderer: WebGLRenderer, scene: Scene, eyes: Eyes): void {
-    for (const { camera } of eyes.all) camera.layers.set(PANES);
-    withoutBackground(scene, () => drawEyes(renderer, scene, eyes, this.panes, 1));
-    for (const { camera } of eyes.all) camera.layers.set(0);
+    withoutBackground(scene, () =>
+      drawAllEyes(renderer, scene, eyes, this.both.cameraOf(eyes, PANES), this.panes),
+    );
   }
 
   dispose(): void {

@@ -136,6 +136,7 @@ export class Picture {
     const specimen = room.specimen.group.matrixWorld;
     renderer.info.reset();
     room.light(head);
+    this.both.takeIn(room.scene);
     this.cuts.follow(clip, specimen);
     this.aim(bounds, resolution);
     this.marchFrame.uIsCrossing.value = volumes.isInDisc;
@@ -150,7 +151,7 @@ export class Picture {
       ]);
     const isTraced = traced.isShown;
     if (isTraced || !volumes.isEmpty) opaque();
-    const isMarched = !volumes.isEmpty && !(isTraced && this.needsNoMarch(drawn, isMoving));
+    const isMarched = !volumes.isEmpty && !(isTraced && this.needsNoMarch(drawn, clip, isMoving));
     const isMixed = isMarched && !isTraced && hybrid.outer_rad > 0 && volumes.isPartlyInDisc;
     if (isMarched) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
@@ -206,13 +207,13 @@ export class Picture {
    * Whether the march need not stand in for what is traced, or what was marched last still does: the view is
    * at rest. Before a head, which never rests, it does until the first traced picture.
    */
-  private needsNoMarch({ volumes, traced }: Drawn, isMoving: boolean): boolean {
+  private needsNoMarch({ volumes, traced, solids }: Drawn, clip: Clip, isMoving: boolean): boolean {
     const isWorn = this.eyes.all.length > 1;
     if (isWorn && traced.standsAlone) {
       this.stoodIn = "";
       return true;
     }
-    const stoodIn = isMoving ? "" : JSON.stringify(volumes.status());
+    const stoodIn = isMoving ? "" : JSON.stringify([volumes.status(), clip, solids]);
     const isSame = stoodIn !== "" && stoodIn === this.stoodIn;
     this.stoodIn = stoodIn;
     return isSame;

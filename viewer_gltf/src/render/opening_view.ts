@@ -55,6 +55,45 @@ export function distanceToFrame({ min, max }: Box, direction: Direction, lens: L
   return needed;
 }
 
+/** Rounds in which middle and distance find each other. */
+const ROUNDS = 5;
+
+/**
+ * Where the eye looks, and from how far, so that a box is seen as large as fits and in the middle: its own
+ * middle is not there, since what is nearer is larger.
+ *
+ * @param up_tan how far above the picture's middle the box's is to be, a metre away
+ */
+export function frameBox(
+  { min, max }: Box,
+  direction: Direction,
+  lens: Lens,
+  up_tan = 0,
+): Readonly<{ target: Vec3; distance: number }> {
+  const half = FILL * Math.tan(lens.fov_rad / 2);
+  const axes = axesOf(direction);
+  const middle = max.map((v, i) => (v + min[i]) / 2);
+  const edges = max.map((v, i) => (v - min[i]) / 2);
+  const corners = Array.from({ length: 8 }, (_, corner) => {
+    const at = edges.map((edge, i) => ((corner >> i) & 1 ? edge : -edge));
+    return axes.map((axis) => axis.reduce((sum, v, i) => sum + v * at[i], 0));
+  });
+  let [right, up, distance] = [0, 0, 0];
+  for (let round = 0; round < ROUNDS; round++) {
+    const needs = corners.map(([x, y, z]) => {
+      return z + Math.max(Math.abs(y - up), Math.abs(x - right) / lens.aspect) / half;
+    });
+    distance = Math.max(...needs);
+    const across = corners.map(([x, , z]) => (x - right) / (distance - z));
+    const along = corners.map(([, y, z]) => (y - up) / (distance - z));
+    right += ((Math.max(...across) + Math.min(...across)) / 2) * distance;
+    up += ((Math.max(...along) + Math.min(...along)) / 2) * distance;
+  }
+  const lift = up - up_tan * distance;
+  const at = (i: 0 | 1 | 2) => middle[i] + axes[0][i] * right + axes[1][i] * lift;
+  return { target: [at(0), at(1), at(2)], distance };
+}
+
 /** About the share of the picture that the box covers. */
 function coverage(box: Box, direction: Direction, lens: Lens): number {
   const [x, y, z] = box.max.map((v, i) => v - box.min[i]);

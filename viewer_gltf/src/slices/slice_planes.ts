@@ -17,8 +17,9 @@ import { Label } from "../annotations/label";
 import type { Sight } from "../annotations/style";
 import { leaveUncut } from "../gpu/unclipped_material";
 import { AHEAD, type Box, boxSpan } from "../math/box";
+import type { ClipPlane } from "../math/clip";
 import { MOST_CORNERS } from "../math/plane_box_section";
-import { outlineOf, placeIn, type SliceFrame } from "../math/slice_frame";
+import { cornerTowards, outlineOf, placeIn, type SliceFrame } from "../math/slice_frame";
 import type { Vec3 } from "../math/vec3";
 import type { SliceImages } from "./slice_images";
 
@@ -92,6 +93,7 @@ export class SlicePlanes {
   /** How often they were placed otherwise. */
   private placed = 0;
   private place = "";
+  private corner: readonly ClipPlane[] = [];
 
   constructor(private readonly images: SliceImages) {
     this.planes = images.canvases.map((canvas) => new Plane(canvas));
@@ -142,6 +144,14 @@ export class SlicePlanes {
       });
     });
     this.lines.geometry.attributes.position.needsUpdate = true;
+  }
+
+  /** The corner before them, towards an eye (um, world), which hides them; none: they don't show. */
+  cornerTowards(eye: Vec3): readonly ClipPlane[] | undefined {
+    const { frames } = this.images;
+    if (!this.group.visible || frames === null) return undefined;
+    this.corner = cornerTowards(eye, frames, this.corner);
+    return this.corner;
   }
 
   /** Changes with what the planes hide: so many of them, however they lie; 0: none. */

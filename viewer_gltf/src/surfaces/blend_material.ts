@@ -21,10 +21,8 @@ import {
 import {
   type BothEyes,
   type BothEyesUniforms,
-  forBoth,
   NOT_THE_OTHERS,
   NOT_THE_OTHERS_DECLARED,
-  SOLIDS,
   TO_EACH_EYE,
   TO_EACH_EYE_DECLARED,
 } from "../gpu/both_eyes";
@@ -69,9 +67,19 @@ export type Share = Readonly<{
   isInDisc: boolean;
   /** Whether the volumes' picture is mixed with the surfaces' in the disc. */
   isCrossing: boolean;
+  /** Of the shown channels: where two surfaces lie in one place, as where the data end, the first shows. */
+  rank: number;
 }>;
 
-const VARYINGS = "varying vec3 vRoom;\nvarying float vEye;\n";
+/**
+ * Of depth, between one channel and the next: more than coordinates differ by that are quantized apart; about
+ * a millimetre of a specimen that is 1.2 m long in the room.
+ */
+const UNITS_APART = 32;
+/** Of depth, between a translucent surface's colour and what writes its depth before. */
+const UNITS_BEHIND = 2;
+
+const VARYINGS = "varying vec3 vRoom;\n";
 const DECLARED = includeChunks(
   `${VARYINGS}${NOT_THE_OTHERS_DECLARED}
 #include <chunks/clip_planes>
@@ -111,7 +119,7 @@ export function depthMaterial(
     colorWrite: false,
     side: DoubleSide,
     uniforms,
-    vertexShader: `${VARYINGS.replaceAll("varying", "out")}${TO_EACH_EYE_DECLARED}
+    vertexShader: `${VARYINGS}${TO_EACH_EYE_DECLARED}
 void main() {
   vec3 transformed = position;
   vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
@@ -119,7 +127,7 @@ void main() {
   gl_Position = projectionMatrix * mvPosition;
   ${TO_EACH_EYE}
 }`,
-    fragmentShader: `${DECLARED.replaceAll("varying", "in")}
+    fragmentShader: `${DECLARED}
 out vec4 oColor;
 void main() {
   ${NOT_THE_OTHERS}
@@ -168,7 +176,6 @@ const LAID_OVER = {
 export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
-  private readonly meshes: readonly Mesh[];
   private readonly twins: readonly Mesh[];
   isBlended = false;
   isPane = false;
@@ -195,18 +202,14 @@ export class BlendedSurface {
     this.depth = depthMaterial(this.uniforms, both, "if (isGone()) discard;");
     // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
     // what lies behind a rim through.
-    this.depth.polygonOffset = true;
-    this.depth.polygonOffsetFactor = 0;
-    this.depth.polygonOffsetUnits = 2;
+    for (const material of [...materials, this.depth]) {
+      material.polygonOffset = true;
+      material.polygonOffsetFactor = 0;
+    }
     const meshes: Mesh[] = [];
     scene.traverse((object) => {
       if (object instanceof Mesh) meshes.push(object);
     });
-    for (const mesh of meshes) {
-      mesh.geometry = forBoth(mesh.geometry);
-      mesh.layers.set(SOLIDS);
-    }
-    this.meshes = meshes;
     this.twins = meshes.map((mesh) => {
       const twin = new Mesh(mesh.geometry, this.depth);
       twin.renderOrder = AFTER_OPAQUE;
@@ -241,7 +244,7 @@ export class BlendedSurface {
     material.customProgramCacheKey = () => "blended";
   }
 
-  set({ opacity, taken, isInDisc, isCrossing }: Share): void {
+  set({ opacity, taken, isInDisc, isCrossing, rank }: Share): void {
     const crosses = isInDisc && isCrossing;
     this.uniforms.uOpacity.value = opacity;
     this.uniforms.uTaken.value = taken;
@@ -251,14 +254,15 @@ export class BlendedSurface {
     this.isPane = this.isBlended && !crosses;
     this.isSolid = isInDisc && opacity === 1;
     this.scene.visible = opacity > 0 && (taken < 1 || isInDisc);
+    this.depth.polygonOffsetUnits = rank * UNITS_APART + UNITS_BEHIND;
     for (const material of this.materials) {
+      material.polygonOffsetUnits = rank * UNITS_APART;
       material.stencilWrite = crosses && this.isBlended;
       if (material.transparent === this.isBlended) continue;
       material.transparent = this.isBlended;
       material.blending = this.isBlended ? CustomBlending : NormalBlending;
       material.needsUpdate = true; // an opaque surface's shader leaves its alpha out
     }
-    for (const mesh of this.meshes) mesh.layers.set(this.isBlended ? 0 : SOLIDS);
     for (const twin of this.twins) {
       twin.visible = this.isBlended;
       if (this.isPane) twin.layers.enable(PANES);

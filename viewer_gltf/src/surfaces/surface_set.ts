@@ -164,6 +164,7 @@ export class SurfaceSet {
       taken: taken ?? 0,
       isInDisc: isInDisc(state, channel),
       isCrossing: this.isCrossing(),
+      rank: state.channels.filter(({ shown }) => shown).indexOf(channel),
     });
     paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
   }

@@ -30,7 +30,13 @@ import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { TileVolume } from "../bundle/generated/volumes";
 import { COLUMNS, ROWS } from "../bundle/transfer_2d";
 import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
-import { boxAround, type ClipUniforms, clipInto, type MarchClip } from "../gpu/clip_uniforms";
+import {
+  boxAround,
+  type ClipUniforms,
+  clipInto,
+  type MarchClip,
+  noCorner,
+} from "../gpu/clip_uniforms";
 import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
 import type { Vec3 } from "../math/vec3";
@@ -230,6 +236,7 @@ export class TileMarch {
         uClipLow: { value: new Vector3() },
         uClipHigh: { value: size.clone() },
         uClipPlane: { value: new Vector4(0, 0, 0, 1) },
+        uCorner: { value: noCorner() },
         uVolume: { value: null },
         uIndex: { value: null },
         uOldVolume: { value: null },

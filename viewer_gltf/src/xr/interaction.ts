@@ -48,8 +48,8 @@ export type HandsOptions = Readonly<{
   layOut: (view: PanelView) => Layout;
   onAction: (action: Action) => void;
   onCommand: (command: Command) => void;
-  /** A tile was chosen by dwell or button; the ray is in um of the specimen. */
-  onChoose: (ray: Ray, tile: string) => void;
+  /** A tile was chosen by dwell (`isByGaze`) or button; the ray is in um of the specimen. */
+  onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void;
   /** Stereo is to end. */
   onLeave: () => void;
   /** The phone is in a viewer of other lenses. */
@@ -122,16 +122,12 @@ export class Hands {
     });
     this.tiles = new TileTarget(specimen.group, options.onChoose);
     this.targets = [...this.panel.targets, ...handles, this.tiles];
-    scene.add(...this.groups);
+    scene.add(...this.overlays);
   }
 
   /** What is no opaque thing, which the pass for the depth has to leave out. */
   get overlays() {
-    return [this.panel.group, this.ring.group, this.notice.mesh];
-  }
-
-  private get groups() {
-    return [this.controllers.group, ...this.overlays];
+    return [this.controllers.group, this.panel.group, this.ring.group, this.notice.mesh];
   }
 
   /** The target met now, for tests and for names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
@@ -222,13 +218,13 @@ export class Hands {
     const hasHeld = this.hold(dt_s);
     const hasFollowed = this.followHead(dt_s, state);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
-    const isRepainted = this.panel.update(dt_s, head, state, () => this.around(state));
+    const isRepainted = this.panel.update(dt_s, head, state);
     const isNoticeNew = this.notice.update(dt_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
     if (fired?.key === GAZE_SWITCH && state.isDwellOn) this.announce(KEEPS_GAZE);
     else if (fired !== null) {
-      this.choose(fired);
+      this.choose(fired, true);
       if (fired.repeats !== undefined) this.goesOn = { met: fired, source: null, elapsed_s: 0 };
     }
     const hasGone = this.goOn(dt_s, state);
@@ -239,7 +235,7 @@ export class Hands {
   dispose(): void {
     this.stop();
     const { scene } = this.options;
-    scene.remove(...this.groups);
+    scene.remove(...this.overlays);
     this.panel.dispose();
     this.notice.dispose();
     this.controllers.dispose();
@@ -286,7 +282,7 @@ export class Hands {
     const met = meetFirst(ray ?? this.gaze, this.free);
     // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
     const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
-    if (met !== null && isUsed) met.target.choose(met, met.ray);
+    if (met !== null && isUsed) met.target.choose(met, met.ray, false);
     if (met?.repeats !== undefined) this.goesOn = { met, source, elapsed_s: 0 };
     const at = this.handOf(source)?.pose?.position ?? null;
     return { met, at, elapsed_s: 0, isUsed };
@@ -319,10 +315,10 @@ export class Hands {
     if (met !== null) this.choose(met);
   }
 
-  private choose(met: Met): void {
+  private choose(met: Met, isByGaze = false): void {
     if (met.key === null) return;
     this.pointer.press(met.key);
-    met.target.choose(met, met.ray);
+    met.target.choose(met, met.ray, isByGaze);
     if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
   }
 

@@ -1,5 +1,5 @@
 /** Stereo, whichever way: a headset's session, or a split screen in a phone's viewer. */
-import { type Camera, Matrix4, type WebGLRenderer } from "three";
+import { type Camera, MathUtils, Matrix4, Vector3, type WebGLRenderer } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Eyes } from "../gpu/eyes";
 import type { Command } from "../state/commands";
@@ -9,11 +9,15 @@ import { askInTap } from "./cardboard/user_gesture";
 import type { Profile } from "./cardboard/viewer_profile";
 import { betweenEyes } from "./head_pose";
 import { Hands, type HandsOptions } from "./interaction";
+import { bearingOf, headBearing } from "./panel/placement";
 import { XrSession } from "./session";
 import { spreadEyes } from "./stereo_strength";
 
 export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
   Readonly<{ onStart: () => void; onEnd: () => void }>;
+
+/** A control of the panel in the room: how far to the right of where the head faces, and above its level. */
+export type MenuEntry = Readonly<{ id: string; right_deg: number; up_deg: number }>;
 
 export type EyeSettings = Readonly<{
   distance_m: number;
@@ -24,9 +28,7 @@ export type EyeSettings = Readonly<{
 }>;
 
 /** On a card before the eyes when stereo begins. */
-export const HOW_IT_WORKS =
-  "Menu: look down and press. A press chooses what you look at; held, it takes the specimen along " +
-  "with your head: tilt down, and it comes nearer.";
+export const HOW_IT_WORKS = "Look down: menu.\nPress: choose.\nHold: it follows you.";
 /** Whoever has seen it so often knows. */
 const TOLD_OFTEN = 3;
 const TOLD_KEY = "stereocell-told";
@@ -169,8 +171,10 @@ export class Stereo {
   /** Take what the head looks at for ahead. Returns its pose then; null: no stereo. */
   recentre(): Matrix4 | null {
     if (this.split?.isRunning) {
+      const before = this.split.head.clone();
       this.split.recentre();
       this.split.update();
+      this.hands.panel.comeAlong(before, this.split.head);
     }
     return this.head;
   }
@@ -213,6 +217,22 @@ export class Stereo {
   /** Say something before the eyes; nothing where there is no stereo. */
   announce(text: string): void {
     this.hands.announce(text);
+  }
+
+  /** What the panel in the room has now, and its button. */
+  get menu(): readonly MenuEntry[] {
+    const { head } = this;
+    if (head === null) return [];
+    const eye = new Vector3().setFromMatrixPosition(head);
+    const { yaw } = headBearing(head);
+    return this.hands.panel.places.map(({ id, at }) => {
+      const bearing = bearingOf(at.sub(eye));
+      return {
+        id,
+        right_deg: MathUtils.radToDeg(bearing.yaw - yaw),
+        up_deg: MathUtils.radToDeg(bearing.pitch),
+      };
+    });
   }
 
   /** Open or close the panel in the room; false: no stereo. */

@@ -167,6 +167,34 @@ describeInChromium("marks", () => {
     await shoot("angle-and-line");
   });
 
+  it("have labels that lie beside one another, though what they name crosses", async () => {
+    await look([0.1, 0.1, 1.5]);
+    await page.evaluate(() => {
+      const { bench } = window;
+      // three distances with one middle, and the values of the last one's ends
+      for (const [x, y] of [
+        [200, 0],
+        [0, 100],
+        [150, 10],
+      ]) {
+        for (const sign of [-1, 1]) {
+          bench?.dispatch({ type: "add-point", point: [500 + sign * x, -200 + sign * y, 190] });
+        }
+      }
+    });
+    await page.waitForTimeout(300);
+    const boxes = await page.evaluate(() => window.bench?.labelBoxes() ?? []);
+    expect(boxes.length).toBeGreaterThanOrEqual(3);
+    boxes.forEach((a, i) => {
+      for (const b of boxes.slice(i + 1)) {
+        const isBeside = a.x + a.width <= b.x || b.x + b.width <= a.x;
+        const isAbove = a.y + a.height <= b.y || b.y + b.height <= a.y;
+        expect(isBeside || isAbove, JSON.stringify([a, b])).toBe(true);
+      }
+    });
+    await shoot("labels-apart");
+  });
+
   it("show the channels' values there, on the source's scale", async () => {
     await look([0, 0, 1.6]);
     await page.evaluate(() =>

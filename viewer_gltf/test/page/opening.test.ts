@@ -83,6 +83,10 @@ describeInChromium("the opening", () => {
       await stand.viewer.open(address(query));
       await stand.viewer.still(); // which a turn would never be
     }
+    // the way to volumes is told only where there is one
+    const hint = page().locator('[data-overlay="hint"]');
+    await stand.viewer.chooseMode("off");
+    expect(await hint.textContent()).toBe("drag to turn, wheel to zoom");
     await page().emulateMedia({ reducedMotion: "reduce" });
   });
 });

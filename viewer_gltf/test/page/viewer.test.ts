@@ -235,12 +235,24 @@ describeInChromium("the viewer", () => {
     expect(await notices.textContent()).not.toContain("not found (404)");
   });
 
-  it("draws no frames while nothing changes", async () => {
+  it("draws no frames while nothing changes, and hardly asks for any", async () => {
     await stand.open();
     await stand.viewer.settled();
     const frames = () => stand.viewer.page.evaluate(() => window.stereocell?.frames);
     const before = await frames();
-    await stand.viewer.page.waitForTimeout(400);
+    await stand.viewer.page.waitForTimeout(700); // it looks on for half a second
+    const asked = await stand.viewer.page.evaluate(async () => {
+      const ask = window.requestAnimationFrame;
+      let count = 0;
+      window.requestAnimationFrame = (draw) => {
+        count++;
+        return ask(draw);
+      };
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+      window.requestAnimationFrame = ask;
+      return count;
+    });
+    expect(asked).toBeLessThanOrEqual(10);
     expect(await frames()).toBe(before);
   });
 });

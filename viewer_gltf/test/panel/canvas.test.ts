@@ -23,7 +23,28 @@ describeInChromium("the panel in the room", () => {
     await hands().lookAt(await hands().controlAt(id, across));
   }
 
-  it("opens by a look down, beside the specimen, and closes again", async () => {
+  it("opens straight below the gaze, also of one who has turned round", async () => {
+    await hands().gazeOnly();
+    for (const [x, z] of [
+      [0, -1],
+      [0.6, -0.8],
+      [-0.3, 0.95],
+    ]) {
+      await hands().lookAt([x, 0, z]);
+      await hands().wait(3); // the button follows
+      await hands().openPanel();
+      const [aside, up] = await hands().page.evaluate(() => window.hands.panelAt());
+      expect(aside).toBeCloseTo(0, 1);
+      expect(up).toBeCloseTo(-30, 1);
+      await hands().lookAt([x, 0, z]);
+      const [asideOfGaze] = await hands().page.evaluate(() => window.hands.panelAt());
+      expect(Math.abs(asideOfGaze)).toBeLessThan(16);
+      await gazeAt("close");
+      await hands().tap();
+    }
+  });
+
+  it("opens by a look down, below the specimen, and closes again", async () => {
     await hands().gazeOnly();
     expect((await hands().status()).isOpen).toBe(false);
     await gazeAt("opener");

@@ -225,11 +225,20 @@ describeInChromium("the panel", () => {
     await page().keyboard.press("o"); // no key works behind it
     expect((await first()).opacity).toBe(1);
     if (SHOTS !== undefined) await page().screenshot({ path: join(SHOTS, "keys.png") });
+    const find = dialog.locator('[data-control="find-key"]');
+    const labels = () => dialog.locator("dd:visible").allTextContents();
+    const all = (await labels()).length;
+    await find.fill("cut box");
+    expect(await labels()).toEqual(["Cut by a box: on or off"]);
+    await find.fill("no such key");
+    expect(await labels()).toEqual([]);
+    expect(await dialog.textContent()).toContain("No key is named so.");
     await page().keyboard.press("Escape");
     expect(await dialog.isVisible()).toBe(false);
     for (const isOpen of [true, false]) {
       await page().keyboard.press("?");
       expect(await dialog.isVisible()).toBe(isOpen);
+      if (isOpen) expect((await labels()).length).toBe(all); // what was sought is forgotten
     }
   });
 });

@@ -615,4 +615,17 @@ describeInChromium("the path tracer's chunks", () => {
       expect(found[k]).toBeCloseTo(v, 5); // two voxels are 1 um
     });
   });
+
+  it("find no gradient of what goes up and down beside: terraces of a sharp edge, noise", async () => {
+    const head = `const float uVoxel = 0.5;
+      vec4 sampleIntensities(vec3 p) {
+        vec3 um = (p - 0.5) * 10.0;
+        return vec4(0.1 * sign(um.x) * cos(3.14159265 * um.y) + 0.2 * um.z, 0.0, 0.0, 0.0);
+      }`;
+    const body = "oColor = vec4(gradientAt(vec3(0.5), vec3(0.1), vec4(1.0)), 1.0);";
+    const [x, y, z] = await run(["gradient"], head, body);
+    expect(x).toBeCloseTo(0, 5); // 0.2 along the axis alone
+    expect(y).toBeCloseTo(0, 5);
+    expect(z).toBeCloseTo(0.2, 5);
+  });
 });

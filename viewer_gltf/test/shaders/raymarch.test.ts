@@ -94,11 +94,18 @@ describeInChromium("the ray-march", () => {
     expect(alpha).toBeCloseTo(red, 2);
   });
 
+  it("shows the middle of a channel's window half as bright on the screen as its end", async () => {
+    const [red] = await bare.call("meanAlong", "maximum", "uniform", 67, 255, [0, 2]);
+    expect(red).toBeCloseTo(((0.5 + 0.055) / 1.055) ** 2.4, 2); // light of an sRGB of a half
+  });
+
   it("adds up what lies along a ray, without a veil", async () => {
-    // 64 voxels of 8 of 255 each, at an eighth; opacities would veil: 1 - (247 / 255) ** 64 = 0.87
-    const [red, , , alpha] = await bare.call("meanAlong", "sum", "uniform", 67, 8);
-    expect(red).toBeCloseTo((64 * 8) / 255 / 8, 2);
-    expect(alpha).toBe(0); // what lies behind is seen as it is
+    // however many voxels a specimen has, 4 where it is opaque; opacities would veil: 0.98
+    for (const side of [67, 35]) {
+      const [red, , , alpha] = await bare.call("meanAlong", "sum", "uniform", side, 16);
+      expect(red).toBeCloseTo((4 * 16) / 255, 2);
+      expect(alpha).toBe(0); // what lies behind is seen as it is
+    }
   });
 
   it("averages pictures of a view at rest", async () => {

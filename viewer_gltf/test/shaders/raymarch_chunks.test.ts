@@ -17,9 +17,11 @@ describeInChromium("the shader's chunks", () => {
   const vec = (...v: number[]) => `vec${v.length}(${v.map((n) => n.toExponential(9)).join(", ")})`;
 
   it("cut a ray's span by box and plane", async () => {
-    const clip = async (plane: number[], dir: number[]) => {
+    const nowhere = [0, 0, 0, 1];
+    const clip = async (plane: number[], dir: number[], corner = [nowhere, nowhere, nowhere]) => {
       const head = `const vec3 uClipLow = vec3(-1.0); const vec3 uClipHigh = vec3(1.0, 1.0, 3.0);
-        const vec4 uClipPlane = ${vec(...plane)};`;
+        const vec4 uClipPlane = ${vec(...plane)};
+        const vec4 uCorner[3] = vec4[3](${corner.map((each) => vec(...each)).join(", ")});`;
       const call = `vec3 dir = ${vec(...dir)};
         oColor = clipSpan(vec2(0.0, 20.0), vec3(0.0, 0.0, -5.0), dir, 1.0 / dir).xyxy;`;
       return (await run(["intersect_box", "clip_span"], head, call)).slice(0, 2);
@@ -31,6 +33,15 @@ describeInChromium("the shader's chunks", () => {
     const [from, to] = await clip([1, 0, 0, -0.5], ahead); // beside the ray: all is cut away
     expect(from).toBeGreaterThan(to);
     expect(await clip([1, 0, 0, 0.5], ahead)).toEqual([4, 8]); // beside the ray: nothing is
+    // the corner x > -0.5, y > -0.5, z < 0, in which the ray begins; and one beside it
+    const [x, y, z] = [
+      [1, 0, 0, -0.5],
+      [0, 1, 0, -0.5],
+      [0, 0, -1, 0],
+    ];
+    expect(await clip(nowhere, ahead, [x, y, z])).toEqual([5, 8]);
+    expect(await clip(nowhere, ahead, [[1, 0, 0, 0.5], y, z])).toEqual([4, 8]);
+    expect(await clip(nowhere, ahead, [x, y, [0, 0, 1, 0]])).toEqual([4, 8]); // only behind
   });
 
   it("cut a ray's span by the disc's cone, seen from its apex or from another eye", async () => {
@@ -161,11 +172,13 @@ describeInChromium("the shader's chunks", () => {
   });
 
   it("return the cut by which a ray came in", async () => {
-    const cut = async (planes: number[][], body: string) => {
-      const lines = planes.map((plane, i) => `uCutsGiven[${i}] = ${vec(...plane)};`).join("\n");
+    const cut = async (planes: number[][], body: string, corner = Array(3).fill([0, 0, 0, 1])) => {
+      const given = (plane: number[], i: number) => `uCutsGiven[${i}] = ${vec(...plane)};`;
+      const bounds = corner.map((plane, i) => given(plane, 7 + i));
+      const lines = [...planes.map(given), ...bounds].join("\n");
       const chunks = await readChunks("clip_planes");
       const text = chunks["chunks/clip_planes"]
-        .replace("uniform vec4 uCuts[7];", "vec4 uCutsGiven[7];")
+        .replace("uniform vec4 uCuts[10];", "vec4 uCutsGiven[10];")
         .replace("uniform int uCutCount;", `const int uCutCount = ${planes.length};`)
         .replaceAll("uCuts[", "uCutsGiven[");
       return runProgram(
@@ -179,6 +192,14 @@ describeInChromium("the shader's chunks", () => {
     const isCut = (p: string) => cut([front], `oColor = vec4(isCut(${p}) ? 1.0 : 0.0);`);
     expect((await isCut("vec3(0.0, 0.0, 3.0)"))[0]).toBe(1);
     expect((await isCut("vec3(0.0, 0.0, 1.0)"))[0]).toBe(0);
+    const octant = [
+      [1, 0, 0, 0],
+      [0, 1, 0, 0],
+      [0, 0, 1, 0],
+    ];
+    const inCorner = (p: string) => cut([], `oColor = vec4(isCut(${p}) ? 1.0 : 0.0);`, octant);
+    expect((await inCorner("vec3(1.0, 1.0, 1.0)"))[0]).toBe(1);
+    expect((await inCorner("vec3(1.0, -1.0, 1.0)"))[0]).toBe(0);
     const right = [1, 0, 0, 1]; // gone is x > 1
     const normal = (eye: string) =>
       cut([front, right], `oColor = vec4(cutNormal(${eye}, vec3(0.0)), 1.0);`);
@@ -430,7 +451,8 @@ describeInChromium("the shader's chunks", () => {
 
     it("not at all where there is no direction or only noise, and fades in between", async () => {
       // the lamp stands beside the eye, and behind the boundary, which would be dark
-      const steep = (step: number) => lit([-step, 0, 0], [0, 0, -1], [-1, 0, 1]); // over 1 um
+      const edgewise = [-1e-5, 0, -1]; // but for rounding, to either side of which it turns
+      const steep = (step: number) => lit([-step, 0, 0], edgewise, [-1, 0, 1]); // over 1 um
       const even = 1.2 * (AMBIENT + DIFFUSE * Math.SQRT1_2); // as on what faces the eye
       expect(await steep(0)).toBeCloseTo(even, 4);
       expect(await steep(0.03)).toBeCloseTo(even, 4);

@@ -1,5 +1,6 @@
 /** The three slices in the page: pictures, crosshair, keys, values, and planes in the specimen. */
 import { beforeAll, expect, it } from "vitest";
+import { project } from "../support/browser/camera";
 import { difference, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -99,6 +100,43 @@ describeInChromium("slices", () => {
     expect(difference(await takePicture(page()), without)).toBeGreaterThan(0.1);
     if (SHOTS) await page().screenshot({ path: `${SHOTS}/planes.png` });
   });
+});
+
+describeInChromium("planes in the specimen", () => {
+  const viewport = { width: 480, height: 272 };
+  const stand = prepareStand({ viewport });
+
+  for (const mode of ["off", "all"]) {
+    it(`are not hidden by what lies between them and the eye, volumes ${mode}`, async () => {
+      const { min, max } = stand.manifest.specimen.bounds_um;
+      const at = async (cut: string) => {
+        const slices = "&planes=on&slice-x=0.1&slice-y=0.1&slice-z=0.3";
+        await stand.open(`&mode=${mode}&switch=9&quality=high#v=1&depth=0${slices}${cut}`);
+        await stand.viewer.settled();
+        return takePicture(stand.viewer.page);
+      };
+      const bare = await at(`&box=${[...max.map((v) => v - 1), ...max].join(",")}`); // nothing left
+      const whole = await at("");
+      let [alike, lit] = [0, 0];
+      for (let x = 0.2; x < 0.9; x += 0.02) {
+        for (let y = 0.2; y < 0.9; y += 0.02) {
+          const point = ([x, y, 0.3] as const).map((v, i) => min[i] + v * (max[i] - min[i]));
+          const { x: px, y: py } = project(
+            point as unknown as readonly [number, number, number],
+            stand.manifest.specimen.bounds_um,
+            whole.width,
+            whole.height,
+          );
+          const [a, b] = [bare.at(px, py), whole.at(px, py)];
+          if (a.every((v, i) => Math.abs(v - b[i]) < 4)) alike++;
+          if (Math.max(...b) > 40) lit++;
+        }
+      }
+      expect(lit).toBeGreaterThan(50);
+      // what sticks out beside the corner is in front of some
+      expect(alike / 36 ** 2).toBeGreaterThan(0.9);
+    });
+  }
 });
 
 describeInChromium("slices whose code does not come", () => {

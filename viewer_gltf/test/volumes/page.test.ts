@@ -140,6 +140,21 @@ describeInChromium("volumes", () => {
     for (const [path, found] of await asked()) expect(found, path).toEqual([FIRST, FINEST]);
   });
 
+  it("are gone with the frame after one that took longer than they fade", async () => {
+    await addClock(page());
+    await stand.open("&mode=off&switch=9&quality=high");
+    await stand.viewer.settled();
+    const surfaces = await takePicture(page());
+    await stand.viewer.chooseMode("all");
+    const drawn = await takePicture(page());
+    expect(apart(drawn, surfaces)).toBeGreaterThan(0.5);
+    await holdFrames(page());
+    await page().locator('[data-mode="off"]').setChecked(true, { force: true });
+    await tick(page(), 16);
+    await tick(page(), 1800); // so slow a device
+    expect(apart(await takePicture(page()), surfaces)).toBeLessThan(0.02);
+  });
+
   it("fade from one level to the next", async () => {
     await addClock(page());
     const release = await holdBack(FINEST);

@@ -60,6 +60,49 @@ describeInChromium("in stereo", () => {
     }
   });
 
+  it("a slice's plane lies where both eyes should see it, over all of the specimen", async () => {
+    const { viewer } = stand;
+    const at = 0.9; // of the specimen's depth: before most of it
+    await addHeadset(viewer.page);
+    await stand.open(`&mode=off&quality=high#v=1&slice-z=${at}`);
+    await viewer.enterStereo();
+    await viewer.settled();
+    const look = () => Promise.all(EYES.map(([left]) => pictureOf(left)));
+    const without = await look();
+    await viewer.page.keyboard.press("|");
+    await viewer.settled();
+    await expect.poll(async () => (await viewer.snapshot()).told.length).toBe(0);
+    const shown = await look();
+    const { scale, center } = place(stand.manifest.specimen.bounds_um);
+    const { min, max } = stand.manifest.specimen.bounds_um;
+    const depth = XR_DISTANCE_M - (min[2] + at * (max[2] - min[2]) - center[2]) * scale;
+    const perMetre = FOCAL_PX / depth;
+    const columns = EYES.map(([, side], i) => {
+      // the middle of each half of the plane, up and down, where no line nor letter is
+      const [a, b] = [shown[i], without[i]];
+      const differs = (x: number, y: number) =>
+        a.at(x, y).some((v, k) => Math.abs(v - b.at(x, y)[k]) > 8);
+      const rows = [0.25, 0.75].map((share) => {
+        const y = min[1] + share * (max[1] - min[1]) - center[1];
+        return Math.round(VIEWPORT.height / 2 - perMetre * y * scale);
+      });
+      const found = Array.from({ length: HALF_PX }, (_, x) => x).filter((x) =>
+        rows.some((row) => differs(x, row)),
+      );
+      const wanted = [min[0], max[0]].map(
+        (x) => HALF_PX / 2 + perMetre * ((x - center[0]) * scale - (side * PUPILS_M) / 2),
+      );
+      return { found, wanted };
+    });
+    const ends = columns.map(({ found, wanted }) => {
+      const [left, right] = [found[0], (found.at(-1) ?? 0) + 1];
+      expect(Math.abs(left - wanted[0])).toBeLessThan(1.5);
+      expect(Math.abs(right - wanted[1])).toBeLessThan(1.5);
+      return (left + right) / 2;
+    });
+    expect(Math.abs(ends[0] - ends[1] - perMetre * PUPILS_M)).toBeLessThan(1);
+  });
+
   for (const [as, query] of [
     ["surface", "&mode=off"],
     ["volume", "&mode=all"],

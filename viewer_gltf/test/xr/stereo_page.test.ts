@@ -1,16 +1,61 @@
 /** The whole page in stereo: what hands and gaze do to it, and how it ends. */
+import type { Page } from "playwright-core";
 import { expect, it } from "vitest";
 import { addHeadset } from "../support/browser/chromium";
 import { isBackground, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
-import { prepareStand } from "../support/browser/stand";
+import { DEMO_BUNDLE, prepareStand } from "../support/browser/stand";
 
 type Headset = import("iwer").XRDevice;
+
+/** To the floor, or straight ahead. */
+const DOWN = [-Math.SQRT1_2, 0, 0, Math.SQRT1_2] as const;
+const AHEAD = [0, 0, 0, 1] as const;
+
+/** Both controllers of the page's headset, beside the head. */
+function pointHands(page: Page, turn: readonly [number, number, number, number]): Promise<void> {
+  return page.evaluate((quaternion) => {
+    const { headset } = window as unknown as { headset: Headset };
+    for (const hand of ["left", "right"] as const) {
+      const controller = headset.controllers[hand];
+      if (controller === undefined) throw new Error(`no ${hand} controller`);
+      controller.position.set(hand === "left" ? -0.2 : 0.2, 1.5, -0.1);
+      controller.quaternion.set(...quaternion);
+    }
+  }, turn);
+}
+
+describeInChromium("a headset's frame", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 270 }, bundle: DEMO_BUNDLE });
+
+  it("takes under 60 draw calls with both controllers, also with volumes and slices", async () => {
+    const { viewer } = stand;
+    await addHeadset(viewer.page);
+    await stand.open("&mode=off&switch=9&quality=auto");
+    await viewer.enterStereo();
+    await pointHands(viewer.page, AHEAD);
+    const calls: Record<string, number> = {};
+    for (const mode of ["off", "all", "disc", "slices"]) {
+      if (mode === "slices")
+        await viewer.page.keyboard.press("|"); // and the disc
+      else await viewer.page.locator(`[data-mode="${mode}"]`).dispatchEvent("click");
+      await viewer.settled();
+      await viewer.page.waitForTimeout(500);
+      const { drawCalls, volumes, state } = await viewer.snapshot();
+      expect(volumes.length > 0, mode).toBe(mode !== "off");
+      expect(state.hasSlicePlanes).toBe(mode === "slices");
+      calls[mode] = drawCalls;
+    }
+    expect(Math.max(...Object.values(calls)), JSON.stringify(calls)).toBeLessThan(60);
+    expect(Math.min(...Object.values(calls))).toBeGreaterThan(10); // there is something
+  });
+});
 
 describeInChromium("the page in stereo", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 270 } });
   const state = async () => (await stand.viewer.snapshot()).state;
   const notices = async () => (await state()).notices;
+  const undo = () => stand.viewer.page.locator('[data-control="undo"]');
 
   const isFull = () => stand.viewer.page.evaluate(() => document.fullscreenElement !== null);
 
@@ -19,23 +64,14 @@ describeInChromium("the page in stereo", () => {
     await addHeadset(stand.viewer.page);
     await stand.open(query);
     await stand.viewer.enterStereo();
-    await stand.viewer.page.evaluate((areHere) => {
-      const { headset } = window as unknown as { headset: Headset };
-      for (const hand of ["left", "right"] as const) {
-        const controller = headset.controllers[hand];
-        if (controller === undefined) throw new Error(`no ${hand} controller`);
-        controller.position.set(hand === "left" ? -0.2 : 0.2, 1.5, -0.1);
-        // to the floor, or straight ahead
-        if (areHere) controller.quaternion.set(0, 0, 0, 1);
-        else controller.quaternion.set(-Math.SQRT1_2, 0, 0, Math.SQRT1_2);
-      }
-    }, hasHands);
+    await pointHands(stand.viewer.page, hasHands ? AHEAD : DOWN);
   }
 
   it("selects what is looked at for 1.5 s, and nothing where dwell is off", async () => {
     await open("&mode=off", false);
     await expect.poll(async () => (await state()).selected, { timeout: 20_000 }).not.toBeNull();
     expect((await state()).isolated).toBeNull(); // once
+    expect(await undo().isDisabled()).toBe(true); // nobody has set anything
   });
 
   it.each([
@@ -69,6 +105,7 @@ describeInChromium("the page in stereo", () => {
     };
     await press();
     await expect.poll(async () => (await state()).selected).not.toBeNull();
+    expect(await undo().isDisabled()).toBe(false);
     await press();
     await expect.poll(async () => (await state()).isolated).not.toBeNull();
   });

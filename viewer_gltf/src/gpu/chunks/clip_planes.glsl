@@ -1,8 +1,17 @@
-// What the clip box and plane cut away, as planes of the room: gone is where dot(xyz, p) > w.
-uniform vec4 uCuts[7];
+// What the clip box and plane cut away, as planes of the room: gone is where dot(xyz, p) > w; and the
+// corner before the slices, which the last three bound: gone is what lies beyond all of them.
+uniform vec4 uCuts[10];
 uniform int uCutCount;
 
+bool isInCorner(vec3 p) {
+  for (int i = 7; i < 10; i++) {
+    if (dot(uCuts[i].xyz, p) <= uCuts[i].w) return false;
+  }
+  return true;
+}
+
 bool isCut(vec3 p) {
+  if (isInCorner(p)) return true;
   for (int i = 0; i < uCutCount; i++) {
     if (dot(uCuts[i].xyz, p) > uCuts[i].w) return true;
   }

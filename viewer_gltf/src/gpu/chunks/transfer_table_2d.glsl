@@ -22,8 +22,3 @@ Steps stepsAt(vec3 p, vec3 h) {
 vec4 steepnessOf(Steps s) {
   return min(sqrt(s.x * s.x + s.y * s.y + s.z * s.z) / uGradientMax, 1.0);
 }
-
-// Of the intensities, each channel by its share, along the axes of the texture.
-vec3 gradientOf(Steps s, vec4 shares) {
-  return vec3(dot(s.x, shares), dot(s.y, shares), dot(s.z, shares));
-}

@@ -8,6 +8,12 @@ describe("text on the panel", () => {
     expect(breakLines("one two", 7, 1, measure)).toEqual(["one two"]);
   });
 
+  it("ends a line where the text does", () => {
+    expect(breakLines("one\ntwo three\nfour", 9, 3, measure)).toEqual(["one", "two three", "four"]);
+    expect(breakLines("one two\nthree", 4, 3, measure)).toEqual(["one", "two", "thr…"]);
+    expect(breakLines("one\ntwo", 9, 1, measure)).toEqual(["one two"]);
+  });
+
   it("breaks between words, and ends with an ellipsis where lines run out", () => {
     expect(breakLines("one two three", 7, 2, measure)).toEqual(["one two", "three"]);
     expect(breakLines("one two three four", 7, 2, measure)).toEqual(["one two", "three…"]);

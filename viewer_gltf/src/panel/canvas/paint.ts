@@ -97,7 +97,7 @@ function paintText(context: Context, mark: Extract<Mark, { kind: "text" }>): voi
   });
 }
 
-/** Lines that fit the width; the last of so many ends with an ellipsis where it must. */
+/** Lines that fit the width, and end at each \n; the last of so many ends with an ellipsis where it must. */
 export function breakLines(
   words: string,
   width: number,
@@ -105,7 +105,12 @@ export function breakLines(
   measure: (words: string) => number,
 ): readonly string[] {
   const lines: string[] = [];
-  let rest = words.split(" ");
+  const [own, ...others] = words.split("\n");
+  if (others.length > 0 && most > 1) {
+    const first = breakLines(own, width, most - 1, measure);
+    return [...first, ...breakLines(others.join("\n"), width, most - first.length, measure)];
+  }
+  let rest = words.split(/[ \n]/);
   while (rest.length > 0) {
     if (lines.length === most - 1) return [...lines, shortened(rest.join(" "), width, measure)];
     let count = 1;

@@ -28,8 +28,26 @@ function shownKeys(keys: readonly string[]): readonly string[] {
   return keys.length > 3 ? [keys[0], "…", keys[keys.length - 1]] : keys;
 }
 
+/** Of more keys one looks for some. */
+const MANY = 15;
+
+/** The rows that a few letters leave, each a key's and its label's; all of them where nothing is sought. */
+export function sought<T extends Readonly<{ text: string }>>(rows: readonly T[], words: string) {
+  const parts = words.toLowerCase().split(/\s+/);
+  return rows.filter(({ text }) => parts.every((part) => text.toLowerCase().includes(part)));
+}
+
+type Row = Readonly<{ text: string; elements: readonly HTMLElement[]; section: HTMLElement }>;
+
 export class Help {
   private readonly dialog: HTMLDialogElement;
+  private readonly rows: readonly Row[];
+  private readonly find = element(
+    "input",
+    { type: "text", placeholder: "Find a key", ariaLabel: "Find a key", autocomplete: "off" },
+    { control: "find-key" },
+  );
+  private readonly none = element("p", { textContent: "No key is named so.", hidden: true });
 
   /** @param onClose called when the user wants it closed, at times once more than needed */
   constructor(parent: HTMLElement, onClose: () => void) {
@@ -39,35 +57,45 @@ export class Help {
       onclick: onClose,
     });
     const title = element("h1", { id: "help-title", textContent: "Keys" });
-    const groups = KEYS.map(({ name, keys }) =>
-      element(
+    const groups = KEYS.map(({ name, keys }) => {
+      const rows = keys.map((each) => {
+        const shown = shownKeys(each.keys).map((key) =>
+          element("kbd", { textContent: textOf(key) }),
+        );
+        const elements = [
+          element("dt", {}, {}, ...shown),
+          element("dd", { textContent: each.label }),
+        ];
+        return {
+          text: `${name} ${elements.map(({ textContent }) => textContent).join(" ")}`,
+          elements,
+        };
+      });
+      const section = element(
         "section",
         {},
         {},
         element("h2", { textContent: name }),
-        element(
-          "dl",
-          {},
-          {},
-          ...keys.flatMap((each) => [
-            element(
-              "dt",
-              {},
-              {},
-              ...shownKeys(each.keys).map((key) => element("kbd", { textContent: textOf(key) })),
-            ),
-            element("dd", { textContent: each.label }),
-          ]),
-        ),
-      ),
-    );
+        element("dl", {}, {}, ...rows.flatMap(({ elements }) => elements)),
+      );
+      return { section, rows: rows.map((row) => ({ ...row, section })) };
+    });
+    this.rows = groups.flatMap(({ rows }) => rows);
+    this.find.hidden = this.rows.length <= MANY;
+    this.find.addEventListener("input", () => this.show(this.find.value));
     this.dialog = element(
       "dialog",
       { className: "help" },
       { help: "" },
-      element("header", {}, {}, title, close),
+      element("header", {}, {}, title, this.find, close),
       // It scrolls: so that the arrow keys reach it
-      element("div", { className: "groups", tabIndex: 0 }, {}, ...groups),
+      element(
+        "div",
+        { className: "groups", tabIndex: 0 },
+        {},
+        ...groups.map(({ section }) => section),
+        this.none,
+      ),
     );
     this.dialog.setAttribute("aria-labelledby", title.id);
     // The state goes first and the dialog follows: its own events come a little late.
@@ -80,17 +108,31 @@ export class Help {
     });
     this.dialog.addEventListener("keydown", (event) => {
       // For a moment after it was closed the focus is still in it.
-      if (event.key !== "?" || !this.dialog.open) return;
+      if (event.key !== "?" || !this.dialog.open || this.find.value !== "") return;
       event.preventDefault(); // or it would open again by the same key
       onClose();
     });
     parent.append(this.dialog);
   }
 
+  private show(words: string): void {
+    const left = new Set(sought(this.rows, words.trim()));
+    const sections = new Set([...left].map(({ section }) => section));
+    for (const row of this.rows) {
+      for (const each of row.elements) each.hidden = !left.has(row);
+      row.section.hidden = !sections.has(row.section);
+    }
+    this.none.hidden = left.size > 0;
+  }
+
   update(isOpen: boolean): void {
     if (isOpen === this.dialog.open) return;
-    if (isOpen) this.dialog.showModal();
-    else this.dialog.close();
+    if (isOpen) {
+      this.find.value = "";
+      this.show("");
+      this.dialog.showModal();
+      this.find.focus();
+    } else this.dialog.close();
   }
 
   dispose(): void {

@@ -2,6 +2,7 @@
 
 import { element, setText } from "../../dom/element";
 import { groupNotices } from "../../state/notice_groups";
+import type { Mode } from "../../state/parameters/volumes";
 import type { ViewerState } from "../../state/viewer_state";
 import type { Progress } from "../../surfaces/overview_progress";
 
@@ -72,20 +73,22 @@ export class Notices {
   }
 }
 
-/** How to begin, under a picture that nobody has touched yet. */
-export class FirstHint {
-  readonly root: HTMLElement;
+/** What comes of going near, or of waiting, by how volumes show. */
+const THEN: Readonly<Partial<Record<Mode, string>>> = {
+  disc: ", go near for volumes",
+  tile: ", go near for volumes",
+  traced: "; at rest the picture clears up",
+};
 
-  constructor(isTouch: boolean) {
-    const [turn, zoom] = isTouch ? ["drag", "pinch"] : ["drag", "wheel"];
-    this.root = element(
-      "p",
-      {
-        className: "first-hint",
-        textContent: `${turn} to turn, ${zoom} to zoom, go near for volumes`,
-      },
-      { overlay: "hint" },
-    );
+/** How to begin, beside a picture that nobody has touched yet. */
+export class FirstHint {
+  readonly root = element("p", { className: "first-hint" }, { overlay: "hint" });
+
+  constructor(private readonly isTouch: boolean) {}
+
+  update(mode: Mode): void {
+    const zoom = this.isTouch ? "pinch" : "wheel";
+    setText(this.root, `drag to turn, ${zoom} to zoom${THEN[mode] ?? ""}`);
   }
 
   /** From the first touch on nobody needs it. */

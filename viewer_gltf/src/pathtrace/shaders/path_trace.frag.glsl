@@ -21,6 +21,7 @@ uniform vec3 uBrick;  // texels along a brick's edges
 uniform vec3 uClipLow;
 uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;
+uniform vec4 uCorner[3];
 
 uniform mat4 uToBox;  // from normalised device coordinates
 uniform vec3 uEyeAt;  // um, box

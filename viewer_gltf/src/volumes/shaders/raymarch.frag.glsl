@@ -38,6 +38,7 @@ uniform float uPresence;  // 0..1: volumes fade in once they have come
 uniform vec3 uClipLow;  // um: nothing outside is drawn
 uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;  // xyz unit normal, w um: nothing with dot(normal, p) > w is drawn
+uniform vec4 uCorner[3];  // nothing with that for all three is drawn
 uniform sampler3D uVolume;
 uniform usampler3D uIndex;  // with STREAM_BRICK
 uniform sampler3D uOldVolume;  // what the volume takes the place of, at another mip level
@@ -97,18 +98,24 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 #include <chunks/shade>
 #include <chunks/jitter>
 #include <chunks/periphery>
+#ifdef MAXIMUM
+#include <chunks/decode_srgb>
+#endif
 
 const float NOWHERE = 1e30;
 
 #ifdef SUM
-const float SUM_LIGHT = 0.125;  // of an opaque voxel: eight of them are as bright as one alone elsewhere
+// Light of what is opaque all along the mean edge of all tiles that are marched. The screen shows thin and
+// deep things: a tenth of it is a third as bright, and few specimens are more than half full.
+const float SUM_LIGHT = 4.0;
 #endif
 #ifdef MAXIMUM
 // The largest value of each channel in its colour, from the first that its table shows to the window's
-// end; as opaque as it is bright.
+// end, where half-way is half as bright on the screen, as on a microscope's; as opaque as it is bright.
 vec4 brightest(vec4 largest) {
   vec4 low = max(uWindowLow, uFloor);
   vec4 share = clamp((largest - low) / max(uWindowHigh - low, 1e-3), 0.0, 1.0);
+  share = vec4(decoded(share.xyz), decoded(share.www).x);
   vec3 color = vec3(0.0);
   // channels as tiles are blended: else a border would show where two tiles hold one each
   for (int c = 0; c < CHANNELS; c++) color = max(color, share[c] * uColor[c]);
@@ -165,6 +172,10 @@ void main() {
   bool isBehind = false;
   float shift = jitter(gl_FragCoord.xy - uPart.xy);
   vec3 face = span.x > 0.0 ? cutFace(start) : vec3(0.0);
+#ifdef SUM
+  vec3 across = uAllHigh - uAllLow;
+  float light = SUM_LIGHT * uVoxel / pow(across.x * across.y * across.z, 1.0 / 3.0);
+#endif
   float t = 0.0;
   float exit = 0.0;  // of the bricks that are known
   int i = 0;
@@ -214,8 +225,8 @@ void main() {
 #endif
       vec4 shares;
 #ifdef TWO_D
-      Steps around = stepsAt(p, uVoxel * abs(texPerUm));
-      vec4 s = classify2d(v, steepnessOf(around), voxels, shares);
+      vec4 steepness = steepnessOf(stepsAt(p, uVoxel * abs(texPerUm)));
+      vec4 s = classify2d(v, steepness, voxels, shares);
 #else
       vec4 s = classify(v, voxels, shares);
 #endif
@@ -223,16 +234,11 @@ void main() {
       largest = max(largest, mix(vec4(0.0), v, greaterThan(voxels, vec4(0.0))));
       sum = brightest(largest);
 #elif defined(SUM)
-      sum.rgb += SUM_LIGHT * s.a * s.rgb;
+      sum.rgb += light * s.a * s.rgb;
 #else
       if (s.a > 0.0) {
-#ifdef TWO_D
-        vec3 gradient = gradientOf(around, shares) * sign(texPerUm);
-        if (t < uVoxel && face != vec3(0.0)) gradient = -face;
-#else
         vec3 gradient = -face;
         if (t >= uVoxel || face == vec3(0.0)) gradient = gradientAt(p, texPerUm, shares);
-#endif
         s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
         sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
       }

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { Rect } from "../../panel/canvas/draw_list";
+import { HOW_IT_WORKS } from "../stereo";
 import {
   ANNOUNCED_S,
   type Announcements,
@@ -38,6 +39,15 @@ describe("notices in stereo", () => {
     expect(after(again, ANNOUNCED_S - 0.25)).toEqual(["a"]);
     const third = announce(advanceAnnouncements(announced("a", "b"), 5), "c");
     expect(after(third, 1)).toEqual(["b", "c"]);
+  });
+
+  it("has letters as large as there is room for", () => {
+    const sizesOf = (...texts: readonly string[]) =>
+      noticeMarks(texts).flatMap((mark) => (mark.kind === "text" ? [mark.size] : []));
+    // over 2 degrees, of which a phone of 280 pixels an eye makes 6 pixels
+    expect(Math.min(...sizesOf(HOW_IT_WORKS))).toBeGreaterThan(60);
+    expect(sizesOf("Quality: low", "Choosing by gaze: off")).toEqual([80, 80]);
+    expect(sizesOf("a word ".repeat(60))).toEqual([28]);
   });
 
   it("fits the plane, however long", () => {

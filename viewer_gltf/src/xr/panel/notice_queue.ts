@@ -31,24 +31,44 @@ export function advanceAnnouncements(announcements: Announcements, dt_s: number)
 }
 
 /** Width of a notice, px: half of a Cardboard's field of view, 0.9 m away. */
-export const NOTICE_WIDTH = 840;
+export const NOTICE_WIDTH = 1040;
 const PAD = 16;
-const LINE = Math.ceil(1.15 * TEXT);
-/** Letters in a line: a letter is about half as wide as it is high, and words break early. */
-const LETTERS = Math.floor((NOTICE_WIDTH - 4 * PAD) / (0.58 * TEXT));
+/** Letters as large as all texts have room for, px: on a phone's half of a screen small ones can't be read. */
+const SIZES = [80, 56, 40, TEXT] as const;
 const MOST_LINES = 4;
-export const NOTICE_HEIGHT = MOST * (MOST_LINES * LINE + 3 * PAD);
+export const NOTICE_HEIGHT = MOST * (MOST_LINES * pitchOf(TEXT) + 3 * PAD);
+
+function pitchOf(size: number): number {
+  return Math.ceil(1.15 * size);
+}
+
+/** A letter is about half as wide as it is high, and words break early. */
+function linesOf(words: string, size: number): number {
+  const letters = Math.floor((NOTICE_WIDTH - 4 * PAD) / (0.58 * size));
+  return words.split("\n").reduce((sum, line) => sum + Math.ceil(line.length / letters), 0);
+}
+
+function sizeFor(texts: readonly string[]): number {
+  const fits = (size: number) => {
+    const lines = texts.map((words) => linesOf(words, size));
+    const height = lines.reduce((sum, each) => sum + each * pitchOf(size) + 3 * PAD, 0);
+    return height <= NOTICE_HEIGHT && Math.max(...lines) <= MOST_LINES;
+  };
+  return SIZES.find(fits) ?? TEXT;
+}
 
 /** From the top of the plane; what is not covered stays clear. */
 export function noticeMarks(texts: readonly string[]): readonly Mark[] {
+  const size = sizeFor(texts);
   let y = 0;
   return texts.flatMap((words): Mark[] => {
-    const lines = Math.min(MOST_LINES, Math.ceil(words.length / LETTERS));
-    const rect: Rect = { x: 0, y, width: NOTICE_WIDTH, height: lines * LINE + 2 * PAD };
+    const lines = Math.min(MOST_LINES, linesOf(words, size));
+    const height = lines * pitchOf(size) + 2 * PAD;
+    const rect: Rect = { x: 0, y, width: NOTICE_WIDTH, height };
     y += rect.height + PAD;
     return [
       { kind: "box", rect, fill: "back", stroke: "line", radius: PAD },
-      text({ ...rect, x: PAD, width: NOTICE_WIDTH - 2 * PAD }, words, { lines }),
+      text({ ...rect, x: PAD, width: NOTICE_WIDTH - 2 * PAD }, words, { lines, size }),
     ];
   });
 }

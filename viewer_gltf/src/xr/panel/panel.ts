@@ -1,6 +1,6 @@
 /**
  * The panel in the room: a quad with one section of the layout at a time, and a button under all
- * that is looked at, which opens and closes it. It opens beside the specimen, never before it.
+ * that is looked at, which opens and closes it. It opens in that button's place, straight below the gaze.
  */
 import { Group, type Matrix4, Vector3 } from "three";
 import type { Hit, RoomRay, Target } from "../../interaction/ray_pointer";
@@ -25,7 +25,14 @@ import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import type { ViewerState } from "../../state/viewer_state";
 import { CanvasQuad, type Spot } from "./canvas_quad";
-import { extentOf, followHead, headBearing, openerPitch, placePanel, pointAt } from "./placement";
+import {
+  type Bearing,
+  followHead,
+  headBearing,
+  openerPitch,
+  panelBearing,
+  pointAt,
+} from "./placement";
 
 const DISTANCE_M = 1.2;
 /** Over a specimen that is brought nearer than the panel, by which it is brought; under a notice. */
@@ -34,10 +41,6 @@ const OPENER_M = 0.7;
 const OPENER: Rect = { x: 0, y: 0, width: 208, height: 80 };
 /** Time between readings of values outside the state (frame time, gazed tile), s. */
 const REFRESH_S = 0.5;
-const HALF = {
-  yaw: Math.atan(WIDTH / PX_PER_M / 2 / DISTANCE_M),
-  pitch: Math.atan(HEIGHT / PX_PER_M / 2 / DISTANCE_M),
-};
 
 export const PANEL = "panel:";
 const OPENER_KEY = "opener";
@@ -108,10 +111,10 @@ export class RoomPanel {
     return this.isOpen ? this.page.regions : [];
   }
 
-  /** Stereo has begun, or has ended. */
   /** The specimen stands on a table: where the button hangs else it would be before it. */
   isTableBelow = false;
 
+  /** Stereo has begun, or has ended. */
   setShown(isShown: boolean): void {
     this.group.visible = isShown;
     this.openerYaw = null;
@@ -128,16 +131,8 @@ export class RoomPanel {
     else this.wantsPlace = true;
   }
 
-  /**
-   * @param around gives points of the specimen's hull, room
-   * @returns whether it looks otherwise than before
-   */
-  update(
-    dt_s: number,
-    head: Matrix4,
-    state: ViewerState,
-    around: () => readonly Vector3[],
-  ): boolean {
+  /** Whether it looks otherwise than before. */
+  update(dt_s: number, head: Matrix4, state: ViewerState): boolean {
     const eye = new Vector3().setFromMatrixPosition(head);
     const bearing = headBearing(head);
     this.openerYaw = followHead(this.openerYaw ?? bearing.yaw, bearing, dt_s);
@@ -150,8 +145,7 @@ export class RoomPanel {
     let isChanged = false;
     if (this.wantsPlace) {
       this.wantsPlace = false;
-      // A head that looks down at the button has no clear heading: the button has.
-      this.open(eye, this.openerYaw, around());
+      this.open(eye, panelBearing(bearing, this.openerYaw));
       isChanged = true;
     }
     if (!this.isOpen) return isChanged;
@@ -167,6 +161,27 @@ export class RoomPanel {
     const id = key?.startsWith(PANEL) ? key.slice(PANEL.length) : null;
     this.quad.light(this.page.regions.find((region) => region.id === id)?.rect ?? null);
     this.opener.light(key === OPENER_KEY ? OPENER : null);
+  }
+
+  /**
+   * The button and what the panel has now, each with a point of it in the room: of a slider at 0.3 of it;
+   * none on a flat screen.
+   */
+  get places(): readonly Readonly<{ id: string; at: Vector3 }>[] {
+    if (!this.group.visible) return [];
+    const opener = { id: OPENER_KEY, isSlide: false };
+    return [opener, ...this.regions].flatMap(({ id, isSlide }) => {
+      const at = this.pointOf(id, isSlide ? 0.3 : 0.5);
+      return at === null ? [] : [{ id, at }];
+    });
+  }
+
+  /** What was ahead is another way of the room now: the panel stays where it is to the head. */
+  comeAlong(from: Matrix4, to: Matrix4): void {
+    this.openerYaw = null;
+    const { position } = this.quad.mesh;
+    position.applyMatrix4(from.clone().invert()).applyMatrix4(to);
+    this.quad.place(position, new Vector3().setFromMatrixPosition(to));
   }
 
   /** Where the middle of a region is in the room; for tests. */
@@ -189,9 +204,7 @@ export class RoomPanel {
     this.opener.dispose();
   }
 
-  private open(eye: Vector3, yaw: number, around: readonly Vector3[]): void {
-    const aside = placePanel(extentOf(around, eye, yaw), HALF);
-    const bearing = { yaw: yaw + aside.yaw, pitch: aside.pitch };
+  private open(eye: Vector3, bearing: Bearing): void {
     this.quad.place(pointAt(bearing, eye, DISTANCE_M), eye);
     this.quad.mesh.visible = true;
     this.isStale = true;

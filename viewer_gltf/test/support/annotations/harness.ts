@@ -20,6 +20,7 @@ import { listenForHandles } from "../../../src/annotations/handle_pointer";
 import type { Label } from "../../../src/annotations/label";
 import type { DecodeAnswer, DecodeRequest } from "../../../src/bundle/decode";
 import type { Manifest } from "../../../src/bundle/generated/bundle";
+import { labelBoxes } from "../../../src/capture/label_boxes";
 import { gazeOf, type Hit } from "../../../src/interaction/ray_pointer";
 import { rayAhead, rayUnder } from "../../../src/interaction/rays";
 import type { Vec3 } from "../../../src/math/vec3";
@@ -244,6 +245,12 @@ class Bench {
   label() {
     const { distance } = this.marks.measured;
     return { angle_rad: this.angleOf(distance), text: distance.text, draws: distance.draws };
+  }
+
+  /** Where measurements' labels lie in the picture, pixels. */
+  labelBoxes() {
+    const { clientWidth: width, clientHeight: height } = this.stage;
+    return labelBoxes(this.marks.measured.group, this.camera, { width, height });
   }
 
   private angleOf({ sprite }: Label): number {

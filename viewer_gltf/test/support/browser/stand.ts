@@ -15,6 +15,8 @@ export const DIST = new URL("../../../dist/", import.meta.url).pathname;
 export const DEMO_BUNDLE = process.env.STEREOCELL_TEST_BUNDLE;
 /** A bundle that was built with `--maps`, of real data. */
 export const MAPS_BUNDLE = process.env.STEREOCELL_REAL_BUNDLE;
+/** A bundle of an MR head, of one tile. */
+export const HEAD_BUNDLE = process.env.STEREOCELL_HEAD_BUNDLE;
 
 export type Stand = Readonly<{
   /** Its folder. */

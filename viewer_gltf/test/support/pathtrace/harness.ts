@@ -14,6 +14,7 @@ import {
 } from "three";
 import { STREAM_BRICK } from "../../../src/bundle/generated/constants";
 import { Cuts } from "../../../src/gpu/clip_planes";
+import { noCorner } from "../../../src/gpu/clip_uniforms";
 import { Eyes } from "../../../src/gpu/eyes";
 import { floatTarget, floatTexture } from "../../../src/gpu/float_targets";
 import { drawEyes } from "../../../src/gpu/offscreen_target";
@@ -175,6 +176,7 @@ function gather(run: Run): Gathered {
     min: new Vector3().setScalar(-1e9),
     max: new Vector3().setScalar(1e9),
     plane: new Vector4(0, 0, 0, 1),
+    corner: noCorner(),
   };
   const eyes = new Eyes();
   const read = (index: number) => {

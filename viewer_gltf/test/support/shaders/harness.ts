@@ -231,6 +231,7 @@ function meanAlong(
   filling: Filling,
   side: number,
   opacity: number,
+  window: readonly [number, number] = [0, 1],
 ): number[] {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
@@ -245,6 +246,7 @@ function meanAlong(
   const bricks = makeBricks({ size: [side, side, side], texels }).texels;
   const march = marchOf(cube(side), texels, bricks, table, true, depth);
   march.composite(compositing);
+  march.setAppearances([{ color: [1, 1, 1], table, window, isInDisc: false }]);
   const camera = new PerspectiveCamera(0.2, 1, edge, edge * 1000);
   camera.position.set(300 * edge, -edge / 2, edge / 2);
   camera.lookAt(0, -edge / 2, edge / 2);

@@ -252,6 +252,18 @@ class Stand {
     return [degrees(Math.atan2(at.x, -at.z)), degrees(Math.atan2(at.y, Math.hypot(at.x, at.z)))];
   }
 
+  /** Where the panel's middle is: to the right of the head's heading, and above its level, degrees. */
+  panelAt(): readonly [number, number] {
+    const head = betweenEyes(this.renderer.xr.getCamera().cameras);
+    const eye = new Vector3().setFromMatrixPosition(head);
+    const at = this.hands.panel.quad.mesh.getWorldPosition(new Vector3()).sub(eye);
+    const ahead = new Vector3(0, 0, -1).transformDirection(head);
+    const turn = Math.atan2(at.x, -at.z) - Math.atan2(ahead.x, -ahead.z);
+    const up = Math.atan2(at.y, Math.hypot(at.x, at.z));
+    const degrees = (radians: number) => (radians * 180) / Math.PI;
+    return [degrees(Math.atan2(Math.sin(turn), Math.cos(turn))), degrees(up)];
+  }
+
   tap(): Promise<void> {
     this.hands.tap();
     return this.step([0]);

@@ -1,0 +1,46 @@
+"""The triangle that is nearest to the eye, at each pixel of a picture."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.kernels.compiled import kernel
+
+
+@kernel
+def find_visible(
+    frames: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    low: NDArray[np.int64],
+    high: NDArray[np.int64],
+    nearest: NDArray[np.float64],
+    triangle_of: NDArray[np.int64],
+    weights_of: NDArray[np.float64],
+) -> None:
+    """Write each pixel's nearest triangle, its barycentric weights and its depth.
+
+    frames       (m, 10), of each triangle: corner a (x, y), pixels; edges a to b and a to c; twice
+                 the area; the heights over the edges opposite a, b and c
+    depth        (m, 3), larger is nearer
+    low, high    (m, 2), first and last pixel (x, y) near each triangle
+    nearest      (height, width), minus infinity where nothing is seen
+    triangle_of  (height, width)
+    weights_of   (height, width, 3)
+    """
+    for triangle in range(len(frames)):
+        ax, ay, abx, aby, acx, acy, twice, over_a, over_b, over_c = frames[triangle]
+        for row in range(low[triangle, 1], high[triangle, 1] + 1):
+            y = row + 0.5 - ay
+            for column in range(low[triangle, 0], high[triangle, 0] + 1):
+                x = column + 0.5 - ax
+                b = (x * acy - y * acx) / twice
+                c = (abx * y - aby * x) / twice
+                a = 1 - b - c
+                if -a * over_a > 1e-9 or -b * over_b > 1e-9 or -c * over_c > 1e-9:  # pixels
+                    continue
+                here = depth[triangle, 0] * a + depth[triangle, 1] * b + depth[triangle, 2] * c
+                if here > nearest[row, column]:
+                    nearest[row, column] = here
+                    triangle_of[row, column] = triangle
+                    weights_of[row, column, 0] = a
+                    weights_of[row, column, 1] = b
+                    weights_of[row, column, 2] = c

@@ -1,0 +1,124 @@
+"""Fewer triangles for walls: each object stays closed, valid and as large as its voxels.
+
+All walls are simplified at once (kernels/collapse_walls.py), so that neighbours share every
+triangle. Where triangles come to meet beside their corners, the vertices around stay as they are,
+and it is done again. Then each object gets its voxels' volume back, by the least shift of the
+vertices.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
+
+from stereocell.kernels.collapse_walls import collapse_walls
+from stereocell.meshes.simplify import OF_DIAGONAL, OF_SIDE, SHARPEST_DEG, STRAY
+from stereocell.objects.walls import Walls, find_faults, measure_volumes, put_on_lattice
+
+_ROUNDS = 12  # of simplifying, and of moving back
+_NEWTON = 2  # steps towards the volumes
+
+
+def simplify_walls(
+    walls: Walls, max_error_um: float, volumes_um3: NDArray[np.float64], step_um: float
+) -> Walls:
+    """Return the walls with fewer triangles; where that can't be, as they are.
+
+    walls         valid, on the lattice
+    max_error_um  largest root of the mean squared distance of a vertex from the planes of the
+                  triangles that it stands for; at small objects less, by their boxes
+    volumes_um3   float64 (objects + 1,), what each object should hold
+    step_um       of the lattice
+    """
+    errors = _errors(walls, max_error_um, len(volumes_um3))
+    centre = (walls.positions.min(axis=0) + walls.positions.max(axis=0)) / 2
+    locked = np.zeros(len(walls.positions), bool)
+    sharpest = float(np.cos(np.radians(SHARPEST_DEG)))
+    for _ in range(_ROUNDS):
+        triangles, gone = collapse_walls(
+            walls.positions - centre, walls.triangles, locked, errors, STRAY, sharpest
+        )
+        fewer = Walls(walls.positions, triangles[~gone], walls.sides[~gone])
+        at_fault = find_faults(fewer)
+        if not len(at_fault):
+            return keep_volumes(_compact(fewer), volumes_um3, step_um)
+        around = np.zeros(len(locked), bool)
+        around[at_fault] = True
+        around[walls.triangles[around[walls.triangles].any(axis=1)]] = True
+        locked |= around
+    return walls
+
+
+def keep_volumes(walls: Walls, volumes_um3: NDArray[np.float64], step_um: float) -> Walls:
+    """Return the walls with each object as large as it should be, as far as nothing comes to cross.
+
+    Moved is along the volumes' gradients, the least by the areas of the vertices' surroundings: a
+    linear system of one unknown an object.
+    """
+    moved = walls
+    for _ in range(_NEWTON):
+        missing = volumes_um3[1:] - measure_volumes(moved, len(volumes_um3) - 1)[1:]
+        moved = replace(moved, positions=moved.positions + _shift(moved, missing))
+    positions = put_on_lattice(moved.positions, step_um)
+    for _ in range(_ROUNDS):
+        at_fault = find_faults(replace(walls, positions=positions))
+        if not len(at_fault):
+            return replace(walls, positions=positions)
+        back = np.zeros(len(positions), bool)
+        back[at_fault] = True
+        positions[back] = walls.positions[back]
+    return walls
+
+
+def _shift(walls: Walls, missing_um3: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far each vertex moves (n, 3), um."""
+    at, count = walls.positions, len(missing_um3)
+    corners = at[walls.triangles]
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    own = np.zeros(len(at))
+    rows, columns, values = [], [], []
+    for k in range(3):
+        own += np.bincount(walls.triangles[:, k], area / 6, len(at))
+        slope = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            held = walls.sides[:, side] > 0
+            for axis in range(3):
+                rows.append(walls.sides[held, side] - 1)
+                columns.append(walls.triangles[held, k].astype(np.int64) * 3 + axis)
+                values.append(sign * slope[held, axis])
+    shape = (count, 3 * len(at))
+    slopes = sparse.coo_matrix(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape
+    ).tocsr()
+    light = sparse.diags(np.repeat(np.where(own > 0, 1 / np.maximum(own, 1e-12), 0.0), 3))
+    pulls = slopes @ light @ slopes.T
+    # an object of which nothing is left pulls nothing
+    pulls += sparse.diags(np.full(count, 1e-9 * max(float(pulls.diagonal().mean()), 1e-12)))
+    pressure = spsolve(pulls.tocsc(), missing_um3)
+    return np.asarray(light @ (slopes.T @ np.atleast_1d(pressure))).reshape(-1, 3)
+
+
+def _errors(walls: Walls, max_error_um: float, count: int) -> NDArray[np.float64]:
+    """Return the error that each vertex may have (n,), um: that of the smallest object there."""
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    for side in walls.sides.T:
+        for k in range(3):
+            np.minimum.at(low, side, walls.positions[walls.triangles[:, k]])
+            np.maximum.at(high, side, walls.positions[walls.triangles[:, k]])
+    lengths = np.maximum(high - low, 0)
+    own = np.minimum(OF_DIAGONAL * np.linalg.norm(lengths, axis=1), OF_SIDE * lengths.min(axis=1))
+    own[0] = np.inf
+    least = own[walls.sides].min(axis=1)
+    errors = np.full(len(walls.positions), max_error_um)
+    for k in range(3):
+        np.minimum.at(errors, walls.triangles[:, k], least)
+    return errors
+
+
+def _compact(walls: Walls) -> Walls:
+    used, triangles = np.unique(walls.triangles, return_inverse=True)
+    return Walls(walls.positions[used], triangles.reshape(-1, 3).astype(np.int32), walls.sides)

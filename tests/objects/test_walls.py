@@ -1,0 +1,170 @@
+"""Walls between objects: closed, shared, as large as the voxels, near the truth, at all levels."""
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import pairwise
+
+import h5py
+import numpy as np
+import pytest
+import tifffile
+from numpy.typing import NDArray
+
+from corpus.real import data_folder
+from stereocell.meshes.validity import find_defects, label_components
+from stereocell.objects.simplify_walls import simplify_walls
+from stereocell.objects.walls import Walls, extract_walls, measure_volumes, surface_of
+from stereocell.objects.well_composed import make_well_composed
+from support.touching_cells import RADIUS_UM, touching_cells
+
+SPACING_UM = (1.0, 0.5, 0.5)
+STEP_UM = 1 / 256
+AIMS_UM = (0.1, 0.2, 0.4, 0.8)
+
+
+def levels_of(
+    labels: NDArray[np.int32], spacing_um: tuple[float, float, float], aims_um: Sequence[float]
+) -> tuple[list[Walls], NDArray[np.float64]]:
+    mended, _ = make_well_composed(np.pad(labels, 2))
+    volumes = np.bincount(mended.ravel()) * np.prod(spacing_um)
+    found = [extract_walls(mended, spacing_um, STEP_UM)]
+    for aim in aims_um:
+        found.append(simplify_walls(found[-1], aim, volumes, STEP_UM))
+    return found, volumes
+
+
+@cache
+def tissue() -> tuple[list[Walls], NDArray[np.float64], NDArray[np.float64]]:
+    labels, centres = touching_cells((36, 72, 72), SPACING_UM)
+    levels, volumes = levels_of(labels, SPACING_UM, AIMS_UM)
+    return levels, volumes, centres
+
+
+def require_sound(walls: Walls, objects: int) -> None:
+    for number in range(1, objects + 1):
+        counts = find_defects(surface_of(walls, number)).counts
+        assert not any(counts.values()), (number, counts)
+
+
+def test_each_object_is_closed_and_valid_at_each_level() -> None:
+    levels, _, centres = tissue()
+    assert len(centres) >= 12
+    for walls in levels:
+        require_sound(walls, len(centres))
+    triangles = [len(walls.triangles) for walls in levels]
+    assert all(fewer < 0.75 * many for many, fewer in pairwise(triangles)), triangles
+
+
+def test_neighbours_share_their_wall_triangle_by_triangle() -> None:
+    levels, _, centres = tissue()
+    for walls in levels:
+        assert (walls.sides[:, 0] < walls.sides[:, 1]).all()
+        shared = walls.sides[(walls.sides > 0).all(axis=1)]
+        assert len(np.unique(shared, axis=0)) >= len(centres)  # the cells do touch
+        # all objects together are as large as what surrounds them: nothing lies between two
+        around = walls.sides[:, 0] == 0
+        corners = walls.positions[walls.triangles[around]]
+        whole = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()
+        assert measure_volumes(walls, len(centres)).sum() == pytest.approx(-whole / 6, rel=1e-9)
+
+
+def test_each_object_keeps_its_voxels_volume() -> None:
+    levels, volumes, centres = tissue()
+    # the coarsest has facets as large as a quarter of a cell
+    for walls, median, most in zip(
+        levels[1:], (1e-3,) * 3 + (5e-3,), (0.01,) * 3 + (0.03,), strict=True
+    ):
+        bias = measure_volumes(walls, len(centres))[1:] / volumes[1:] - 1
+        assert abs(np.median(bias)) < median
+        assert np.abs(bias).max() < most
+
+
+def test_walls_lie_where_the_truth_has_them() -> None:
+    """A wall of two cells midway between their centres, a free one on the cell's sphere."""
+    levels, _, centres = tissue()
+    for walls, most_um in zip(levels[1:], (0.16, 0.17, 0.2, 0.3), strict=True):
+        corners = walls.positions[walls.triangles]
+        x, y, z = corners.mean(axis=1).T
+        at = np.stack([z, -y, x], axis=1) - 2 * np.array(SPACING_UM)  # two voxels are padding
+        area = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        first, second = walls.sides.T
+        to_second = np.linalg.norm(at - centres[second - 1], axis=1)
+        to_first = np.linalg.norm(at - centres[first - 1], axis=1)
+        between = np.linalg.norm(centres[second - 1] - centres[first - 1], axis=1)
+        planes = (to_first**2 - to_second**2) / (2 * np.maximum(between, 1e-9))
+        distance = np.abs(np.where(first > 0, planes, to_second - RADIUS_UM))
+        assert np.average(distance, weights=area) < most_um
+
+
+def test_vertices_lie_on_the_lattice() -> None:
+    for walls in tissue()[0]:
+        np.testing.assert_array_equal(walls.positions, np.round(walls.positions * 256) / 256)
+
+
+def test_a_ring_stays_a_ring_and_two_pieces_stay_two() -> None:
+    z, y, x = np.mgrid[:16, :40, :40] - np.array([7.5, 19.5, 19.5])[:, None, None, None]
+    ring = (np.hypot(np.hypot(y, x) - 12, z) < 4.5).astype(np.int32)
+    ring[np.hypot(np.hypot(z, y), x) < 5] = 2
+    ring[6:10, 2:5, 2:5] = 2  # one object in two pieces
+    levels, _ = levels_of(ring, (1.0, 1.0, 1.0), (0.2, 0.4, 0.8))
+    for walls in levels:
+        require_sound(walls, 2)
+        for number, bodies, genus in ((1, 1, 1), (2, 2, 0)):
+            mesh = surface_of(walls, number)
+            vertices, faces = len(mesh.positions), len(mesh.triangles)
+            assert label_components(mesh.triangles, vertices).max() + 1 == bodies
+            assert vertices - faces // 2 == 2 * bodies - 2 * genus  # Euler
+
+
+def test_one_object_that_fills_all_is_a_box() -> None:
+    levels, volumes = levels_of(np.ones((8, 10, 12), np.int32), (2.0, 1.0, 1.0), (0.2, 0.8))
+    for walls in levels:
+        require_sound(walls, 1)
+    assert volumes[1] == pytest.approx(2 * 8 * 10 * 12)
+    assert measure_volumes(levels[-1], 1)[1] == pytest.approx(volumes[1], rel=1e-3)
+
+
+def test_small_objects_stay() -> None:
+    labels = np.zeros((6, 6, 40), np.int32)
+    for number in range(1, 10):
+        labels[2 : 2 + number % 3 + 1, 2:4, 4 * number - 1 : 4 * number + 1] = number
+    levels, volumes = levels_of(labels, (1.0, 1.0, 1.0), AIMS_UM)
+    for walls in levels:
+        require_sound(walls, 9)
+    np.testing.assert_allclose(measure_volumes(levels[-1], 9)[1:], volumes[1:], rtol=0.02)
+
+
+def test_the_same_labels_give_the_same_walls() -> None:
+    labels, _ = touching_cells((36, 72, 72), SPACING_UM)
+    again, _ = levels_of(labels, SPACING_UM, AIMS_UM)
+    for a, b in zip(tissue()[0], again, strict=True):
+        assert a.positions.tobytes() == b.positions.tobytes()
+        assert a.triangles.tobytes() == b.triangles.tobytes()
+
+
+def _mask(name: str) -> NDArray[np.integer]:
+    folder = data_folder()
+    assert folder is not None
+    if name == "nuclei":
+        return tifffile.imread(folder / "nuclei_stardist" / "mask3d.tif")
+    with h5py.File(folder / "ovule_plantseg" / "sample_ovule.h5") as file:
+        return file["label"][:]
+
+
+@pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
+@pytest.mark.parametrize("name", ["ovule", "nuclei"])
+def test_masks_of_real_cells(name: str) -> None:
+    mask = _mask(name)
+    ids, numbered = np.unique(mask, return_inverse=True)
+    labels = (numbered.reshape(mask.shape) + (ids[0] != 0)).astype(np.int32)
+    levels, volumes = levels_of(labels, (1.0, 1.0, 1.0), (0.15, 0.3, 0.6))
+    objects = len(volumes) - 1
+    assert objects >= 50
+    for walls in levels:
+        require_sound(walls, objects)
+    for walls in levels[1:]:
+        bias = measure_volumes(walls, objects)[1:] / volumes[1:] - 1
+        assert abs(np.median(bias)) < 1e-3
+        assert np.abs(np.percentile(bias, [2, 98])).max() < 0.01

@@ -1,0 +1,73 @@
+"""Labels whose objects have surfaces without pinches."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell.kernels.critical import find_critical
+from stereocell.meshes.validity import find_non_manifold_vertices, match_edges
+from stereocell.model.errors import SourceError
+from stereocell.objects.walls import _faces
+from stereocell.objects.well_composed import make_well_composed
+
+
+def has_pinches(labels: NDArray[np.int32]) -> bool:
+    """Whether the faces between an object's voxels and others make no 2-manifold."""
+    _, quads, sides = _faces(labels)
+    for number in range(1, int(labels.max()) + 1):
+        own = np.concatenate([quads[sides[:, 0] == number], quads[sides[:, 1] == number][:, ::-1]])
+        used, corners = np.unique(own, return_inverse=True)
+        corners = corners.reshape(-1, 4)
+        triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.int64)
+        _, twins, is_crowded = match_edges(triangles)
+        if is_crowded.any() or len(find_non_manifold_vertices(triangles, twins, len(used))):
+            return True
+    return False
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_place_is_found_exactly_where_a_surface_is_pinched(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    labels = np.zeros((6, 6, 6), np.int32)
+    labels[2:4, 2:4, 2:4] = rng.choice([0, 1, 2], (2, 2, 2), p=[0.4, 0.4, 0.2])
+    assert (find_critical(labels, 100)[1] > 0) == has_pinches(labels)
+
+
+def test_all_cubes_of_one_label() -> None:
+    """256 cubes of 2 x 2 x 2 voxels, inside and outside."""
+    for bits in range(256):
+        cube = (bits >> np.arange(8) & 1).reshape(2, 2, 2).astype(np.int32)
+        labels = np.zeros((6, 6, 6), np.int32)
+        labels[2:4, 2:4, 2:4] = cube
+        assert (find_critical(labels, 100)[1] > 0) == has_pinches(labels), bits
+
+
+def blobs(shape: tuple[int, int, int], seed: int) -> NDArray[np.int32]:
+    """Return touching objects with rough borders."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(4, np.array(shape) - 4, (6, 3))
+    grid = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
+    away = np.linalg.norm(grid[..., None, :] - places, axis=-1) + rng.normal(0, 0.15, (*shape, 6))
+    return np.pad(np.where(away.min(-1) < 7, away.argmin(-1) + 1, 0), 2).astype(np.int32)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_mended_objects_have_no_pinch_and_few_voxels_less(seed: int) -> None:
+    labels = blobs((30, 30, 30), seed)
+    assert has_pinches(labels)
+    mended, changed = make_well_composed(labels)
+    assert not has_pinches(mended)
+    assert 0 < changed == (mended != labels).sum() < 0.01 * (labels > 0).sum()
+    again, none = make_well_composed(mended)
+    assert none == 0
+    np.testing.assert_array_equal(again, mended)
+
+
+def test_shells_of_one_voxel_are_refused_by_name() -> None:
+    z, y, x = np.mgrid[:24, :24, :24] - 11.5
+    radius = np.sqrt(z**2 + y**2 + x**2)
+    labels = np.zeros((24, 24, 24), np.int32)
+    labels[radius < 9] = 1
+    labels[(radius < 9) & (radius > 8.3)] = 2  # full of holes
+    with pytest.raises(SourceError, match=r"object 2 touches itself .* would change"):
+        make_well_composed(labels)

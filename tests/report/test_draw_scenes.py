@@ -1,0 +1,90 @@
+"""Pictures of meshes: where things are, what hides what, and how light falls."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.typing import NDArray
+from PIL import Image
+
+from stereocell.report.draw_scenes import Scene, Surface, draw_scene
+
+FRAME = ((-10.0, -10.0, -10.0), (10.0, 10.0, 10.0))
+RED, BLUE = (1.0, 0.02, 0.02), (0.02, 0.02, 1.0)
+EYE = np.array([0.42, 0.5, 1.0]) / np.linalg.norm([0.42, 0.5, 1.0])
+
+
+def ball(folder: Path, name: str, center: NDArray[np.float64], radius: float) -> str:
+    found = pv.Icosphere(radius, center, nsub=4)
+    triangles = found.regular_faces
+    normals = (found.points - center) / radius
+    np.savez(folder / f"{name}.npz", positions=found.points, triangles=triangles, normals=normals)
+    return str(folder / f"{name}.npz")
+
+
+def picture_of(*surfaces: Surface, boxes: tuple[object, ...] = ()) -> NDArray[np.int64]:
+    drawn = draw_scene(Scene(surfaces, boxes, FRAME, (300, 300)))  # type: ignore[arg-type]
+    with Image.open(io.BytesIO(drawn.data)) as image:
+        assert image.size == (drawn.width, drawn.height)
+        return np.asarray(image.convert("RGB")).astype(np.int64)
+
+
+def test_a_ball_is_a_disc_in_the_middle_of_its_size(tmp_path: Path) -> None:
+    picture = picture_of(Surface(ball(tmp_path, "ball", np.zeros(3), 6.0), RED))
+    is_ball = picture[..., 0] > 60
+    rows, columns = np.nonzero(is_ball)
+    assert abs(rows.mean() - (picture.shape[0] - 1) / 2) < 1
+    assert abs(columns.mean() - (picture.shape[1] - 1) / 2) < 1
+    # the frame's box is wider than high from the eye
+    right = np.cross([0.0, 1.0, 0.0], EYE) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], EYE))
+    scale = picture.shape[1] / (20 * np.abs(right).sum()) / 1.04
+    up = np.cross(EYE, right)
+    scale = min(scale, picture.shape[0] / (20 * np.abs(up).sum()) / 1.04)
+    assert is_ball.sum() == pytest.approx(np.pi * (6 * scale) ** 2, rel=0.02)
+
+
+def test_light_comes_over_the_left_shoulder(tmp_path: Path) -> None:
+    picture = picture_of(Surface(ball(tmp_path, "ball", np.zeros(3), 6.0), RED))[..., 0]
+    middle = np.array(picture.shape) // 2
+    at = 40
+    upper_left, lower_right = picture[tuple(middle - at)], picture[tuple(middle + at)]
+    assert upper_left > lower_right + 40 > 60
+
+
+def test_what_is_nearer_hides_what_is_behind_in_either_order(tmp_path: Path) -> None:
+    near = Surface(ball(tmp_path, "near", 4 * EYE, 3.0), RED)
+    far = Surface(ball(tmp_path, "far", -4 * EYE, 4.5), BLUE)
+    for order in ((near, far), (far, near)):
+        picture = picture_of(*order)
+        middle = picture[picture.shape[0] // 2, picture.shape[1] // 2]
+        assert middle[0] > middle[2] + 50
+        is_blue = picture[..., 2] > picture[..., 0] + 30
+        assert is_blue.sum() > 1000  # a ring of the larger one is seen
+
+
+def test_the_inside_of_an_open_shell_is_lit(tmp_path: Path) -> None:
+    file = ball(tmp_path, "ball", np.zeros(3), 6.0)
+    with np.load(file) as arrays:
+        parts = dict(arrays)
+    towards = parts["positions"][parts["triangles"]].mean(axis=1) @ EYE
+    parts["triangles"] = parts["triangles"][towards < 0]  # the half that faces away
+    np.savez(tmp_path / "shell.npz", **parts)
+    picture = picture_of(Surface(str(tmp_path / "shell.npz"), RED))
+    assert picture[picture.shape[0] // 2, picture.shape[1] // 2, 0] > 100
+
+
+def test_boxes_are_hidden_behind_surfaces_and_drawn_before_them(tmp_path: Path) -> None:
+    box = ((-8.0, -8.0, -8.0), (8.0, 8.0, 8.0))
+    around = picture_of(boxes=(box,))
+    lines = np.abs(around - around[0, 0]).sum(axis=2) > 60
+    assert 500 < lines.sum() < 8000
+    covered = picture_of(Surface(ball(tmp_path, "ball", np.zeros(3), 7.9), RED), boxes=(box,))
+    is_line = np.abs(covered - around).sum(axis=2) < 24
+    assert 0.4 < (is_line & lines).sum() / lines.sum() < 0.8  # those behind are hidden
+
+
+def test_an_empty_scene_is_a_picture() -> None:
+    picture = picture_of()
+    assert (picture == picture[0, 0]).all()

@@ -1,0 +1,61 @@
+/** Surface and volume of one channel look like one thing: mean colours over the same pixels. */
+import { describe, expect, it } from "vitest";
+import { isBackground, type Picture, type Pixel, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { DEMO_BUNDLE, HEAD_BUNDLE, MAPS_BUNDLE, prepareStand } from "../support/browser/stand";
+import { colorDifference, toLab } from "../support/color_difference";
+
+const VIEWPORT = { width: 640, height: 360 };
+const TAN_HALF_FIELD = Math.tan((20 * Math.PI) / 180);
+/** Of the disc, degrees, and of what is all volume within its soft rim. */
+const [DISC, WITHIN] = [12, 6.5];
+/** Largest difference of a channel's mean colours (CIEDE2000). */
+const MOST = 5;
+
+/** Mean colours of two pictures over pixels of the disc's inside that show the specimen in both. */
+function meansWithin(a: Picture, b: Picture): Readonly<{ pixels: number; means: Pixel[] }> {
+  const radius = ((a.height / 2) * Math.tan((WITHIN * Math.PI) / 180)) / TAN_HALF_FIELD;
+  const sums = [0, 1].map(() => [0, 0, 0]);
+  let pixels = 0;
+  for (let y = 0; y < a.height; y++) {
+    for (let x = 0; x < a.width; x++) {
+      if (Math.hypot(x + 0.5 - a.width / 2, y + 0.5 - a.height / 2) > radius) continue;
+      const both = [a.at(x, y), b.at(x, y)];
+      if (both.some(isBackground)) continue;
+      pixels++;
+      both.forEach((pixel, i) => {
+        for (const [k, v] of pixel.entries()) sums[i][k] += v;
+      });
+    }
+  }
+  return { pixels, means: sums.map(([r, g, b]) => [r / pixels, g / pixels, b / pixels] as const) };
+}
+
+type Case = Readonly<{ name: string; bundle: string | undefined; channels: readonly string[] }>;
+const CASES: readonly Case[] = [
+  { name: "the demo", bundle: DEMO_BUNDLE, channels: ["CD31", "Hoechst"] },
+  { name: "real cells", bundle: MAPS_BUNDLE, channels: ["Cells"] },
+  { name: "an MR head", bundle: HEAD_BUNDLE, channels: ["MR"] },
+];
+
+for (const { name, bundle, channels } of CASES) {
+  describe.skipIf(!bundle)(name, () => {
+    describeInChromium("in the disc", () => {
+      const stand = prepareStand({ bundle, viewport: VIEWPORT });
+
+      for (const channel of channels) {
+        it(`${channel} has the surface's colour`, async () => {
+          const at = async (mode: string) => {
+            await stand.open(`&mode=${mode}&switch=9&disc=${DISC}&quality=high#v=1&c=${channel}`);
+            await stand.viewer.settled();
+            return takePicture(stand.viewer.page);
+          };
+          const { pixels, means } = meansWithin(await at("disc"), await at("off"));
+          expect(pixels).toBeGreaterThan(300);
+          const [volume, surface] = means.map(toLab);
+          expect(colorDifference(volume, surface)).toBeLessThanOrEqual(MOST);
+        });
+      }
+    });
+  });
+}

@@ -1,0 +1,65 @@
+/** Walking through the switch distance in stereo: surfaces from afar, volumes near by, and back. */
+import { expect, it } from "vitest";
+import { difference, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+const SWITCH_M = 0.75;
+
+describeInChromium("nearer and farther on the split screen", () => {
+  const stand = prepareStand({ viewport: { width: 320, height: 160 } });
+
+  it("goes from surfaces to volumes, and back", async () => {
+    const { page } = stand.viewer;
+    await stand.open(`&mode=disc&switch=${SWITCH_M}&disc=20&quality=low#v=1`);
+    await page.keyboard.press("j"); // what is looked at is not chosen
+    await page.keyboard.press("P");
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
+    const seen = async () => {
+      await stand.viewer.settled();
+      const { specimenAt, discRadius_deg, volumes, triangles } = await stand.viewer.snapshot();
+      return {
+        distance_m: Math.hypot(...specimenAt),
+        isVolume: discRadius_deg > 0 && volumes.length > 0,
+        triangles,
+      };
+    };
+    /** Press until what shows is another, and how far the specimen was before and after. */
+    const walk = async (key: string, isVolume: boolean) => {
+      let before = await seen();
+      expect(before.isVolume).toBe(!isVolume);
+      for (let i = 0; i < 20; i++) {
+        await page.keyboard.press(key);
+        await page.waitForTimeout(300); // the disc grows
+        const now = await seen();
+        expect(now.distance_m < before.distance_m).toBe(key === "+");
+        if (now.isVolume === isVolume) return [before.distance_m, now.distance_m] as const;
+        before = now;
+      }
+      throw new Error(`still as it was, ${before.distance_m} m away`);
+    };
+    /** How unlike the picture is to that of surfaces alone. */
+    const unlikeSurfaces = async () => {
+      await expect.poll(async () => (await stand.viewer.snapshot()).told.length).toBe(0);
+      const pictures = [];
+      for (const mode of ["disc", "off", "disc"]) {
+        await page.locator(`[data-mode="${mode}"]`).dispatchEvent("click");
+        await page.waitForTimeout(300);
+        await stand.viewer.settled();
+        pictures.push(await takePicture(page, { x: 0, y: 0, width: 320, height: 160 }));
+      }
+      return difference(pictures[0], pictures[1]);
+    };
+
+    expect((await seen()).triangles).toBeGreaterThan(0);
+    expect(await unlikeSurfaces()).toBeLessThan(0.001);
+    const [far, near] = await walk("+", true);
+    expect(near).toBeLessThan(far);
+    expect(await unlikeSurfaces()).toBeGreaterThan(0.005);
+    const [nearer, farther] = await walk("-", false);
+    // it neither flickers nor sticks: volumes go a tenth beyond where they came
+    expect(nearer).toBeGreaterThanOrEqual(near * 0.999);
+    expect(farther).toBeLessThan(1.35 * far);
+    expect(await unlikeSurfaces()).toBeLessThan(0.001);
+  });
+});
