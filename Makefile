@@ -52,7 +52,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-iso bench-threshold bench-tissue bench-unit bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -254,6 +254,9 @@ bench: setup ## Ratios of two things in one run, medians
 
 bench-scale: setup ## Units a second, memory and bytes read by 4 to 32 units; the whole dataset
 	$(BIN)/python tests/bench/scale.py out/bench-scale
+
+bench-scene: setup ## The paper's scene whole, 5 x 2 tiles of 194 x 512 x 512 x 3, by 1 and 2 workers and a cluster
+	$(BIN)/python tests/bench/scene.py out/bench-scene
 
 bench-iso: setup ## Levels for a surface over the corpus, and peers; volumes of nothing
 	$(BIN)/python tests/bench/iso.py

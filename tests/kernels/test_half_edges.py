@@ -7,11 +7,13 @@ from stereocell.kernels.half_edges import (
     BORDER,
     CROWDED,
     count_fans,
+    find_first,
     label_bodies,
     match_twins,
     measure_areas,
     measure_boxes,
     measure_volumes,
+    measure_windings,
     sum_gains,
     sum_normals,
 )
@@ -76,3 +78,22 @@ def test_gain_is_the_area_where_all_move_outwards() -> None:
     label, bodies = label_bodies(triangles, len(at))
     gain = sum_gains(at, triangles, label, bodies, sum_normals(at, triangles))
     np.testing.assert_allclose(gain, 4 * np.pi * 4, rtol=0.01)
+
+
+def test_windings_are_six_volumes_whichever_axis_and_zero_and_boxes() -> None:
+    one, other = ball(2.0), moved(ball(1.0), (9.0, 0.0, 0.0))
+    mesh = joined(one, other)
+    triangles, count = mesh.triangles.astype(np.int32), len(mesh.positions)
+    turned = triangles.copy()
+    turned[len(one.triangles) :] = turned[len(one.triangles) :, ::-1]  # the small one, inwards
+    label, bodies = label_bodies(turned, count)
+    assert find_first(turned, label, bodies + 1).tolist() == [0, len(one.triangles), -1]
+    at = mesh.positions.astype(np.float64)
+    normals = sum_normals(at, triangles).astype(np.float32)
+    zero = np.array([[5.0, -3.0, 0.0], [0.0, 1.0, 2.0]])
+    along, volumes, low, high = measure_windings(at, normals, turned, label, zero)
+    wanted = 6 * np.array([enclosed_volume(one), -enclosed_volume(other)])
+    np.testing.assert_allclose(volumes, np.repeat(wanted[:, None], 3, axis=1), rtol=1e-5)
+    assert along[0] > 0 > along[1]
+    np.testing.assert_allclose(low, [at[label == body].min(axis=0) for body in range(2)])
+    np.testing.assert_allclose(high, [at[label == body].max(axis=0) for body in range(2)])

@@ -20,12 +20,14 @@ from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_
 from stereocell.kernels.grid import bound_boxes, count_entries, list_by_cell
 from stereocell.kernels.half_edges import (
     count_fans,
+    find_first,
     label_bodies,
     match_twins,
     measure_areas,
     measure_boxes,
     measure_triangles,
     measure_volumes,
+    measure_windings,
     sum_gains,
     sum_normals,
 )
@@ -61,6 +63,8 @@ def compile_of_meshes() -> None:
     measure_volumes(at, triangles, labels, bodies)
     measure_areas(at, triangles, twins, labels, bodies)
     measure_boxes(at, labels, bodies)
+    find_first(triangles, labels, bodies)
+    measure_windings(at, at.astype(np.float32), triangles, labels, np.zeros((bodies, 3)))
     measure_triangles(at, triangles)
     sum_gains(at, triangles, labels, bodies, sum_normals(at, triangles))
     bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)

@@ -153,6 +153,44 @@ def measure_volumes(at: Points, triangles: Ints, labels: Ints, bodies: int) -> P
 
 
 @kernel
+def find_first(triangles: Ints, labels: Ints, bodies: int) -> Ints:
+    """Return the first triangle of each body (bodies,), or -1: it has none."""
+    first = np.full(bodies, -1, np.int32)
+    for t in range(len(triangles) - 1, -1, -1):
+        first[labels[triangles[t, 0]]] = t
+    return first
+
+
+@kernel
+def measure_windings(
+    at: Points, normals: NDArray[np.float32], triangles: Ints, labels: Ints, zero: Points
+) -> tuple[Points, Points, Points, Points]:
+    """Return what tells how each body is wound, for its triangles' doubled areas A.
+
+    zero  (bodies, 3), a place on each axis for each body
+
+    First (bodies,), the sum of A times the corners' normals. Then (bodies, 3), for each axis k,
+    that of A_k times the height of the corners above zero_k: by Gauss's law six volumes. Last the
+    least and the largest corner of each body's box (bodies, 3).
+    """
+    along, volumes = np.zeros(len(zero)), np.zeros((len(zero), 3))
+    low, high = np.full((len(zero), 3), np.inf), np.full((len(zero), 3), -np.inf)
+    for t in range(len(triangles)):
+        a, b, c = triangles[t]
+        body = labels[a]
+        area = doubled_area(at, a, b, c)
+        share = 0.0
+        for k in range(3):
+            share += area[k] * (normals[a, k] + normals[b, k] + normals[c, k])
+            height = at[a, k] + at[b, k] + at[c, k] - 3 * zero[body, k]
+            volumes[body, k] += area[k] * height
+            low[body, k] = min(low[body, k], at[a, k], at[b, k], at[c, k])
+            high[body, k] = max(high[body, k], at[a, k], at[b, k], at[c, k])
+        along[body] += share
+    return along, volumes, low, high
+
+
+@kernel
 def measure_triangles(at: Points, triangles: Ints) -> Points:
     """Return the area of each triangle (m,)."""
     areas = np.empty(len(triangles))

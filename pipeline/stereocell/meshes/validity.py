@@ -12,7 +12,15 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.half_edges import CROWDED, count_fans, label_bodies, match_twins
+from stereocell.kernels.half_edges import (
+    BORDER,
+    CROWDED,
+    count_fans,
+    find_first,
+    label_bodies,
+    match_twins,
+    measure_windings,
+)
 from stereocell.meshes.self_intersections import find_crossings, find_flat
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
@@ -89,19 +97,21 @@ def find_defects(
     degenerate = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     degenerate[find_flat(positions, triangles)] = True
     used = np.flatnonzero(~degenerate)
-    edges, twins, is_non_manifold = match_edges(triangles)
-    border_edges = np.flatnonzero((twins < 0) & ~is_non_manifold)
-    lone = border_edges[~_on_planes(mesh.positions, edges[border_edges], planes)]
-    non_manifold_vertices = find_non_manifold_vertices(triangles, twins, len(mesh.positions))
+    corners = np.ascontiguousarray(triangles, np.int32)
+    twins = match_twins(corners, len(mesh.positions))
+    rim = _ends_of(triangles, np.flatnonzero(twins == BORDER))
+    non_manifold_vertices = np.flatnonzero(count_fans(corners, twins, len(mesh.positions))[1] < 0)
     crossings = find_crossings(
         positions, triangles[used], fresh=None if fresh is None else fresh[used]
     )
     return Defects(
         degenerate=np.flatnonzero(degenerate),
-        open=edges[lone],
-        non_manifold_edges=np.unique(np.sort(edges[is_non_manifold], axis=1), axis=0),
+        open=rim[~_on_planes(mesh.positions, rim, planes)],
+        non_manifold_edges=np.unique(
+            np.sort(_ends_of(triangles, np.flatnonzero(twins == CROWDED)), axis=1), axis=0
+        ),
         non_manifold_vertices=non_manifold_vertices,
-        inside_out=_inside_out(mesh, positions[triangles], edges, border_edges, planes),
+        inside_out=_inside_out(mesh, positions, corners, rim, planes),
         crossings=used[crossings],
         walls=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
     )
@@ -121,22 +131,10 @@ def border(triangles: NDArray[np.integer]) -> Indices:
 
     triangles  (m, 3)
     """
-    edges, twins, _ = match_edges(triangles.astype(np.int64))
-    lone = edges[twins < 0]
+    corners = np.ascontiguousarray(triangles, np.int32)
+    twins = match_twins(corners, int(corners.max(initial=-1)) + 1)
+    lone = _ends_of(corners.astype(np.int64), np.flatnonzero(twins < 0))
     return lone[np.lexsort(lone.T[::-1])]
-
-
-def match_edges(triangles: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
-    """Return the directed edges int64 (3 m, 2), the twin of each or -1, and which are non-manifold.
-
-    triangles  int64 (m, 3)
-
-    Edge 3 t + k goes from corner k of triangle t to the next one.
-    """
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    count = int(triangles.max(initial=-1)) + 1
-    twins = match_twins(np.ascontiguousarray(triangles, np.int32), count)
-    return edges, twins.astype(np.int64), twins == CROWDED
 
 
 def _on_planes(
@@ -149,54 +147,41 @@ def _on_planes(
     return on
 
 
-def find_non_manifold_vertices(triangles: Indices, twins: Indices, vertices: int) -> Indices:
-    """Return the vertices whose triangles don't make one fan, int64 (n,).
-
-    triangles, twins  int64 (m, 3) and (3 m,), as of `match_edges`
-    vertices          number of vertices
-
-    It walks around each vertex and counts the triangles.
-    """
-    corners, across = (np.ascontiguousarray(a, np.int32) for a in (triangles, twins))
-    return np.flatnonzero(count_fans(corners, across, vertices)[1] < 0)
+def _ends_of(triangles: Indices, half_edges: NDArray[np.integer]) -> Indices:
+    """Return the two vertices of half-edges, int64 (n, 2)."""
+    triangle, corner = np.divmod(half_edges, 3)
+    return np.stack([triangles[triangle, corner], triangles[triangle, (corner + 1) % 3]], axis=1)
 
 
 def _inside_out(
     mesh: Mesh,
-    corners: NDArray[np.float64],
-    edges: Indices,
-    lone: Indices,
+    positions: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    rim: Indices,
     planes: tuple[Plane, ...],
 ) -> Indices:
-    """Return one triangle of each body that is wound inwards. `lone`: its boundary edges."""
-    if not len(mesh.triangles):
+    """Return one triangle of each body that is wound inwards. `rim`: its boundary edges."""
+    if not len(triangles):
         return np.zeros(0, np.int64)
-    labels = label_components(mesh.triangles, len(mesh.positions))[mesh.triangles[:, 0]]
-    names, first, body = np.unique(labels, return_index=True, return_inverse=True)
-    a, b, c = corners.transpose(1, 0, 2)
-    area = np.cross(b - a, c - a)
+    labels, bodies = label_bodies(triangles, len(positions))
+    first = find_first(triangles, labels, bodies).astype(np.int64)
+    zero, cuts = positions[triangles[first, 0]], np.zeros((bodies, 3), int)
+    for column, value in planes:
+        on = (mesh.positions[rim, column] == np.float32(value)).all(axis=1)
+        touched = np.unique(labels[rim[on, 0]])
+        zero[touched, column] = value
+        cuts[touched, column] += 1
     # by its normals, for a body that reaches from plane to plane along all three axes
-    size = np.bincount(body, (area * mesh.normals[mesh.triangles].sum(axis=1)).sum(axis=1))
-    known = np.zeros(len(names), bool)
+    size, volumes, low, high = measure_windings(
+        positions, np.ascontiguousarray(mesh.normals, np.float32), triangles, labels, zero
+    )
+    known = np.zeros(bodies, bool)
     for axis in range(3):
         # Gauss: the integral of x n_x. Caps across other axes add nothing, nor does one at x = 0
-        zero, cuts = corners[first, 0, axis], np.zeros(len(names), int)
-        for column, value in planes:
-            if column == axis:
-                on = lone[(mesh.positions[edges[lone], axis] == np.float32(value)).all(axis=1)]
-                touched = np.unique(body[on // 3])
-                zero[touched] = value
-                cuts[touched] += 1
-        height = corners[:, :, axis].sum(axis=1) - 3 * zero[body]
-        volume = np.bincount(body, area[:, axis] * height)
-        fits = (cuts <= 1) & ~known
-        size[fits] = volume[fits]
+        fits = (cuts[:, axis] <= 1) & ~known
+        size[fits] = volumes[fits, axis]
         known |= fits
-    wrong = size <= 0
-    low, high = np.full((2, len(names), 3), np.inf) * [[[1.0]], [[-1.0]]]
-    np.minimum.at(low, body, corners.min(axis=1))
-    np.maximum.at(high, body, corners.max(axis=1))
-    solid = ~wrong
+    wrong, solid = (first >= 0) & (size <= 0), (first >= 0) & (size > 0)
     for hollow in np.flatnonzero(wrong & (size < 0)).tolist():
         around = (low[solid] <= low[hollow]).all(axis=1) & (high[solid] >= high[hollow]).all(axis=1)
         wrong[hollow] = not around.any()

@@ -270,6 +270,10 @@ def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTa
     own = eight_bit[tuple(slice(APRON, APRON + n) for n in task.own_shape)]
     if vdb is None:
         return [*problems, "its volume has no field with a file"]
+    wanted = None if measured is None else vdb
+    if composed.measured != wanted:
+        found, expected = (file or "none" for file in (composed.measured, wanted))
+        problems.append(f"its measured voxels: found {found}, expected {expected}")
     with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
         anew = Path(folder) / vdb.name
         write_vdb(
