@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.kernels.critical import find_critical
-from stereocell.meshes.validity import find_non_manifold_vertices, match_edges
+from stereocell.kernels.half_edges import CROWDED, count_fans, match_twins
 from stereocell.model.errors import SourceError
 from stereocell.objects.walls import _faces
 from stereocell.objects.well_composed import make_well_composed
@@ -18,9 +18,9 @@ def has_pinches(labels: NDArray[np.int32]) -> bool:
         own = np.concatenate([quads[sides[:, 0] == number], quads[sides[:, 1] == number][:, ::-1]])
         used, corners = np.unique(own, return_inverse=True)
         corners = corners.reshape(-1, 4)
-        triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.int64)
-        _, twins, is_crowded = match_edges(triangles)
-        if is_crowded.any() or len(find_non_manifold_vertices(triangles, twins, len(used))):
+        triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.int32)
+        twins = match_twins(triangles, len(used))
+        if (twins == CROWDED).any() or (count_fans(triangles, twins, len(used))[1] < 0).any():
             return True
     return False
 
