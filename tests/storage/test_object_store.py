@@ -120,7 +120,9 @@ def test_what_is_lost_or_half_made_there_is_made_again(
 ) -> None:
     fs = store.files()
     before = of_parts(marks(store, "bucket/there"))
-    (unit,) = [key for key in before if key.startswith("units/r0_c0/") and key.endswith(".npy")]
+    (unit,) = [
+        key for key in before if key.startswith("units/r0_c0/") and key.endswith("volume.npy")
+    ]
     fs.rm(f"bucket/there/{unit}")
     fs.pipe_file("bucket/there/bundle/index.html", b"cut")
     capsys.readouterr()
@@ -144,7 +146,9 @@ def test_flipped_bits_there_are_named_and_get_no_further(
 ) -> None:
     fs = store.files()
     before = of_parts(marks(store, "bucket/there"))
-    (unit,) = [key for key in before if key.startswith("units/r0_c0/") and key.endswith(".npy")]
+    (unit,) = [
+        key for key in before if key.startswith("units/r0_c0/") and key.endswith("volume.npy")
+    ]
     (atlas,) = [key for key in before if key.startswith("stage/tiles/r0_c0/") and ".exr" in key]
     for key, phase in ((unit, "stage"), (atlas, "bundle")):
         whole = fs.cat_file(f"bucket/there/{key}")

@@ -26,21 +26,30 @@ import type { SliceImages } from "./slice_images";
 
 const LINE = 0xffd24a;
 const LETTER = "#ffd24a";
+/** Round each slice in the texture of all. */
+const BORDER_PX = 1;
 
-class Plane {
+/** All planes at once: a draw call costs as much as they do. */
+class Planes {
   readonly mesh: Mesh<BufferGeometry, MeshBasicMaterial>;
-  private readonly texture: CanvasTexture;
+  /** The slices side by side, each with its edges once more around it, for what is read between texels. */
+  private readonly canvas = document.createElement("canvas");
+  private readonly texture = new CanvasTexture(this.canvas);
 
-  constructor(private readonly canvas: HTMLCanvasElement) {
-    this.texture = new CanvasTexture(canvas);
+  constructor(private readonly slices: readonly HTMLCanvasElement[]) {
     this.texture.colorSpace = SRGBColorSpace;
     this.texture.minFilter = LinearFilter;
     this.texture.generateMipmaps = false;
-    const corners = Array.from({ length: MOST_CORNERS - 2 }, (_, i) => [0, i + 1, i + 2]);
+    const count = slices.length * MOST_CORNERS;
+    const triangles = slices.flatMap((_, plane) =>
+      Array.from({ length: MOST_CORNERS - 2 }, (_, i) =>
+        [0, i + 1, i + 2].map((corner) => plane * MOST_CORNERS + corner),
+      ),
+    );
     const geometry = new BufferGeometry()
-      .setAttribute("position", new BufferAttribute(new Float32Array(3 * MOST_CORNERS), 3))
-      .setAttribute("uv", new BufferAttribute(new Float32Array(2 * MOST_CORNERS), 2))
-      .setIndex(corners.flat());
+      .setAttribute("position", new BufferAttribute(new Float32Array(3 * count), 3))
+      .setAttribute("uv", new BufferAttribute(new Float32Array(2 * count), 2))
+      .setIndex(triangles.flat());
     const material = new MeshBasicMaterial({
       map: this.texture,
       side: DoubleSide,
@@ -52,24 +61,40 @@ class Plane {
     leaveUncut(this.mesh); // a cut lays it open
   }
 
-  place(frame: SliceFrame, box: Box): void {
-    const outline = outlineOf(frame, box);
-    this.mesh.visible = outline.length > 2;
-    const { geometry } = this.mesh;
-    outline.forEach((corner, i) => {
-      const { x, y } = placeIn(frame, corner);
-      geometry.attributes.position.setXYZ(i, ...corner);
-      geometry.attributes.uv.setXY(i, x, 1 - y);
+  place(frames: readonly SliceFrame[], box: Box): void {
+    const { position, uv } = this.mesh.geometry.attributes;
+    const { width, height } = this.canvas;
+    let left = BORDER_PX;
+    this.slices.forEach((slice, plane) => {
+      const outline = outlineOf(frames[plane], box);
+      for (let i = 0; i < MOST_CORNERS; i++) {
+        // the triangles that are left over have no area
+        const corner = outline.length > 2 ? outline[Math.min(i, outline.length - 1)] : box.min;
+        const { x, y } = placeIn(frames[plane], corner);
+        const at = plane * MOST_CORNERS + i;
+        position.setXYZ(at, ...corner);
+        uv.setXY(at, (left + x * slice.width) / width, 1 - (BORDER_PX + y * slice.height) / height);
+      }
+      left += slice.width + 2 * BORDER_PX;
     });
-    geometry.attributes.position.needsUpdate = true;
-    geometry.attributes.uv.needsUpdate = true;
-    geometry.setDrawRange(0, 3 * Math.max(0, outline.length - 2));
+    position.needsUpdate = true;
+    uv.needsUpdate = true;
   }
 
-  /** The canvas has another picture. */
+  /** The slices have other pictures. */
   refresh(): void {
-    const { image } = this.texture;
-    if (image !== this.canvas) this.texture.image = this.canvas;
+    const sum = (widths: readonly number[]) => widths.reduce((all, width) => all + width, 0);
+    this.canvas.width = sum(this.slices.map(({ width }) => width + 2 * BORDER_PX));
+    this.canvas.height = Math.max(...this.slices.map(({ height }) => height)) + 2 * BORDER_PX;
+    const context = this.canvas.getContext("2d");
+    if (context === null) throw new Error("no 2D canvas");
+    let left = 0;
+    for (const slice of this.slices) {
+      const { width, height } = slice;
+      context.drawImage(slice, left, 0, width + 2 * BORDER_PX, height + 2 * BORDER_PX);
+      context.drawImage(slice, left + BORDER_PX, BORDER_PX);
+      left += width + 2 * BORDER_PX;
+    }
     this.texture.dispose(); // its size on the GPU is fixed
     this.texture.needsUpdate = true;
   }
@@ -86,7 +111,7 @@ export class SlicePlanes {
   readonly group = new Object3D();
   /** Lines and letters, which no depth knows of. */
   readonly marks = new Object3D();
-  private readonly planes: readonly Plane[];
+  private readonly planes: Planes;
   private readonly lines: LineSegments<BufferGeometry, LineBasicMaterial>;
   private readonly letters = Array.from({ length: 6 }, () => new Label("above", LETTER));
   private readonly places = Array.from({ length: 6 }, () => new Vector3());
@@ -97,7 +122,7 @@ export class SlicePlanes {
   private corner: readonly ClipPlane[] = [];
 
   constructor(private readonly images: SliceImages) {
-    this.planes = images.canvases.map((canvas) => new Plane(canvas));
+    this.planes = new Planes(images.canvases);
     const positions = new BufferAttribute(new Float32Array(3 * 6), 3);
     const material = new LineBasicMaterial({ color: LINE, toneMapped: false, fog: false });
     this.lines = new LineSegments(
@@ -107,7 +132,7 @@ export class SlicePlanes {
     this.lines.frustumCulled = false;
     this.marks.add(this.lines, ...this.letters.map(({ sprite }) => sprite));
     this.group.name = "slices";
-    this.group.add(this.marks, ...this.planes.map(({ mesh }) => mesh));
+    this.group.add(this.marks, this.planes.mesh);
     this.group.visible = false;
   }
 
@@ -115,9 +140,7 @@ export class SlicePlanes {
     const { frames, box, point } = this.images;
     this.group.visible = areShown && frames !== null;
     if (!this.group.visible || frames === null) return;
-    this.planes.forEach((plane, i) => {
-      plane.place(frames[i], box);
-    });
+    this.planes.place(frames, box);
     const place = JSON.stringify(frames);
     if (place !== this.place) this.placed++;
     this.place = place;
@@ -161,10 +184,12 @@ export class SlicePlanes {
   }
 
   update(sight: Sight): void {
-    if (!this.group.visible) return;
-    if (this.version !== this.images.version) {
-      this.version = this.images.version;
-      for (const plane of this.planes) plane.refresh();
+    const { frames, box, version } = this.images;
+    if (!this.group.visible || frames === null) return;
+    if (this.version !== version) {
+      this.version = version;
+      this.planes.refresh();
+      this.planes.place(frames, box); // its texture has another size
     }
     this.letters.forEach((letter, i) => {
       letter.place(this.places[i], sight);
@@ -173,7 +198,7 @@ export class SlicePlanes {
 
   dispose(): void {
     this.group.removeFromParent();
-    for (const plane of this.planes) plane.dispose();
+    this.planes.dispose();
     for (const letter of this.letters) letter.dispose();
     this.lines.geometry.dispose();
     this.lines.material.dispose();
