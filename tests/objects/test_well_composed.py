@@ -71,3 +71,17 @@ def test_shells_of_one_voxel_are_refused_by_name() -> None:
     labels[(radius < 9) & (radius > 8.3)] = 2  # full of holes
     with pytest.raises(SourceError, match=r"object 2 touches itself .* would change"):
         make_well_composed(labels)
+
+
+def test_noise_is_refused_after_the_first_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    rounds = []
+
+    def counted(labels: NDArray[np.int32], most: int) -> tuple[NDArray[np.int64], int]:
+        rounds.append(most)
+        return find_critical(labels, most)
+
+    monkeypatch.setattr("stereocell.objects.well_composed.find_critical", counted)
+    noise = np.random.default_rng(0).integers(0, 6, (24, 24, 24))
+    with pytest.raises(SourceError, match="touches itself"):
+        make_well_composed(np.pad(noise, 2).astype(np.int32))
+    assert len(rounds) == 1
