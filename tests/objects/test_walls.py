@@ -126,6 +126,11 @@ def test_one_object_that_fills_all_is_a_box() -> None:
     assert measure_volumes(levels[-1], 1)[1] == pytest.approx(volumes[1], rel=1e-3)
 
 
+def test_labels_without_an_object_have_no_walls() -> None:
+    levels, _ = levels_of(np.zeros((4, 5, 6), np.int32), SPACING_UM, AIMS_UM)
+    assert all(walls.triangles.shape == walls.positions.shape == (0, 3) for walls in levels)
+
+
 def test_small_objects_stay() -> None:
     labels = np.zeros((6, 6, 40), np.int32)
     for number in range(1, 10):

@@ -32,6 +32,8 @@ def simplify_walls(
     volumes_um3   float64 (objects + 1,), what each object should hold
     step_um       of the lattice
     """
+    if not len(walls.triangles):
+        return walls
     errors = _errors(walls, max_error_um, len(volumes_um3))
     centre = (walls.positions.min(axis=0) + walls.positions.max(axis=0)) / 2
     locked = np.zeros(len(walls.positions), bool)
