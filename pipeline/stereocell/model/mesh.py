@@ -17,6 +17,8 @@ class Mesh:
     tangents   float32 (n, 4)  xyz and the bitangent's sign (glTF's convention), or None
     colors     float32 (n, 3)  linear RGB 0..1 as read from a stage, or None: the channel's colour
     openness   float32 (n,)    1 - ambient occlusion as read from a stage, 0..1, or None
+    objects    int32   (n,)    which object of its tile a vertex belongs to, from 0, or None: see
+                               object_table.py; each object's vertices are its own, and together
     """
 
     positions: NDArray[np.float32]
@@ -26,6 +28,7 @@ class Mesh:
     tangents: NDArray[np.float32] | None = None
     colors: NDArray[np.float32] | None = None
     openness: NDArray[np.float32] | None = None
+    objects: NDArray[np.int32] | None = None
 
 
 @dataclass(frozen=True, slots=True)
