@@ -8,6 +8,7 @@ nothing.
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +156,11 @@ class OutFolder:
                     raise OutputError(f"{self.survey_file}: {name} is not in it: {_RUN_UNITS}")
                 if name not in index:
                     raise OutputError(f"{self.index_file}: {name} is not in it: {_RUN_UNITS}")
+        for tile_id, labels in product((tile.id for tile in plan.tiles), plan.labels):
+            if f"{tile_id}/{labels.id}" not in index:
+                raise OutputError(
+                    f"{self.index_file}: {tile_id}/{labels.id} is not in it: {_RUN_UNITS}"
+                )
 
     def remove_other_folders(self, parent: Path, keep: set[str]) -> None:
         """Remove the folders in `parent` that an earlier plan left, all except `keep`."""

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
-from stereocell.building.channels import Channel, choose_color, with_surfaces
+from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
 from stereocell.building.intensities import require_intensities
+from stereocell.building.label_maps import are_alone, find_labels
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
@@ -62,6 +63,7 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     console.print(
         f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
         f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
+        + "".join(f", objects of {one.name}" for one in plan.labels)
     )
     return plan
 
@@ -77,8 +79,9 @@ def settle(source: str, settings: Settings) -> Plan:
         find_wrapper()
     dataset = open_source(as_asked(location, options))
     modality = dataset.modality or options.modality
+    alone = are_alone(settings.labels)
     indices = dataset.find_channels(options.channels) if options.channels else None
-    chosen = range(len(dataset.channels)) if indices is None else indices
+    chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
     channels = [
         Channel(
             index,
@@ -89,7 +92,15 @@ def settle(source: str, settings: Settings) -> Plan:
     ]
     channels = with_surfaces(channels, settings.surfaces)
     level = choose_level(dataset.levels, len(channels), settings)
-    if options.taken_as != INTENSITY:
+    labels = find_labels(
+        dataset,
+        location,
+        settings.labels,
+        options=options,
+        colors=PALETTE[len(channels) :] + PALETTE[: len(channels)],
+        taken=[channel.name for channel in channels],
+    )
+    if options.taken_as != INTENSITY and not alone:
         whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
         require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
     origin = dataset.levels[level[0]].origin_um
@@ -105,6 +116,7 @@ def settle(source: str, settings: Settings) -> Plan:
         modality=modality,
         placement=dataset.placement,
         has_sides=dataset.has_sides,
+        labels=labels,
     )
     gaps = told_of_gaps(dataset, plan)
     for note in (*dataset.notes, *gaps, *told_in_vain(settings, channels)):  # an error stands alone
@@ -145,7 +157,7 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
     with phase_of(out_folder, "units") as phase:
         built, missing = run_passes(out_folder, plan, engine=engine, only=only)
         phase.is_up_to_date = not built
-        units = len(plan.tiles) * len(plan.channels)
+        units = len(plan.tiles) * (len(plan.channels) + len(plan.labels))
         phase.about = "" if built == units else f"{built} of {units} units"
         if missing:
             console.print(f"units: {missing} of {units} are still to be built")
