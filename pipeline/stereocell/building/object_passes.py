@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
+from functools import cache
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from stereocell.building.label_maps import Labels
 from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
@@ -19,10 +21,12 @@ from stereocell.building.tasks.objects import ImageRef, ObjectsTask
 from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted
+from stereocell.model.object_notes import ObjectNotes
 from stereocell.read.open_dataset import reader_of
 from stereocell.storage.cache_key import key_of
-from stereocell.storage.json_files import find_sealed, read_sealed
+from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 
+NOTES = "units.schema.json#Notes"
 EXTENTS = "units.schema.json#Extents"
 _AGAIN = "run `stereocell units OUT` again"
 _UM = 1e6  # um a metre
@@ -46,6 +50,23 @@ def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: En
         tile: extents_from_json(read_sealed(file, EXTENTS, _AGAIN)) for tile, file in files.items()
     }
     return locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
+
+
+def save_notes(out_folder: OutFolder, labels: Labels) -> None:
+    """Keep what a label map's file says of its objects: the stage is made without that file."""
+    notes = _notes().dump_python(labels.open().notes, mode="json")
+    write_sealed(out_folder.notes_file(labels.id), {"notes": notes})
+
+
+def read_notes(out_folder: OutFolder, labels: Labels) -> ObjectNotes:
+    """Return what `save_notes` kept. Raises OutputError."""
+    file = out_folder.notes_file(labels.id)
+    return _notes().validate_python(read_sealed(file, NOTES, _AGAIN)["notes"])
+
+
+@cache
+def _notes() -> TypeAdapter[ObjectNotes]:
+    return TypeAdapter(ObjectNotes)
 
 
 def tell_objects(labels: Labels, located: Located) -> None:

@@ -108,6 +108,10 @@ class OutFolder:
         """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
+    def notes_file(self, labels_id: str) -> Path:
+        """Return the path of what a label map's own file says of its objects."""
+        return self.out / "units" / f"notes-{labels_id}.json"
+
     def tile_result(self, what: str, tile_id: str, channel_id: str, key: str) -> Path:
         """Return the path of what a pass before the units found of one tile: evidence, solids."""
         return self.out / "units" / tile_id / channel_id / f"{what}-{key}.json"

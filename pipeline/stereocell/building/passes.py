@@ -11,7 +11,7 @@ from itertools import chain, product
 from stereocell.building.channel_survey import survey_channels
 from stereocell.building.channels import Channel
 from stereocell.building.label_maps import Labels
-from stereocell.building.object_passes import locate_objects, object_tasks, tell_objects
+from stereocell.building.object_passes import locate_objects, object_tasks, save_notes, tell_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
@@ -53,6 +53,8 @@ def run_passes(
     """
     wanted = {f"{tile_id}/{channel.id}": channel for tile_id, channel in _select(plan, only)}
     survey = survey_channels(out_folder, plan, engine)
+    for labels in plan.labels:
+        save_notes(out_folder, labels)
     located = {one.id: locate_objects(out_folder, plan, one, engine) for one in plan.labels}
     tasks: list[tuple[str, UnitTask | ObjectsTask]] = []
     keys, others = {}, 0

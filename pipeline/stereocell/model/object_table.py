@@ -1,6 +1,6 @@
 """Objects of a label map and what is known of each: a table with a row an object."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,18 @@ class ObjectTable:
     columns: tuple[Column, ...]
     names: tuple[str, ...] = ()
     default: str = ""
+
+    def of_tile(self, tile: str) -> "ObjectTable":
+        """Return the table of one tile's objects, in the order in which its meshes number them."""
+        rows = self.rows[tile]
+        return replace(
+            self,
+            labels=self.labels[rows],
+            boxes=self.boxes[rows],
+            rows={tile: np.arange(len(rows), dtype=np.int32)},
+            columns=tuple(replace(one, values=one.values[rows]) for one in self.columns),
+            names=tuple(self.names[row] for row in rows.tolist()) if self.names else (),
+        )
 
     def column(self, column_id: str) -> Column | None:
         """Return a column by its ID; None: there is none."""
