@@ -43,6 +43,7 @@ class ObjectTable:
              surroundings has a piece in several tiles, and one row
     columns  the properties; `volume_um3` is always the first
     default  ID of the column that colours objects first; empty: each has its channel's colour
+    walls    int32 (m, 2): rows of two objects that share a wall, each pair once; None: not known
     """
 
     labels: NDArray[np.uint64]
@@ -51,6 +52,7 @@ class ObjectTable:
     columns: tuple[Column, ...]
     names: tuple[str, ...] = ()
     default: str = ""
+    walls: NDArray[np.int32] | None = None
 
     def of_tile(self, tile: str) -> "ObjectTable":
         """Return the table of one tile's objects, in the order in which its meshes number them."""
