@@ -78,9 +78,27 @@ def make_table(
             if notes.names
             else (),
             _default(columns, plan.settings.objects.color_by),
+            _walls(facts, rows, names),
         ),
         remarks + renamed,
     )
+
+
+def _walls(
+    facts: Mapping[str, ObjectFacts],
+    rows: Mapping[str, NDArray[np.int32]],
+    labels: NDArray[np.uint64],
+) -> NDArray[np.int32]:
+    """Return the rows of the objects that share a wall, int32 (m, 2), each pair once."""
+    order = np.argsort(labels)
+    found = [np.zeros((0, 2), np.int64)]
+    for tile, one in facts.items():
+        at = np.searchsorted(labels[order], one.beside).clip(0, max(len(labels) - 1, 0))
+        other = order[at] if len(order) else at
+        known = labels[other] == one.beside if len(order) else np.zeros(0, bool)
+        found.append(np.stack([rows[tile][one.walls][known], other[known]], axis=1))
+    pairs = np.sort(np.concatenate(found), axis=1)
+    return np.unique(pairs, axis=0).astype(np.int32)
 
 
 def _order(located: Located, facts: Mapping[str, ObjectFacts]) -> NDArray[np.int64]:

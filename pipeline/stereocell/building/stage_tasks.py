@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.unit_files import (
@@ -41,7 +44,7 @@ class TileTask:
     content  the tile without its channels
     units    ID, unit folder and sampled colours of each channel
     shared   IDs of those whose volume is another channel's: they have surfaces alone
-    tables   of the tile's objects, by the ID of their label map
+    tables   of the tile's objects: the ID of their label map, and which ones touch
     record   units/<tile>/stage.json: the key of the tile as written, and its files
     key      digest of the inputs of the tile to write
     """
@@ -52,7 +55,7 @@ class TileTask:
     record: Path
     key: str
     shared: frozenset[str] = frozenset()
-    tables: tuple[tuple[str, ObjectTable], ...] = ()
+    tables: tuple[tuple[str, ObjectTable, NDArray[np.uint64]], ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -102,7 +105,9 @@ def tile_task(
         (labels.id, out_folder.unit_dir(tile.id, labels.id, index[f"{tile.id}/{labels.id}"]), None)
         for labels in plan.labels
     )
-    own = tuple((id_, table.of_tile(tile.id)) for id_, table in tables.items())
+    own = tuple(
+        (id_, table.of_tile(tile.id), table.touching(tile.id)) for id_, table in tables.items()
+    )
     lattice = tile.lattice(plan.region)
     content = TileContent(
         id=tile.id,
@@ -118,7 +123,7 @@ def tile_task(
         asdict(content),
         [(*one, paint and asdict(paint)) for *one, paint in made_of],
         sorted(shared),
-        [(id_, digest_of_table(table)) for id_, table in own],
+        [(id_, digest_of_table(table), touching.tolist()) for id_, table, touching in own],
     ]
     key = key_of(depends, sys.modules[__name__])
     record = out_folder.tile_file(tile.id)
@@ -143,7 +148,7 @@ _DESCRIBED = ("id", "name", "about", "unit", "categories", "colors")
 def run_tile(task: TileTask) -> None:
     """Write one tile of the stage from its units. Raises OutputError where one is damaged."""
     remove(task.record)
-    tables = dict(task.tables)
+    tables = {id_: (table, touching) for id_, table, touching in task.tables}
     no_volume = task.shared | tables.keys()
     with cached(*(folder for _, folder, _ in task.units)):
         channels = tuple(
@@ -154,7 +159,7 @@ def run_tile(task: TileTask) -> None:
                 paint,
                 find_closed(folder),
                 None if channel_id in no_volume else load_measured(folder),
-                tables.get(channel_id),
+                *tables.get(channel_id, (None, None)),
             )
             for channel_id, folder, paint in task.units
         )

@@ -64,7 +64,15 @@ class ObjectTable:
             rows={tile: np.arange(len(rows), dtype=np.int32)},
             columns=tuple(replace(one, values=one.values[rows]) for one in self.columns),
             names=tuple(self.names[row] for row in rows.tolist()) if self.names else (),
+            walls=None,
         )
+
+    def touching(self, tile: str) -> NDArray[np.uint64]:
+        """Return the labels of objects that share a wall, uint64 (m, 2), the tile's first."""
+        if self.walls is None:
+            return np.zeros((0, 2), np.uint64)
+        both = np.concatenate([self.walls, self.walls[:, ::-1]])
+        return self.labels[both[np.isin(both[:, 0], self.rows[tile])]]
 
     def column(self, column_id: str) -> Column | None:
         """Return a column by its ID; None: there is none."""

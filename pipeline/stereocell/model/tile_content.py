@@ -26,6 +26,7 @@ class ChannelContent:
     closed  STL file of a closed copy of the surface; None: no file
     measured  the volume's voxels as they were read; None: they are not kept
     objects   the table of the objects in `lods`, which count in it; None: it is no label map
+    touching  uint64 (m, 2): labels of these objects, and of those that they share a wall with
     """
 
     channel_id: str
@@ -35,6 +36,7 @@ class ChannelContent:
     closed: Path | None = None
     measured: NDArray[Any] | None = None
     objects: ObjectTable | None = None
+    touching: NDArray[np.uint64] | None = None
 
 
 @dataclass(frozen=True, slots=True)

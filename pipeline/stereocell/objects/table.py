@@ -80,12 +80,18 @@ def own_columns(
     for index, name in enumerate(channels):
         mean, p95 = means[:, index], p95s[:, index]
         made.append(
-            (f"mean {name}", f"mean {name}", mean, f"Mean of {name} over its voxels", "counts")
+            (
+                f"mean_{to_identifier(name)}",
+                f"mean {name}",
+                mean,
+                f"Mean of {name} over its voxels",
+                "counts",
+            )
         )
         about = f"95th percentile of {name} over its voxels; missing of cut objects"
-        made.append((f"p95 {name}", f"p95 {name}", p95, about, "counts"))
+        made.append((f"p95_{to_identifier(name)}", f"p95 {name}", p95, about, "counts"))
     return [
-        Column(to_identifier(id_), name, np.asarray(values, np.float32), about, unit)
+        Column(id_, name, np.asarray(values, np.float32), about, unit)
         for id_, name, values, about, unit in made
     ]
 

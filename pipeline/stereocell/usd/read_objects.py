@@ -9,7 +9,15 @@ from pxr import Usd, UsdGeom
 from stereocell.model.errors import StageError
 from stereocell.model.object_table import Column
 from stereocell.usd.layer import CHANNELS
-from stereocell.usd.write_objects import COLUMN, COLUMNS, DEFAULT, LABELS, NAMES, OBJECT_ID
+from stereocell.usd.write_objects import (
+    COLUMN,
+    COLUMNS,
+    DEFAULT,
+    LABELS,
+    NAMES,
+    OBJECT_ID,
+    TOUCHING,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,11 +27,13 @@ class TileObjects:
     labels   uint64 (n,)
     names    by object; empty: there are none
     values   float32 (n,) by column ID
+    touching  uint64 (m, 2), labels of objects that share a wall, the tile's first
     """
 
     labels: NDArray[np.uint64]
     names: tuple[str, ...]
     values: dict[str, NDArray[np.float32]]
+    touching: NDArray[np.uint64]
 
 
 def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] | None:
@@ -89,7 +99,10 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
             codes = values[column.id]
             is_known = (codes >= 0) & (codes < len(column.categories))
             values[column.id] = np.where(is_known, codes, -1).astype(np.float32)
-    return TileObjects(np.array([int(label) for label in labels], np.uint64), names, values)
+    pairs = np.array(list(mesh.GetAttribute(TOUCHING).Get() or ()), np.uint64)
+    if len(pairs) % 2:
+        raise StageError(f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected pairs")
+    return TileObjects(np.array(list(labels), np.uint64), names, values, pairs.reshape(-1, 2))
 
 
 def objects_of(mesh: UsdGeom.Mesh) -> NDArray[np.int64] | None:

@@ -8,8 +8,6 @@ DCC tools show as a material slot.
 On the channel's prim stands what the columns mean: see `write_columns`.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
@@ -23,6 +21,7 @@ from stereocell.usd.layer import CHANNELS, set_attribute
 OBJECT_ID = "objectId"  # primvar: the place of a face's object in LABELS
 LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
 NAMES = "stereocell:objectNames"  # on a tile's mesh, too
+TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
 COLUMNS, DEFAULT = "stereocell:columns", "stereocell:defaultColumn"
 COLUMN = "stereocell:column:"
 MOST_CLASSES = 32  # categories that are GeomSubsets: each is a prim in each level of each tile
@@ -73,13 +72,25 @@ def write_columns(prim: Usd.Prim, table: ObjectTable, roughness: float) -> None:
         material.CreateSurfaceOutput().ConnectToSource(output)
 
 
-def define_objects(mesh: UsdGeom.Mesh, look: Sdf.Path, channel_id: str, table: ObjectTable) -> None:
-    """Write what all levels of a tile's objects share: their numbers, names and classes' looks."""
+def define_objects(
+    mesh: UsdGeom.Mesh,
+    look: Sdf.Path,
+    channel_id: str,
+    table: ObjectTable,
+    touching: NDArray[np.uint64] | None,
+) -> None:
+    """Write what all levels of a tile's objects share: their numbers, names and classes' looks.
+
+    touching  uint64 (m, 2), labels of objects that share a wall, the tile's first; None: not known
+    """
     prim = mesh.GetPrim()
     set_attribute(prim, LABELS, _Types.UInt64Array, _uint64(table.labels), custom=True)
     if table.names:
         names = Vt.StringArray(list(table.names))
         set_attribute(prim, NAMES, _Types.StringArray, names, custom=True)
+    if touching is not None:
+        pairs = _uint64(touching.ravel())
+        set_attribute(prim, TOUCHING, _Types.UInt64Array, pairs, custom=True)
     classes = classes_of(table)
     for code in range(len(classes.categories) if classes else 0):
         assert classes is not None
@@ -149,5 +160,5 @@ def _write(
     primvar.SetIndices(indices)
 
 
-def _uint64(labels: NDArray[np.uint64] | Sequence[int]) -> Vt.UInt64Array:
-    return Vt.UInt64Array([int(label) for label in labels])
+def _uint64(labels: NDArray[np.uint64]) -> Vt.UInt64Array:
+    return Vt.UInt64Array(labels.tolist())

@@ -185,7 +185,7 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
     if channel.objects is not None:
         look = branch.GetPath().AppendChild(_leaf(tile, channel, "_look"))
         feed_primvar(mesh, look, "color")
-        define_objects(mesh, look, channel.channel_id, channel.objects)
+        define_objects(mesh, look, channel.channel_id, channel.objects, channel.touching)
 
 
 def _define_volume(
