@@ -18,7 +18,9 @@ from stereocell.meshes.simplify import OF_DIAGONAL, OF_SIDE, SHARPEST_DEG, STRAY
 from stereocell.objects.walls import Walls, find_faults, measure_volumes, put_on_lattice
 
 _ROUNDS = 12  # of simplifying, and of moving back
-_NEWTON = 2  # steps towards the volumes
+_ANEW = 6  # of those rounds of moving, in which the way is found anew
+_NEWTON = 4  # steps towards the volumes, at most
+_CLOSE = 5e-4  # share of a volume that may be missing
 
 
 def simplify_walls(
@@ -67,20 +69,30 @@ def keep_volumes(
     Moved is along the volumes' gradients, the least by the areas of the vertices' surroundings: a
     linear system of one unknown an object.
     """
-    moved = walls
     fixed = fixed | _at_ends(walls)
-    for _ in range(_NEWTON):
-        missing = volumes_um3[1:] - measure_volumes(moved, len(volumes_um3) - 1)[1:]
-        moved = replace(moved, positions=moved.positions + _shift(moved, missing, fixed))
-    positions = put_on_lattice(moved.positions, step_um)
-    for _ in range(_ROUNDS):
+    positions = walls.positions
+    for turn in range(_ROUNDS):
+        if turn < _ANEW:  # what can't move makes the others move more
+            positions = put_on_lattice(_moved(walls, volumes_um3, fixed), step_um)
         at_fault = find_faults(replace(walls, positions=positions))
         if not len(at_fault):
             return replace(walls, positions=positions)
-        back = np.zeros(len(positions), bool)
-        back[at_fault] = True
-        positions[back] = walls.positions[back]
+        fixed[at_fault] = True
+        positions = np.where(fixed[:, np.newaxis], walls.positions, positions)
     return walls
+
+
+def _moved(
+    walls: Walls, volumes_um3: NDArray[np.float64], fixed: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return where the vertices are when each object has its volume (n, 3), um."""
+    moved = walls
+    for _ in range(_NEWTON):
+        missing = volumes_um3[1:] - measure_volumes(moved, len(volumes_um3) - 1)[1:]
+        if not (np.abs(missing) > _CLOSE * volumes_um3[1:]).any():
+            break
+        moved = replace(moved, positions=moved.positions + _shift(moved, missing, fixed))
+    return moved.positions
 
 
 def _at_ends(walls: Walls) -> NDArray[np.bool_]:

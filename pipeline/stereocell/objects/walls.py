@@ -130,7 +130,11 @@ def _smoothed(centres: NDArray[np.float64], quads: NDArray[np.int64]) -> NDArray
     ends = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
     ends = np.concatenate([ends, ends[:, ::-1]])
     edges = sparse.coo_matrix((np.ones(len(ends)), ends.T), (count, count)).tocsr()
-    edges.data[:] = 1.0  # once, of however many faces it is
+    # within a wall an edge is of two faces; where walls meet in a line, a vertex goes by that alone
+    is_line = edges.data != 2
+    from_vertex = np.repeat(np.arange(count), np.diff(edges.indptr))
+    on_line = np.bincount(from_vertex, is_line, count) == 2
+    edges.data = np.where(on_line[from_vertex], is_line, True).astype(np.float64)
     mean = sparse.diags(1 / np.maximum(np.asarray(edges.sum(axis=1)).ravel(), 1)) @ edges
     low, high = centres - _REACH, centres + _REACH
     placed = centres.copy()
