@@ -283,7 +283,7 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_sample(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", choices=["cycif", "brain-cells", "mri"])
+    parser.add_argument("name", choices=["cycif", "brain-cells", "mri", "cells"])
     parser.add_argument("out", type=_place, metavar="OUT", help="file or folder to write")
     parser.add_argument(
         "--seed", type=int, default=0, help="cycif, mri: another seed, another block or noise"
