@@ -167,6 +167,11 @@ def numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
 
 def _pair(flag: Flag, kind: type, text: str) -> tuple[str, Any]:
     """Return a channel and what is given for it."""
+    if flag.form.endswith("[=PATH]"):  # a path may hold anything
+        name, _, value = text.partition("=")
+        if not name or text.endswith("="):
+            raise UsageError(f"{flag.name} is {text!r}, expected {flag.form}")
+        return name, value
     name, _, value = text.rpartition("=")
     try:
         given = kind(value) if isinstance(kind, type) else _number_or_text(value)

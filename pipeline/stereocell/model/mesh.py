@@ -91,6 +91,7 @@ class Lod:
     normal_map   uint8 (h, w, 3), tangent space, row 0 at the top (v = 1), or None
     quality      None where the writer doesn't know it
     baked        ambient occlusion and sampled channel; None: neither
+    farthest_um  the largest of these distances, where there is no `quality`; None: not known
     """
 
     mesh: Mesh
@@ -98,10 +99,11 @@ class Lod:
     normal_map: NDArray[np.uint8] | None = None
     quality: Quality | None = None
     baked: Baked | None = None
+    farthest_um: float | None = None
 
     @property
     def largest_um(self) -> float:
         """The largest distance that was found between this mesh and the iso-surface, um."""
         if self.quality is None:
-            return self.distance_um
+            return self.distance_um if self.farthest_um is None else self.farthest_um
         return max(self.distance_um, self.quality.away.max, self.quality.back.max)

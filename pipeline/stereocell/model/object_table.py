@@ -1,6 +1,6 @@
 """Objects of a label map and what is known of each: a table with a row an object."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,26 @@ class ObjectTable:
     names: tuple[str, ...] = ()
     default: str = ""
     walls: NDArray[np.int32] | None = None
+
+    def of_tile(self, tile: str) -> "ObjectTable":
+        """Return the table of one tile's objects, in the order in which its meshes number them."""
+        rows = self.rows[tile]
+        return replace(
+            self,
+            labels=self.labels[rows],
+            boxes=self.boxes[rows],
+            rows={tile: np.arange(len(rows), dtype=np.int32)},
+            columns=tuple(replace(one, values=one.values[rows]) for one in self.columns),
+            names=tuple(self.names[row] for row in rows.tolist()) if self.names else (),
+            walls=None,
+        )
+
+    def touching(self, tile: str) -> NDArray[np.uint64]:
+        """Return the labels of objects that share a wall, uint64 (m, 2), the tile's first."""
+        if self.walls is None:
+            return np.zeros((0, 2), np.uint64)
+        both = np.concatenate([self.walls, self.walls[:, ::-1]])
+        return self.labels[both[np.isin(both[:, 0], self.rows[tile])]]
 
     def column(self, column_id: str) -> Column | None:
         """Return a column by its ID; None: there is none."""
