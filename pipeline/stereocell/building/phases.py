@@ -122,6 +122,8 @@ def settle(source: str, settings: Settings) -> Plan:
         has_sides=dataset.has_sides,
         labels=labels,
     )
+    for one in plan.labels:
+        table_of(plan, one)  # what can't be read is told before the build
     gaps = told_of_gaps(dataset, plan)
     for note in (*dataset.notes, *gaps, *told_in_vain(settings, channels)):  # an error stands alone
         console.print(f"plan: {note}", markup=False)

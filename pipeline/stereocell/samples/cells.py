@@ -48,7 +48,6 @@ MARKERS = {
     "HLADR": (0.15, 0.2, 0.8, 0.9),
     "SOX10": (0.7, 0.02, 0.02, 0.02),
 }
-_COLORS = ("4F70F5", "F0CD3C", "B4566E", "92ECF6", "F6F0DC", "A0562C", "3F8CA0", "B4C078")
 _FULL, _OFFSET, _NOISE = 3000.0, 120.0, 18.0  # counts
 _MEMBRANE_UM = 0.8
 _INSIDE = 0.35  # of a marker's brightness at the membrane
@@ -138,12 +137,7 @@ def _write_zarr(folder: Path, tissue: CellTissue, seed: int) -> None:
                 "name": "cells",
             }
         ],
-        "omero": {
-            "channels": [
-                {"label": name, "color": _COLORS[i % len(_COLORS)], "active": True}
-                for i, name in enumerate(names)
-            ]
-        },
+        "omero": {"channels": [{"label": name, "active": True} for name in names]},
     }
     group.attrs["ome"] = about
     array = group.create_array(
