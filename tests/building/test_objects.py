@@ -14,6 +14,7 @@ from stereocell import samples
 from stereocell.building.located_objects import CUT
 from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.unit_files import load_objects
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
@@ -262,12 +263,13 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(tmp_path: Path) -> Non
         assert np.mean([one[0] for one in shared]) == pytest.approx(at, abs=0.3)
 
 
-def test_small_objects_and_those_beyond_the_region_are_counted(
+def test_small_objects_are_counted_and_others_end_with_the_region(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     labels = np.zeros((12, 40, 40), np.int64)
     labels[2:8, 2:10, 2:10] = 2**62
     labels[2:8, 2:10, 28:38] = 4
+    labels[2:8, 20:28, 14:26] = 6
     labels[5, 30, 5:9] = 3
     labels[9, :3, :] = -1
     source, out = tmp_path / "l.tif", tmp_path / "out"
@@ -276,11 +278,12 @@ def test_small_objects_and_those_beyond_the_region_are_counted(
     assert run("plan", source, "-o", out, *flags) == 0
     assert run("units", out, "--workers", 0) == 0
     told = said(capsys)
-    assert "l: 1 object; 1 of too few voxels are left out" in told
-    assert "1 with their centroid outside the region are left out" in told
+    assert "l: 2 objects; 1 of too few voxels are left out" in told
     plan = OutFolder(out).plan()
     located = locate_objects(OutFolder(out), plan, plan.labels[0], Engine(0))
-    assert located.extents.labels.tolist() == [2**62]
+    assert located.extents.labels.tolist() == [6, 2**62]
+    facts = load_objects(next((out / "units/r0_c0/l").iterdir()))
+    assert facts.voxels.tolist() == located.extents.voxels.tolist() == [6 * 8 * 6, 6 * 8 * 8]
     assert CUT not in located.owners.tolist()
 
 

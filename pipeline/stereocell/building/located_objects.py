@@ -62,7 +62,7 @@ class TileGrid:
         return Box((z0, y0, x0), (z1, y1, x1))
 
     def places(self, voxels: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the tiles' places (n, 3) of voxels (n, 3); -1 or too large where there is none."""
+        """Return the tiles' places (n, 3) of voxels (n, 3) of the region."""
         parts = [
             np.searchsorted(e, v, side="right") - 1
             for e, v in zip(self.edges, voxels.T, strict=True)
@@ -82,7 +82,6 @@ class Located:
     owners   int64 (n,): the tile, counted in `tiles`, or CUT
     tiles    IDs
     small    objects left out for having too few voxels
-    outside  objects left out for having their centroid outside the region
     parts    by tile: the labels of its own voxels
     """
 
@@ -91,7 +90,6 @@ class Located:
     owners: NDArray[np.int64]
     tiles: tuple[str, ...]
     small: int
-    outside: int
     parts: Mapping[str, NDArray[np.uint64]]
 
     def owned(self, tile: str) -> NDArray[np.int64]:
@@ -100,7 +98,7 @@ class Located:
         cut = np.flatnonzero((self.owners == CUT) & np.isin(self.extents.labels, self.parts[tile]))
         return np.concatenate([whole, cut])
 
-    def window(self, tile: str, labels: Labels) -> Box | None:
+    def window(self, tile: str) -> Box | None:
         """Return the voxels of a label map that a tile's objects need; None: it has none."""
         numbers = self.owned(tile)
         if not len(numbers):
@@ -110,8 +108,11 @@ class Located:
         is_cut = self.owners[numbers] == CUT
         low[is_cut] = np.maximum(low[is_cut], own.start)
         high[is_cut] = np.minimum(high[is_cut], own.stop)
-        z0, y0, x0 = np.maximum(low.min(axis=0) - HALO, 0).tolist()
-        z1, y1, x1 = np.minimum(high.max(axis=0) + HALO, labels.shape).tolist()
+        # objects end where the region does
+        first = [int(edges[0]) for edges in self.grid.edges]
+        last = [int(edges[-1]) for edges in self.grid.edges]
+        z0, y0, x0 = np.maximum(low.min(axis=0) - HALO, first).tolist()
+        z1, y1, x1 = np.minimum(high.max(axis=0) + HALO, last).tolist()
         return Box((z0, y0, x0), (z1, y1, x1))
 
     def near(self, window: Box) -> NDArray[np.int64]:
@@ -131,23 +132,21 @@ def locate(
     places = grid.places(centres)
     tiles = tuple(tile.id for tile in plan.tiles)
     number = {place: tiles.index(id_) for place, id_ in grid.ids.items()}
-    owners = np.array([number.get((z, y, x), -2) for z, y, x in places.tolist()], np.int64)
+    owners = np.array([number[z, y, x] for z, y, x in places.tolist()], np.int64)
     for place, tile in number.items():
         box = grid.box(place)
         reach = np.maximum(np.array(box.shape) * AROUND, 1)
         mine = owners == tile
         inside = (whole.low >= box.start - reach) & (whole.high <= box.stop + reach)
         owners[mine & ~inside.all(axis=1)] = CUT
-    kept = large & (owners > -2)
     return Located(
         grid,
         Extents(
-            *(getattr(whole, name)[kept] for name in ("labels", "voxels", "low", "high", "sums"))
+            *(getattr(whole, name)[large] for name in ("labels", "voxels", "low", "high", "sums"))
         ),
-        owners[kept],
+        owners[large],
         tiles,
         int((~large).sum()),
-        int((large & (owners == -2)).sum()),
         {tile: part.labels for tile, part in parts.items()},
     )
 

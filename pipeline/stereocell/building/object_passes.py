@@ -78,8 +78,6 @@ def tell_objects(labels: Labels, located: Located) -> None:
         told += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
     if located.small:
         told += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
-    if located.outside:
-        told += f"; {located.outside} with their centroid outside the region are left out"
     console.print(f"units: {labels.name}: {told}", markup=False)
 
 
@@ -93,7 +91,7 @@ def object_tasks(
         found = located[labels.id]
         boxes = tile_boxes(found.grid)
         for tile in plan.tiles:
-            window = found.window(tile.id, labels)
+            window = found.window(tile.id)
             numbers = found.owned(tile.id)
             near = np.zeros(0, np.int64) if window is None else found.near(window)
             is_cut = found.owners == CUT
@@ -147,7 +145,7 @@ def lattice_step_um(plan: Plan, located: Mapping[str, Located]) -> float:
         low = np.array(plan.position_um(tile.box.start)) - spacing
         high = np.array(plan.position_um(tile.box.stop)) + spacing
         for labels in plan.labels:
-            window = located[labels.id].window(tile.id, labels)
+            window = located[labels.id].window(tile.id)
             if window is not None:
                 low = np.minimum(low, labels.position_um(window.start))
                 high = np.maximum(high, labels.position_um(window.stop))
