@@ -16,7 +16,7 @@ import { type MetObject, pickObject } from "./pick";
 import { loadObjects, type ObjectTable } from "./table";
 
 /** By which each object is always drawn in, as a share of the specimen's longest edge. */
-const INSET = 1e-4;
+const INSET = 4e-4;
 
 export type ObjectsOptions = Readonly<{
   base: string;
