@@ -3,7 +3,7 @@ import type { Object3D } from "three";
 import { TemporaryError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Box } from "../math/box";
-import type { Ray } from "../math/vec3";
+import type { Ray, Vec3 } from "../math/vec3";
 import type { Objects } from "../objects/objects";
 import type { MetObject } from "../objects/pick";
 import type { Control, Group } from "../panel/controls";
@@ -20,7 +20,7 @@ export type ObjectsPartOptions = Readonly<{
   surfaces: SurfaceSet;
   specimen: () => Object3D;
   dispatch: (action: Action, isStep?: boolean) => void;
-  onAim: (box: Box) => void;
+  onAim: (box: Box, isSeen: (eye: Vec3) => boolean) => void;
   announce: (text: string) => void;
   onChange: () => void;
   onError: (error: unknown) => void;

@@ -31,8 +31,8 @@ export type ContentsOptions = Readonly<{
   view: HTMLElement;
   dispatch: (action: Action, isStep?: boolean) => void;
   announce: (text: string) => void;
-  /** An object is to be flown to; um, world. */
-  onAim: (box: Box) => void;
+  /** An object is to be flown to, um, world; `isSeen`: whether nothing lies before it for an eye. */
+  onAim: (box: Box, isSeen: (eye: Vec3) => boolean) => void;
   /** The picture is no longer true. */
   onChange: () => void;
   onError: (error: unknown) => void;

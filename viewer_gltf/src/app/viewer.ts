@@ -11,7 +11,7 @@ import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
-import type { Ray } from "../math/vec3";
+import type { Ray, Vec3 } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
 import { StageSize } from "../render/canvas_size";
@@ -61,6 +61,11 @@ const NOTHING_AHEAD = "No tile is in the middle of the view.";
 /** Distance of the eye from an object that it flies to, in the object's lengths, and at least, m. */
 const NEAREST_OBJECT = 6;
 const NEAREST_OBJECT_M = 0.08;
+/** From where else it is looked at: corners, edges and faces of a cube, those in front first. */
+const ASIDE = [1, 0, -1].flatMap((z) =>
+  [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
+);
+const BEHIND_OTHERS = "Others lie before it on all sides: from its card it is shown alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
 const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
@@ -135,7 +140,7 @@ export class Viewer {
       view: stage.parentElement ?? stage,
       dispatch: (action, isStep) => this.dispatch(action, isStep),
       announce: (text) => this.onAnnounce(text),
-      onAim: (box) => this.flyTo(box),
+      onAim: (box, isSeen) => this.flyTo(box, isSeen),
       onChange: () => this.loop.come(),
       onError: (error) => this.report(error),
     });
@@ -591,17 +596,26 @@ export class Viewer {
     return { position: position.setY(height_m), orientation };
   }
 
-  /** Bring an object near: the flat camera goes there, in stereo it comes before the eyes. */
-  private flyTo(box: Box): void {
+  /**
+   * Bring an object near: the flat camera goes there, to where nothing lies before it, if there is such a place;
+   * in stereo it comes before the eyes.
+   */
+  private flyTo(box: Box, isSeen: (eye: Vec3) => boolean): void {
     const { specimen } = this.room;
+    const toSpecimen = specimen.group.matrixWorld.clone().invert();
     const middle = new Vector3(...centerOf(box)).applyMatrix4(specimen.group.matrixWorld);
     const edge_m = specimen.scale * Math.max(...box.max.map((v, i) => v - box.min[i]));
     if (this.stereo.kind === null) {
       const { position, target } = this.navigation.lookNow;
-      const away = new Vector3(...position).sub(new Vector3(...target));
-      away.setLength(Math.max(NEAREST_OBJECT * edge_m, NEAREST_OBJECT_M));
-      const to = middle.toArray();
-      this.navigation.lookFrom({ position: away.add(middle).toArray(), target: to });
+      const distance_m = Math.max(NEAREST_OBJECT * edge_m, NEAREST_OBJECT_M);
+      const now = new Vector3(...position).sub(new Vector3(...target));
+      const eyes = [now, ...ASIDE.map((way) => new Vector3(...way))].map((way) =>
+        way.setLength(distance_m).add(middle),
+      );
+      const free = eyes.find((eye) => isSeen(eye.clone().applyMatrix4(toSpecimen).toArray()));
+      if (free === undefined) this.onAnnounce(BEHIND_OTHERS);
+      const { x, y, z } = free ?? eyes[0];
+      this.navigation.lookFrom({ position: [x, y, z], target: middle.toArray() });
     } else {
       const larger = Math.max(1, OBJECT_IN_ROOM_M / edge_m);
       const pose = zoomAbout(specimen.pose, middle, larger);

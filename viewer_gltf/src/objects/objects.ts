@@ -1,9 +1,9 @@
 /** The objects of one label map: their table, how their surfaces look, and who is met by a ray. */
 import { Matrix4, Mesh, type Object3D } from "three";
 import type { FileRef, Manifest } from "../bundle/generated/bundle";
-import type { Box } from "../math/box";
+import { type Box, centerOf } from "../math/box";
 import type { Clip } from "../math/clip";
-import type { Ray } from "../math/vec3";
+import type { Ray, Vec3 } from "../math/vec3";
 import { type ObjectChange, type ObjectView, START_OBJECTS } from "../state/objects";
 import type { ViewerState } from "../state/viewer_state";
 import type { SurfaceSet } from "../surfaces/surface_set";
@@ -16,7 +16,7 @@ import { type MetObject, pickObject } from "./pick";
 import { loadObjects, type ObjectTable } from "./table";
 
 /** By which each object is always drawn in, as a share of the specimen's longest edge. */
-const INSET = 1e-4;
+const INSET = 4e-4;
 
 export type ObjectsOptions = Readonly<{
   base: string;
@@ -27,8 +27,8 @@ export type ObjectsOptions = Readonly<{
   /** What the surfaces' world is seen by: um to the room. */
   specimen: Object3D;
   dispatch: (change: ObjectChange, isStep?: boolean) => void;
-  /** An object is to be flown to; um. */
-  onAim: (box: Box) => void;
+  /** An object is to be flown to, um; `isSeen`: whether nothing lies before it for an eye. */
+  onAim: (box: Box, isSeen: (eye: Vec3) => boolean) => void;
   onChange: () => void;
   onError: (error: unknown) => void;
 }>;
@@ -119,7 +119,10 @@ export class Objects {
     }
     this.draw();
     const { aim } = this.view;
-    if (aim !== this.aimed && aim !== null) this.options.onAim(this.box(aim.row));
+    if (aim !== this.aimed && aim !== null) {
+      const box = this.box(aim.row);
+      this.options.onAim(box, (eye) => this.isSeen(aim.row, centerOf(box), eye));
+    }
     this.aimed = aim;
   }
 
@@ -192,6 +195,13 @@ export class Objects {
     const meshes = surfaces.meshes.filter((each) => each.channel === channel);
     const world = new Matrix4().copy(specimen.matrixWorld);
     return pickObject(ray, world, meshes, this.table.boxes, this.flags, this.clip);
+  }
+
+  /** Also where nothing is met at all: what is beside the view is not on screen, and can't be asked. */
+  private isSeen(row: number, middle: Vec3, eye: Vec3): boolean {
+    const [x, y, z] = middle.map((v, i) => v - eye[i]);
+    const met = this.meet({ origin: eye, direction: [x, y, z] });
+    return met === null || met.row === row;
   }
 
   /** Open a row's card, or close it where it is open; a gaze that rests closes none, and is no step to undo. */

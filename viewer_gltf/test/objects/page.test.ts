@@ -154,9 +154,40 @@ describeInChromium("the objects of a label map", () => {
     expect(isBackground(at(picture, centerOf(BEHIND)))).toBe(true);
   });
 
+  it("open their card by a gaze that rests, which is no step to undo", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const { page } = stand.viewer;
+    await page.locator('[data-action="split"]').dispatchEvent("click");
+    await page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
+    // the specimen is moved until a ball is straight ahead: 10 um a step
+    for (const key of ["Shift+ArrowUp", "Shift+ArrowUp", "Shift+ArrowLeft", "Shift+ArrowLeft"]) {
+      await page.keyboard.press(key);
+      await page.waitForTimeout(200);
+    }
+    const ahead = rowAt(0, 3, 0, 1);
+    await expect.poll(async () => (await view())?.picked).toBe(ahead);
+    expect((await stand.viewer.snapshot()).told).toContain(`Object ${labelOf(ahead)}`);
+    await page.waitForTimeout(2500); // it goes on resting there: the card stays
+    expect((await view()).picked).toBe(ahead);
+    await page.keyboard.press("Control+z");
+    expect((await view()).picked).toBe(ahead);
+  });
+
   it("are found by number and flown to", async () => {
     await stand.open();
     await stand.viewer.settled();
+    // one that lies behind another is seen from elsewhere
+    await control("search").fill(String(labelOf(BEHIND)));
+    await control(`found-${BEHIND}`).click();
+    await stand.viewer.settled();
+    await control("close").click();
+    await stand.viewer.settled();
+    const later = await takePicture(stand.viewer.page);
+    const own = later.at(later.width / 2, later.height / 2);
+    expect(hasColor(COLORS[BEHIND % 3])(own)).toBe(true);
+    const { look: aside } = await stand.viewer.snapshot();
+    expect(aside.position[2], "from behind").toBeLessThan(aside.target[2]);
     const { look } = await stand.viewer.snapshot();
     const wanted = rowAt(1, 4, 2, 1);
     await control("search").fill(String(labelOf(wanted)));
