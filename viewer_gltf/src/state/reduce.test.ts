@@ -85,6 +85,14 @@ describe("the viewer's state", () => {
     expect(state.middle).toBe("r0_c2");
   });
 
+  it("opens with the label maps alone", () => {
+    const plain = sampleManifest(6);
+    const table = { path: "o.json", bytes: 1, sha256: "0".repeat(64) };
+    const channels = plain.channels.map((one, i) => (i === 5 ? { ...one, objects: table } : one));
+    const state = initialState({ ...plain, channels });
+    expect(state.channels.filter((c) => c.shown).map((c) => c.id)).toEqual(["c5"]);
+  });
+
   it("draws an unsure surface from afar as it does a clear one", () => {
     const clear = sampleManifest(1);
     const [first] = clear.channels;
