@@ -133,6 +133,13 @@ def _compare_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[flo
     decoded = drawn.positions_m.astype(np.float64)
     # float32 metres of a viewer, beside half the diagonal of a lattice cell
     limit_m = math.sqrt(3) / 2 * drawn.step_m + 4e-7 * float(np.abs(places).max())
+    if (drawn.objects is None) != (lod.mesh.objects is None):
+        return 0.0, ["its vertices are of no object" if drawn.objects is None else "it has objects"]
+    if drawn.objects is not None and lod.mesh.objects is not None:
+        # objects touch: each is compared with itself, a row of them
+        length = 2 * float(np.ptp(places, axis=0).max())
+        places[:, 0] += lod.mesh.objects * length
+        decoded[:, 0] += drawn.objects * length
     there, here = places[triangles], decoded[drawn.triangles]
     apart = max(_farthest(places, decoded), _farthest(there.mean(axis=1), here.mean(axis=1)))
     if apart > limit_m:

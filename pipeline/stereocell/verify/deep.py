@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from stereocell.building.channels import Channel
-from stereocell.building.input_unchanged import require_added, require_input
+from stereocell.building.input_unchanged import require_added, require_input, require_labels
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import unit_tasks
 from stereocell.building.plan import Plan
@@ -19,6 +20,7 @@ from stereocell.usd.read_stage import dependencies, open_stage, tile_prims
 from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
 from stereocell.verify.bundle_manifest import compare_histograms, compare_manifest
 from stereocell.verify.formats import CheckLine, raise_on
+from stereocell.verify.objects_against_source import compare_objects
 from stereocell.verify.stage_against_source import SourceTask, UnitFinding, compare_unit
 
 
@@ -49,6 +51,7 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
         out_folder.require_units_of(plan)
         require_input(plan)
         require_added(plan)
+        require_labels(plan)
         odd = list(_odd_values(out_folder, plan))
         findings = engine.run("source", compare_unit, list(_source_tasks(out_folder, plan)))
     except StereoCellError as error:
@@ -56,6 +59,11 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
     else:
         for channel in plan.channels if findings else ():
             yield from _channel_lines(channel, findings, odd)
+        for labels in plan.labels:
+            yield _line(
+                f"{labels.name} against source",
+                partial(compare_objects, out_folder, plan, labels, engine),
+            )
     yield _line("manifest against stage", lambda: _compare_manifest(exported, bundle))
     yield _line("bundle against stage", lambda: _compare_bundle(exported, bundle, engine))
 

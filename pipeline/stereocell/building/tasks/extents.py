@@ -24,12 +24,17 @@ class ExtentsTask:
     box: Box
 
 
+def find_in_tile(task: ExtentsTask) -> Extents:
+    """Return the objects in a tile's voxels. Raises SourceError."""
+    if min(task.box.shape) == 0:
+        return find_extents(np.zeros((0, 0, 0), np.uint8), task.box.start)
+    return find_extents(task.labels.open().read(task.box), task.box.start)
+
+
 def write_extents(task_and_file: tuple[ExtentsTask, Path]) -> None:
     """Find the objects and write where they are. Raises SourceError."""
     task, file = task_and_file
-    found = find_extents(np.zeros((0, 0, 0), np.uint8), task.box.start)
-    if min(task.box.shape) > 0:
-        found = find_extents(task.labels.open().read(task.box), task.box.start)
+    found = find_in_tile(task)
     packed = {
         name: base64.b64encode(getattr(found, name).astype(dtype).tobytes()).decode()
         for name, dtype in _DTYPES.items()

@@ -1,0 +1,125 @@
+"""Compare the objects of a stage with their label map: voxels are counted anew, surfaces measured.
+
+Of each object its voxels' volume, box and centroid are found again, the table is joined again, and
+both are held against the columns in the stage. The volume inside each level's surface may differ
+from the voxels' by what the units state.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.building.label_maps import Labels
+from stereocell.building.located_objects import TileGrid, locate, tile_boxes
+from stereocell.building.object_passes import read_notes
+from stereocell.building.object_tables import make_table, table_of
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan import Plan
+from stereocell.building.tasks.extents import ExtentsTask, find_in_tile
+from stereocell.building.unit_files import load_objects
+from stereocell.engine.run import Engine
+from stereocell.model.mesh import Mesh
+from stereocell.model.object_table import ObjectTable
+from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
+from stereocell.usd.read_stage import loaded, mesh_at, open_stage, read_lods
+from stereocell.verify.formats import raise_on
+
+_CLOSE = 1e-4  # share by which a level's volume may exceed what is stated: float32
+_SHOWN = 5  # problems of a column
+
+
+@dataclass(frozen=True, slots=True)
+class _TileTask:
+    stage_file: Path
+    tile: str
+    labels_id: str
+
+
+def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> str:
+    """Return what was compared of a label map. Raises CheckError where something differs."""
+    boxes = tile_boxes(TileGrid.of(plan, labels))
+    names = [(f"{tile}/{labels.name}", ExtentsTask(labels, box)) for tile, box in boxes.items()]
+    counted = engine.run("objects", find_in_tile, names)
+    parts = dict(zip(boxes, counted, strict=True))
+    located = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
+    index = out_folder.index()
+    facts = {
+        tile.id: load_objects(
+            out_folder.unit_dir(tile.id, labels.id, index[f"{tile.id}/{labels.id}"])
+        )
+        for tile in plan.tiles
+    }
+    notes = read_notes(out_folder, labels)
+    table, _ = make_table(plan, labels, located, facts, notes, table_of(plan, labels))
+    tasks = [(tile.id, _TileTask(out_folder.stage_file, tile.id, labels.id)) for tile in plan.tiles]
+    found = engine.run("stage", _read_tile, tasks)
+    problems: list[str] = []
+    worst: list[float] = []
+    for tile, (there, volumes) in zip(plan.tiles, found, strict=True):
+        problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd(table, tile.id, there)]
+        if there is None or problems:
+            continue
+        own = facts[tile.id]
+        voxels = own.voxels * float(np.prod(labels.spacing_um))
+        for level, held in enumerate(volumes):
+            bias = float(np.abs(held / voxels - 1).max(initial=0.0))
+            worst += [0.0] * (level + 1 - len(worst))
+            worst[level] = max(worst[level], bias)
+            if bias > own.bias[level] + _CLOSE:
+                problems.append(
+                    f"{tile.id}/{labels.id}: lod{level}: an object's volume is {bias:.2%} from its "
+                    f"voxels', {own.bias[level]:.2%} is stated"
+                )
+    raise_on(problems)
+    told = ", ".join(f"{share:.2%}" for share in worst)
+    return (
+        f"{len(table.labels)} objects, {len(table.columns)} columns as counted and joined anew; "
+        f"volumes of their surfaces by level within {told or 'nothing'}"
+    )
+
+
+def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
+    """Return what differs between a tile's objects in the stage and the table."""
+    own = table.of_tile(tile)
+    if there is None:
+        return [f"the stage has no objects, expected {len(own.labels)}"] if len(own.labels) else []
+    if there.labels.tolist() != own.labels.tolist():
+        return [
+            f"the stage has {len(there.labels)} objects, others than the {len(own.labels)} found"
+        ]
+    found = []
+    for column in own.columns:
+        values = there.values.get(column.id)
+        if values is None:
+            found.append(f"column {column.id} is missing")
+            continue
+        same = np.isclose(values, column.values, rtol=1e-5, atol=1e-6, equal_nan=True)
+        if not same.all():
+            shown = ", ".join(map(str, own.labels[~same][:_SHOWN].tolist()))
+            found.append(f"column {column.id} has other values of {shown}")
+    return found
+
+
+def _read_tile(task: _TileTask) -> tuple[TileObjects | None, list[NDArray[np.float64]]]:
+    """Return a tile's objects in the stage, and the volume of each by level, um^3."""
+    stage = open_stage(task.stage_file)
+    described = read_columns(stage, task.labels_id)
+    with loaded(stage, task.tile) as (tile, _):
+        prim = mesh_at(tile, task.labels_id, 0)
+        there = None if prim is None or described is None else read_tile_objects(prim, described[0])
+        if there is None:
+            return None, []
+        count = len(there.labels)
+        return there, [_volumes(lod.mesh, count) for lod in read_lods(tile, task.labels_id)]
+
+
+def _volumes(mesh: Mesh, count: int) -> NDArray[np.float64]:
+    """Return the volume inside each object's surface, um^3, float64 (n,)."""
+    if mesh.objects is None:
+        return np.zeros(count)
+    at = mesh.positions.astype(np.float64) - mesh.positions.mean(axis=0)
+    a, b, c = (at[mesh.triangles[:, k]] for k in range(3))
+    parts = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    return np.bincount(mesh.objects[mesh.triangles[:, 0]], parts, count).astype(np.float64)
