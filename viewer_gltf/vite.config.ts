@@ -125,7 +125,7 @@ export default defineConfig({
           globalSetup: "test/support/browser/shared_fixture.ts",
           testTimeout: 180_000,
           hookTimeout: 180_000,
-          expect: { poll: { timeout: 20_000 } }, // its usual second is short for a busy machine
+          expect: { poll: { timeout: 90_000 } }, // its usual second is short for a busy machine
           // one page for each core: software draws it, mostly in one thread, and it waits between
           maxWorkers: Math.min(availableParallelism(), 8),
           isolate: false,

@@ -4,16 +4,23 @@ import { BaseSequencer, type TestSpecification } from "vitest/node";
 export const LONG = [
   "offline/first_visit", // it waits for most of it, as the next one does
   "offline/offline",
-  "render/gaze_focus",
   "pathtrace/page",
-  "xr/stereo_page",
-  "page/faults_of_host",
-  "render/clip_page",
+  "render/gaze_focus",
   "xr/disparity",
-  "capture/page",
-  "page/viewer",
+  "page/opening",
+  "render/clip_page",
+  "xr/stereo_page",
+  "volumes/bricks_page",
+  "page/faults_of_host",
   "pathtrace/path_tracer",
+  "render/color_match",
+  "shaders/psnr_against_reference",
+  "page/viewer",
+  "page/faults",
+  "xr/room_page",
+  "volumes/page",
   "interop/stage_round_trip",
+  "bench/bench_page",
 ];
 
 /**
