@@ -21,12 +21,16 @@ else ifeq ($(SAMPLE),mri)
 export OUT ?= out/mri-demo
 DEMO_INPUT := out/samples/head
 DEMO_ARGS := --preset mri
+else ifeq ($(SAMPLE),cells)
+export OUT ?= out/cells
+DEMO_INPUT := out/samples/cells.ome.zarr
+DEMO_ARGS := --grid 2x1 --channels DNA,panCK,CD3,CD68 --labels cells --table out/samples/cells.csv
 else ifeq ($(SAMPLE),cycif)
 export OUT ?= out/demo
 DEMO_INPUT := out/samples/cycif.ome.zarr
 DEMO_ARGS := --preset cycif --grid 5x2
 else
-$(error SAMPLE is $(SAMPLE), expected cycif, brain-cells or mri)
+$(error SAMPLE is $(SAMPLE), expected cycif, brain-cells, mri or cells)
 endif
 
 VENV := .venv
@@ -94,7 +98,7 @@ browser: ## Install Debian's chromium for the browser tests, if it is missing an
 	elif [ -n "$$CI" ]; then echo "browser: no chromium, and CI needs one: apt-get install chromium" >&2; exit 1; \
 	else echo "browser: no chromium, so the browser tests are skipped; get it by: sudo apt-get install chromium"; fi
 
-demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells or mri)
+demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells, mri or cells)
 	@mkdir -p out/samples
 	test -e $(DEMO_INPUT) || $(RUN) sample "$$SAMPLE" $(DEMO_INPUT)
 	$(WITH_ARGS) $(RUN) build $(DEMO_INPUT) --out="$$OUT" --workers="$$WORKERS" $(DEMO_ARGS) ARGS

@@ -29,6 +29,11 @@ FORMATS: dict[str, tuple[str, str, str]] = {
     ),
     "bundle": ("Bundle", "bundle", "`OUT/bundle/manifest.json` and `files.json`."),
     "volumes": ("Bundle: volumes", "volumes", "`OUT/bundle/channels/<channel>/volumes.json`."),
+    "objects": (
+        "Bundle: objects",
+        "objects",
+        "`OUT/bundle/channels/<channel>/objects.json`, of a label map: [Objects](../objects.md).",
+    ),
     "transfer2d": (
         "Bundle: transfer functions",
         "transfer2d",

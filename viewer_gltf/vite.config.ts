@@ -39,8 +39,18 @@ const UNUSED = new Set([
   ],
   ...["meshlambert", "meshmatcap", "meshnormal", "meshphong", "meshtoon"],
 ]);
-/** Parts of the others for what none of the page's materials does. */
+/** Parts of the others for what none of the page's materials does, and parts of the unused ones alone. */
 const UNUSED_PARTS = [
+  "lights_lambert_fragment",
+  "lights_lambert_pars_fragment",
+  "lights_phong_fragment",
+  "lights_phong_pars_fragment",
+  "lights_toon_fragment",
+  "lights_toon_pars_fragment",
+  "gradientmap_pars_fragment",
+  "shadowmap_pars_fragment",
+  "shadowmap_pars_vertex",
+  "shadowmap_vertex",
   "transmission_fragment",
   "transmission_pars_fragment",
   "cube_uv_reflection_fragment",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from corpus.real import data_folder
 from stereocell.meshes.validity import find_defects, label_components
 from stereocell.objects.simplify_walls import simplify_walls
-from stereocell.objects.walls import Walls, extract_walls, measure_volumes, surface_of
+from stereocell.objects.walls import Walls, extract_walls, measure_volumes, surfaces_of
 from stereocell.objects.well_composed import make_well_composed
 from support.touching_cells import RADIUS_UM, touching_cells
 
@@ -42,7 +42,7 @@ def tissue() -> tuple[list[Walls], NDArray[np.float64], NDArray[np.float64]]:
 
 def require_sound(walls: Walls, objects: int) -> None:
     for number in range(1, objects + 1):
-        counts = find_defects(surface_of(walls, number)).counts
+        counts = find_defects(surfaces_of(walls, np.array([number], np.int32))).counts
         assert not any(counts.values()), (number, counts)
 
 
@@ -112,7 +112,7 @@ def test_a_ring_stays_a_ring_and_two_pieces_stay_two() -> None:
     for walls in levels:
         require_sound(walls, 2)
         for number, bodies, genus in ((1, 1, 1), (2, 2, 0)):
-            mesh = surface_of(walls, number)
+            mesh = surfaces_of(walls, np.array([number], np.int32))
             vertices, faces = len(mesh.positions), len(mesh.triangles)
             assert label_components(mesh.triangles, vertices).max() + 1 == bodies
             assert vertices - faces // 2 == 2 * bodies - 2 * genus  # Euler

@@ -14,7 +14,8 @@ from PIL import Image
 from corpus.real import data_folder
 from stereocell import read
 from stereocell.building import phases
-from stereocell.building.open_source import open_source, source_of
+from stereocell.building.open_source import open_source
+from stereocell.building.plan_source import source_of
 from stereocell.building.settings import PlanOptions, Settings
 from stereocell.cli.__main__ import main
 from stereocell.preview.cut_planes import LONGEST_PX, cut_planes, square_pixels

@@ -6,6 +6,8 @@ import struct
 import meshoptimizer
 import numpy as np
 
+_NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+
 
 def read(data):
     """Return the document and the decoded accessors."""
@@ -39,8 +41,35 @@ def read(data):
             decoded = np.ascontiguousarray(rows["row"])
             if view.get("filter") == "OCTAHEDRAL":
                 decoded = meshoptimizer.decode_filter_oct(decoded, *decoded.shape)
-            arrays.append(decoded[:, : {"VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]])
+            arrays.append(decoded[:, : _NUMBERS[accessor["type"]]])
     return document, arrays
+
+
+def property_table(data):
+    """Return the document's one property table by EXT_structural_metadata: numbers, enums by name.
+
+    Where it has no value by its schema: None.
+    """
+    document, _ = read(data)
+    binary = data[28 + struct.unpack_from("<I", data, 12)[0] :]
+    metadata = document["extensions"]["EXT_structural_metadata"]
+    (table,) = metadata["propertyTables"]
+    properties = metadata["schema"]["classes"][table["class"]]["properties"]
+    found = {}
+    for name, entry in table["properties"].items():
+        view, shape = document["bufferViews"][entry["values"]], properties[name]
+        assert view["byteOffset"] % 8 == 0
+        enum = metadata["schema"]["enums"][shape["enumType"]] if "enumType" in shape else None
+        kind = np.dtype((enum["valueType"] if enum else shape["componentType"]).lower())
+        assert view["byteLength"] == kind.itemsize * table["count"]
+        values = np.frombuffer(binary, kind, table["count"], view["byteOffset"]).tolist()
+        if enum:
+            names = {each["value"]: each["name"] for each in enum["values"]}
+            assert len(set(names.values())) == len(enum["values"])
+            values = [names[value] for value in values]
+        none = shape.get("noData")
+        found[name] = [None if none is not None and v == none else v for v in values]
+    return found
 
 
 def decoded_positions_m(data):

@@ -1,3 +1,4 @@
+import json
 import re
 import shutil
 import subprocess
@@ -18,7 +19,7 @@ from stereocell.storage.assets import find_asset
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.usd.written_files import write_list
 from stereocell.verify.formats import check
-from support import spheres
+from support import object_bundle, spheres
 
 GLB = "channels/CD31/r0_c0/lod0.glb"
 VOLUME = "volumes/r0_c0/CD31.ktx2"
@@ -316,3 +317,31 @@ def test_missing_packages_are_named(made, monkeypatch):
     monkeypatch.setattr(subprocess, "run", lambda *args, **options: answer)
     found = lines(made)
     assert "run `make setup`" in found["glTF validator"].detail
+
+
+@pytest.fixture
+def cells(tmp_path, node):
+    """A bundle of a label map."""
+    object_bundle.write(tmp_path / "cells")
+    return tmp_path / "cells"
+
+
+def test_a_bundle_of_objects_passes(cells):
+    assert [line for line in check(cells) if not line.ok] == []
+    assert lines(cells)["object tables"].detail == f"{object_bundle.COUNT} objects"
+
+
+def test_a_table_that_is_too_short_and_rows_that_are_not_there_are_named(cells):
+    path = cells / "channels/cells/objects.json"
+    content = json.loads(path.read_text())
+    content["columns"][0]["bytes"]["bytes"] -= 1
+    content["tiles"]["r0_c1"]["more"] = [object_bundle.COUNT]
+    path.write_text(json.dumps(content))
+    detail = lines(cells)["object tables"].detail
+    assert "0_volume_um3.u8 has 60 bytes, expected 61" in detail
+    assert "r0_c1: names rows beyond the 61" in detail
+
+
+def test_a_column_that_is_damaged_is_named(cells):
+    change_byte(cells / "channels/cells/objects/2_CD8.f32")
+    assert "2_CD8.f32" in lines(cells)["hashes"].detail

@@ -22,6 +22,7 @@ export const LAYERS: readonly string[] = [
   "interaction",
   "annotations",
   "slices",
+  "objects",
   "panel",
   "xr",
   "share",

@@ -59,7 +59,7 @@ async function writeChanged(name: string, text: string): Promise<void> {
 
 await mkdir(OUT, { recursive: true });
 await writeChanged("constants.ts", await readConstants());
-for (const name of ["bundle", "volumes", "transfer2d"]) {
+for (const name of ["bundle", "volumes", "transfer2d", "objects"]) {
   const text = await readFile(new URL(`${name}.schema.json`, SCHEMAS), "utf8");
   const schema = toOlderDraft(JSON.parse(text)) as { [key: string]: Json };
   const types = await compile(schema, name, { format: false, unreachableDefinitions: false });

@@ -24,9 +24,9 @@ from stereocell.building.level_choice import (
     hold_to_solids,
     level_of_tile,
 )
-from stereocell.building.open_source import source_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
 from stereocell.building.source_tasks import (
     around,
     box_to_json,

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from stereocell.building.open_source import open_source, source_of
+from stereocell.building.open_source import open_source
 from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
 from stereocell.building.tissue_files import read_whole
 from stereocell.model.errors import SourceError
 
@@ -28,6 +29,17 @@ def require_input(plan: Plan) -> None:
         raise SourceError(
             f"{plan.name}: level {plan.level} holds no such region: plan into another OUT"
         )
+
+
+def require_labels(plan: Plan) -> None:
+    """Raise SourceError unless the label maps hold the voxels that were planned."""
+    for labels in plan.labels:
+        found = open_source(labels.ref).fingerprint
+        if found != labels.ref.fingerprint:
+            raise SourceError(
+                f"labels {labels.name!r}: changed since they were planned (fingerprint "
+                f"{found[:12]}, expected {labels.ref.fingerprint[:12]}): plan into another OUT"
+            )
 
 
 def require_added(plan: Plan) -> None:

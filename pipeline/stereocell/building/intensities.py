@@ -37,8 +37,8 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
     if dataset.labels:
         raise UsageError(
             f"{dataset.shown}: is a label map: found {dataset.labels}, expected intensities: "
-            "objects can't be built yet; --as intensity takes it for an image, as suits the mask "
-            "of one object"
+            "--labels . builds its objects; --as intensity takes it for an image, as suits the "
+            "mask of one object"
         )
     stored = dataset.stored_dtype
     (z0, y0, x0), (z1, y1, x1) = (
@@ -56,8 +56,8 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
             raise UsageError(
                 f"{dataset.shown}: channel {dataset.channels[index].name!r} may be a label map: "
                 f"found {stored.name} and {found.values or 'no'} value besides 0, "
-                "expected intensities: objects can't be built yet; --as intensity takes it for an "
-                "image"
+                "expected intensities: --labels . builds its objects; --as intensity takes it for "
+                "an image"
             )
 
 
@@ -127,5 +127,5 @@ def _told(dataset: Dataset, index: int, found: _Found) -> str:
     return (
         f"{dataset.shown}: channel {dataset.channels[index].name!r} looks like a label map of "
         f"{found.values} objects: found {found.pieces} pieces of equal voxels, expected "
-        "intensities: objects can't be built yet; --as intensity takes it for an image"
+        "intensities: --labels . builds its objects; --as intensity takes it for an image"
     )

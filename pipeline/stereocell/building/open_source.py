@@ -5,8 +5,6 @@ from functools import lru_cache
 from pathlib import Path
 
 from stereocell import read
-from stereocell.building.channels import Channel
-from stereocell.building.plan import Plan
 from stereocell.building.settings import PlanOptions
 from stereocell.storage.workspace import fetch
 
@@ -47,13 +45,6 @@ def open_source(ref: SourceRef) -> read.Dataset:
         pattern=ref.pattern,
         axes=ref.axes,
     )
-
-
-def source_of(plan: Plan, channel: Channel | None = None) -> SourceRef:
-    """Return the reference to a plan's source, or to that of one of its channels."""
-    if channel is not None and channel.source:
-        return SourceRef(channel.source, 0, (), fingerprint=channel.fingerprint)
-    return as_asked(plan.source, plan.settings.plan, plan.fingerprint)
 
 
 def as_asked(source: str, options: PlanOptions, fingerprint: str = "") -> SourceRef:

@@ -8,6 +8,7 @@ nothing.
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,10 @@ class OutFolder:
         """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
+    def notes_file(self, labels_id: str) -> Path:
+        """Return the path of what a label map's own file says of its objects."""
+        return self.out / "units" / f"notes-{labels_id}.json"
+
     def tile_result(self, what: str, tile_id: str, channel_id: str, key: str) -> Path:
         """Return the path of what a pass before the units found of one tile: evidence, solids."""
         return self.out / "units" / tile_id / channel_id / f"{what}-{key}.json"
@@ -155,6 +160,11 @@ class OutFolder:
                     raise OutputError(f"{self.survey_file}: {name} is not in it: {_RUN_UNITS}")
                 if name not in index:
                     raise OutputError(f"{self.index_file}: {name} is not in it: {_RUN_UNITS}")
+        for tile_id, labels in product((tile.id for tile in plan.tiles), plan.labels):
+            if f"{tile_id}/{labels.id}" not in index:
+                raise OutputError(
+                    f"{self.index_file}: {tile_id}/{labels.id} is not in it: {_RUN_UNITS}"
+                )
 
     def remove_other_folders(self, parent: Path, keep: set[str]) -> None:
         """Remove the folders in `parent` that an earlier plan left, all except `keep`."""

@@ -4,14 +4,17 @@ The survey finds each channel's window and level, dataset-wide (channel_survey.p
 volumes are built. Every result lies under a name that says what it depends on.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
+from itertools import chain, product
 
 from stereocell.building.channel_survey import survey_channels
 from stereocell.building.channels import Channel
-from stereocell.building.open_source import source_of
+from stereocell.building.label_maps import Labels
+from stereocell.building.object_passes import locate_objects, object_tasks, save_notes, tell_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
 from stereocell.building.source_tasks import (
     around,
     box_to_json,
@@ -21,6 +24,7 @@ from stereocell.building.source_tasks import (
 )
 from stereocell.building.survey_file import Survey
 from stereocell.building.tasks import unit as unit_maker
+from stereocell.building.tasks.objects import ObjectsTask, run_objects
 from stereocell.building.tasks.unit import UnitTask, run_unit
 from stereocell.building.unit import UnitInput
 from stereocell.building.unit_files import is_whole
@@ -47,20 +51,29 @@ def run_passes(
     Raises SourceError if the source is no longer what was planned, TasksFailedError once all
     others are finished.
     """
-    wanted = {(tile_id, channel.id) for tile_id, channel in _select(plan, only)}
+    wanted = {f"{tile_id}/{channel.id}": channel for tile_id, channel in _select(plan, only)}
     survey = survey_channels(out_folder, plan, engine)
-    tasks, keys, others = [], {}, 0
-    for name, task, key in unit_tasks(out_folder, plan, survey):
+    for labels in plan.labels:
+        save_notes(out_folder, labels)
+    located = {one.id: locate_objects(out_folder, plan, one, engine) for one in plan.labels}
+    tasks: list[tuple[str, UnitTask | ObjectsTask]] = []
+    keys, others = {}, 0
+    every: list[Iterable[tuple[str, UnitTask | ObjectsTask, str]]] = [
+        unit_tasks(out_folder, plan, survey),
+        object_tasks(out_folder, plan, located),
+    ]
+    for name, task, key in chain(*every):
         keys[name] = key
         if is_whole(task.directory):
             continue
-        tile_id, channel_id = name.split("/")
-        if (tile_id, channel_id) in wanted:
-            channel = next(channel for channel in plan.channels if channel.id == channel_id)
-            tasks.append((f"{tile_id}/{channel.name}", task))
+        if name in wanted:
+            tasks.append((f"{name.split('/')[0]}/{wanted[name].name}", task))
         else:
             others += 1
-    run_on_input(plan, engine, "units", run_unit, tasks)
+    if tasks:
+        for labels in plan.labels:
+            tell_objects(labels, located[labels.id])
+    run_on_input(plan, engine, "units", _run, tasks)
     if not others:  # all there: the stage may be made of them
         out_folder.save_units(plan, keys)
     return len(tasks), others
@@ -70,7 +83,7 @@ def unit_tasks(
     out_folder: OutFolder, plan: Plan, survey: Survey
 ) -> Iterator[tuple[str, UnitTask, str]]:
     """Yield `<tile>/<channel>`, task and key of every unit."""
-    for tile_id, channel in _select(plan, None):
+    for tile_id, channel in product((tile.id for tile in plan.tiles), plan.channels):
         statistics = survey[channel.id].statistics
         painter = plan.painter(channel)
         painted = None if painter is None else (painter.index, survey[painter.id].statistics.window)
@@ -92,21 +105,31 @@ def unit_tasks(
         yield f"{tile_id}/{channel.id}", task, key
 
 
-def _select(plan: Plan, only: str | None) -> list[tuple[str, Channel]]:
-    wanted = [(tile.id, channel) for tile in plan.tiles for channel in plan.channels]
+def _run(task: UnitTask | ObjectsTask) -> None:
+    if isinstance(task, ObjectsTask):
+        run_objects(task)
+    else:
+        run_unit(task)
+
+
+def _select(plan: Plan, only: str | None) -> list[tuple[str, Channel | Labels]]:
+    every: list[Channel | Labels] = [*plan.channels, *plan.labels]
+    wanted = [(tile.id, channel) for tile in plan.tiles for channel in every]
     if only is None:
         return wanted
     chosen = [(t, c) for t, c in wanted if only in {f"{t}/{n}" for n in _names(c)}]
     if not chosen:
         raise UsageError(
             f"--only is {only!r}, expected TILE/CHANNEL with a tile from {plan.tiles[0].id} to "
-            f"{plan.tiles[-1].id} and a channel of {', '.join(c.name for c in plan.channels)}"
+            f"{plan.tiles[-1].id} and a channel of {', '.join(c.name for c in every)}"
         )
     return chosen
 
 
-def _names(channel: Channel) -> tuple[str | int, ...]:
+def _names(channel: Channel | Labels) -> tuple[str | int, ...]:
     """Return what a channel may be called; an index is one of the input's."""
+    if isinstance(channel, Labels):
+        return channel.name, channel.id
     return (channel.name, channel.id) + (() if channel.source else (channel.index,))
 
 

@@ -5,29 +5,34 @@ Every phase skips finished work: a result is named by everything that it depends
 
 import hashlib
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
-from stereocell.building.channels import Channel, choose_color, with_surfaces
+from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
 from stereocell.building.intensities import require_intensities
+from stereocell.building.label_maps import Labels, are_alone, find_labels
+from stereocell.building.object_passes import locate_objects, read_notes
+from stereocell.building.object_tables import appearance_of_labels, make_table, table_of
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
 from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
 from stereocell.building.plan_notes import told_in_vain, told_of_gaps
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
-from stereocell.building.stage_tasks import run_tile, tile_task
+from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
 from stereocell.building.survey_file import appearance_to_json, read_survey
 from stereocell.building.tasks import evidence, solids, unit, window
+from stereocell.building.unit_files import load_objects
 from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
 from stereocell.model.errors import OutputError
+from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
 from stereocell.read.open_dataset import READERS
@@ -62,6 +67,7 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     console.print(
         f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
         f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
+        + "".join(f", objects of {one.name}" for one in plan.labels)
     )
     return plan
 
@@ -77,8 +83,9 @@ def settle(source: str, settings: Settings) -> Plan:
         find_wrapper()
     dataset = open_source(as_asked(location, options))
     modality = dataset.modality or options.modality
+    alone = are_alone(settings.labels)
     indices = dataset.find_channels(options.channels) if options.channels else None
-    chosen = range(len(dataset.channels)) if indices is None else indices
+    chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
     channels = [
         Channel(
             index,
@@ -89,7 +96,15 @@ def settle(source: str, settings: Settings) -> Plan:
     ]
     channels = with_surfaces(channels, settings.surfaces)
     level = choose_level(dataset.levels, len(channels), settings)
-    if options.taken_as != INTENSITY:
+    labels = find_labels(
+        dataset,
+        location,
+        settings.labels,
+        options=options,
+        colors=PALETTE[len(channels) :] + PALETTE[: len(channels)],
+        taken=[channel.name for channel in channels],
+    )
+    if options.taken_as != INTENSITY and not alone:
         whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
         require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
     origin = dataset.levels[level[0]].origin_um
@@ -105,7 +120,10 @@ def settle(source: str, settings: Settings) -> Plan:
         modality=modality,
         placement=dataset.placement,
         has_sides=dataset.has_sides,
+        labels=labels,
     )
+    for one in plan.labels:
+        table_of(plan, one)  # what can't be read is told before the build
     gaps = told_of_gaps(dataset, plan)
     for note in (*dataset.notes, *gaps, *told_in_vain(settings, channels)):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
@@ -145,7 +163,7 @@ def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
     with phase_of(out_folder, "units") as phase:
         built, missing = run_passes(out_folder, plan, engine=engine, only=only)
         phase.is_up_to_date = not built
-        units = len(plan.tiles) * len(plan.channels)
+        units = len(plan.tiles) * (len(plan.channels) + len(plan.labels))
         phase.about = "" if built == units else f"{built} of {units} units"
         if missing:
             console.print(f"units: {missing} of {units} are still to be built")
@@ -163,8 +181,13 @@ def run_stage(out: Path, engine: Engine) -> None:
         out_folder.require_units_of(plan)
         index, survey = out_folder.index(), read_survey(out_folder)
         appearances = [survey[channel.id].appearance for channel in plan.channels]
+        appearances += [appearance_of_labels(labels) for labels in plan.labels]
+        tables = {
+            labels.id: _table(out_folder, plan, labels, index, engine) for labels in plan.labels
+        }
         tiles = [
-            (tile.id, tile_task(out_folder, plan, index=index, tile=tile)) for tile in plan.tiles
+            (tile.id, tile_task(out_folder, plan, index=index, tile=tile, tables=tables))
+            for tile in plan.tiles
         ]
         about = provenance(plan)
         names = [plan.name, plan.modality]
@@ -175,6 +198,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             names,
             list(plan.placement),
             plan.has_sides,
+            {id_: digest_of_table(table) for id_, table in tables.items()},
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
         if phase.is_done(key, partial(_digest_of_stage, out_folder)):
@@ -196,6 +220,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             modality=plan.modality,
             placement=plan.placement,
             has_sides=plan.has_sides,
+            tables=tables,
         )
         out_folder.remove_other_folders(
             out_folder.stage_dir / "tiles", {tile.id for tile in plan.tiles}
@@ -211,6 +236,23 @@ def run_stage(out: Path, engine: Engine) -> None:
         written_files.write_list(
             out_folder.stage_dir, files, looks_dir, out_folder.stage_file, small
         )
+
+
+def _table(
+    out_folder: OutFolder, plan: Plan, labels: Labels, index: Mapping[str, str], engine: Engine
+) -> ObjectTable:
+    """Return the table of a label map's objects, and print what did not fit it."""
+    names = {tile.id: f"{tile.id}/{labels.id}" for tile in plan.tiles}
+    facts = {
+        tile: load_objects(out_folder.unit_dir(tile, labels.id, index[name]))
+        for tile, name in names.items()
+    }
+    located = locate_objects(out_folder, plan, labels, engine)
+    notes = read_notes(out_folder, labels)
+    table, remarks = make_table(plan, labels, located, facts, notes, table_of(plan, labels))
+    for remark in remarks:
+        console.print(f"stage: {remark}", markup=False, soft_wrap=True)
+    return table
 
 
 def _tell_size(tiles: FileList, measured: int) -> None:

@@ -17,6 +17,7 @@ from stereocell.building.channels import (
     require_no_background,
     windows_of,
 )
+from stereocell.building.label_maps import Labels
 from stereocell.building.settings import Settings
 from stereocell.filters.denoise import SMOOTHING_REACH
 from stereocell.isosurface.repair import RepairOptions
@@ -52,6 +53,7 @@ class Plan:
                 (volume.zyx_to_xyz) to the specimen's place
     has_sides   whether the source states where the patient's left, back and head are: then the
                 specimen's place is the patient's world (read/anatomical_axes.py)
+    labels      label maps whose objects are built, channels beside `channels`
     """
 
     source: str
@@ -69,6 +71,7 @@ class Plan:
     modality: str = ""
     placement: Matrix = IDENTITY
     has_sides: bool = False
+    labels: tuple[Labels, ...] = ()
 
     @property
     def repair(self) -> RepairOptions:
@@ -190,6 +193,7 @@ def make_plan(
     modality: str = "",
     placement: Matrix = IDENTITY,
     has_sides: bool = False,
+    labels: Sequence[Labels] = (),
 ) -> Plan:
     """Return the plan for these channels at this level (index and reason).
 
@@ -237,6 +241,7 @@ def make_plan(
         modality=modality,
         placement=placement,
         has_sides=has_sides,
+        labels=tuple(labels),
     )
 
 

@@ -29,6 +29,8 @@ def to_json(plan: Plan) -> dict[str, Any]:
         for key in ("source", "fingerprint", "rung", "base"):
             if not channel[key]:
                 del channel[key]
+    if not content["labels"]:
+        del content["labels"]
     return {"format": _FORMAT, "version": _VERSION, **content}
 
 
@@ -52,7 +54,8 @@ def from_json(content: Mapping[str, Any]) -> Plan:
 
 def _find_fault(plan: Plan) -> str | None:
     """Return what a schema can't say of a plan that was edited or damaged."""
-    for name in (plan.name, *(channel.name for channel in plan.channels)):
+    names = [*(one.name for one in plan.channels), *(one.name for one in plan.labels)]
+    for name in (plan.name, *names):
         if not name.isprintable():
             return f"name: found {name!r:.80}, expected one that can be shown"
     if not _is_inside(plan.region, Box((0, 0, 0), plan.region.stop)):

@@ -18,6 +18,8 @@ def told_of_gaps(dataset: Dataset, plan: Plan) -> list[str]:
     Raises SourceError where a channel has nothing else.
     """
     indices = list(dict.fromkeys(channel.index for channel in plan.channels))
+    if not indices:
+        return []
     boxes = sample_boxes(plan.region, max(1, _LOOKED_AT // len(indices)))
     found = []
     for index in indices:

@@ -19,6 +19,7 @@ from stereocell.model.axes import axes_of, is_axes
 from stereocell.model.errors import UsageError
 from stereocell.model.modality import MODALITIES
 from stereocell.model.settings import AUTO, Flag, setting
+from stereocell.objects.options import ObjectOptions
 from stereocell.textures.options import UnwrapOptions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.windows import parse_window
@@ -185,6 +186,7 @@ class Settings:
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     lod: LodOptions = field(default_factory=LodOptions)
     unwrap: UnwrapOptions = field(default_factory=UnwrapOptions)
+    objects: ObjectOptions = field(default_factory=ObjectOptions)
     iso_values: Mapping[str, float | str] = setting(
         {},
         "channel = voxel value, or one above the background as 162+b, instead of what is found",
@@ -224,6 +226,18 @@ class Settings:
             "paint the second channel's intensity on the first one's surface, as CD31=MART1; "
             "may be repeated",
             "CHANNEL=CHANNEL",
+        ),
+    )
+
+    labels: Mapping[str, str] = setting(
+        {},
+        "label maps whose objects are built: name = path; empty: one of the input's own labels; .: "
+        "the input itself",
+        Flag(
+            "--labels",
+            "build the objects of a label map: one of the input's own by name, or NAME=PATH; "
+            "--labels . takes the input itself for one; may be repeated",
+            "NAME[=PATH]",
         ),
     )
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from stereocell.building.channels import Channel
-from stereocell.building.input_unchanged import require_added, require_input
+from stereocell.building.input_unchanged import require_added, require_input, require_labels
 from stereocell.building.plan import Plan
 from stereocell.engine.run import Engine
 from stereocell.model.lattice_field import LatticeField
@@ -27,6 +27,7 @@ def run_on_input(
         return []
     require_input(plan)
     require_added(plan)
+    require_labels(plan)
     return engine.run(label, function, tasks)
 
 

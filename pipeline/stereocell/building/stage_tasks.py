@@ -3,10 +3,14 @@
 The keys of the stage and of its tiles cover this module's whole lineage: see storage/cache_key.py.
 """
 
+import hashlib
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
@@ -20,6 +24,7 @@ from stereocell.building.unit_files import (
 from stereocell.formats.vdb import MEASURED_NAME
 from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.model.channel import PaintColors
+from stereocell.model.object_table import ObjectTable
 from stereocell.model.tile_content import ChannelContent, TileContent
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
@@ -39,6 +44,7 @@ class TileTask:
     content  the tile without its channels
     units    ID, unit folder and sampled colours of each channel
     shared   IDs of those whose volume is another channel's: they have surfaces alone
+    tables   of the tile's objects: the ID of their label map, and which ones touch
     record   units/<tile>/stage.json: the key of the tile as written, and its files
     key      digest of the inputs of the tile to write
     """
@@ -49,6 +55,7 @@ class TileTask:
     record: Path
     key: str
     shared: frozenset[str] = frozenset()
+    tables: tuple[tuple[str, ObjectTable, NDArray[np.uint64]], ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -73,9 +80,18 @@ class TileTask:
 
 
 def tile_task(
-    out_folder: OutFolder, plan: Plan, *, index: Mapping[str, str], tile: Tile
+    out_folder: OutFolder,
+    plan: Plan,
+    *,
+    index: Mapping[str, str],
+    tile: Tile,
+    tables: Mapping[str, ObjectTable],
 ) -> TileTask:
-    """Return the task of one tile; `index` holds the units' keys, by `<tile>/<channel>`."""
+    """Return the task of one tile.
+
+    index   the units' keys, by `<tile>/<channel>`
+    tables  of all objects, by the ID of their label map
+    """
     units = tuple(
         (
             channel.id,
@@ -84,6 +100,13 @@ def tile_task(
         )
         for channel in plan.channels
         for painter in [plan.painter(channel)]
+    )
+    units += tuple(
+        (labels.id, out_folder.unit_dir(tile.id, labels.id, index[f"{tile.id}/{labels.id}"]), None)
+        for labels in plan.labels
+    )
+    own = tuple(
+        (id_, table.of_tile(tile.id), table.touching(tile.id)) for id_, table in tables.items()
     )
     lattice = tile.lattice(plan.region)
     content = TileContent(
@@ -100,24 +123,43 @@ def tile_task(
         asdict(content),
         [(*one, paint and asdict(paint)) for *one, paint in made_of],
         sorted(shared),
+        [(id_, digest_of_table(table), touching.tolist()) for id_, table, touching in own],
     ]
     key = key_of(depends, sys.modules[__name__])
     record = out_folder.tile_file(tile.id)
-    return TileTask(out_folder.stage_dir, content, units, record, key, shared)
+    return TileTask(out_folder.stage_dir, content, units, record, key, shared, own)
+
+
+def digest_of_table(table: ObjectTable) -> str:
+    """Return a digest of all that a table holds."""
+    digest = hashlib.sha256(table.labels.tobytes() + table.boxes.tobytes())
+    for rows in table.rows.values():
+        digest.update(rows.tobytes())
+    for column in table.columns:
+        digest.update(repr([getattr(column, name) for name in _DESCRIBED]).encode())
+        digest.update(column.values.tobytes())
+    digest.update(repr((sorted(table.rows), table.names, table.default)).encode())
+    return digest.hexdigest()
+
+
+_DESCRIBED = ("id", "name", "about", "unit", "categories", "colors")
 
 
 def run_tile(task: TileTask) -> None:
     """Write one tile of the stage from its units. Raises OutputError where one is damaged."""
     remove(task.record)
+    tables = {id_: (table, touching) for id_, table, touching in task.tables}
+    no_volume = task.shared | tables.keys()
     with cached(*(folder for _, folder, _ in task.units)):
         channels = tuple(
             ChannelContent(
                 channel_id,
                 load_lods(folder),
-                None if channel_id in task.shared else load_volume(folder),
+                None if channel_id in no_volume else load_volume(folder),
                 paint,
                 find_closed(folder),
-                None if channel_id in task.shared else load_measured(folder),
+                None if channel_id in no_volume else load_measured(folder),
+                *tables.get(channel_id, (None, None)),
             )
             for channel_id, folder, paint in task.units
         )

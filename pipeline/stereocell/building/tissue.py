@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from stereocell.building.channels import PALETTE, Channel
 from stereocell.building.input_unchanged import require_input
-from stereocell.building.open_source import SourceRef, open_source, source_of
+from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.phases import provenance
 from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
 from stereocell.building.tissue_files import (
     FOLDER,
     RECORD,

@@ -7,7 +7,7 @@ own hash before it is read.
 
 import io
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from stereocell.formats.stl import write_stl
 from stereocell.model.errors import OutputError
 from stereocell.model.mesh import Baked, Lod, Mesh, Quality, Spread
-from stereocell.model.unit import Closed, Unit
+from stereocell.model.unit import Closed, ObjectFacts, Unit
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import DAMAGED, MISSING, find_faults, is_same, measure
 from stereocell.storage.json_files import (
@@ -32,7 +32,7 @@ from stereocell.storage.workspace import fetch, is_file
 
 SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
 _RECORD, _CLOSED, _SECONDS = "unit.json", "closed.stl", "seconds.json"
-_VOLUME, _MEASURED = "volume.npy", "measured.npy"
+_VOLUME, _MEASURED, _OBJECTS = "volume.npy", "measured.npy", "objects.npz"
 
 
 def save_unit(directory: Path, unit: Unit) -> None:
@@ -44,6 +44,7 @@ def save_unit(directory: Path, unit: Unit) -> None:
             "distance_um": lod.distance_um,
             "maps": _describe_maps(lod),
             "quality": None if lod.quality is None else asdict(lod.quality),
+            **({} if lod.farthest_um is None else {"farthest_um": lod.farthest_um}),
         }
         for lod in unit.lods
     ]
@@ -56,13 +57,15 @@ def save_unit(directory: Path, unit: Unit) -> None:
                 (folder / name).write_bytes(buffer.getbuffer())
         for level, lod in enumerate(unit.lods):
             np.savez(lod_file(folder, level), **_arrays(lod))
+        if unit.objects is not None:
+            np.savez(folder / _OBJECTS, allow_pickle=False, **_facts(unit.objects))
         if unit.closed is not None:
             write_stl(folder / _CLOSED, unit.closed.mesh)
         record = {
             "reason": unit.reason,
             "lods": lods,
             "closed": _describe_closed(unit.closed),
-            "volume": list(unit.volume.shape),
+            "volume": [] if unit.volume is None else list(unit.volume.shape),
             "fragments_dropped": unit.fragments_dropped,
             "cavities_filled": unit.cavities_filled,
             "files": {file.name: measure(file) for file in sorted(folder.iterdir())},
@@ -154,6 +157,24 @@ def load_measured(directory: Path) -> NDArray[Any] | None:
     return _load_voxels(directory, _MEASURED) if has_any else None
 
 
+def load_objects(directory: Path) -> ObjectFacts:
+    """Return what a label map's unit knows of its objects. Raises OutputError."""
+    try:
+        with (
+            _as_written(directory, directory / _OBJECTS).open("rb") as file,
+            np.load(file) as arrays,
+        ):
+            found = {field.name: arrays[field.name] for field in fields(ObjectFacts)}
+    except (OSError, ValueError, LookupError, EOFError, BadZipFile) as error:
+        raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
+    bias = tuple(float(share) for share in found.pop("bias"))
+    return ObjectFacts(changed=int(found.pop("changed")), bias=bias, **found)
+
+
+def _facts(objects: ObjectFacts) -> dict[str, NDArray[Any]]:
+    return {field.name: np.asarray(getattr(objects, field.name)) for field in fields(ObjectFacts)}
+
+
 def _load_voxels(directory: Path, name: str) -> NDArray[Any]:
     file = _as_written(directory, directory / name)
     try:
@@ -175,6 +196,7 @@ def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
             arrays["normals"],
             arrays.get("uvs"),
             arrays.get("tangents"),
+            objects=arrays.get("objects"),
         )
         quality = stored["quality"] and load_quality(stored["quality"])
         baked = None
@@ -182,7 +204,8 @@ def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
             maps = stored["maps"]
             facts = (maps["texel_um"], maps["charts"], maps["reason"])
             baked = Baked(arrays["openness"], arrays.get("paint"), *facts)
-        return Lod(mesh, stored["distance_um"], arrays.get("normal_map"), quality, baked)
+        normals, farthest = arrays.get("normal_map"), stored.get("farthest_um")
+        return Lod(mesh, stored["distance_um"], normals, quality, baked, farthest)
 
 
 def _describe_closed(closed: Closed | None) -> dict[str, int] | None:
@@ -219,6 +242,7 @@ def _arrays(lod: Lod) -> dict[str, Any]:
         "normal_map": lod.normal_map,
         "openness": lod.baked and lod.baked.openness,
         "paint": lod.baked and lod.baked.paint,
+        "objects": lod.mesh.objects,
     }
     return {name: array for name, array in arrays.items() if array is not None}
 

@@ -21,7 +21,9 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from stereocell.bundle.gather_table import gather_table
 from stereocell.bundle.write_ar import write_ar
+from stereocell.bundle.write_objects import write_objects
 from stereocell.bundle.write_tile import (
     BundleTile,
     FileRef,
@@ -42,6 +44,7 @@ from stereocell.storage.json_files import compact_json
 from stereocell.storage.workspace import is_file, move, remove, sizes_below
 from stereocell.transfer.opacity import evaluate
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
+from stereocell.usd.read_objects import read_columns
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
@@ -154,7 +157,13 @@ def _fill(
         files += refs
     channels = []
     for i, appearance in enumerate(appearances):
-        entry, written = _write_channel(root, appearance, [(t.id, t.channels[i]) for t in tiles])
+        own = [(t.id, t.channels[i]) for t in tiles]
+        entry, written = _write_channel(root, appearance, own)
+        table = gather_table(read_columns(stage, appearance.id), own)
+        if table is not None:
+            index_of_objects, more = write_objects(root, f"channels/{appearance.id}", table)
+            entry["objects"] = asdict(index_of_objects)
+            written += more
         channels.append(entry)
         files += written
     usdz, usdz_reason = write_ar(stage_path, root, as_written)

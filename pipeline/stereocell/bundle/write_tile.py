@@ -21,6 +21,7 @@ from stereocell.bundle.windowed_voxels import read_windowed
 from stereocell.bundle.write_transfer2d import count_tile
 from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
 from stereocell.formats.gltf import Glb, Textures, encode_glb
+from stereocell.formats.gltf_features import Features
 from stereocell.formats.ktx2 import (
     encode_3d,
     encode_color_map,
@@ -37,11 +38,13 @@ from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd.layer import move_box
 from stereocell.usd.read_appearances import ComposedAppearance
 from stereocell.usd.read_attributes import Point
+from stereocell.usd.read_objects import read_columns, read_tile_objects
 from stereocell.usd.read_stage import (
     ComposedLod,
     ComposedVolume,
     hinted_box,
     loaded,
+    mesh_at,
     open_stage,
     read_volume,
 )
@@ -50,6 +53,7 @@ from stereocell.usd.read_variants import Representation
 from stereocell.usd.written_files import AsWritten
 
 _RECORD = "tile.json"
+FIRST_COLUMN = "volume_um3"  # which every table of objects has
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +66,26 @@ class FileRef:
 
 
 @dataclass(frozen=True, slots=True)
+class PackedObjects:
+    """The objects of one tile: little-endian arrays as bytes.
+
+    labels    uint64 (n,)
+    names     by object; empty: there are none
+    values    float32 (n,) by column ID
+    boxes     float32 (n, 6): least and largest (x, y, z), world um
+    touching  uint64 (m, 2), labels of objects that share a wall
+    """
+
+    __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
+
+    labels: bytes
+    names: tuple[str, ...]
+    values: dict[str, bytes]
+    boxes: bytes
+    touching: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class TileChannel:
     """One (tile, channel) in the bundle.
 
@@ -71,6 +95,7 @@ class TileChannel:
     volume     its entry in volumes.json, or None
     files      all that was written
     joint      the volume's histogram of value and gradient, packed; see bundle/write_transfer2d.py
+    objects    of a label map's tile; None: it has none
     edit       what was edited by hand of its surface, and what follows from that; or empty
     """
 
@@ -84,6 +109,7 @@ class TileChannel:
     files: tuple[FileRef, ...]
     joint: bytes | None
     edit: str = ""
+    objects: PackedObjects | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,10 +212,11 @@ def _export_channel(
     finer = b""
     shown = shown_lods(tile, channel_id, finest_lod)
     levels = shown.lods
+    objects, features = _objects(tile, channel_id, levels)
     for lod in levels:
         for image in lod.maps.files:
             as_written.require(image)
-        glb = _encode(tile, channel_id, lod, step_m)
+        glb = _encode(tile, channel_id, lod, step_m, features)
         triangles += [len(lod.mesh.triangles)] * (lod.level + 1 - len(triangles))
         distances += [(lod.distance_um, lod.largest_um)] * (lod.level + 1 - len(distances))
         if glb.data == finer:
@@ -197,7 +224,7 @@ def _export_channel(
         finer = glb.data
         if lod is levels[-1] and lods:
             lod = _bare(lod)
-            glb = _encode(tile, channel_id, lod, step_m)
+            glb = _encode(tile, channel_id, lod, step_m, features)
         uri = f"{tile.GetName()}/lod{lod.level}.glb"
         file = write_file(root, f"channels/{channel_id}/{uri}", glb.data)
         files.append(file)
@@ -216,6 +243,7 @@ def _export_channel(
         tuple(files),
         joint,
         shown.edit,
+        objects,
     )
 
 
@@ -237,7 +265,7 @@ def _bare(lod: ComposedLod) -> ComposedLod:
 
 def _welded(mesh: Mesh) -> Mesh:
     """Return the mesh without the vertices that are in all like an earlier one."""
-    parts = [mesh.positions, mesh.normals, mesh.colors, mesh.openness]
+    parts = [mesh.positions, mesh.normals, mesh.colors, mesh.openness, mesh.objects]
     values = [part.reshape(len(mesh.positions), -1) for part in parts if part is not None]
     _, first, twin = np.unique(
         np.concatenate(values, axis=1), axis=0, return_index=True, return_inverse=True
@@ -251,10 +279,43 @@ def _welded(mesh: Mesh) -> Mesh:
         normals=mesh.normals[kept],
         colors=None if mesh.colors is None else mesh.colors[kept],
         openness=None if mesh.openness is None else mesh.openness[kept],
+        objects=None if mesh.objects is None else mesh.objects[kept],
     )
 
 
-def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) -> Glb:
+def _objects(
+    tile: Usd.Prim, channel_id: str, levels: Sequence[ComposedLod]
+) -> tuple[PackedObjects | None, Features | None]:
+    """Return the objects of a tile's channel, and what each of its files says of them."""
+    described = read_columns(tile.GetStage(), channel_id)
+    prim = mesh_at(tile, channel_id, levels[0].level) if levels else None
+    if described is None or prim is None:
+        return None, None
+    columns, default = described
+    found = read_tile_objects(prim, columns)
+    mesh = levels[0].mesh
+    if found is None or mesh.objects is None:
+        return None, None
+    boxes = np.full((len(found.labels), 6), np.nan, np.float32)
+    order = np.argsort(mesh.objects, kind="stable")
+    present, firsts = np.unique(mesh.objects[order], return_index=True)
+    boxes[present, :3] = np.minimum.reduceat(mesh.positions[order], firsts)
+    boxes[present, 3:] = np.maximum.reduceat(mesh.positions[order], firsts)
+    packed = PackedObjects(
+        found.labels.astype("<u8").tobytes(),
+        found.names,
+        {name: values.astype("<f4").tobytes() for name, values in found.values.items()},
+        boxes.astype("<f4").tobytes(),
+        found.touching.astype("<u8").tobytes(),
+    )
+    shown = [column for column in columns if column.id in (FIRST_COLUMN, default)]
+    filled = tuple(replace(column, values=found.values[column.id]) for column in shown)
+    return packed, Features(found.labels, filled)
+
+
+def _encode(
+    tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float, features: Features | None
+) -> Glb:
     prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
     maps = lod.images or lod.maps
     textures = Textures(
@@ -270,6 +331,7 @@ def _encode(tile: Usd.Prim, channel_id: str, lod: ComposedLod, step_m: float) ->
             name=f"{channel_id}_{tile.GetName()}",
             extras={"tile": tile.GetName(), "channel": channel_id},
             textures=textures,
+            features=features if lod.mesh.objects is not None else None,
         )
     except ValueError as error:  # what an artist may have done to the mesh
         raise StageError(f"{prim}: lod{lod.level}: {error}") from error

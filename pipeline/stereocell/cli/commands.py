@@ -249,6 +249,8 @@ def sample(options: argparse.Namespace) -> Answer:
         )
     elif options.name == "mri":
         samples.write_head(options.out, options.seed)
+    elif options.name == "cells":
+        samples.write_cells(options.out, options.seed)
     else:
         samples.write_brain_cells(options.out)
     print_unless_json(options, f"wrote {options.out}")

@@ -167,6 +167,11 @@ def numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
 
 def _pair(flag: Flag, kind: type, text: str) -> tuple[str, Any]:
     """Return a channel and what is given for it."""
+    if flag.form.endswith("[=PATH]"):  # a path may hold anything
+        name, _, value = text.partition("=")
+        if not name or text.endswith("="):
+            raise UsageError(f"{flag.name} is {text!r}, expected {flag.form}")
+        return name, value
     name, _, value = text.rpartition("=")
     try:
         given = kind(value) if isinstance(kind, type) else _number_or_text(value)
@@ -278,7 +283,7 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_sample(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", choices=["cycif", "brain-cells", "mri"])
+    parser.add_argument("name", choices=["cycif", "brain-cells", "mri", "cells"])
     parser.add_argument("out", type=_place, metavar="OUT", help="file or folder to write")
     parser.add_argument(
         "--seed", type=int, default=0, help="cycif, mri: another seed, another block or noise"

@@ -22,6 +22,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.formats.gltf_features import (
+    Features,
+    add_feature_ids,
+    describe_features,
+    require_whole,
+)
 from stereocell.formats.meshopt import CompressedBuffers, reorder
 from stereocell.model.mesh import Mesh
 from stereocell.model.version import GENERATOR
@@ -80,6 +86,7 @@ def encode_glb(
     name: str,
     extras: dict[str, str],
     textures: Textures | None = None,
+    features: Features | None = None,
 ) -> Glb:
     """Return the mesh as .glb.
 
@@ -87,14 +94,17 @@ def encode_glb(
     step_m    step of the lattice in metres, see `choose_step`
     extras    written on the scene and on its one node
     textures  UVs are written only with a map, tangents only with a normal map
+    features  what is known of the objects of a mesh that has some, by their number in the tile
 
     Raises ValueError for a mesh without triangles, for one larger than 65535 steps along an axis,
-    and for maps without UVs.
+    for maps without UVs, for objects that share a triangle, and for more than 65536 of them.
     """
     maps = _pick(textures or Textures())
     if len(mesh.triangles) == 0:
         raise ValueError(f"{name} has no triangles")
-    indices, order = reorder(mesh.triangles, len(mesh.positions))
+    if mesh.objects is not None:
+        require_whole(mesh.objects, mesh.triangles, name, features)
+    indices, order = reorder(mesh.triangles, len(mesh.positions), mesh.objects)
 
     steps = np.rint(mesh.positions[order].astype(np.float64) * (_METRES_PER_UM / step_m))
     lattice = steps.astype(np.int64)
@@ -125,7 +135,9 @@ def encode_glb(
             attributes["TANGENT"] = _add_tangents(buffers, mesh.tangents[order])
     if mesh.colors is not None or mesh.openness is not None:
         attributes["COLOR_0"] = _add_colors(buffers, mesh, order)
-    primitive = {
+    if mesh.objects is not None:
+        attributes["_FEATURE_ID_0"] = add_feature_ids(buffers, mesh.objects[order])
+    primitive: dict[str, Any] = {
         "attributes": attributes,
         "indices": buffers.add_indices(indices, len(order)),
         "material": 0,
@@ -179,6 +191,12 @@ def encode_glb(
                 "wrapT": _CLAMP,
             }
         ]
+    if features is not None:
+        of_objects = ["EXT_mesh_features", "EXT_structural_metadata"]  # not required: to draw
+        document["extensionsUsed"] = [*extensions, *of_objects]
+        ids, metadata = describe_features(buffers, features, extras.get("channel", name))
+        primitive["extensions"] = {"EXT_mesh_features": ids}
+        document["extensions"] = {"EXT_structural_metadata": metadata}
     binary = buffers.finish(document)
     return Glb(
         _pack(document, binary), _to_metres(origin, step_m), _to_metres(origin + max_offset, step_m)

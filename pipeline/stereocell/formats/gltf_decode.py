@@ -36,6 +36,7 @@ class Drawn:
     maps         KTX2 files by their names in the material
     uvs          float64 (n, 2), v downwards, or None
     step_m       distance between two possible positions of a vertex, metres
+    objects      int64 (n,), which object of its tile a vertex is of, or None
     """
 
     positions_m: NDArray[np.float32]
@@ -46,6 +47,7 @@ class Drawn:
     maps: dict[str, bytes]
     uvs: NDArray[np.float64] | None
     step_m: float
+    objects: NDArray[np.int64] | None = None
 
 
 def read_glb(path: Path) -> Drawn:
@@ -83,6 +85,9 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
     if "TEXCOORD_0" in attributes:
         stored = _decode(document, binary, attributes["TEXCOORD_0"])
         uvs = stored / (0xFFFF if stored.dtype == np.uint16 else 1.0)
+    objects = None
+    if "_FEATURE_ID_0" in attributes:
+        objects = _decode(document, binary, attributes["_FEATURE_ID_0"])[:, 0].astype(np.int64)
     material = document["materials"][primitive["material"]]
     shading = material["pbrMetallicRoughness"]
     red, green, blue, _ = shading["baseColorFactor"]
@@ -100,6 +105,7 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
         },
         uvs,
         float(scale[0]),
+        objects,
     )
 
 

@@ -11,18 +11,22 @@ _VERTICES, _INDICES = 34962, 34963  # bufferView.target
 
 
 def reorder(
-    triangles: NDArray[np.uint32], vertex_count: int
+    triangles: NDArray[np.uint32], vertex_count: int, objects: NDArray[np.int32] | None = None
 ) -> tuple[NDArray[np.uint32], NDArray[np.intp]]:
     """Return the triangles in an order that suits the GPU's vertex cache, and the vertices to keep.
 
     triangles     uint32 (m, 3)
     vertex_count  number of vertices
+    objects       int32 (vertex_count,): the object of a vertex. Objects come one after another then
     result        indices uint32 (3m,), by the kept vertices; kept vertices int64 (k,), in the order
                   of their first use. Unused vertices are left out
     """
     source = np.ascontiguousarray(triangles, dtype=np.uint32).ravel()
     indices = np.empty_like(source)
     meshoptimizer.optimize_vertex_cache(indices, source, len(source), vertex_count)
+    if objects is not None:
+        corners = indices.reshape(-1, 3)
+        indices = corners[np.argsort(objects[corners[:, 0]], kind="stable")].ravel()
     used, first = np.unique(indices, return_index=True)
     order = used[np.argsort(first)].astype(np.intp)
     new = np.zeros(vertex_count, dtype=np.uint32)
@@ -43,9 +47,10 @@ class CompressedBuffers:
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
 
-    def add(self, data: bytes) -> int:
-        """Store bytes as they are; return the bufferView's index."""
-        self._views.append({"buffer": 0, "byteOffset": self._align(), "byteLength": len(data)})
+    def add(self, data: bytes, *, alignment: int = 4) -> int:
+        """Store bytes as they are, at a multiple of `alignment`; return the bufferView's index."""
+        start = self._align(alignment)
+        self._views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data)})
         self._data += data
         return len(self._views) - 1
 
@@ -131,8 +136,8 @@ class CompressedBuffers:
         self._accessors.append({"bufferView": len(self._views) - 1, **accessor})
         return len(self._accessors) - 1
 
-    def _align(self) -> int:
-        self._data += bytes(-len(self._data) % 4)
+    def _align(self, alignment: int = 4) -> int:
+        self._data += bytes(-len(self._data) % alignment)
         return len(self._data)
 
 

@@ -17,6 +17,8 @@ class Mesh:
     tangents   float32 (n, 4)  xyz and the bitangent's sign (glTF's convention), or None
     colors     float32 (n, 3)  linear RGB 0..1 as read from a stage, or None: the channel's colour
     openness   float32 (n,)    1 - ambient occlusion as read from a stage, 0..1, or None
+    objects    int32   (n,)    which object of its tile a vertex belongs to, from 0, or None: see
+                               object_table.py; each object's vertices are its own, and together
     """
 
     positions: NDArray[np.float32]
@@ -26,6 +28,7 @@ class Mesh:
     tangents: NDArray[np.float32] | None = None
     colors: NDArray[np.float32] | None = None
     openness: NDArray[np.float32] | None = None
+    objects: NDArray[np.int32] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +91,7 @@ class Lod:
     normal_map   uint8 (h, w, 3), tangent space, row 0 at the top (v = 1), or None
     quality      None where the writer doesn't know it
     baked        ambient occlusion and sampled channel; None: neither
+    farthest_um  the largest of these distances, where there is no `quality`; None: not known
     """
 
     mesh: Mesh
@@ -95,10 +99,11 @@ class Lod:
     normal_map: NDArray[np.uint8] | None = None
     quality: Quality | None = None
     baked: Baked | None = None
+    farthest_um: float | None = None
 
     @property
     def largest_um(self) -> float:
         """The largest distance that was found between this mesh and the iso-surface, um."""
         if self.quality is None:
-            return self.distance_um
+            return self.distance_um if self.farthest_um is None else self.farthest_um
         return max(self.distance_um, self.quality.away.max, self.quality.back.max)

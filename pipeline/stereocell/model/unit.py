@@ -23,21 +23,51 @@ class Closed:
 
 
 @dataclass(frozen=True, slots=True)
+class ObjectFacts:
+    """What a unit of a label map knows of its n objects, or pieces of objects, by their order.
+
+    labels    uint64 (n,), their numbers in the label map, ascending
+    voxels    int64 (n,)
+    area_um2  float64 (n,), of the surface, without the planes that cut it into pieces
+    walls     int32 (m,), which object touches another one; `beside` uint64 (m,), that one's number;
+              `wall_um2` float64 (m,), the area that they share
+    means     float64 (n, channels), of the image's channels over an object's voxels
+    p95s      float64 (n, channels), their 95th percentiles; NaN: of a piece
+    changed   voxels that were changed so that no object touches itself by an edge or a corner
+    bias      the largest share of an object's volume that a level has more or less, by level
+    """
+
+    labels: NDArray[np.uint64]
+    voxels: NDArray[np.int64]
+    area_um2: NDArray[np.float64]
+    walls: NDArray[np.int32]
+    beside: NDArray[np.uint64]
+    wall_um2: NDArray[np.float64]
+    means: NDArray[np.float64]
+    p95s: NDArray[np.float64]
+    changed: int
+    bias: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Unit:
     """The result of one unit of work.
 
     closed   a closed copy of lod0, if one is asked for and the tile has connected components
-    volume   uint8 (z, y, x): the lattice's voxels, window applied, and APRON voxels on every side
+    volume   uint8 (z, y, x): the lattice's voxels, window applied, and APRON voxels on every side;
+             None: of a label map
     reason   why there is no surface; empty if there is one
     seconds  time spent, by step
     measured  the same voxels as they were read; None: not kept, or `volume` is no different
+    objects   of a label map; None: of an image's channel
     """
 
     lods: tuple[Lod, ...]
     closed: Closed | None
-    volume: NDArray[np.uint8]
+    volume: NDArray[np.uint8] | None
     reason: str
     fragments_dropped: int
     cavities_filled: int
     seconds: dict[str, float]
     measured: NDArray[Any] | None = None
+    objects: ObjectFacts | None = None

@@ -18,65 +18,102 @@ from stereocell.meshes.simplify import OF_DIAGONAL, OF_SIDE, SHARPEST_DEG, STRAY
 from stereocell.objects.walls import Walls, find_faults, measure_volumes, put_on_lattice
 
 _ROUNDS = 12  # of simplifying, and of moving back
-_NEWTON = 2  # steps towards the volumes
+_ANEW = 6  # of those rounds of moving, in which the way is found anew
+_NEWTON = 4  # steps towards the volumes, at most
+_CLOSE = 5e-4  # share of a volume that may be missing
 
 
 def simplify_walls(
-    walls: Walls, max_error_um: float, volumes_um3: NDArray[np.float64], step_um: float
+    walls: Walls,
+    max_error_um: float,
+    volumes_um3: NDArray[np.float64],
+    step_um: float,
+    locked: NDArray[np.bool_] | None = None,
 ) -> Walls:
     """Return the walls with fewer triangles; where that can't be, as they are.
 
-    walls         valid, on the lattice
+    walls         valid, on the lattice; open where the objects beyond are not looked at
     max_error_um  largest root of the mean squared distance of a vertex from the planes of the
                   triangles that it stands for; at small objects less, by their boxes
-    volumes_um3   float64 (objects + 1,), what each object should hold
+    volumes_um3   float64 (objects + 1,), what each object should hold; NaN: it is not looked at
     step_um       of the lattice
+    locked        bool (n,), the vertices that stay where they are; None: none
     """
     if not len(walls.triangles):
         return walls
+    fixed = np.zeros(len(walls.positions), bool) if locked is None else locked
     errors = _errors(walls, max_error_um, len(volumes_um3))
     centre = (walls.positions.min(axis=0) + walls.positions.max(axis=0)) / 2
-    locked = np.zeros(len(walls.positions), bool)
+    stays = fixed.copy()
     sharpest = float(np.cos(np.radians(SHARPEST_DEG)))
     for _ in range(_ROUNDS):
         triangles, gone = collapse_walls(
-            walls.positions - centre, walls.triangles, locked, errors, STRAY, sharpest
+            walls.positions - centre, walls.triangles, stays, errors, STRAY, sharpest
         )
         fewer = Walls(walls.positions, triangles[~gone], walls.sides[~gone])
         at_fault = find_faults(fewer)
         if not len(at_fault):
-            return keep_volumes(_compact(fewer), volumes_um3, step_um)
-        around = np.zeros(len(locked), bool)
+            return keep_volumes(*_compact(fewer, fixed), volumes_um3, step_um)
+        around = np.zeros(len(stays), bool)
         around[at_fault] = True
         around[walls.triangles[around[walls.triangles].any(axis=1)]] = True
-        locked |= around
+        stays |= around
     return walls
 
 
-def keep_volumes(walls: Walls, volumes_um3: NDArray[np.float64], step_um: float) -> Walls:
+def keep_volumes(
+    walls: Walls, fixed: NDArray[np.bool_], volumes_um3: NDArray[np.float64], step_um: float
+) -> Walls:
     """Return the walls with each object as large as it should be, as far as nothing comes to cross.
 
     Moved is along the volumes' gradients, the least by the areas of the vertices' surroundings: a
     linear system of one unknown an object.
     """
-    moved = walls
-    for _ in range(_NEWTON):
-        missing = volumes_um3[1:] - measure_volumes(moved, len(volumes_um3) - 1)[1:]
-        moved = replace(moved, positions=moved.positions + _shift(moved, missing))
-    positions = put_on_lattice(moved.positions, step_um)
-    for _ in range(_ROUNDS):
+    fixed = fixed | _at_ends(walls)
+    positions = walls.positions
+    for turn in range(_ROUNDS):
+        if turn < _ANEW:  # what can't move makes the others move more
+            positions = put_on_lattice(_moved(walls, volumes_um3, fixed), step_um)
         at_fault = find_faults(replace(walls, positions=positions))
         if not len(at_fault):
             return replace(walls, positions=positions)
-        back = np.zeros(len(positions), bool)
-        back[at_fault] = True
-        positions[back] = walls.positions[back]
+        fixed[at_fault] = True
+        positions = np.where(fixed[:, np.newaxis], walls.positions, positions)
     return walls
 
 
-def _shift(walls: Walls, missing_um3: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far each vertex moves (n, 3), um."""
-    at, count = walls.positions, len(missing_um3)
+def _moved(
+    walls: Walls, volumes_um3: NDArray[np.float64], fixed: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return where the vertices are when each object has its volume (n, 3), um."""
+    moved = walls
+    for _ in range(_NEWTON):
+        missing = volumes_um3[1:] - measure_volumes(moved, len(volumes_um3) - 1)[1:]
+        if not (np.abs(missing) > _CLOSE * volumes_um3[1:]).any():
+            break
+        moved = replace(moved, positions=moved.positions + _shift(moved, missing, fixed))
+    return moved.positions
+
+
+def _at_ends(walls: Walls) -> NDArray[np.bool_]:
+    """Return which vertices lie at open ends (n,): of an edge of one triangle alone."""
+    ends = np.concatenate([walls.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    ends.sort(axis=1)
+    count = np.int64(len(walls.positions))
+    edges, times = np.unique(ends[:, 0] * count + ends[:, 1], return_counts=True)
+    found = np.zeros(count, bool)
+    for end in np.divmod(edges[times == 1], count):
+        found[end] = True
+    return found
+
+
+def _shift(
+    walls: Walls, missing_um3: NDArray[np.float64], fixed: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return how far each vertex moves (n, 3), um; `missing_um3` is NaN where nothing is asked."""
+    at, asked = walls.positions, np.isfinite(missing_um3)
+    row = np.concatenate([[-1], np.where(asked, np.cumsum(asked) - 1, -1)])
+    count = int(asked.sum())
     corners = at[walls.triangles]
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
@@ -87,20 +124,22 @@ def _shift(walls: Walls, missing_um3: NDArray[np.float64]) -> NDArray[np.float64
         own += np.bincount(walls.triangles[:, k], area / 6, len(at))
         slope = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6
         for side, sign in ((0, 1.0), (1, -1.0)):
-            held = walls.sides[:, side] > 0
+            rows_here = row[walls.sides[:, side]]
+            held = rows_here >= 0
             for axis in range(3):
-                rows.append(walls.sides[held, side] - 1)
+                rows.append(rows_here[held])
                 columns.append(walls.triangles[held, k].astype(np.int64) * 3 + axis)
                 values.append(sign * slope[held, axis])
     shape = (count, 3 * len(at))
     slopes = sparse.coo_matrix(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape
     ).tocsr()
-    light = sparse.diags(np.repeat(np.where(own > 0, 1 / np.maximum(own, 1e-12), 0.0), 3))
+    moves = (own > 0) & ~fixed
+    light = sparse.diags(np.repeat(np.where(moves, 1 / np.maximum(own, 1e-12), 0.0), 3))
     pulls = slopes @ light @ slopes.T
     # an object of which nothing is left pulls nothing
     pulls += sparse.diags(np.full(count, 1e-9 * max(float(pulls.diagonal().mean()), 1e-12)))
-    pressure = spsolve(pulls.tocsc(), missing_um3)
+    pressure = spsolve(pulls.tocsc(), missing_um3[asked])
     return np.asarray(light @ (slopes.T @ np.atleast_1d(pressure))).reshape(-1, 3)
 
 
@@ -121,6 +160,7 @@ def _errors(walls: Walls, max_error_um: float, count: int) -> NDArray[np.float64
     return errors
 
 
-def _compact(walls: Walls) -> Walls:
+def _compact(walls: Walls, fixed: NDArray[np.bool_]) -> tuple[Walls, NDArray[np.bool_]]:
     used, triangles = np.unique(walls.triangles, return_inverse=True)
-    return Walls(walls.positions[used], triangles.reshape(-1, 3).astype(np.int32), walls.sides)
+    kept: NDArray[np.int32] = triangles.reshape(-1, 3).astype(np.int32)
+    return Walls(walls.positions[used], kept, walls.sides), fixed[used]

@@ -32,7 +32,7 @@ _REACH = 0.5  # voxels; farthest way of a vertex from its cube's centre, along e
 class Walls:
     """All walls; 0 is what lies outside all objects, and takes part as they do.
 
-    positions  float64 (n, 3), (x, y, z) um, from the centre of the labels' first voxel
+    positions  float64 (n, 3), (x, y, z) um, world
     triangles  int32 (m, 3)
     sides      int32 (m, 2), the objects that a triangle's normal leaves and enters; the lower first
     """
@@ -43,13 +43,17 @@ class Walls:
 
 
 def extract_walls(
-    labels: NDArray[np.int32], spacing_um: tuple[float, float, float], step_um: float
+    labels: NDArray[np.int32],
+    spacing_um: tuple[float, float, float],
+    step_um: float,
+    origin_um: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Walls:
     """Return the walls of a label map.
 
     labels      int32 (z, y, x), well-composed; outermost voxels are 0
     spacing_um  (z, y, x)
     step_um     of the lattice; far less than the voxels'
+    origin_um   (z, y, x), centre of the first voxel
 
     >>> labels = np.zeros((5, 5, 5), np.int32)
     >>> labels[2, 2, 1:4] = 1, 1, 2
@@ -61,7 +65,8 @@ def extract_walls(
     centres = (cubes - 0.5).astype(np.float64)
     placed = _smoothed(centres, quads)
     for _ in range(_ROUNDS):
-        positions = put_on_lattice(zyx_to_xyz(placed * np.asarray(spacing_um)), step_um)
+        at = placed * np.asarray(spacing_um) + np.asarray(origin_um)
+        positions = put_on_lattice(zyx_to_xyz(at), step_um)
         walls = Walls(positions, *_split(positions, quads, sides))
         at_fault = find_faults(walls)
         if not len(at_fault):
@@ -125,7 +130,11 @@ def _smoothed(centres: NDArray[np.float64], quads: NDArray[np.int64]) -> NDArray
     ends = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
     ends = np.concatenate([ends, ends[:, ::-1]])
     edges = sparse.coo_matrix((np.ones(len(ends)), ends.T), (count, count)).tocsr()
-    edges.data[:] = 1.0  # once, of however many faces it is
+    # within a wall an edge is of two faces; where walls meet in a line, a vertex goes by that alone
+    is_line = edges.data != 2
+    from_vertex = np.repeat(np.arange(count), np.diff(edges.indptr))
+    on_line = np.bincount(from_vertex, is_line, count) == 2
+    edges.data = np.where(on_line[from_vertex], is_line, True).astype(np.float64)
     mean = sparse.diags(1 / np.maximum(np.asarray(edges.sum(axis=1)).ravel(), 1)) @ edges
     low, high = centres - _REACH, centres + _REACH
     placed = centres.copy()
@@ -151,18 +160,42 @@ def measure_volumes(walls: Walls, objects: int) -> NDArray[np.float64]:
     return volumes
 
 
-def surface_of(walls: Walls, number: int) -> Mesh:
-    """Return the closed surface of an object; normals are means over areas."""
+def measure_areas(walls: Walls) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Return the pairs of objects that share a wall (n, 2), the lower first, and its um^2 (n,)."""
+    pairs, which = np.unique(walls.sides, axis=0, return_inverse=True)
+    corners = walls.positions[walls.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1) / 2
+    return pairs, np.bincount(which.ravel(), areas, len(pairs)).astype(np.float64)
+
+
+def surfaces_of(walls: Walls, numbers: NDArray[np.int32]) -> Mesh:
+    """Return the closed surfaces of objects as one mesh, one after the other, each by itself.
+
+    numbers  ascending; `Mesh.objects` counts in them
+
+    Normals are means over the areas of an object's own triangles.
+    """
     left, entered = walls.sides.T
-    triangles = np.concatenate(
-        [walls.triangles[left == number], walls.triangles[entered == number][:, ::-1]]
-    )
-    used, own = np.unique(triangles, return_inverse=True)
+    sides = np.concatenate([left, entered])
+    triangles = np.concatenate([walls.triangles, walls.triangles[:, ::-1]])
+    kept = np.isin(sides, numbers)
+    sides, triangles = sides[kept], triangles[kept]
+    order = np.argsort(sides, kind="stable")
+    triangles = triangles[order].astype(np.int64)
+    which = np.searchsorted(numbers, sides[order])
+    corners = which[:, np.newaxis] * len(walls.positions) + triangles
+    used, own = np.unique(corners, return_inverse=True)
     own = own.reshape(-1, 3)
-    at = walls.positions[used]
+    objects, vertices = np.divmod(used, len(walls.positions))
+    at = walls.positions[vertices]
     area = np.cross(at[own[:, 1]] - at[own[:, 0]], at[own[:, 2]] - at[own[:, 0]])
-    normals = np.zeros_like(at)
-    for k in range(3):
-        np.add.at(normals, own[:, k], area)
+    parts = [np.bincount(own.ravel(), np.repeat(part, 3), len(at)) for part in area.T]
+    normals = np.stack(parts, axis=1).astype(np.float64)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
-    return Mesh(at.astype(np.float32), own.astype(np.uint32), normals.astype(np.float32))
+    return Mesh(
+        at.astype(np.float32),
+        own.astype(np.uint32),
+        normals.astype(np.float32),
+        objects=objects.astype(np.int32),
+    )

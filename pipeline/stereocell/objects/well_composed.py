@@ -9,7 +9,7 @@ L. J. Latecki, "3D well-composed pictures", Graphical Models and Image Processin
 doi:10.1006/gmip.1997.0422
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,13 @@ _AT_ONCE = 1 << 20  # places of a round
 _AGAIN = 1000  # neighbours that a voxel needs more, to change a second time
 
 
-def make_well_composed(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
+def make_well_composed(
+    labels: NDArray[np.int32], name_of: Callable[[int], str] = str
+) -> tuple[NDArray[np.int32], int]:
     """Return labels without such places, and how many voxels changed.
 
-    labels  int32 (z, y, x), 0 outside; two voxels at each end of each axis are 0
+    labels   int32 (z, y, x), 0 outside; two voxels at each end of each axis are 0
+    name_of  names an object for a message
 
     Raises SourceError where an object would change by more than MOST_SHARE.
 
@@ -53,7 +56,7 @@ def make_well_composed(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], in
                 flat[voxel] = label
                 touched.add(voxel)
                 changed.add(voxel)
-        _require_likeness(labels, mended)  # at once: noise takes many rounds
+        _require_likeness(labels, mended, name_of)  # at once: noise takes many rounds
     else:
         raise SourceError(
             f"labels: {count} places where an object touches itself by an edge or a corner are "
@@ -81,7 +84,9 @@ def _best_change(
     return max(changes, key=gain)
 
 
-def _require_likeness(labels: NDArray[np.int32], mended: NDArray[np.int32]) -> None:
+def _require_likeness(
+    labels: NDArray[np.int32], mended: NDArray[np.int32], name_of: Callable[[int], str]
+) -> None:
     where = labels != mended
     if not where.any():
         return
@@ -92,7 +97,7 @@ def _require_likeness(labels: NDArray[np.int32], mended: NDArray[np.int32]) -> N
     worst = int(np.argmax((moved / most)[1:])) + 1
     if moved[worst] > most[worst]:
         raise SourceError(
-            f"labels: object {worst} touches itself by edges and corners of voxels: to mend it "
-            f"{moved[worst]} of its {voxels[worst]} voxels would change, expected at most "
+            f"labels: object {name_of(worst)} touches itself by edges and corners of voxels: to "
+            f"mend it {moved[worst]} of its {voxels[worst]} voxels would change, expected at most "
             f"{most[worst]:.0f}: shells and threads of one voxel can't be built; resample it finer"
         )

@@ -22,10 +22,11 @@ from stereocell.building.level_choice import (
     given_level,
     hold_to_histogram,
 )
-from stereocell.building.open_source import open_source, source_of
+from stereocell.building.open_source import open_source
 from stereocell.building.other_levels import ends_of, find_other_levels, take
 from stereocell.building.phases import settle
 from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
 from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import Window, measure_window

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
+from stereocell.model.object_notes import ObjectNotes
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
@@ -119,6 +120,9 @@ class Dataset:
     remarks      changes and omissions of the reader, a sentence each
     acquired     the source's own images: the axis across which they lie
     labels       what in the metadata says that the voxels number objects; empty: nothing does
+    objects      what the file says of these objects
+    offset_um    where the source puts the centre of level 0's voxel (0, 0, 0), (z, y, x), um;
+                 results count from that voxel, and only two sources together need it
     """
 
     source: str
@@ -137,6 +141,8 @@ class Dataset:
     has_sides: bool = False
     remarks: tuple[str, ...] = ()
     labels: str = ""
+    objects: ObjectNotes = ObjectNotes()  # noqa: RUF009  (frozen)
+    offset_um: tuple[float, float, float] = (0.0, 0.0, 0.0)
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
     _darkest: dict[int, float] = field(init=False, repr=False, default_factory=dict)
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from stereocell.model.object_notes import ObjectNotes
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.read.acquired import Acquired
 from stereocell.read.dataset import VoxelArray
@@ -21,7 +22,7 @@ class Image:
     images         the number of images in the source
     close          frees open files, or None
     title          the image's name; None: the file's name is used
-    modality, placement, has_sides, acquired, labels  as in Dataset
+    modality, placement, has_sides, acquired, labels, objects  as in Dataset
     notes          become Dataset's `remarks`
     notes_at       returns more notes, about one time point; it may read that point's voxels
     """
@@ -38,5 +39,6 @@ class Image:
     has_sides: bool = False
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
     labels: str = ""
+    objects: ObjectNotes = ObjectNotes()  # noqa: RUF009  (frozen)
     notes: tuple[str, ...] = ()
     notes_at: Callable[[int], tuple[str, ...]] | None = None

@@ -26,10 +26,12 @@ from numpy.typing import NDArray
 from scipy.io.matlab import MatReadError
 
 from stereocell.model.errors import SourceError
+from stereocell.model.object_notes import ObjectNotes
 from stereocell.read.acquired import Acquired
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import Image
+from stereocell.read.label_notes import notes_of_nifti
 from stereocell.read.resample import orthogonal_grid, resample_sheared
 from stereocell.read.rescale import dtype_for, rescale
 from stereocell.read.spacing import Grid
@@ -118,6 +120,7 @@ def read_image(location: Location) -> Image:
         placement=canonical.placement,
         has_sides=has_sides,
         labels=_labels(header) if is_nifti else "",
+        objects=notes_of_nifti(_tables(header)) if is_nifti else ObjectNotes(),
         acquired=Acquired(_image_axis(header.get_dim_info()[2] if is_nifti else None, canonical)),
         notes=tuple(notes),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
@@ -150,10 +153,15 @@ def _labels(header: Any) -> str:
     """Return what in the header says that voxels number objects; of a table only its presence."""
     if header["intent_code"] == _INTENT_LABEL:
         return f"NIfTI's intent code {_INTENT_LABEL} (label)"
-    tables = (extension.get_content() for extension in header.extensions)
-    if any(isinstance(text, bytes) and _LABEL_TABLE in text for text in tables):
+    if any(_LABEL_TABLE in text for text in _tables(header)):
         return "a table of labels in an extension of its header"
     return ""
+
+
+def _tables(header: Any) -> list[bytes]:
+    """Return the contents of the header's extensions."""
+    contents = (extension.get_content() for extension in header.extensions)
+    return [content for content in contents if isinstance(content, bytes)]
 
 
 def _image_axis(named: int | None, canonical: Canonical) -> int:

@@ -23,6 +23,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import bare_zarr
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image
+from stereocell.read.label_notes import notes_of_ngff
 from stereocell.read.spacing import Grid, Triple, um_per
 from stereocell.read.zarr_collections import (
     ZarrTree,
@@ -120,6 +121,7 @@ def read_image(location: Location, axes: str = "", *, is_part: bool = False) -> 
         len(multiscales),
         notes=notes_on_labels(tree),
         labels=labels_evidence(ome, location),
+        objects=notes_of_ngff(ome.get("image-label")),
     )
 
 

@@ -240,6 +240,8 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         ),
         acquired=image.acquired,
         labels=image.labels,
+        objects=image.objects,
+        offset_um=image.grids[0].offset_um or (0.0, 0.0, 0.0),
     )
 
 

@@ -146,7 +146,7 @@ def describe_group(ome: Mapping[str, Any], series: Sequence[str], tree: ZarrTree
         )
     if "labels" in ome:
         names = [str(name) for name in ome["labels"]] if isinstance(ome["labels"], list) else []
-        return f"found a list of labels, {_counted(names, 'label image')}, which are not built"
+        return f"found a list of labels, {_counted(names, 'label image')}"
     groups = _groups_below(tree)
     if groups:
         return f"found {_counted(groups, 'group')}; open an image by its path, as {shown}/PATH"
@@ -163,7 +163,7 @@ def notes_on_labels(tree: ZarrTree) -> tuple[str, ...]:
     told += [_cut(name) for name in names[_LOOKED_AT:_SHOWN]]
     if len(names) > _SHOWN:
         told.append(f"{len(names) - _SHOWN} more")
-    return (f"label images of it, which are not built: {', '.join(told)}",)
+    return (f"label images of it: {', '.join(told)} (--labels NAME builds the objects of one)",)
 
 
 def labels_evidence(ome: Mapping[str, Any], location: Location) -> str:

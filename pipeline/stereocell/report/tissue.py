@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.building.input_unchanged import require_added
-from stereocell.building.open_source import open_source, source_of
+from stereocell.building.open_source import open_source
 from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
 from stereocell.building.tissue_files import FOLDER, read_record
 from stereocell.model.color import to_srgb8
 from stereocell.model.tiling import Box

@@ -15,6 +15,7 @@ from pxr import Usd, UsdGeom
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.usd.read_attributes import require_still
+from stereocell.usd.read_objects import objects_of
 
 _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
 
@@ -59,6 +60,10 @@ def read_mesh(
         **{name: _primvar(primvars.GetPrimvar(name)) for name in sorted(shown)},
     }
     values = {name: given for name, given in found.items() if given is not None}
+    objects = objects_of(mesh)
+    if objects is not None and len(objects) == len(counts):
+        values |= _at_vertices(values, indices, counts, len(points))
+        objects = _of_vertices(np.repeat(objects, counts), indices, len(points))
     if is_edited:
         sizes = {"faceVarying": len(indices), "uniform": len(counts), "constant": 1}
         for name in sorted(values.keys() - {"normals"}):
@@ -77,6 +82,8 @@ def read_mesh(
         triangles, points, arrays = _split(path, points, indices, counts, corners, values)
     if "normals" not in arrays:
         arrays["normals"] = _smooth_normals(points, triangles)
+    if objects is not None and len(objects) != len(points):  # edits changed the faces
+        objects = None
     return move_mesh(
         Mesh(
             points,
@@ -86,6 +93,7 @@ def read_mesh(
             arrays.get("tangents"),
             arrays.get("displayColor"),
             arrays.get("occlusion"),
+            None if objects is None else objects.astype(np.int32),
         ),
         to_world,
     )
@@ -117,6 +125,28 @@ def _primvar(primvar: UsdGeom.Primvar) -> _Values | None:
     if not primvar or not primvar.HasValue():
         return None
     return _array(primvar.ComputeFlattened(), np.float32), str(primvar.GetInterpolation())
+
+
+def _at_vertices(
+    values: dict[str, _Values], indices: NDArray[np.int64], counts: NDArray[np.int64], points: int
+) -> dict[str, _Values]:
+    """Return the values by face that are the same all around each vertex, by vertex."""
+    found: dict[str, _Values] = {}
+    for name, (array, kind) in values.items():
+        if kind == "uniform" and len(array) == len(counts):
+            moved = _of_vertices(np.repeat(array, counts, axis=0), indices, points)
+            if moved is not None:
+                found[name] = moved, "vertex"
+    return found
+
+
+def _of_vertices(
+    corners: NDArray[Any], indices: NDArray[np.int64], points: int
+) -> NDArray[Any] | None:
+    """Return values of face corners as values of vertices; None: they differ at a vertex."""
+    moved = np.zeros((points, *corners.shape[1:]), corners.dtype)
+    moved[indices] = corners
+    return moved if np.array_equal(moved[indices], corners, equal_nan=True) else None
 
 
 def _triangulate(counts: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -202,4 +232,5 @@ def move_mesh(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
         tangents,
         mesh.colors,
         mesh.openness,
+        mesh.objects,
     )

@@ -68,8 +68,13 @@ def feed_vertices(
     mesh: UsdGeom.Mesh, look: Sdf.Path, kind: Kind, values: NDArray[np.float32]
 ) -> None:
     """Store values at a mesh's vertices, (n,) or (n, 3), float32, and feed them to its surface."""
-    feed, stage = FEEDS[kind], mesh.GetPrim().GetStage()
     set_primvar(mesh, kind, values)
+    feed_primvar(mesh, look, kind)
+
+
+def feed_primvar(mesh: UsdGeom.Mesh, look: Sdf.Path, kind: Kind) -> None:
+    """Feed the primvar of a kind, which the mesh has or gets, to its surface."""
+    feed, stage = FEEDS[kind], mesh.GetPrim().GetStage()
     reader = UsdShade.Shader.Define(stage, look.AppendChild(feed.primvar))
     reader.CreateIdAttr(feed.reader)
     reader.CreateInput("varname", _Types.String).Set(feed.primvar)

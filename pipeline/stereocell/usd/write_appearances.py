@@ -13,7 +13,7 @@ colour from `inputs:color`. The bundle's viewer has its own ray caster. docs/sta
 tried (usd-core's validators refuse every shader that a renderer knows), and such a layer.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 from stereocell.filters.denoise import MEDIAN_REACH, SMOOTHING_REACH
 from stereocell.formats.exr import write_lut
 from stereocell.model.channel import Appearance, OpacityPoints, Shapes, SurfaceLevel
+from stereocell.model.object_table import ObjectTable
 from stereocell.storage.json_files import write_json
 from stereocell.usd.layer import (
     CHANNEL_API,
@@ -32,14 +33,20 @@ from stereocell.usd.layer import (
     set_attribute,
 )
 from stereocell.usd.numbers2d import write_numbers
+from stereocell.usd.write_objects import write_columns
 
 DEFAULT_FUNCTION = "default"
+ROUGHNESS = 0.5  # of all surfaces, as UsdPreviewSurface has it without a word
 
 _Types = Sdf.ValueTypeNames
 
 
-def write_appearances(folder: Path, appearances: Sequence[Appearance]) -> None:
+def write_appearances(
+    folder: Path, appearances: Sequence[Appearance], tables: Mapping[str, ObjectTable]
+) -> None:
     """Write channels.usda, <channel>_<function>.exr and <channel>_level.json into `folder`.
+
+    tables  of the objects of label maps, by the ID of their channel
 
     Raises OutputError.
     """
@@ -49,7 +56,10 @@ def write_appearances(folder: Path, appearances: Sequence[Appearance]) -> None:
     for appearance in appearances:
         material = UsdShade.Material.Define(stage, CHANNELS.AppendChild(appearance.id))
         _author_appearance(material, appearance)
-        _author_surface(material, appearance)
+        is_fed = bool(appearance.painted_by) or appearance.id in tables
+        _author_surface(material, is_fed)
+        if appearance.id in tables:
+            write_columns(material.GetPrim(), tables[appearance.id], ROUGHNESS)
         _author_functions(material.GetPrim(), appearance)
         if appearance.level is not None:
             write_json(folder / _level_name(appearance), level_to_json(appearance.level))
@@ -118,16 +128,16 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
         set_attribute(prim, "stereocell:threshold", _Types.Float, appearance.threshold)
 
 
-def _author_surface(material: UsdShade.Material, appearance: Appearance) -> None:
+def _author_surface(material: UsdShade.Material, is_fed: bool) -> None:
     stage, path = material.GetPrim().GetStage(), material.GetPath().AppendChild("surface")
     surface = UsdShade.Shader.Define(stage, path)
     surface.CreateIdAttr("UsdPreviewSurface")
     # else tiles feed it: an opinion here would be stronger than theirs
-    if not appearance.painted_by:
+    if not is_fed:
         color = surface.CreateInput("diffuseColor", _Types.Color3f)
         color.ConnectToSource(material.GetInput("color"))
     surface.CreateInput("metallic", _Types.Float).Set(0.0)
-    surface.CreateInput("roughness", _Types.Float).Set(0.5)
+    surface.CreateInput("roughness", _Types.Float).Set(ROUGHNESS)
     output = surface.CreateOutput("surface", _Types.Token)
     material.CreateSurfaceOutput().ConnectToSource(output)
 

@@ -14,7 +14,7 @@ unloaded. An artist's layer over the stage is stronger than all of these.
 
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 
 from stereocell.model.channel import Appearance
+from stereocell.model.object_table import ObjectTable
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.tile_content import Provenance, TileContent
 from stereocell.storage.assets import find_asset
@@ -85,6 +86,7 @@ def write_stage(
     modality: str = "",
     placement: Matrix = IDENTITY,
     has_sides: bool = False,
+    tables: Mapping[str, ObjectTable] | None = None,
 ) -> None:
     """Write stage.usda and looks/ over tiles that `write_tile` has written.
 
@@ -99,10 +101,12 @@ def write_stage(
     has_sides   whether the placed specimen lies as read/anatomical_axes.py has it: then the group
                 of the tiles says where left, posterior and superior are
 
+    tables      of the objects of label maps, by the ID of their channel
+
     Raises OutputError where a file can't be written.
     """
     with replacing_folder(stage_dir / "looks") as folder:
-        write_appearances(folder, appearances)
+        write_appearances(folder, appearances, tables or {})
         shutil.copyfile(find_asset("usd_assets/lights.usda"), folder / "lights.usda")
 
     stage = new_stage(".usda", ROOT.name)

@@ -46,7 +46,8 @@ from stereocell.usd.layer import (
     vec3f,
     world_box,
 )
-from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
+from stereocell.usd.shader_inputs import Kind, feed_image, feed_primvar, feed_vertices
+from stereocell.usd.write_objects import define_objects, write_objects
 
 DEFAULT_LOD = 1  # level of detail that a stage selects
 LAYER_NAME = "tile.usdc"
@@ -181,6 +182,10 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateDoubleSidedAttr(True)  # the tile's end cuts the surface open
     _bind(mesh, branch, _leaf(tile, channel, "_look"))
+    if channel.objects is not None:
+        look = branch.GetPath().AppendChild(_leaf(tile, channel, "_look"))
+        feed_primvar(mesh, look, "color")
+        define_objects(mesh, look, channel.channel_id, channel.objects, channel.touching)
 
 
 def _define_volume(
@@ -266,7 +271,10 @@ def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, leve
     if lod.mesh.tangents is not None:
         tangents = primvars.CreatePrimvar("tangents", _Types.Float4Array, vertex)
         tangents.Set(Vt.Vec4fArray.FromNumpy(_float32(lod.mesh.tangents)))
-    _author_maps(mesh, branch.AppendChild(_leaf(tile, channel, "_look")), channel, level)
+    look = branch.AppendChild(_leaf(tile, channel, "_look"))
+    if channel.objects is not None:
+        write_objects(mesh, look, lod.mesh, channel.objects)
+    _author_maps(mesh, look, channel, level)
 
 
 def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, level: int) -> None:

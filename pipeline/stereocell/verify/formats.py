@@ -99,6 +99,7 @@ def _checks_of_bundle(bundle: Path, out_folder: OutFolder | None) -> list[_Check
         ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
         ("volume lists", lambda: _check_volume_lists(bundle)),
         ("2D transfer functions", lambda: _check_transfer2d(bundle)),
+        ("object tables", lambda: _check_objects(bundle)),
         ("tilesets", lambda: _check_tilesets(bundle)),
         ("hashes", lambda: _check_hashes(bundle, out_folder)),
         ("bundle usdz", lambda: _check_usdz_of_bundle(bundle)),
@@ -322,6 +323,40 @@ def _check_transfer2d(bundle: Path) -> str:
     return f"{count} shapes"
 
 
+def _objects(bundle: Path, channel: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the table of a channel that is a label map; None: it is an image's."""
+    if "objects" not in channel:
+        return None
+    path = bundle / channel["objects"]["path"]
+    content: dict[str, Any] = read_json(path, "objects.schema.json", _RUN_BUNDLE)
+    return content
+
+
+def _check_objects(bundle: Path) -> str:
+    """Check each objects.json: that its files have a value a row, and its tiles rows there are."""
+    problems = []
+    objects = 0
+    for channel in _channels(bundle):
+        content = _objects(bundle, channel)
+        if content is None:
+            continue
+        count, name = content["count"], channel["objects"]["path"]
+        objects += count
+        sizes = [(content["labels"], content["label_bytes"]), (content["boxes"], 24)]
+        sizes += [(column["bytes"], 1) for column in content["columns"]]
+        sizes += [(column["exact"], 4) for column in content["columns"]]
+        problems += [
+            f"{name}: {ref['path']} has {ref['bytes']} bytes, expected {count * width}"
+            for ref, width in sizes
+            if ref["bytes"] != count * width
+        ]
+        for tile, rows in content["tiles"].items():
+            if max([rows["first"] + rows["count"] - 1, *rows.get("more", [])]) >= max(count, 1):
+                problems.append(f"{name}: {tile}: names rows beyond the {count} that there are")
+    raise_on(problems)
+    return f"{objects} objects"
+
+
 def _check_tilesets(bundle: Path) -> str:
     contents = 0
     problems = []
@@ -381,6 +416,7 @@ def _check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
         path = bundle / channel["volumes"]["path"]
         references += _references(read_json(path, "volumes.schema.json", _RUN_BUNDLE))
         references += _references(_transfer2d(bundle, channel))
+        references += _references(_objects(bundle, channel))
     for reference in references:
         entry = {"bytes": reference["bytes"], "sha256": reference["sha256"]}
         expected = listed.get(reference["path"])

@@ -19,11 +19,10 @@ import {
   START_VIEW,
   type Wish,
 } from "../panel/controls";
-import { CardMeasure, PER_INCH } from "../panel/html/card_measure";
+import type { CardMeasure } from "../panel/html/card_measure";
 import { Help } from "../panel/html/key_list";
 import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
-import { scanByCamera } from "../panel/html/qr_scanner";
 import { isRefusal, type KeyContext } from "../panel/key";
 import { isWritten, listenForKeys } from "../panel/key_events";
 import { wishOf } from "../panel/keys";
@@ -40,7 +39,7 @@ import { allOf, measurementsCsv } from "../state/measurements";
 import { setTo } from "../state/parameters/kinds";
 import { EYE_DISTANCE, START_TOOLS, STEREO_STRENGTH } from "../state/parameters/tools";
 import { SWITCH_DISTANCE } from "../state/parameters/volumes";
-import type { XrSupport } from "../state/stereo";
+import { PER_INCH, type XrSupport } from "../state/stereo";
 import { cssPixelsPerInch } from "../xr/cardboard/lens";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
@@ -57,6 +56,7 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
 
+const NOT_COME = "This part of the page has not come: check the connection and try again.";
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
 const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
 
@@ -132,7 +132,8 @@ export class Controller {
   private view: PanelView = { ...START_VIEW, ...rememberedLens() };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
   private readonly help: Help;
-  private readonly card: CardMeasure;
+  /** Once it was asked for. */
+  private card: CardMeasure | null = null;
   private readonly ranges: Ranges;
   private readonly disposed = new AbortController();
   private timer = 0;
@@ -145,7 +146,7 @@ export class Controller {
 
   constructor(
     private readonly viewer: Viewer,
-    parent: HTMLElement,
+    private readonly parent: HTMLElement,
     private readonly said: Said,
     private readonly options: ControllerOptions,
   ) {
@@ -156,11 +157,6 @@ export class Controller {
     parent.append(this.panel.root);
     this.help = new Help(parent, () => {
       if (this.view.isHelpOpen) this.perform({ panel: "help" });
-    });
-    this.card = new CardMeasure(parent, (perInch) => {
-      remember(SCREEN_KEY, String(perInch));
-      viewer.setScreen(perInch);
-      this.say(`The screen has ${perInch} pixels an inch: split it to see.`);
     });
     viewer.setScreen(rememberedScreen());
     for (const action of rememberedEyes()) viewer.dispatch(action);
@@ -246,8 +242,7 @@ export class Controller {
     } else if (command === "scan") {
       void this.scan();
     } else if (command === "measure-screen") {
-      const { userAgent } = navigator;
-      this.card.open(this.viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
+      void this.measureScreen();
     } else if (command === "own-light") {
       void this.lightByFile();
     } else if (command === "save-picture") {
@@ -256,6 +251,8 @@ export class Controller {
       void this.saveVideo();
     } else if (command === "save-csv") {
       this.saveMeasurements();
+    } else if (command === "save-objects") {
+      this.saveObjects();
     } else if (command === "find") {
       const isLong = this.goTo("channels", "find-channel");
       if (!isLong) this.say("The panel lists all channels.");
@@ -304,7 +301,29 @@ export class Controller {
     }
   }
 
+  private async measureScreen(): Promise<void> {
+    const { viewer, parent } = this;
+    const part = await import("../panel/html/card_measure").catch(() => null);
+    if (part === null) {
+      this.say(NOT_COME);
+      return;
+    }
+    this.card ??= new part.CardMeasure(parent, (perInch) => {
+      remember(SCREEN_KEY, String(perInch));
+      viewer.setScreen(perInch);
+      this.say(`The screen has ${perInch} pixels an inch: split it to see.`);
+    });
+    const { userAgent } = navigator;
+    this.card.open(viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
+  }
+
   private async scan(): Promise<void> {
+    const scanner = await import("../panel/html/qr_scanner").catch(() => null);
+    if (scanner === null) {
+      this.say(NOT_COME);
+      return;
+    }
+    const { scanByCamera } = scanner;
     try {
       const text = await scanByCamera(document.body, scanCode);
       if (text !== null) this.perform({ panel: "code", text });
@@ -444,6 +463,16 @@ export class Controller {
     this.save("measurements", "csv", new Blob([measurementsCsv(list)], { type: "text/csv" }));
   }
 
+  private saveObjects(): void {
+    if (this.viewer.objectItems.length === 0) {
+      this.say("No objects of a label map are shown.");
+      return;
+    }
+    const text = this.viewer.objectsCsv();
+    if (text === null) this.say("Their values are on their way: once more, please.");
+    else this.save("objects", "csv", new Blob([text], { type: "text/csv" }));
+  }
+
   private get shown(): Box {
     return shownBox(this.viewer.bundle.manifest, this.viewer.state.isolated);
   }
@@ -488,6 +517,7 @@ export class Controller {
       isLoading,
       values: viewer.snapshot().measuredValues,
       sliceValues: viewer.sliceValues,
+      objectItems: viewer.objectItems,
       isFilming: this.filming !== null,
       undo: viewer.undoes,
       redo: viewer.redoes,
@@ -499,6 +529,6 @@ export class Controller {
     this.disposed.abort();
     this.panel.root.remove();
     this.help.dispose();
-    this.card.dispose();
+    this.card?.dispose();
   }
 }

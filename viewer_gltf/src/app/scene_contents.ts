@@ -19,6 +19,7 @@ import { BrickService } from "../volumes/bricks/brick_service";
 import type { BrickView } from "../volumes/bricks/protocol";
 import { TransferFunctions2dLoader } from "../volumes/transfer_functions_loader";
 import { VolumeSet } from "../volumes/volume_set";
+import { ObjectsPart } from "./objects_part";
 import { SlicesPart } from "./slices_part";
 
 export type ContentsOptions = Readonly<{
@@ -28,8 +29,10 @@ export type ContentsOptions = Readonly<{
   state: ViewerState;
   /** The part of the page with the stage. */
   view: HTMLElement;
-  dispatch: (action: Action) => void;
+  dispatch: (action: Action, isStep?: boolean) => void;
   announce: (text: string) => void;
+  /** An object is to be flown to; um, world. */
+  onAim: (box: Box) => void;
   /** The picture is no longer true. */
   onChange: () => void;
   onError: (error: unknown) => void;
@@ -45,6 +48,8 @@ export class Contents {
   readonly marks: Marks;
   /** Pictures of the slices, and the planes that show them in the specimen. */
   readonly slices: SlicesPart;
+  /** The objects of label maps. */
+  readonly objects: ObjectsPart;
   private readonly bricks: BrickService | null;
   private readonly clip = new Matrix4();
   private readonly point = new Vector3();
@@ -86,6 +91,12 @@ export class Contents {
       onChange,
       onError,
     );
+    this.objects = new ObjectsPart({
+      ...options,
+      ...bundle,
+      surfaces: this.surfaces,
+      specimen: () => this.surfaces.group.parent ?? this.surfaces.group,
+    });
     const values = bundle.values === undefined ? null : new ValuesHost(bundle.values);
     const reading = {
       values,
@@ -125,6 +136,7 @@ export class Contents {
       this.traced.isLoading ||
       this.transferFunctions2d.isLoading ||
       this.slices.isLoading ||
+      this.objects.isLoading ||
       !this.surfaces.overview.isComplete
     );
   }
@@ -137,6 +149,7 @@ export class Contents {
     this.traced.follow(state);
     this.surfaces.follow(state, focusTiles);
     this.slices.follow(state);
+    this.objects.follow(state);
     this.marks.follow(state);
   }
 
@@ -147,6 +160,7 @@ export class Contents {
     this.traced.retryFailed();
     this.transferFunctions2d.retryFailed();
     this.slices.retryFailed();
+    this.objects.retryFailed();
     this.marks.readAnew();
   }
 
@@ -204,6 +218,7 @@ export class Contents {
   dispose(): void {
     this.marks.dispose();
     this.slices.dispose();
+    this.objects.dispose();
     this.surfaces.dispose();
     this.volumes.dispose();
     this.traced.dispose();

@@ -8,7 +8,8 @@ import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
 import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
-import type { HandPose } from "../math/grab";
+import { type Box, centerOf } from "../math/box";
+import { type HandPose, zoomAbout } from "../math/grab";
 import { pickTile, shownBox, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
@@ -57,6 +58,11 @@ const NEAR_AT_START = 1.1;
 const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset", "next-view"]);
 
 const NOTHING_AHEAD = "No tile is in the middle of the view.";
+/** Distance of the eye from an object that it flies to, in the object's lengths, and at least, m. */
+const NEAREST_OBJECT = 6;
+const NEAREST_OBJECT_M = 0.08;
+/** How long one is at least that is brought before the eyes in stereo, m. */
+const OBJECT_IN_ROOM_M = 0.15;
 const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
 const NEXT_KEPT = "` goes to the next.";
 
@@ -127,8 +133,9 @@ export class Viewer {
       picture: this.loop.picture,
       state: this.state,
       view: stage.parentElement ?? stage,
-      dispatch: (action) => this.dispatch(action),
+      dispatch: (action, isStep) => this.dispatch(action, isStep),
       announce: (text) => this.onAnnounce(text),
+      onAim: (box) => this.flyTo(box),
       onChange: () => this.loop.come(),
       onError: (error) => this.report(error),
     });
@@ -155,6 +162,10 @@ export class Viewer {
       onStart: () => this.enterStereo(),
       onEnd: () => this.leaveStereo(),
     });
+    this.stereo.hands.tiles.objectAlong = (ray) => {
+      const met = this.contents.objects.meet(ray);
+      return met && { id: `${met.channel}/${met.row}`, distance: met.distance };
+    };
     this.steps = new Steps(
       () => ({ state: this.state, camera: this.cameraView, isInRoom: this.stereo.kind !== null }),
       this.disposed.signal,
@@ -502,6 +513,16 @@ export class Viewer {
     return this.contents.transferFunctions2d.histogram(channel);
   }
 
+  /** The panel's section of the objects of label maps. */
+  get objectItems() {
+    return this.contents.objects.items;
+  }
+
+  /** The objects that are meant, as a table; null: it is on its way, or there is none. */
+  objectsCsv(): string | null {
+    return this.contents.objects.csv();
+  }
+
   /** The channels' values where the slices meet, in the source's units; none: no slices show. */
   get sliceValues(): readonly string[] {
     return this.contents.slices.values;
@@ -570,6 +591,26 @@ export class Viewer {
     return { position: position.setY(height_m), orientation };
   }
 
+  /** Bring an object near: the flat camera goes there, in stereo it comes before the eyes. */
+  private flyTo(box: Box): void {
+    const { specimen } = this.room;
+    const middle = new Vector3(...centerOf(box)).applyMatrix4(specimen.group.matrixWorld);
+    const edge_m = specimen.scale * Math.max(...box.max.map((v, i) => v - box.min[i]));
+    if (this.stereo.kind === null) {
+      const { position, target } = this.navigation.lookNow;
+      const away = new Vector3(...position).sub(new Vector3(...target));
+      away.setLength(Math.max(NEAREST_OBJECT * edge_m, NEAREST_OBJECT_M));
+      const to = middle.toArray();
+      this.navigation.lookFrom({ position: away.add(middle).toArray(), target: to });
+    } else {
+      const larger = Math.max(1, OBJECT_IN_ROOM_M / edge_m);
+      const pose = zoomAbout(specimen.pose, middle, larger);
+      pose.position.add(specimen.anchor).sub(middle);
+      specimen.moveTo(pose, new Vector3().setFromMatrixPosition(this.loop.head));
+    }
+    this.loop.change();
+  }
+
   private enterStereo(): void {
     const { isInUsersRoom, head } = this.stereo;
     const table = isInUsersRoom && head !== null ? this.tableBefore(head) : null;
@@ -596,6 +637,7 @@ export class Viewer {
   private choose(ray: Ray, tile: string | null, isByGaze = false): boolean {
     const { state } = this;
     if (state.tool === "measure") void this.contents.marks.measure(ray);
+    else if (this.contents.objects.choose(ray, isByGaze)) return true;
     else if (state.isolated === null && tile !== null) {
       this.dispatch(chosenTile(state, tile), !isByGaze);
     } else return false;

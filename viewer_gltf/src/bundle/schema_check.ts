@@ -12,7 +12,7 @@ import { faultOf, MAX_SHAPES } from "./transfer_2d";
 export const FORMAT = "stereocell-bundle";
 export const VERSION = 1;
 
-function checkSchema(schema: object, value: unknown, path: string): void {
+export function checkSchema(schema: object, value: unknown, path: string): void {
   const result = new Validator(schema as Schema, "2020-12", true).validate(value);
   if (result.valid) return;
   // The innermost error is the most exact; after a wrong tuple the validator adds a bare "false".

@@ -1,4 +1,7 @@
-/** The specimen's tiles as what a ray meets: the boxes of those that are shown, as far as cut. */
+/**
+ * The specimen's tiles as what a ray meets: the boxes of those that are shown, as far as cut; and the objects in
+ * them, so that the gaze rests on one of them and not on its tile.
+ */
 import { Matrix4, type Object3D } from "three";
 import { type Clip, WHOLE } from "../math/clip";
 import { type BoxedTile, pickTile } from "../math/pick";
@@ -7,12 +10,16 @@ import type { Hit, RoomRay, Target } from "./ray_pointer";
 import { rayAlong } from "./rays";
 
 export const TILE = "tile:";
+/** Between a tile and an object in it. */
+const OF = "/";
 
 export class TileTarget implements Target {
   readonly isOnTop = false;
   /** Those that are shown. */
   tiles: readonly BoxedTile[] = [];
   clip: Clip = WHOLE;
+  /** The object along a ray, in um of the specimen: its name, and where; null: none. */
+  objectAlong: (ray: Ray) => Readonly<{ id: string; distance: number }> | null = () => null;
   private readonly toSpecimen = new Matrix4();
 
   /** @param onChoose the ray is in um of the specimen */
@@ -23,7 +30,10 @@ export class TileTarget implements Target {
 
   meet(ray: RoomRay): Hit | null {
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
-    const met = pickTile(rayAlong(ray, this.toSpecimen), this.tiles, this.clip);
+    const inside = rayAlong(ray, this.toSpecimen);
+    const met = pickTile(inside, this.tiles, this.clip);
+    const object = met && this.objectAlong(inside);
+    if (object) return { key: `${TILE}${met.id}${OF}${object.id}`, distance_m: object.distance };
     // The ray's direction is one metre long, whatever it is in um.
     return met && { key: TILE + met.id, distance_m: met.distance };
   }
@@ -31,6 +41,6 @@ export class TileTarget implements Target {
   choose({ key }: Hit, ray: RoomRay, isByGaze: boolean): void {
     if (key === null) return;
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
-    this.onChoose(rayAlong(ray, this.toSpecimen), key.slice(TILE.length), isByGaze);
+    this.onChoose(rayAlong(ray, this.toSpecimen), key.slice(TILE.length).split(OF)[0], isByGaze);
   }
 }

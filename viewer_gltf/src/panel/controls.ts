@@ -73,7 +73,7 @@ export const START_VIEW: PanelView = {
   shape: null,
   grasp: null,
   shapeNumber: null,
-  open: ["channels", "volumes", "light", "tiles", "view", "stereo"],
+  open: ["channels", "objects", "volumes", "light", "tiles", "view", "stereo"],
   lenses: "v2",
   code: "",
   isHidden: false,
@@ -180,6 +180,21 @@ export type HistogramEditor = Base &
     /** null: nothing has changed by it. */
     drag: (at: HistogramPoint) => Wish | null;
   }>;
+/** Whatever is drawn of something that only its owner knows. Places: shares of width and height, from the upper left. */
+export type Picture = Base &
+  Readonly<{
+    kind: "picture";
+    /** As a share of its width. */
+    height: number;
+    /** Changes with what is drawn. */
+    version: string;
+    draw: (context: CanvasRenderingContext2D, width: number, height: number) => void;
+    /** It in words. */
+    text: string;
+    press: (x: number, y: number) => Wish;
+    /** null: nothing has changed by it; absent: only a press does something. */
+    drag?: (x: number, y: number) => Wish | null;
+  }>;
 /** What can only be read. */
 export type Text = Base & Readonly<{ kind: "text"; value: string }>;
 export type Search = Base &
@@ -202,6 +217,7 @@ export type Control =
   | Button
   | TileMap
   | HistogramEditor
+  | Picture
   | Text
   | Search
   | Link;

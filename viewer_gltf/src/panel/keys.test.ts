@@ -87,6 +87,7 @@ describe("the keys", () => {
     );
     const wanted: Readonly<Record<Action["type"], boolean>> = {
       set: true,
+      objects: false, // the panel's, and a tap
       show: true,
       window: true,
       "choose-transfer-function": true,
@@ -120,6 +121,7 @@ describe("the keys", () => {
       scan: true,
       share: true,
       "save-csv": true,
+      "save-objects": true,
       "save-picture": true,
       "save-video": true,
       "keep-view": true,

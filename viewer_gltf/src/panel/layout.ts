@@ -51,6 +51,8 @@ export type Facts = StereoSupport &
     values: readonly (readonly string[])[];
     /** The channels' values where the slices meet. */
     sliceValues: readonly string[];
+    /** Of label maps; absent or empty: none is shown. */
+    objectItems?: Section["items"];
     /** Whether a video is being made. */
     isFilming: boolean;
     /** What undoing and redoing would change, in words; null: there is nothing. */
@@ -92,6 +94,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         ? [section("notices", "Notices", noticeItems(state))]
         : []),
       section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
+      ...(facts.objectItems?.length ? [section("objects", "Objects", facts.objectItems)] : []),
       section("volumes", "Volumes", [...controlsOf(VOLUMES, state), discNow(state, facts)]),
       section("light", "Light", lightItems(state, view, facts.isStereo)),
       section("tiles", "Tiles", tileItems(state, facts.focusTile)),

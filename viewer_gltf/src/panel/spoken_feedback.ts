@@ -126,6 +126,7 @@ function spokenChannel(
     }
     case "choose-transfer-function":
     case "set-shapes":
+    case "objects":
     case "learn-transfer-2d":
       return `${name}: ${channel.transferFunction}`;
   }

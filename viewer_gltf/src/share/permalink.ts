@@ -8,7 +8,7 @@
  * name_shapes: see shapes_link.ts) t(ransfer function) n(o volume).
  * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
  * corner), cut (a plane's normal and offset), points (um), measures (see measurements_link.ts), views
- * (kept ones, as eye), tool, dwell, quality, light (see
+ * (kept ones, as eye), objects (of label maps: see state/objects.ts), tool, dwell, quality, light (see
  * path_trace_link.ts), lamps (shown or not), eye and pose.
  * An address is somebody else's text: whatever it holds, the actions are ones that a user could
  * have taken; an unreadable part is reported and left out.
@@ -19,6 +19,7 @@ import { type Clip, withinSpecimen } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
 import { AXES } from "../math/vec3";
 import type { Action } from "../state/actions";
+import { linkedObjects } from "../state/objects";
 import { CHANNEL, START_CHANNEL } from "../state/parameters/channel";
 import type { Parameter } from "../state/parameters/kinds";
 import { LIGHT } from "../state/parameters/light";
@@ -82,6 +83,11 @@ function linkOf(
   );
   if (cameras.length > 0) parts.l = cameras.join(",");
   Object.assign(parts, Object.fromEntries(writeWords(VOLUMES, state, start, WORDS)));
+  const objects = Object.entries(state.objects).flatMap(([id, view]) => {
+    const text = linkedObjects(view);
+    return text === "" ? [] : [[id, text].map(encodeURIComponent).join(":")];
+  });
+  if (objects.length > 0) parts.objects = objects.join(",");
   if (state.selected !== null) parts.tile = encodeURIComponent(state.selected);
   if (state.isolated !== null) parts.only = encodeURIComponent(state.isolated);
   const { box, plane } = state.clip;
@@ -181,6 +187,7 @@ class LinkReader {
   read(): Shared {
     this.readShown();
     this.readLooks();
+    this.readObjects();
     this.readParameters(VOLUMES);
     this.tile("tile", "select");
     this.tile("only", "isolate");
@@ -249,6 +256,20 @@ class LinkReader {
         const action = lookAction(channel, camera);
         if (action === null) this.unread.push(`l ${shortened(`${channel.id}:${camera}`)}`);
         else this.actions.push(action);
+      }
+    }
+  }
+
+  /** The code that knows the table reads it on. */
+  private readObjects(): void {
+    const text = this.parts.get("objects");
+    for (const entry of text ? text.split(",") : []) {
+      const [id, words = ""] = entry.split(":");
+      const channel = this.channel(id);
+      const linked = decoded(words);
+      if (linked === null) this.unread.push(`objects ${shortened(words)}`);
+      else if (channel !== null) {
+        this.actions.push({ type: "objects", channel: channel.id, change: { linked } });
       }
     }
   }

@@ -5,10 +5,12 @@ import type { Clip } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
 import type { KeptView } from "./kept_views";
 import type { Measurement } from "./measurements";
+import type { ObjectChange } from "./objects";
 import type { SetAction } from "./parameters/kinds";
 import type { ViewerState } from "./viewer_state";
 
 export type Action =
+  | ObjectChange
   /** The user sets a number, a switch, a choice or a colour: see parameters/. */
   | SetAction
   | Readonly<{ type: "show"; channel: string; shown: boolean }>

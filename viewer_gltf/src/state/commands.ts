@@ -17,6 +17,8 @@ export type Command =
   | "share"
   /** The measurements as a file. */
   | "save-csv"
+  /** The objects of a label map that are selected, or that show, as a file. */
+  | "save-objects"
   /** What the screen shows, as large as is chosen. */
   | "save-picture"
   /** Once round, or through the views that were kept; once more: leave it. */

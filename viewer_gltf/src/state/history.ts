@@ -107,6 +107,8 @@ export function keyOfChange(action: Action): string | null {
       const { kind } = channel === undefined ? parameterOf(id) : channelParameterOf(id);
       return kind === "number" || kind === "colour" ? `set ${id} ${channel ?? ""}` : null;
     }
+    case "objects":
+      return `${action.type} ${action.channel} ${Object.keys(action.change)}`;
     case "window":
     case "set-shapes":
       return `${action.type} ${action.channel}`;
@@ -131,6 +133,8 @@ export function nameOfChange(action: Action, { channels }: ViewerState): string 
         : `${nameOf(action.channel)}: ${channelParameterOf(action.id).label}`;
     case "show":
       return `${nameOf(action.channel)}: ${action.shown ? "shown" : "hidden"}`;
+    case "objects":
+      return `${nameOf(action.channel)}: objects`;
     case "window":
       return `${nameOf(action.channel)}: window`;
     case "choose-transfer-function":

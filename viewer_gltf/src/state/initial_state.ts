@@ -58,6 +58,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
       representation: asStaged.has(tile) ? tile.representation : "mesh",
     })),
     middle: ordered[0].id,
+    objects: {},
     mode: startMode(manifest, canTrace, staged.length > 0),
     selected: null,
     isolated: null,

@@ -3,6 +3,7 @@ import type { Action } from "./actions";
 import { withOwn } from "./history";
 import { MAX_VIEWS } from "./kept_views";
 import { finished, MAX_POINTS, withinLimits, withPoint } from "./measurements";
+import { withObjects } from "./objects";
 import { withValue } from "./parameters/kinds";
 import { LAMP } from "./parameters/light";
 import { SLICE_AT, SLICE_TURN } from "./parameters/slices";
@@ -62,6 +63,10 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       const { at = [], turn_deg = [] } = action;
       const moved = at.reduce((on, share, i) => withValue(SLICE_AT[i], on, share), state);
       return turn_deg.reduce((on, angle, i) => withValue(SLICE_TURN[i], on, angle), moved);
+    }
+    case "objects": {
+      const objects = withObjects(state.objects, action);
+      return objects === state.objects ? state : { ...state, objects };
     }
     case "show":
       if (action.shown) return withShown(state, action.channel);

@@ -14,3 +14,6 @@ export type StereoSupport = Readonly<{
   /** The fault of the text of a phone viewer's code, in words; "": none. */
   faultOfCode: (code: string) => string;
 }>;
+
+/** CSS pixels in an inch that a screen may have. */
+export const PER_INCH = [60, 240] as const;

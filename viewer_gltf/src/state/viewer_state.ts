@@ -7,6 +7,7 @@ import type { Clip } from "../math/clip";
 import type { Rgb } from "../math/color";
 import type { KeptView } from "./kept_views";
 import type { Measuring } from "./measurements";
+import type { ObjectViews } from "./objects";
 import type { ChannelSettings } from "./parameters/channel";
 import type { LightSettings } from "./parameters/light";
 import type { SliceSettings } from "./parameters/slices";
@@ -50,6 +51,8 @@ export type ViewerState = VolumeSettings &
   Readonly<{
     channels: readonly ChannelState[];
     tiles: readonly TileState[];
+    /** Of the channels that are label maps. */
+    objects: ObjectViews;
     /** The tile nearest to the specimen's centre. */
     middle: string;
     /** The tile that was chosen; null: the gaze chooses. */

@@ -59,6 +59,18 @@ export function makeSurfaceFrame(
  */
 export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean; isSolid: boolean }>;
 
+/**
+ * What some surfaces have beside all others, as text in their shaders. `place` may move `transformed` along
+ * `normal`, `end` changes `gl_Position`, `color` changes `diffuseColor`.
+ */
+export type SurfacePart = Readonly<{
+  /** Of the text: the same for the same one. */
+  key: string;
+  uniforms: Readonly<Record<string, { value: unknown }>>;
+  vertex: Readonly<{ declared: string; place: string; end: string }>;
+  fragment: Readonly<{ declared: string; color: string }>;
+}>;
+
 /** How much of a surface is left. */
 export type Share = Readonly<{
   opacity: number;
@@ -78,6 +90,12 @@ export type Share = Readonly<{
 const UNITS_APART = 32;
 /** Of depth, between a translucent surface's colour and what writes its depth before. */
 const UNITS_BEHIND = 2;
+
+const NO_PART: Pick<SurfacePart, "uniforms" | "vertex" | "fragment"> = {
+  uniforms: {},
+  vertex: { declared: "", place: "", end: "" },
+  fragment: { declared: "", color: "" },
+};
 
 const VARYINGS = "varying vec3 vRoom;\n";
 const DECLARED = includeChunks(
@@ -177,6 +195,7 @@ export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
   private readonly twins: readonly Mesh[];
+  private part: SurfacePart | null = null;
   isBlended = false;
   isPane = false;
   isSolid = false;
@@ -221,17 +240,20 @@ export class BlendedSurface {
 
   private patch(material: MeshStandardMaterial): void {
     material.onBeforeCompile = (shader) => {
-      Object.assign(shader.uniforms, this.uniforms);
-      shader.vertexShader = (VARYINGS + TO_EACH_EYE_DECLARED + shader.vertexShader).replace(
+      const { vertex, fragment, uniforms } = this.part ?? NO_PART;
+      Object.assign(shader.uniforms, this.uniforms, uniforms);
+      const declared = VARYINGS + TO_EACH_EYE_DECLARED + vertex.declared;
+      shader.vertexShader = (declared + shader.vertexShader).replace(
         "#include <project_vertex>",
-        "#include <project_vertex>\n\tvRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;" +
-          TO_EACH_EYE,
+        `${vertex.place}\n#include <project_vertex>\n\tvRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;` +
+          TO_EACH_EYE +
+          vertex.end,
       );
-      shader.fragmentShader = (DECLARED + MARCHED + shader.fragmentShader)
+      shader.fragmentShader = (DECLARED + MARCHED + fragment.declared + shader.fragmentShader)
         .replace("#include <dithering_fragment>", `${BLENDED}\n#include <dithering_fragment>`)
         .replace(
           "#include <color_fragment>",
-          `#include <color_fragment>${NOT_THE_OTHERS}\tif (isGone() || isCut(vRoom)) discard;`,
+          `#include <color_fragment>\n${fragment.color}${NOT_THE_OTHERS}\tif (isGone() || isCut(vRoom)) discard;`,
         )
         .replace(
           "#include <normal_fragment_maps>",
@@ -241,7 +263,21 @@ export class BlendedSurface {
             "\t\t\tnormal = normalize((viewMatrix * vec4(flatNormal, 0.0)).xyz);\n\t\t}\n\t}",
         );
     };
-    material.customProgramCacheKey = () => "blended";
+    material.customProgramCacheKey = () => `blended ${this.part?.key}`;
+  }
+
+  /** Have a part from now on. */
+  wear(part: SurfacePart): void {
+    this.part = part;
+    const { declared, place, end } = part.vertex;
+    const { depth } = this;
+    Object.assign(depth.uniforms, part.uniforms);
+    depth.vertexShader = (declared + depth.vertexShader)
+      .replace("vec3 transformed = position;", (found) => `${found}\n${place}`)
+      .replace(/}$/, `${end}}`);
+    for (const material of [...this.materials, depth]) material.needsUpdate = true;
+    // in the pass for the depth, too, what is gone is not there
+    for (const material of this.materials) material.allowOverride = false;
   }
 
   set({ opacity, taken, isInDisc, isCrossing, rank }: Share): void {

@@ -29,6 +29,8 @@ export class SurfaceSet {
   /** Whether the first picture is whole. */
   private hasBegun = false;
   private errorTarget_px = ERROR_TARGET_PX;
+  /** A surface has come. */
+  onSurface: (channel: string, surface: Surface) => void = () => undefined;
 
   constructor(
     private readonly bundle: Bundle,
@@ -83,6 +85,11 @@ export class SurfaceSet {
         isBlended ? [{ scene, isPane, isSolid }] : [],
       ),
     );
+  }
+
+  /** All that have come of a channel. */
+  of(channel: string): readonly Surface[] {
+    return [...(this.tilesets.get(channel)?.surfaces.values() ?? [])];
   }
 
   /** The meshes on screen, but for those that write depth alone. */
@@ -143,7 +150,10 @@ export class SurfaceSet {
       this.loader,
       this.frame,
       this.bytes,
-      (surface) => this.dress(id, surface),
+      (surface) => {
+        this.dress(id, surface);
+        this.onSurface(id, surface);
+      },
       this.onChange,
       this.onError,
     );

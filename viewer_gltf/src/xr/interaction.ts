@@ -89,7 +89,7 @@ export class Hands {
   readonly notice = new RoomNotice();
   private readonly controllers = new Controllers();
   private readonly pointer = new Pointer();
-  private readonly tiles: TileTarget;
+  readonly tiles: TileTarget;
   private readonly targets: readonly Target[];
   private readonly carry = new GazeCarry();
   private readonly presses = new Map<XRInputSource, Press>();

@@ -6,6 +6,8 @@ import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, MAPS_BUNDLE, prepareStand } from "../support/browser/stand";
 import { FIXTURE_LETTER } from "../support/fixture/letter";
 import { CESIUM, Globe, type View } from "../support/interop/globe";
+import { BEAM, CHANNEL, centerOf, labelOf, prepareObjects, rowAt } from "../support/object_bundle";
+import { hasPython } from "../support/python";
 
 const VIEWPORT = { width: 320, height: 180 };
 /** Pixels of error as Cesium counts them: the tiles' coarsest surfaces, and the finest. */
@@ -35,6 +37,40 @@ describeInChromium("CesiumJS", () => {
       for (const point of [...inside, ...outside]) {
         const { x, y } = await globe.pixelOf(point);
         expect(isBackground(picture.at(x, y)), `${point}`).toBe(outside.includes(point));
+      }
+    });
+  });
+
+  describe.skipIf(!hasPython)("with the objects of a label map", () => {
+    const stand = prepareStand({ ...options, bundle: prepareObjects() });
+
+    it("styles them by their table, and tells it of one that is picked", async () => {
+      const globe = await Globe.open(stand.viewer.page, stand.host);
+      const address = `/bundle/channels/${CHANNEL}/tileset.json`;
+      const { failed } = await globe.draw(address, viewOf(stand.manifest.specimen), FINEST);
+      expect([...failed, ...globe.errors]).toEqual([]);
+      const isRed = hasColor([1, 0, 0]);
+      const isRedAt = async (point: readonly [number, number, number]) => {
+        const { x, y } = await globe.pixelOf(point);
+        return isRed((await takePicture(stand.viewer.page)).at(x, y));
+      };
+      const ball = centerOf(rowAt(0, 3, 1, 1));
+      await globe.style("volume_um3", "> 300", "red"); // the beam has 400, a ball 268
+      expect(await isRedAt([60, -42.5, 16])).toBe(true);
+      expect(await isRedAt(ball)).toBe(false);
+      await globe.style("cell_type", "=== 'Tumour'", "red");
+      expect(await isRedAt(ball)).toBe(true);
+      expect(await isRedAt([60, -42.5, 16])).toBe(false);
+      for (const [point, row] of [
+        [ball, rowAt(0, 3, 1, 1)],
+        [centerOf(rowAt(1, 4, 0, 1)), rowAt(1, 4, 0, 1)],
+        [[57, -42.5, 16], BEAM], // an object in both tiles is the same in both
+        [[63, -42.5, 16], BEAM],
+      ] as const) {
+        const { x, y } = await globe.pixelOf(point);
+        const picked = await globe.pick(x, y);
+        expect(picked?.label).toBe(labelOf(row));
+        expect(picked?.CD8).toBeCloseTo(10 * 1.15 ** row, -1);
       }
     });
   });

@@ -18,10 +18,11 @@ const FIRST_PICTURE_BYTES = 300_000;
 const DEMO_TILES = 10;
 /**
  * Fetched where they are wanted: textures, bricks from a server, paths of light, what shades volumes, pictures
- * and videos, the split screen, the benchmark, the slices.
+ * and videos, the split screen, the benchmark, the slices, the objects of label maps, dialogs about the screen
+ * and the phone viewer.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|palettes|card_measure|qr_scanner/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {

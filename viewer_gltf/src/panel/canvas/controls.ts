@@ -16,6 +16,7 @@ import {
   text,
 } from "./draw_list";
 import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
+import { pictureBlock } from "./picture";
 import { sliderRow, windowRow } from "./sliders";
 import { histogramBlock } from "./transfer_function_2d";
 
@@ -27,7 +28,7 @@ import { histogramBlock } from "./transfer_function_2d";
 export const ELSEWHERE: ReadonlySet<string> = new Set([
   ...["stereo", "split"],
   ...["scan", "lens-code", "measure-screen"],
-  ...["own-light", "save-csv"],
+  ...["own-light", "save-csv", "save-objects"],
   "slice-pictures", // the planes in the specimen are what a headset shows
   // of the screen's camera, as files
   ...["picture-size", "save-picture", "save-video", "keep-view", "next-view", "forget-views"],
@@ -58,6 +59,8 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
       return [mapBlock(item, width)];
     case "histogram":
       return [histogramBlock(item, width)];
+    case "picture":
+      return [pictureBlock(item, width)];
     case "text":
       return item.value === "" ? [] : [textBlock(item.label, item.value, width)];
     case "search":

@@ -38,6 +38,13 @@ export type Mark =
       rect: Rect;
       histogram: Histogram;
       window: readonly [number, number];
+    }>
+  /** Another's; `version` changes with what it is. */
+  | Readonly<{
+      kind: "picture";
+      rect: Rect;
+      version: string;
+      draw: (context: CanvasRenderingContext2D, width: number, height: number) => void;
     }>;
 
 /** What the plane keeps for itself, since it shows one section at a time, and a page of it. */

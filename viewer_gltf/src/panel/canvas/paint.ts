@@ -25,6 +25,7 @@ export function paint(context: CanvasRenderingContext2D, marks: readonly Mark[])
     else if (mark.kind === "text") paintText(context, mark);
     else if (mark.kind === "outline") paintOutline(context, mark);
     else if (mark.kind === "histogram") paintHistogram(context, mark);
+    else if (mark.kind === "picture") paintPicture(context, mark);
     else paintTick(context, mark.rect, mark.tone);
   }
 }
@@ -62,6 +63,14 @@ function paintOutline(context: Context, mark: Extract<Mark, { kind: "outline" }>
   context.lineWidth = 3;
   context.strokeStyle = colorOf(mark.stroke);
   context.stroke();
+}
+
+function paintPicture(context: Context, mark: Extract<Mark, { kind: "picture" }>): void {
+  const { x, y, width, height } = mark.rect;
+  context.save();
+  context.translate(x, y);
+  mark.draw(context, width, height);
+  context.restore();
 }
 
 /** A window cuts a part out of the plane: of the values as much as of the gradients. */

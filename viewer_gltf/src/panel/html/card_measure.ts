@@ -3,13 +3,12 @@
  * as large (ISO/IEC 7810 ID-1). Its short edge fits an upright phone.
  */
 import { element } from "../../dom/element";
+import { PER_INCH } from "../../state/stereo";
 
 /** Short edge of a card, inches: 53.98 mm. */
 const CARD_IN = 53.98 / 25.4;
 /** Its long edge as a multiple. */
 const LONG = 85.6 / 53.98;
-/** CSS pixels in an inch that a screen may have. */
-export const PER_INCH = [60, 240] as const;
 
 /** CSS pixels in an inch of a screen on which a card's short edge is so wide. */
 export function perInchOf(card_px: number): number {

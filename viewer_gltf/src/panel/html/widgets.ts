@@ -6,6 +6,7 @@
 import { element, setText } from "../../dom/element";
 import type { Button, Choice, Control, Link, Search, Slider, Text, Toggle } from "../controls";
 import { makeColour } from "./colour";
+import { makePicture } from "./picture";
 import { makeWindow } from "./range";
 import { makeMap } from "./tile_map";
 import { makeHistogram } from "./transfer_function_2d";
@@ -24,6 +25,7 @@ const MAKERS: Readonly<{
   button: makeButton,
   map: makeMap,
   histogram: makeHistogram,
+  picture: makePicture,
   text: makeText,
   search: makeSearch,
   link: makeLink,

@@ -41,6 +41,7 @@ export const TOOL_KEYS: readonly Key[] = [
   key("(", "Save the measurements as CSV", ({ state }) =>
     allOf(state).length === 0 ? NOT_MEASURED : "save-csv",
   ),
+  key("Insert", "Save the objects that are selected, or that show, as CSV", "save-objects"),
   key("b", "Cut by a box: on or off", ({ state: { clip }, shown }) => ({
     type: "set-clip",
     clip: { ...clip, box: clip.box === null ? middleBox(shown) : null },

@@ -124,6 +124,40 @@ export class Globe {
     );
   }
 
+  /** Colour objects by a condition on a property, in Cesium's styling language; the rest is white. */
+  async style(property: string, condition: string, color: string): Promise<void> {
+    await this.page.evaluate(
+      async ([condition, color]) => {
+        const { Cesium, globe } = window;
+        if (globe?.tileset === undefined) throw new Error("no tileset");
+        const conditions = [
+          [condition, `color("${color}")`],
+          ["true", 'color("white")'],
+        ];
+        globe.tileset.style = new Cesium.Cesium3DTileStyle({ color: { conditions } });
+        const isDrawn = () => new Promise(requestAnimationFrame);
+        for (let frame = 0; frame < 5; frame++) await isDrawn();
+      },
+      [`\${${property}} ${condition}`, color] as const,
+    );
+  }
+
+  /** What Cesium knows of the object at a pixel, by property; null: nothing is there. */
+  pick(x: number, y: number): Promise<Readonly<Record<string, unknown>> | null> {
+    return this.page.evaluate(
+      ([x, y]) => {
+        const { Cesium, globe } = window;
+        const found: CesiumModule.Cesium3DTileFeature | undefined = globe?.widget.scene.pick(
+          new Cesium.Cartesian2(x, y),
+        );
+        if (found === undefined) return null;
+        const ids = found.getPropertyIds();
+        return Object.fromEntries(ids.map((id) => [id, found.getProperty(id)]));
+      },
+      [x, y] as const,
+    );
+  }
+
   /** Where the picture shows a point (um, world). */
   pixelOf(point: Vec3): Promise<{ x: number; y: number }> {
     return this.page.evaluate(([x, y, z]) => {

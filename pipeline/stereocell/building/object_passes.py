@@ -1,0 +1,172 @@
+"""The passes over label maps: first where the objects are, then the units that build them."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from functools import cache
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from stereocell.building.label_maps import Labels
+from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
+from stereocell.building.open_source import open_source
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
+from stereocell.building.source_tasks import box_to_json, run_on_input
+from stereocell.building.tasks import extents as extents_maker
+from stereocell.building.tasks import objects as objects_maker
+from stereocell.building.tasks.extents import ExtentsTask, extents_from_json, write_extents
+from stereocell.building.tasks.objects import ImageRef, ObjectsTask
+from stereocell.engine.run import Engine, console
+from stereocell.formats.gltf import choose_step
+from stereocell.model.counted import counted
+from stereocell.model.object_notes import ObjectNotes
+from stereocell.read.open_dataset import reader_of
+from stereocell.storage.cache_key import key_of
+from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
+
+NOTES = "units.schema.json#Notes"
+EXTENTS = "units.schema.json#Extents"
+_AGAIN = "run `stereocell units OUT` again"
+_UM = 1e6  # um a metre
+
+
+def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> Located:
+    """Return which tile builds which object of a label map; a tile that was searched stays so.
+
+    Raises SourceError where a label map can't be read.
+    """
+    boxes = tile_boxes(TileGrid.of(plan, labels))
+    files, tasks = {}, []
+    for tile, box in boxes.items():
+        depends = [labels.ref.fingerprint, labels.channel, box_to_json(box)]
+        key = key_of(depends, extents_maker, reader_of(labels.ref.source))
+        files[tile] = out_folder.tile_result("extents", tile, labels.id, key)
+        if find_sealed(files[tile], EXTENTS) is None:
+            tasks.append((f"{tile}/{labels.name}", (ExtentsTask(labels, box), files[tile])))
+    run_on_input(plan, engine, "objects", write_extents, tasks)
+    parts = {
+        tile: extents_from_json(read_sealed(file, EXTENTS, _AGAIN)) for tile, file in files.items()
+    }
+    return locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
+
+
+def save_notes(out_folder: OutFolder, labels: Labels) -> None:
+    """Keep what a label map's file says of its objects: the stage is made without that file."""
+    notes = _notes().dump_python(labels.open().notes, mode="json")
+    write_sealed(out_folder.notes_file(labels.id), {"notes": notes})
+
+
+def read_notes(out_folder: OutFolder, labels: Labels) -> ObjectNotes:
+    """Return what `save_notes` kept. Raises OutputError."""
+    file = out_folder.notes_file(labels.id)
+    return _notes().validate_python(read_sealed(file, NOTES, _AGAIN)["notes"])
+
+
+@cache
+def _notes() -> TypeAdapter[ObjectNotes]:
+    return TypeAdapter(ObjectNotes)
+
+
+def tell_objects(labels: Labels, located: Located) -> None:
+    """Say how many objects there are, which are cut, and how many are left out."""
+    told = counted(len(located.owners), "object")
+    cut = located.extents.labels[located.owners == CUT]
+    if len(cut):
+        shown = ", ".join(map(str, cut[:8].tolist())) + ", ..." * (len(cut) > 8)
+        told += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
+    if located.small:
+        told += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
+    if located.outside:
+        told += f"; {located.outside} with their centroid outside the region are left out"
+    console.print(f"units: {labels.name}: {told}", markup=False)
+
+
+def object_tasks(
+    out_folder: OutFolder, plan: Plan, located: Mapping[str, Located]
+) -> Iterator[tuple[str, ObjectsTask, str]]:
+    """Yield `<tile>/<labels>`, task and key of the unit of each tile and label map."""
+    images = _images(plan)
+    step_um = lattice_step_um(plan, located)
+    for labels in plan.labels:
+        found = located[labels.id]
+        boxes = tile_boxes(found.grid)
+        for tile in plan.tiles:
+            window = found.window(tile.id, labels)
+            numbers = found.owned(tile.id)
+            near = np.zeros(0, np.int64) if window is None else found.near(window)
+            is_cut = found.owners == CUT
+            others = np.setdiff1d(near, numbers)
+            names = found.extents.labels
+            parts = {
+                "whole": names[numbers[~is_cut[numbers]]],
+                "cut": names[numbers[is_cut[numbers]]],
+                "others": names[others],
+                "others_cut": names[others[is_cut[others]]],
+            }
+            depends = [
+                labels.ref.fingerprint,
+                labels.channel,
+                [labels.spacing_um, labels.origin_um],
+                window and box_to_json(window),
+                box_to_json(boxes[tile.id]),
+                {name: part.tolist() for name, part in parts.items()},
+                [edges.tolist() for edges in found.grid.edges] if is_cut.any() else [],
+                step_um,
+                [_image_key(image) for image in images],
+                asdict(plan.settings.objects)
+                | dict.fromkeys(("table", "table_key", "columns", "color_by")),
+            ]
+            readers = {reader_of(ref.source) for ref in (labels.ref, *(i.ref for i in images))}
+            key = key_of(depends, objects_maker, *sorted(readers))
+            directory = out_folder.unit_dir(tile.id, labels.id, key)
+            task = ObjectsTask(
+                labels,
+                window,
+                boxes[tile.id],
+                **parts,
+                edges=found.grid.edges,
+                step_um=step_um,
+                images=images,
+                options=plan.settings.objects,
+                directory=directory,
+            )
+            yield f"{tile.id}/{labels.id}", task, key
+
+
+def lattice_step_um(plan: Plan, located: Mapping[str, Located]) -> float:
+    """Return the step of the lattice that objects' vertices lie on, um.
+
+    It is the bundle's, or a multiple of it: a power of two of metres, of tiles as large as they may
+    become. So that what is checked is what is written.
+    """
+    longest = 0.0
+    for tile in plan.tiles:
+        spacing = np.asarray(plan.spacing_um)
+        low = np.array(plan.position_um(tile.box.start)) - spacing
+        high = np.array(plan.position_um(tile.box.stop)) + spacing
+        for labels in plan.labels:
+            window = located[labels.id].window(tile.id, labels)
+            if window is not None:
+                low = np.minimum(low, labels.position_um(window.start))
+                high = np.maximum(high, labels.position_um(window.stop))
+        longest = max(longest, float((high - low).max()))
+    return choose_step(longest) * _UM
+
+
+def _images(plan: Plan) -> tuple[ImageRef, ...]:
+    """Return the image's channels, as they are built."""
+    seen, found = set(), []
+    for channel in plan.channels:
+        if channel.voxels_id in seen:
+            continue
+        seen.add(channel.voxels_id)
+        ref, level = source_of(plan, channel), plan.level_of(channel)
+        shape = open_source(ref).levels[level].shape
+        found.append(ImageRef(ref, channel.index, level, shape, plan.spacing_um, plan.origin_um))
+    return tuple(found)
+
+
+def _image_key(image: ImageRef) -> list[object]:
+    return [image.ref.fingerprint, image.channel, image.level, image.spacing_um, image.origin_um]

@@ -1,0 +1,228 @@
+"""The table of a label map's objects, put together from the units, the file's notes and a table."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.building.label_maps import Labels
+from stereocell.building.located_objects import CUT, Located
+from stereocell.building.plan import Plan
+from stereocell.model.channel import Appearance
+from stereocell.model.counted import counted
+from stereocell.model.errors import UsageError
+from stereocell.model.object_notes import ObjectNotes
+from stereocell.model.object_table import Column, ObjectTable
+from stereocell.model.unit import ObjectFacts
+from stereocell.model.volume import zyx_to_xyz
+from stereocell.objects.table import (
+    Place,
+    category_column,
+    number_column,
+    own_columns,
+)
+from stereocell.read.tables import Table, read_table
+from stereocell.read.tables.table import TableColumn, listed
+from stereocell.usd.write_appearances import DEFAULT_FUNCTION
+
+NAMES = "name"  # the column of the names that a label map's own file gives
+
+
+def make_table(
+    plan: Plan,
+    labels: Labels,
+    located: Located,
+    facts: Mapping[str, ObjectFacts],
+    notes: ObjectNotes,
+    table: Table | None,
+) -> tuple[ObjectTable, list[str]]:
+    """Return the objects of a label map with all columns, and remarks on the join.
+
+    facts  by tile ID
+    notes  what the label map's own file says
+    table  the user's; None: none is given, or it belongs to another label map
+
+    Raises UsageError where a column that is asked for isn't there.
+    """
+    order = _order(located, facts)
+    known = located.extents
+    names = known.labels[order]
+    place_of = {label: row for row, label in enumerate(names.tolist())}
+    rows = {
+        tile: np.array([place_of[label] for label in one.labels.tolist()], np.int32)
+        for tile, one in facts.items()
+    }
+    half = 0.5
+    low = np.array(labels.origin_um) + (known.low[order] - half) * labels.spacing_um
+    high = np.array(labels.origin_um) + (known.high[order] - half) * labels.spacing_um
+    centre = np.array(labels.origin_um) + known.centroids[order] * labels.spacing_um
+    volume = known.voxels[order] * float(np.prod(labels.spacing_um))
+    channels = list(dict.fromkeys(channel.base or channel.name for channel in plan.channels))
+    place = Place(low, high, centre, volume.astype(np.float64))
+    columns = own_columns(place, [(rows[tile], one) for tile, one in facts.items()], channels)
+    remarks: list[str] = []
+    columns += _noted(notes, names)
+    if table is not None:
+        joined, remarks = _joined(table, names)
+        columns += joined
+    columns, renamed = _unique(columns)
+    corners = np.stack([zyx_to_xyz(low), zyx_to_xyz(high)])
+    return (
+        ObjectTable(
+            names,
+            np.hstack([corners.min(axis=0), corners.max(axis=0)]).astype(np.float32),
+            rows,
+            tuple(columns),
+            tuple(notes.names.get(label, str(label)) for label in names.tolist())
+            if notes.names
+            else (),
+            _default(columns, plan.settings.objects.color_by),
+            _walls(facts, rows, names),
+        ),
+        remarks + renamed,
+    )
+
+
+def _walls(
+    facts: Mapping[str, ObjectFacts],
+    rows: Mapping[str, NDArray[np.int32]],
+    labels: NDArray[np.uint64],
+) -> NDArray[np.int32]:
+    """Return the rows of the objects that share a wall, int32 (m, 2), each pair once."""
+    order = np.argsort(labels)
+    found = [np.zeros((0, 2), np.int64)]
+    for tile, one in facts.items():
+        at = np.searchsorted(labels[order], one.beside).clip(0, max(len(labels) - 1, 0))
+        other = order[at] if len(order) else at
+        known = labels[other] == one.beside if len(order) else np.zeros(0, bool)
+        found.append(np.stack([rows[tile][one.walls][known], other[known]], axis=1))
+    pairs = np.sort(np.concatenate(found), axis=1)
+    return np.unique(pairs, axis=0).astype(np.int32)
+
+
+def _order(located: Located, facts: Mapping[str, ObjectFacts]) -> NDArray[np.int64]:
+    """Return the numbers of all objects, those of each tile together, cut ones last."""
+    whole = [np.flatnonzero(located.owners == located.tiles.index(tile)) for tile in facts]
+    return np.concatenate([*whole, np.flatnonzero(located.owners == CUT)])
+
+
+def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
+    """Return the columns of what the label map's own file says."""
+    found = []
+    listed_labels = labels.tolist()
+    if notes.names:
+        texts = [notes.names.get(label, "") for label in listed_labels]
+        colors = {
+            name: notes.colors[label]
+            for label, name in notes.names.items()
+            if label in notes.colors
+        }
+        made = category_column(NAMES, texts, "From the label map's file", colors)
+        found += [] if made is None else [made]
+    for name, values in notes.properties.items():
+        held = [values.get(label) for label in listed_labels]
+        if any(isinstance(value, str) for value in held):
+            texts = ["" if value is None else str(value) for value in held]
+            made = category_column(name, texts, "From the label map's file")
+            found += [] if made is None else [made]
+        else:
+            numbers = np.array([np.nan if value is None else float(value) for value in held])
+            found.append(number_column(name, numbers, "From the label map's file"))
+    return found
+
+
+def _joined(table: Table, labels: NDArray[np.uint64]) -> tuple[list[Column], list[str]]:
+    """Return a table's columns in the order of the objects, and what did not fit."""
+    order = np.argsort(table.labels, kind="stable")
+    sorted_labels = table.labels[order]
+    at = np.searchsorted(sorted_labels, labels).clip(0, max(len(order) - 1, 0))
+    has_row = sorted_labels[at] == labels if len(order) else np.zeros(len(labels), bool)
+    row = order[at] if len(order) else np.zeros(len(labels), np.int64)
+    remarks = []
+    strangers = np.setdiff1d(table.labels, labels)
+    if len(strangers):
+        remarks.append(
+            f"{table.shown}: {counted(len(strangers), 'row')} without an object: {table.key} "
+            f"{listed(strangers.tolist())}"
+        )
+    if not has_row.all():
+        lacking = labels[~has_row]
+        remarks.append(
+            f"{table.shown}: {counted(len(lacking), 'object')} without a row: "
+            f"{listed(lacking.tolist())}"
+        )
+    if table.left_out:
+        remarks.append(
+            f"{table.shown}: {counted(table.left_out, 'column')} beyond the first "
+            f"{len(table.columns)} left out: name those you want by --columns"
+        )
+    found = []
+    for column in table.columns:
+        made = _column(column, row, has_row)
+        if made is None:
+            remarks.append(
+                f"{table.shown}: column {column.name!r} left out: found more than 255 different "
+                "texts, expected categories or numbers"
+            )
+        else:
+            found.append(made)
+    return found, remarks
+
+
+def _column(
+    column: TableColumn, row: NDArray[np.int64], has_row: NDArray[np.bool_]
+) -> Column | None:
+    if column.numbers is not None:
+        padded = np.append(column.numbers, np.nan)
+        return number_column(column.name, padded[np.where(has_row, row, -1)], "From the table")
+    assert column.texts is not None
+    texts = [column.texts[r] if has else "" for r, has in zip(row.tolist(), has_row, strict=True)]
+    return category_column(column.name, texts, "From the table")
+
+
+def _unique(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
+    """Return the columns under IDs of their own: the table's names win over a file's notes."""
+    found: dict[str, Column] = {}
+    remarks = []
+    for column in columns:
+        name, number = column.id, 2
+        while name in found:
+            name, number = f"{column.id}_{number}", number + 1
+        if name != column.id:
+            remarks.append(f"column {column.name!r} is there already: the second one is {name}")
+        found[name] = replace(column, id=name)
+    return list(found.values()), remarks
+
+
+def _default(columns: Sequence[Column], wanted: str) -> str:
+    """Return the ID of the column that colours first: the one asked for, or of categories."""
+    if wanted:
+        for column in columns:
+            if wanted in (column.name, column.id):
+                return column.id
+        raise UsageError(
+            f"--color-by is {wanted!r}, expected one of "
+            f"{', '.join(column.name for column in columns)}"
+        )
+    categories = [column.id for column in columns if column.categories]
+    return categories[0] if categories else ""
+
+
+def table_of(plan: Plan, labels: Labels) -> Table | None:
+    """Return the user's table of a label map: of several maps, the first one's.
+
+    Raises SourceError where it can't be read.
+    """
+    options = plan.settings.objects
+    if not options.table or labels.id != plan.labels[0].id:
+        return None
+    return read_table(options.table, options.table_key, options.columns, labels.name)
+
+
+def appearance_of_labels(labels: Labels) -> Appearance:
+    """Return how the objects of a label map are drawn: by their table, and without a volume."""
+    window, points = (0.0, 1.0), ((0.0, 0.0), (1.0, 1.0))
+    return Appearance(
+        labels.name, labels.color, window, None, 1.0, "clear", {DEFAULT_FUNCTION: points}
+    )

@@ -1,0 +1,221 @@
+"""Build the objects of one tile of a label map, on a worker. Picklable."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.building.label_maps import Labels
+from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.unit_files import save_unit
+from stereocell.model.tiling import Box
+from stereocell.model.timing import Clock
+from stereocell.model.unit import ObjectFacts, Unit
+from stereocell.objects.build_objects import BuiltObjects, build_objects
+from stereocell.objects.extents import Runs
+from stereocell.objects.intensities import Measured, measure_intensities
+from stereocell.objects.options import ObjectOptions
+
+
+@dataclass(frozen=True, slots=True)
+class ImageRef:
+    """An image channel that is measured over objects; `place`: its voxel (0, 0, 0) and spacing."""
+
+    ref: SourceRef
+    channel: int
+    level: int
+    shape: tuple[int, int, int]
+    spacing_um: tuple[float, float, float]
+    origin_um: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectsTask:
+    """One tile of a label map.
+
+    window   voxels of the label map
+    tile     those of the tile itself
+    whole    uint64 (n,), ascending: labels that are built as a whole
+    cut      the same, of those cut at the tiles' planes: their part inside the tile is built
+    others   the same, of further labels in the window that are built by other tiles; all else is
+             left out. Those of them that are cut are among `others_cut`
+    edges    by axis (z, y, x): indices of voxels where tiles begin
+    step_um  of the lattice
+    """
+
+    labels: Labels
+    window: Box | None
+    tile: Box
+    whole: NDArray[np.uint64]
+    cut: NDArray[np.uint64]
+    others: NDArray[np.uint64]
+    others_cut: NDArray[np.uint64]
+    edges: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
+    step_um: float
+    images: tuple[ImageRef, ...]
+    options: ObjectOptions
+    directory: Path
+
+
+def run_objects(task: ObjectsTask) -> None:
+    """Build the objects of a tile and write their folder. Raises SourceError, OutputError."""
+    clock = Clock()
+    if task.window is None:
+        save_unit(task.directory, Unit((), None, None, "no object", 0, 0, {}, objects=_none(task)))
+        return
+    start = time.perf_counter()
+    voxels = task.labels.open().read(task.window)
+    compact, names = _numbered(task, voxels)
+    del voxels
+    clock.seconds["read"] = time.perf_counter() - start
+    is_whole = np.isin(names.labels, task.whole)
+    is_piece = np.isin(names.labels, task.cut) & (names.tiles == names.own_tile)
+    owned = np.flatnonzero(is_whole | is_piece).astype(np.int32)
+    built = build_objects(
+        compact,
+        owned,
+        spacing_um=task.labels.spacing_um,
+        origin_um=task.labels.position_um(task.window.start),
+        step_um=task.step_um,
+        options=task.options,
+        clock=clock,
+        name_of=lambda number: str(names.labels[number]),
+    )
+    with clock("intensities"):
+        measured = [_measure(task, image, compact, owned) for image in task.images]
+    facts = _facts(built, owned, names, measured, compact, task)
+    reason = "" if built.lods else "no object"
+    unit = Unit(built.lods, None, None, reason, 0, 0, clock.seconds, objects=facts)
+    save_unit(task.directory, unit)
+
+
+@dataclass(frozen=True, slots=True)
+class _Names:
+    """What the compact numbers of a window stand for; entry 0 is nothing.
+
+    labels    uint64 (n + 1,)
+    tiles     int64 (n + 1,): of a piece, the tile that it lies in, in C order of places; else -1
+    own_tile  the tile that is built
+    """
+
+    labels: NDArray[np.uint64]
+    tiles: NDArray[np.int64]
+    own_tile: int
+
+
+def _numbered(
+    task: ObjectsTask, voxels: NDArray[np.unsignedinteger]
+) -> tuple[NDArray[np.int32], _Names]:
+    """Return the window with numbers from 1 in place of labels, pieces each their own."""
+    assert task.window is not None
+    kept = np.sort(np.concatenate([task.whole, task.cut, task.others]))
+    runs = Runs.of(voxels)
+    values = runs.values.astype(np.uint64)
+    place = np.searchsorted(kept, values).clip(0, max(len(kept) - 1, 0))
+    known = (kept[place] == values) & (values > 0) if len(kept) else np.zeros(len(values), bool)
+    of_run = np.where(known, place + 1, 0).astype(np.int32)
+    compact = runs.spread(of_run).reshape(voxels.shape)
+    labels = np.concatenate([np.zeros(1, np.uint64), kept])
+    tiles = np.full(len(labels), -1, np.int64)
+    counts = [len(edges) + 1 for edges in task.edges]
+    own = [
+        int(np.searchsorted(edges, start, side="right"))
+        for edges, start in zip(task.edges, task.tile.start, strict=True)
+    ]
+    own_tile = (own[0] * counts[1] + own[1]) * counts[2] + own[2]
+    cut = np.concatenate([task.cut, task.others_cut])
+    is_cut = np.isin(labels, cut)
+    if not is_cut.any():
+        return compact, _Names(labels, tiles, own_tile)
+    which = is_cut[compact]
+    planes = [
+        np.searchsorted(edges, np.arange(a, b), side="right")
+        for edges, a, b in zip(task.edges, task.window.start, task.window.stop, strict=True)
+    ]
+    z, y, x = np.nonzero(which)
+    at = (planes[0][z] * counts[1] + planes[1][y]) * counts[2] + planes[2][x]
+    pairs = compact[which].astype(np.int64) * int(np.prod(counts)) + at
+    pieces, number = np.unique(pairs, return_inverse=True)
+    compact[which] = len(labels) + number.ravel().astype(np.int32)
+    of_piece, tile_of_piece = np.divmod(pieces, int(np.prod(counts)))
+    return compact, _Names(
+        np.concatenate([labels, labels[of_piece]]),
+        np.concatenate([tiles, tile_of_piece]),
+        own_tile,
+    )
+
+
+def _measure(
+    task: ObjectsTask, image: ImageRef, compact: NDArray[np.int32], owned: NDArray[np.int32]
+) -> Measured:
+    """Return a channel's mean and percentile over objects, by the image's nearest voxels."""
+    assert task.window is not None
+    indices = []
+    for axis in range(3):
+        first = task.labels.origin_um[axis] - image.origin_um[axis]
+        at = np.arange(task.window.start[axis], task.window.stop[axis])
+        nearest = np.rint((first + at * task.labels.spacing_um[axis]) / image.spacing_um[axis])
+        indices.append(nearest.astype(np.int64).clip(0, image.shape[axis] - 1))
+    z0, y0, x0 = (int(part.min()) for part in indices)
+    z1, y1, x1 = (int(part.max()) + 1 for part in indices)
+    read = open_source(image.ref).read(image.channel, Box((z0, y0, x0), (z1, y1, x1)), image.level)
+    voxels = read.voxels
+    for axis, (part, start) in enumerate(zip(indices, (z0, y0, x0), strict=True)):
+        if len(part) != voxels.shape[axis] or (np.diff(part) != 1).any():
+            voxels = np.take(voxels, part - start, axis)
+    return measure_intensities(compact, voxels, owned)
+
+
+def _facts(
+    built: BuiltObjects,
+    owned: NDArray[np.int32],
+    names: _Names,
+    measured: Sequence[Measured],
+    compact: NDArray[np.int32],
+    task: ObjectsTask,
+) -> ObjectFacts:
+    labels = names.labels[owned]
+    beside = names.labels[built.walls[:, 1]]
+    own = labels[built.walls[:, 0]] == beside  # planes that cut an object into pieces
+    cut_um2 = np.bincount(built.walls[own, 0], built.wall_um2[own], len(owned))
+    pairs = np.stack([built.walls[:, 0].astype(np.uint64), beside], axis=1)[~own]
+    found, which = np.unique(pairs, axis=0, return_inverse=True)
+    voxels = np.bincount(compact.ravel(), minlength=len(names.labels))[owned]
+    is_piece = names.tiles[owned] >= 0
+    means = (
+        np.stack([one.mean for one in measured], axis=1) if measured else np.zeros((len(owned), 0))
+    )
+    p95s = np.stack([one.p95 for one in measured], axis=1) if measured else means.copy()
+    p95s[is_piece] = np.nan
+    return ObjectFacts(
+        labels,
+        voxels.astype(np.int64),
+        built.areas_um2 - cut_um2,
+        found[:, 0].astype(np.int32),
+        found[:, 1],
+        np.bincount(which.ravel(), built.wall_um2[~own], len(found)).astype(np.float64),
+        means,
+        p95s,
+        built.changed,
+        built.largest_bias,
+    )
+
+
+def _none(task: ObjectsTask) -> ObjectFacts:
+    nothing = np.zeros(0)
+    by_channel = np.zeros((0, len(task.images)))
+    return ObjectFacts(
+        np.zeros(0, np.uint64),
+        np.zeros(0, np.int64),
+        nothing,
+        np.zeros(0, np.int32),
+        np.zeros(0, np.uint64),
+        nothing,
+        by_channel,
+        by_channel,
+        0,
+        (),
+    )

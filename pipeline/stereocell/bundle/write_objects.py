@@ -1,0 +1,131 @@
+"""Write the table of a label map's objects, as schemas/objects.schema.json describes it.
+
+    objects.json        the columns, and which rows are in which tile
+    objects/            raw arrays: labels, boxes, and two files a column
+
+The viewer colours by one column at a time, so each is a file, of a byte an object: 20 000 objects
+are recoloured by 20 kB. The exact values lie beside it, for when they are read out.
+
+A byte's scale. 1 to 255 span the 0.1th to the 99.9th percentile, so that one wild value doesn't
+make all others equal. They lie evenly, or evenly in the logarithm where that shows more: all values
+are positive, their span is tenfold or more, and the median lies nearer to its middle in the
+logarithm. Means of markers are such columns, shapes and places are not.
+"""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.bundle.write_tile import FileRef, write_file
+from stereocell.model.object_table import MISSING, Column, ObjectTable
+from stereocell.storage.json_files import compact_json
+
+OBJECTS = "objects.json"
+_SPAN = (0.1, 99.9)  # percentiles that bytes 1 and 255 stand for
+_LOG_FROM = 10.0  # least ratio of the span's ends for a logarithmic scale
+
+
+def write_objects(root: Path, folder: str, table: ObjectTable) -> tuple[FileRef, list[FileRef]]:
+    """Write a channel's table below `folder` of a bundle; return objects.json, and all files.
+
+    Raises OutputError.
+    """
+    files: list[FileRef] = []
+
+    def write(name: str, values: NDArray[Any]) -> dict[str, Any]:
+        files.append(write_file(root, f"{folder}/objects/{name}", values.tobytes()))
+        return asdict(files[-1])
+
+    count = len(table.labels)
+    is_wide = count > 0 and int(table.labels.max()) > np.iinfo(np.uint32).max
+    content: dict[str, Any] = {
+        "count": count,
+        "labels": write("labels.bin", table.labels.astype("<u8" if is_wide else "<u4")),
+        "label_bytes": 8 if is_wide else 4,
+        "names": list(table.names),
+        "boxes": write("boxes.bin", table.boxes.astype("<f4")),
+        "default": table.default,
+        "tiles": {tile: _compact(rows) for tile, rows in table.rows.items()},
+        "columns": [],
+    }
+    for i, column in enumerate(table.columns):
+        data, entry = _describe(column)
+        # two IDs may differ by their case alone, and some disks don't tell such names apart
+        entry["bytes"] = write(f"{i}_{column.id}.u8", data)
+        entry["exact"] = write(f"{i}_{column.id}.f32", column.values.astype("<f4"))
+        content["columns"].append(entry)
+    if table.walls is not None:
+        first, rows = _neighbours(table.walls, count)
+        content["neighbours"] = {
+            "first": write("neighbours_first.bin", first),
+            "rows": write("neighbours.bin", rows),
+        }
+    index = write_file(root, f"{folder}/{OBJECTS}", compact_json(content))
+    return index, [index, *files]
+
+
+def _compact(rows: NDArray[np.int32]) -> dict[str, Any]:
+    """Return the longest run of rows from the first on, and the rows behind it."""
+    if len(rows) == 0:
+        return {"first": 0, "count": 0}
+    is_next = rows == rows[0] + np.arange(len(rows))
+    count = len(rows) if is_next.all() else int(np.argmin(is_next))
+    more = rows[count:].tolist()
+    return {"first": int(rows[0]), "count": count, **({"more": more} if more else {})}
+
+
+def _describe(column: Column) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+    """Return a column's bytes and its entry but for the files."""
+    entry: dict[str, Any] = {
+        "id": column.id,
+        "name": column.name,
+        "about": column.about,
+        "unit": column.unit,
+        "kind": "category" if column.categories else "number",
+    }
+    if column.categories:
+        codes = np.nan_to_num(column.values, nan=MISSING).astype(np.int64)
+        entry["categories"] = list(column.categories)
+        entry["colors"] = [list(color) for color in column.colors]
+        data = (np.clip(codes, MISSING, 254) + 1).astype(np.uint8)
+    else:
+        data, span = _quantize(column.values)
+        if span is not None:
+            entry["range"] = span
+    return data, {**entry, "known": int(np.count_nonzero(data))}
+
+
+def _quantize(values: NDArray[np.float32]) -> tuple[NDArray[np.uint8], dict[str, Any] | None]:
+    """Return numbers as bytes, 0: missing, and the range that they span; None: all are missing."""
+    data = np.zeros(len(values), dtype=np.uint8)
+    is_known = np.isfinite(values)
+    known = values[is_known].astype(np.float64)
+    if len(known) == 0:
+        return data, None
+    low, middle, high = (float(v) for v in np.percentile(known, [_SPAN[0], 50, _SPAN[1]]))
+    is_log = bool(
+        known.min() > 0
+        and high >= _LOG_FROM * low
+        and abs(np.log(middle / low) / np.log(high / low) - 0.5)
+        < abs((middle - low) / (high - low) - 0.5)
+    )
+    at, start, end = (np.log(known), np.log(low), np.log(high)) if is_log else (known, low, high)
+    share = np.clip((at - start) / (end - start), 0, 1) if end > start else np.zeros_like(at)
+    data[is_known] = np.rint(1 + 254 * share).astype(np.uint8)
+    scale = "log" if is_log else "linear"
+    span = {"min": float(known.min()), "max": float(known.max()), "low": low, "high": high}
+    return data, {**span, "scale": scale}
+
+
+def _neighbours(
+    walls: NDArray[np.int32], count: int
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Return where each row's neighbours begin (count + 1,), and all neighbours, ascending."""
+    both = np.concatenate([walls, walls[:, ::-1]])
+    both = both[np.lexsort((both[:, 1], both[:, 0]))]
+    first = np.zeros(count + 1, dtype="<u4")
+    first[1:] = np.cumsum(np.bincount(both[:, 0], minlength=count))
+    return first, both[:, 1].astype("<u4")

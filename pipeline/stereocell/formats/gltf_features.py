@@ -1,0 +1,147 @@
+"""Name the objects in a .glb: EXT_mesh_features, and a table by EXT_structural_metadata.
+
+A vertex has the number of its object in the tile, `_FEATURE_ID_0`. glTF has no 32-bit vertex
+attributes, so a file names at most 65 536 objects. The table says the object's label and what else
+other clients style and pick by (CesiumJS: `${volume_um3} > 500`); every level of detail repeats
+it, so it is small.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.formats.meshopt import CompressedBuffers
+from stereocell.model.object_table import MISSING, Column, ObjectTable
+
+MOST_OBJECTS = 1 << 16  # in a file: 16 bits name them
+MOST_COLUMNS = 8  # in a file, besides the label
+_LABEL = "label"
+_UNSIGNED_SHORT = 5123
+_NO_NUMBER = float(np.finfo(np.float32).min)  # stands for NaN, which JSON has not
+_NO_CATEGORY = 0xFFFF
+_ALIGNMENT = 8  # bytes, of property tables
+
+
+@dataclass(frozen=True, slots=True)
+class Features:
+    """A tile's objects in the order in which its meshes number them: labels and some columns."""
+
+    labels: NDArray[np.uint64]
+    columns: tuple[Column, ...]
+
+
+def tile_features(table: ObjectTable, tile: str, wanted: tuple[str, ...] = ()) -> Features:
+    """Return a tile's objects, with `volume_um3` and the wanted columns, MOST_COLUMNS at most."""
+    rows = table.rows[tile]
+    first = table.columns[0].id if table.columns else _LABEL
+    names = [name for name in dict.fromkeys((first, *wanted)) if name != _LABEL]
+    found = [column for name in names if (column := table.column(name)) is not None]
+    columns = tuple(
+        Column(c.id, c.name, c.values[rows], c.about, c.unit, c.categories, c.colors)
+        for c in found[:MOST_COLUMNS]
+    )
+    return Features(table.labels[rows], columns)
+
+
+def require_whole(
+    objects: NDArray[np.int32],
+    triangles: NDArray[np.uint32],
+    name: str,
+    features: Features | None,
+) -> None:
+    """Raise ValueError where an object can't be named or isn't known, or a triangle is of two."""
+    if len(objects) and (objects.min() < 0 or objects.max() >= MOST_OBJECTS):
+        raise ValueError(
+            f"{name} has objects {objects.min()} to {objects.max()}, and a file names "
+            f"{MOST_OBJECTS} at most: split the tile"
+        )
+    if features is not None and len(objects) and objects.max() >= len(features.labels):
+        raise ValueError(
+            f"{name} has objects up to {objects.max()}, and {len(features.labels)} are known: "
+            "expected one row for each"
+        )
+    owners = objects[triangles]
+    if (owners != owners[:, :1]).any():
+        raise ValueError(f"{name} has a triangle between two objects: each has its own vertices")
+
+
+def add_feature_ids(buffers: CompressedBuffers, objects: NDArray[np.int32]) -> int:
+    """Store each vertex's object; return the accessor's index."""
+    rows = np.zeros((len(objects), 2), dtype=np.uint16)  # vertex strides are multiples of 4 bytes
+    rows[:, 0] = objects
+    return buffers.add_attribute(rows, {"componentType": _UNSIGNED_SHORT, "type": "SCALAR"})
+
+
+def describe_features(
+    buffers: CompressedBuffers, features: Features, channel: str
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Store the table; return the primitive's EXT_mesh_features, and EXT_structural_metadata.
+
+    Raises ValueError for more than MOST_COLUMNS columns.
+    """
+    if len(features.columns) > MOST_COLUMNS:
+        raise ValueError(f"{len(features.columns)} columns in a file, {MOST_COLUMNS} at most")
+    count = len(features.labels)
+    is_wide = count > 0 and int(features.labels.max()) > np.iinfo(np.uint32).max
+    labels = features.labels.astype("<u8" if is_wide else "<u4")
+    properties = {_LABEL: {"type": "SCALAR", "componentType": "UINT64" if is_wide else "UINT32"}}
+    values = {_LABEL: labels.tobytes()}
+    enums: dict[str, Any] = {}
+    for column in features.columns:
+        if column.categories:
+            enums[column.id], values[column.id] = _enum(column)
+            properties[column.id] = {"type": "ENUM", "enumType": column.id}
+            properties[column.id] |= {"noData": enums[column.id]["values"][-1]["name"]}
+        else:
+            properties[column.id] = _number(column)
+            known = np.where(np.isfinite(column.values), column.values, _NO_NUMBER)
+            values[column.id] = known.astype("<f4").tobytes()
+    table = {
+        name: {"values": buffers.add(data, alignment=_ALIGNMENT)} for name, data in values.items()
+    }
+    schema: dict[str, Any] = {"id": f"objects_of_{channel}", "classes": {}}
+    schema["classes"]["object"] = {"properties": properties}
+    if enums:
+        schema["enums"] = enums
+    ids = {"featureCount": count, "attribute": 0, "propertyTable": 0}
+    return (
+        {"featureIds": [ids]},
+        {
+            "schema": schema,
+            "propertyTables": [{"class": "object", "count": count, "properties": table}],
+        },
+    )
+
+
+def _number(column: Column) -> dict[str, Any]:
+    entry = {"name": column.name, "type": "SCALAR", "componentType": "FLOAT32"}
+    if column.about:
+        entry["description"] = column.about
+    return {**entry, "noData": _NO_NUMBER}
+
+
+def _enum(column: Column) -> tuple[dict[str, Any], bytes]:
+    """Return the glTF enum of a column of categories, the last for objects without, and values."""
+    missing = "none"
+    while missing in column.categories:
+        missing += "_"
+    names = [*_distinct(column.categories), missing]
+    codes = [*range(len(column.categories)), _NO_CATEGORY]
+    listed = [{"name": name, "value": code} for name, code in zip(names, codes, strict=True)]
+    known = np.where(column.values == MISSING, _NO_CATEGORY, np.nan_to_num(column.values))
+    return (
+        {"name": column.name, "valueType": "UINT16", "values": listed},
+        known.astype("<u2").tobytes(),
+    )
+
+
+def _distinct(names: tuple[str, ...]) -> list[str]:
+    """Return names of which each is another, as an enum needs them."""
+    found: dict[str, None] = {}
+    for name in names:
+        while name in found:
+            name += "_"
+        found[name] = None
+    return list(found)

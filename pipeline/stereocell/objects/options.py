@@ -1,0 +1,55 @@
+"""Settings of objects."""
+
+from dataclasses import dataclass
+
+from stereocell.model.errors import UsageError
+from stereocell.model.settings import Flag, setting
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectOptions:
+    """How the objects of label maps are built, and which table is joined to them.
+
+    Raises UsageError unless the errors are positive and rise, and numbers are at least 1.
+    """
+
+    errors: tuple[float, ...] = setting(
+        (0.15, 0.6, 1.2, 4.0),
+        "aim of simplifying to lod0, lod1, ..., in finest spacings; at small objects less",
+    )
+    samples: int = setting(1000, "points of a tile at which distances are measured, each way")
+    smallest_voxels: int = setting(27, "objects of fewer voxels are left out, and counted")
+    table: str = setting(
+        "",
+        "a table with a row an object: CSV, TSV, or a table of SpatialData",
+        Flag("--table", "a table with a row an object, joined by --table-key: CSV, TSV", "FILE"),
+    )
+    table_key: str = setting(
+        "",
+        "the table's column of the objects' numbers; empty: CellID, label, Label, cell_id, ...",
+        Flag(
+            "--table-key",
+            "the table's column of the objects' numbers (default: CellID, label, cell_id, "
+            "instance_id, object_id, whichever is there)",
+            "COLUMN",
+        ),
+    )
+    columns: tuple[str, ...] = setting(
+        (),
+        "columns of the table that are taken; empty: all, up to 128",
+        Flag("--columns", "columns of the table that are taken, as CD8,cell_type", "A,B,..."),
+    )
+    color_by: str = setting(
+        "",
+        "the column that colours objects first; empty: the first of categories",
+        Flag("--color-by", "the column that colours objects first", "COLUMN"),
+    )
+
+    def __post_init__(self) -> None:
+        if not self.errors or list(self.errors) != sorted(self.errors) or self.errors[0] <= 0:
+            raise UsageError(
+                f"objects.errors is {list(self.errors)}, expected rising positive numbers"
+            )
+        for name in ("samples", "smallest_voxels"):
+            if getattr(self, name) < 1:
+                raise UsageError(f"objects.{name} is {getattr(self, name)}, expected 1 or more")

@@ -1,0 +1,31 @@
+"""Tables with a row an object: CSV, TSV, and AnnData's tables in Zarr, as SpatialData has them."""
+
+from stereocell.model.errors import SourceError
+from stereocell.read.tables.anndata_zarr import read_anndata
+from stereocell.read.tables.delimited import read_delimited
+from stereocell.read.tables.table import KEYS, Table, TableColumn
+from stereocell.storage.location import Location
+
+__all__ = ["KEYS", "Table", "TableColumn", "read_table"]
+
+
+def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Table:
+    """Return a table: its key and its columns, in the file's order.
+
+    place   a file, or a Zarr group of a table
+    key     the column of the objects' numbers; empty: the first of KEYS that is there
+    wanted  names of columns; empty: all but the key
+    labels  the name of the label map, of a table that belongs to several
+
+    Raises SourceError where the table can't be read or lacks a column.
+    """
+    location = Location.of(place)
+    name = location.parts[-1].lower() if location.parts else ""
+    if name.endswith((".csv", ".tsv", ".txt")):
+        return read_delimited(location, key, wanted)
+    if any(part.endswith(".zarr") for part in location.parts):
+        return read_anndata(location, key, wanted, labels)
+    raise SourceError(
+        f"{location.shown}: unknown kind of table, expected .csv, .tsv, or a table in a .zarr "
+        "(convert .h5ad and .parquet: `adata.write_zarr(...)`, `frame.to_csv(...)`)"
+    )

@@ -1,0 +1,78 @@
+"""Tables of text: CSV and TSV. The csv module reads them."""
+
+import csv
+import io
+import os
+from collections.abc import Iterator
+
+from stereocell.model.errors import SourceError
+from stereocell.read.tables.table import (
+    Table,
+    as_column,
+    choose_columns,
+    choose_key,
+    clean,
+    keys_of,
+    shown,
+)
+from stereocell.storage.location import Location
+
+_MOST_BYTES = 4 << 30  # of a table
+_MOST_NAMES = 100_000  # columns of a header
+_LONGEST = 1 << 17  # characters of a cell: the csv module's own limit
+
+
+def read_delimited(location: Location, key: str, wanted: tuple[str, ...]) -> Table:
+    """Return a table of text. Raises SourceError."""
+    where = location.shown
+    try:
+        size = os.path.getsize(location.source)
+        if size > _MOST_BYTES:
+            raise SourceError(f"{where}: found {size} bytes, expected at most {_MOST_BYTES}")
+        with open(location.source, encoding="utf-8-sig", newline="") as text:
+            return _read(text, where, key, wanted)
+    except UnicodeDecodeError as error:
+        raise SourceError(
+            f"{where}: found bytes that are no text ({error.reason}), expected UTF-8"
+        ) from None
+    except csv.Error as error:
+        raise SourceError(
+            f"{where}: {error}, expected rows of cells of at most {_LONGEST} characters"
+        ) from None
+    except (OSError, EOFError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SourceError(f"{where}: can't be read ({reason}), expected a table") from None
+
+
+def _read(text: io.TextIOWrapper, where: str, key: str, wanted: tuple[str, ...]) -> Table:
+    first = text.readline(1 << 24)
+    if not first.strip():
+        raise SourceError(f"{where}: found no header, expected names of columns in the first line")
+    mark = max("\t,;", key=first.count)
+    names = [clean(name) for name in next(csv.reader([first], delimiter=mark))]
+    if len(names) > _MOST_NAMES:
+        raise SourceError(f"{where}: found {len(names)} columns, expected at most {_MOST_NAMES}")
+    twice = sorted({name for name in names if names.count(name) > 1}) if len(names) < 1000 else []
+    if twice:
+        raise SourceError(f"{where}: found columns twice ({shown(twice)}), expected each name once")
+    chosen_key = choose_key(where, names, key)
+    taken, left_out = choose_columns(where, names, chosen_key, wanted)
+    places = [names.index(name) for name in (chosen_key, *taken)]
+    cells: list[list[str]] = [[] for _ in places]
+    for row in _rows(text, mark, where, len(names)):
+        for held, place in zip(cells, places, strict=True):
+            held.append(row[place])
+    labels = keys_of(where, chosen_key, cells[0])
+    columns = tuple(as_column(name, texts) for name, texts in zip(taken, cells[1:], strict=True))
+    return Table(where, chosen_key, labels, columns, left_out)
+
+
+def _rows(text: io.TextIOWrapper, mark: str, where: str, width: int) -> Iterator[list[str]]:
+    for number, row in enumerate(csv.reader(text, delimiter=mark), start=2):
+        if not row:
+            continue
+        if len(row) != width:
+            raise SourceError(
+                f"{where}: line {number}: found {len(row)} cells, expected {width} as the header"
+            )
+        yield row

@@ -1,0 +1,139 @@
+"""A table as it was read: texts and numbers by row."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+
+# Columns of objects' numbers, as MCMICRO, scikit-image, Cellpose, Xenium, SpatialData call them
+KEYS = ("CellID", "label", "cell_id", "instance_id", "object_id", "ObjectNumber", "id")
+MOST_COLUMNS = 128  # that are taken without being named
+_SHOWN = 8  # names that a message lists
+
+
+@dataclass(frozen=True, slots=True)
+class TableColumn:
+    """One column. Exactly one of the two has a value a row.
+
+    numbers  float64 (n,), NaN: missing
+    texts    empty: missing
+    """
+
+    name: str
+    numbers: NDArray[np.float64] | None
+    texts: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """`shown`: the file, for messages. `labels`: uint64 (n,), each once. `left_out`: columns."""
+
+    shown: str
+    key: str
+    labels: NDArray[np.uint64]
+    columns: tuple[TableColumn, ...]
+    left_out: int = 0
+
+
+def choose_key(where: str, names: Sequence[str], key: str) -> str:
+    """Return the name of the key's column. Raises SourceError."""
+    if key:
+        if key not in names:
+            raise SourceError(f"{where}: no column {key!r:.60}, expected one of {shown(names)}")
+        return key
+    lower = {name.lower(): name for name in reversed(names)}
+    for one in KEYS:
+        if one.lower() in lower:
+            return lower[one.lower()]
+    raise SourceError(
+        f"{where}: no column of the objects' numbers: found {shown(names)}; expected "
+        f"{', '.join(KEYS)}, or --table-key COLUMN"
+    )
+
+
+def choose_columns(
+    where: str, names: Sequence[str], key: str, wanted: Sequence[str]
+) -> tuple[list[str], int]:
+    """Return the names of the columns to take, and how many are left out. Raises SourceError."""
+    for name in wanted:
+        if name not in names:
+            raise SourceError(f"{where}: no column {name!r:.60}, expected one of {shown(names)}")
+    if wanted:
+        return list(wanted), 0
+    others = [name for name in names if name != key]
+    return others[:MOST_COLUMNS], max(0, len(others) - MOST_COLUMNS)
+
+
+def keys_of(
+    where: str, key: str, values: NDArray[np.float64] | Sequence[str]
+) -> NDArray[np.uint64]:
+    """Return the objects' numbers of all rows. Raises SourceError for a fraction, or one twice."""
+    found: list[int] = []
+    for row, value in enumerate(values):
+        try:
+            number = int(value) if isinstance(value, str) else _whole(float(value))
+        except (ValueError, OverflowError):
+            try:
+                number = _whole(float(value))
+            except (ValueError, OverflowError):
+                number = -1
+        if not 0 < number < 1 << 64:
+            raise SourceError(
+                f"{where}: {key}, row {row + 1}: found {value!s:.40}, expected a number of an "
+                "object: a whole number above 0"
+            )
+        found.append(number)
+    labels = np.array(found, np.uint64)
+    unique, counts = np.unique(labels, return_counts=True)
+    if (counts > 1).any():
+        twice = unique[counts > 1].tolist()
+        raise SourceError(
+            f"{where}: {key}: found {listed(twice)} more than once ({len(twice)} in all), expected "
+            "each object in one row"
+        )
+    return labels
+
+
+def as_column(name: str, texts: Sequence[str]) -> TableColumn:
+    """Return a column of texts, as numbers where all that are there are numbers."""
+    numbers = np.full(len(texts), np.nan)
+    for row, text in enumerate(texts):
+        if text.strip().lower() in _MISSING:
+            continue
+        try:
+            numbers[row] = float(text)
+        except ValueError:
+            return TableColumn(
+                name,
+                None,
+                tuple(one if one.strip().lower() not in _MISSING else "" for one in texts),
+            )
+    return TableColumn(name, numbers, None)
+
+
+def listed(values: Sequence[object]) -> str:
+    """Return the first few of a list, and that there are more."""
+    return ", ".join(map(str, values[:5])) + ", ..." * (len(values) > 5)
+
+
+def shown(names: Sequence[str]) -> str:
+    """Return the first names of a list, as a message may show them."""
+    cut = [f"{clean(name):.40}" for name in names[:_SHOWN]]
+    return ", ".join(cut) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
+
+
+def clean(name: str) -> str:
+    """Return a name as it may be shown: no control characters, one space for several."""
+    return " ".join("".join(c if c.isprintable() else " " for c in name).split())
+
+
+def _whole(value: float) -> int:
+    if value != value // 1:
+        raise ValueError
+    return int(value)
+
+
+_MISSING = ("", "na", "nan", "n/a", "null", "none", "<na>")

@@ -1,0 +1,223 @@
+"""A synthetic tissue of touching cells: an image of markers, a label map, and a table of the cells.
+
+A cell is what lies nearest to its centre, within a ball round it; centres are spread and then moved
+to the middle of what is nearest to them (Lloyd). Types lie in patches, as tissues have them. A dye
+of nuclei fills an ellipsoid in each cell; each marker fills a cell by its type's level, brighter at
+the membrane. The table has each cell's type and the level of each marker as the image was drawn
+with: the truth, without blur and noise.
+"""
+
+import csv
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+from zarr.codecs import ZstdCodec
+from zarr.storage import LocalStore
+
+from stereocell.model.errors import UsageError
+from stereocell.storage.atomic_write import replacing_folder, write_bytes
+
+SUFFIX = ".ome.zarr"
+SHAPE = (44, 176, 264)  # voxels (z, y, x)
+SPACING_UM = (1.0, 0.5, 0.5)  # (z, y, x)
+CELLS = 300
+RADIUS_UM = 7.5  # of the ball that a cell stays in
+LABELS = "cells"
+TYPES = ("tumour", "T cell", "B cell", "macrophage")
+_SHARES = (0.45, 0.25, 0.18, 0.12)  # of the cells, by type
+NUCLEI = "DNA"
+# levels of the markers by type, in the order of TYPES; 1 is a channel's full brightness
+MARKERS = {
+    "panCK": (1.0, 0.05, 0.05, 0.1),
+    "Ki67": (0.6, 0.2, 0.15, 0.05),
+    "CD3": (0.03, 1.0, 0.05, 0.05),
+    "CD4": (0.03, 0.6, 0.05, 0.3),
+    "CD8": (0.03, 0.7, 0.03, 0.03),
+    "CD20": (0.03, 0.05, 1.0, 0.05),
+    "CD45": (0.05, 0.8, 0.9, 0.7),
+    "CD68": (0.05, 0.05, 0.05, 1.0),
+    "CD163": (0.03, 0.03, 0.03, 0.7),
+    "PDL1": (0.4, 0.1, 0.1, 0.5),
+    "HLADR": (0.15, 0.2, 0.8, 0.9),
+    "SOX10": (0.7, 0.02, 0.02, 0.02),
+}
+_FULL, _OFFSET, _NOISE = 3000.0, 120.0, 18.0  # counts
+_MEMBRANE_UM = 0.8
+_INSIDE = 0.35  # of a marker's brightness at the membrane
+_BLUR_UM = 0.45  # sigma
+_LLOYD = 4  # rounds
+
+
+@dataclass(frozen=True, slots=True)
+class CellTissue:
+    """The truth: n cells.
+
+    labels   uint32 (z, y, x), 1 to n; 0: between cells
+    centres  float64 (n, 3), um, (z, y, x)
+    types    int64 (n,), in TYPES
+    levels   float64 (n, markers), 0..1 and more
+    """
+
+    labels: NDArray[np.uint32]
+    centres: NDArray[np.float64]
+    types: NDArray[np.int64]
+    levels: NDArray[np.float64]
+
+
+def write_cells(path: Path, seed: int = 1, shape: tuple[int, int, int] = SHAPE) -> None:
+    """Write the sample to `path` (NAME.ome.zarr), and its table to NAME.csv beside it.
+
+    shape  voxels (z, y, x); the number of cells goes by the volume
+
+    Raises UsageError for another ending, OutputError where it can't be written.
+    """
+    if not path.name.endswith(SUFFIX):
+        raise UsageError(f"{path}: expected a name that ends in {SUFFIX}")
+    tissue = make_tissue(shape, seed)
+    with replacing_folder(path) as folder:
+        _write_zarr(folder, tissue, seed)
+    write_bytes(table_beside(path), _table(tissue).encode())
+
+
+def table_beside(path: Path) -> Path:
+    """Return the path of the table of a sample."""
+    return path.with_name(path.name.removesuffix(SUFFIX) + ".csv")
+
+
+def make_tissue(shape: tuple[int, int, int], seed: int) -> CellTissue:
+    """Return the cells of a box of voxels (z, y, x); the same seed gives the same ones."""
+    rng = np.random.default_rng([seed, 77])
+    spacing = np.array(SPACING_UM)
+    box = (np.array(shape) - 1) * spacing
+    count = max(2, round(CELLS * float(np.prod(shape)) / float(np.prod(SHAPE))))
+    margin = np.minimum(RADIUS_UM - 1.5, box / 4)
+    centres = rng.uniform(margin, box - margin, (count, 3))
+    grid = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) * spacing
+    points = grid.reshape(-1, 3)
+    inside = ((points >= margin) & (points <= box - margin)).all(axis=1)
+    for _ in range(_LLOYD):
+        nearest = cKDTree(centres).query(points[inside])[1]
+        for axis in range(3):
+            sums = np.bincount(nearest, points[inside][:, axis], count)
+            centres[:, axis] = sums / np.maximum(np.bincount(nearest, minlength=count), 1)
+    distance, nearest = cKDTree(centres).query(points)
+    labels = np.where(distance <= RADIUS_UM, nearest + 1, 0).astype(np.uint32).reshape(shape)
+    types = _types(centres, rng)
+    by_type = np.array(list(MARKERS.values())).T[types]
+    levels = by_type * rng.lognormal(0.0, 0.25, by_type.shape)
+    return CellTissue(labels, centres, types, levels)
+
+
+def _types(centres: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return types in patches: by a smooth field, with some cells among others."""
+    wave = np.sin(centres @ np.array([0.03, 0.055, 0.04])) + np.cos(centres[:, 2] * 0.05)
+    rank = np.argsort(np.argsort(wave + rng.normal(0, 0.35, len(centres)))) / len(centres)
+    return np.searchsorted(np.cumsum(_SHARES)[:-1], rank, side="right")
+
+
+def _write_zarr(folder: Path, tissue: CellTissue, seed: int) -> None:
+    names = (NUCLEI, *MARKERS)
+    shape = tissue.labels.shape
+    scale: list[Any] = [{"type": "scale", "scale": [1.0, *SPACING_UM]}]
+    group = zarr.open_group(LocalStore(folder), mode="w", zarr_format=3)
+    axes = [{"name": "c", "type": "channel"}, *_axes()]
+    about: dict[str, Any] = {
+        "version": "0.5",
+        "multiscales": [
+            {
+                "axes": axes,
+                "datasets": [{"path": "0", "coordinateTransformations": scale}],
+                "name": "cells",
+            }
+        ],
+        "omero": {"channels": [{"label": name, "active": True} for name in names]},
+    }
+    group.attrs["ome"] = about
+    array = group.create_array(
+        "0",
+        shape=(len(names), *shape),
+        chunks=(1, *shape),
+        dtype="uint16",
+        compressors=ZstdCodec(level=3),
+    )
+    depth = _depth(tissue.labels)
+    for index in range(len(names)):
+        array[index] = _record(tissue, depth, index, seed)
+    held = group.create_group("labels")
+    held.attrs["ome"] = {"version": "0.5", "labels": [LABELS]}
+    labels = held.create_group(LABELS)
+    labels.attrs["ome"] = {
+        "version": "0.5",
+        "multiscales": [
+            {
+                "axes": _axes(),
+                "datasets": [
+                    {
+                        "path": "0",
+                        "coordinateTransformations": [{"type": "scale", "scale": list(SPACING_UM)}],
+                    }
+                ],
+                "name": LABELS,
+            }
+        ],
+        "image-label": {"version": "0.5", "source": {"image": "../../"}},
+    }
+    stored = labels.create_array(
+        "0", shape=shape, chunks=shape, dtype="uint32", compressors=ZstdCodec(level=3)
+    )
+    stored[...] = tissue.labels
+
+
+def _axes() -> list[dict[str, str]]:
+    return [{"name": name, "type": "space", "unit": "micrometer"} for name in "zyx"]
+
+
+def _depth(labels: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """Return how deep in its cell each voxel lies, um, float32; 0 outside."""
+    at_wall = np.zeros(labels.shape, bool)
+    for axis in range(3):
+        ahead = np.diff(labels.astype(np.int64), axis=axis) != 0
+        low, high = [slice(None)] * 3, [slice(None)] * 3
+        low[axis], high[axis] = slice(None, -1), slice(1, None)
+        at_wall[tuple(low)] |= ahead
+        at_wall[tuple(high)] |= ahead
+    return np.where(labels > 0, ndimage.distance_transform_edt(~at_wall, SPACING_UM), 0.0).astype(
+        np.float32
+    )
+
+
+def _record(
+    tissue: CellTissue, depth: NDArray[np.float32], channel: int, seed: int
+) -> NDArray[np.uint16]:
+    """Return a channel of the image, uint16 (z, y, x)."""
+    rng = np.random.default_rng([seed, 78, channel])
+    if channel == 0:
+        dye = np.zeros(tissue.labels.shape, np.float32)
+        deepest = ndimage.maximum(depth, tissue.labels, np.arange(len(tissue.centres) + 1))
+        share = depth / np.maximum(np.asarray(deepest)[tissue.labels], 1e-6)
+        dye[(share > 0.45) & (tissue.labels > 0)] = 1.0
+    else:
+        level = np.concatenate([[0.0], tissue.levels[:, channel - 1]]).astype(np.float32)
+        at_membrane = np.where(depth <= _MEMBRANE_UM, 1.0, _INSIDE).astype(np.float32)
+        dye = level[tissue.labels] * at_membrane
+    blurred = ndimage.gaussian_filter(dye, _BLUR_UM / np.array(SPACING_UM))
+    counts = rng.poisson(np.maximum(blurred, 0) * _FULL + _OFFSET) + rng.normal(
+        0, _NOISE, dye.shape
+    )
+    return np.clip(np.rint(counts), 0, 65535).astype(np.uint16)
+
+
+def _table(tissue: CellTissue) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["CellID", "cell_type", *MARKERS])
+    for row, (kind, levels) in enumerate(zip(tissue.types, tissue.levels, strict=True)):
+        writer.writerow([row + 1, TYPES[kind], *(f"{_FULL * level:.1f}" for level in levels)])
+    return text.getvalue()

@@ -1,0 +1,114 @@
+"""Read the objects of a composed stage: which vertex is whose, and the table's columns."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from stereocell.model.errors import StageError
+from stereocell.model.object_table import Column
+from stereocell.usd.layer import CHANNELS
+from stereocell.usd.write_objects import (
+    COLUMN,
+    COLUMNS,
+    DEFAULT,
+    LABELS,
+    NAMES,
+    OBJECT_ID,
+    TOUCHING,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TileObjects:
+    """The objects of one tile, as the stage has them after all edits.
+
+    labels   uint64 (n,)
+    names    by object; empty: there are none
+    values   float32 (n,) by column ID
+    touching  uint64 (m, 2), labels of objects that share a wall, the tile's first
+    """
+
+    labels: NDArray[np.uint64]
+    names: tuple[str, ...]
+    values: dict[str, NDArray[np.float32]]
+    touching: NDArray[np.uint64]
+
+
+def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] | None:
+    """Return a channel's columns without values, and the one that colours first; None: no objects.
+
+    Raises StageError for a column that isn't described.
+    """
+    prim = stage.GetPrimAtPath(CHANNELS.AppendChild(channel_id))
+    ids = prim.GetAttribute(COLUMNS).Get()
+    if ids is None:
+        return None
+    columns = []
+    for name in map(str, ids):
+        attribute = prim.GetAttribute(f"{COLUMN}{name}")
+        if not attribute:
+            raise StageError(f"{prim.GetPath()}.{COLUMN}{name}: missing, expected a column's name")
+        data = attribute.GetCustomData()
+        categories = tuple(map(str, data.get("categories", ())))
+        colors = np.array(data.get("colors", ()), np.float64).reshape(-1, 3).clip(0, 1)
+        if len(colors) != len(categories):
+            raise StageError(
+                f"{attribute.GetPath()}: found {len(colors)} colours for {len(categories)} "
+                "categories, expected as many"
+            )
+        columns.append(
+            Column(
+                name,
+                str(attribute.Get() or name),
+                np.zeros(0, np.float32),
+                str(attribute.GetDocumentation()),
+                str(data.get("unit", "")),
+                categories,
+                tuple((float(r), float(g), float(b)) for r, g, b in colors),
+            )
+        )
+    return columns, str(prim.GetAttribute(DEFAULT).Get() or "")
+
+
+def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | None:
+    """Return what a tile's mesh, at the selected level, knows of its objects; None: nothing.
+
+    Raises StageError where a column has another number of values.
+    """
+    labels = mesh.GetAttribute(LABELS).Get()
+    if labels is None:
+        return None
+    count = len(labels)
+    names = tuple(map(str, mesh.GetAttribute(NAMES).Get() or ()))
+    if names and len(names) != count:
+        raise StageError(f"{mesh.GetPath()}.{NAMES}: found {len(names)}, expected {count}")
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    values = {}
+    for column in columns:
+        given = primvars.GetPrimvar(column.id).Get()
+        found = np.array([] if given is None else given, np.float32)
+        if given is not None and found.shape != (count,):
+            raise StageError(
+                f"{mesh.GetPath()}.primvars:{column.id}: found {len(found)} values, expected "
+                f"{count}, one an object"
+            )
+        values[column.id] = found if given is not None else np.full(count, np.nan, np.float32)
+        if column.categories:
+            codes = values[column.id]
+            is_known = (codes >= 0) & (codes < len(column.categories))
+            values[column.id] = np.where(is_known, codes, -1).astype(np.float32)
+    pairs = np.array(list(mesh.GetAttribute(TOUCHING).Get() or ()), np.uint64)
+    if len(pairs) % 2:
+        raise StageError(f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected pairs")
+    return TileObjects(np.array(list(labels), np.uint64), names, values, pairs.reshape(-1, 2))
+
+
+def objects_of(mesh: UsdGeom.Mesh) -> NDArray[np.int64] | None:
+    """Return which object each face is of (m,); None: the mesh has none."""
+    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar(OBJECT_ID)
+    if not primvar or primvar.GetInterpolation() != UsdGeom.Tokens.uniform:
+        return None
+    flat = primvar.ComputeFlattened()
+    return None if flat is None else np.array(flat, np.int64)

@@ -1,0 +1,164 @@
+"""Write the objects of a label map into a stage: which face is whose, and the table's columns.
+
+Columns are indexed uniform primvars: a value an object, an index a face. A constant array of values
+would arrive in Blender as values of the first points; values expanded to the faces would take three
+times the bytes. Categories are codes, and each is a GeomSubset with a material of its own, which
+DCC tools show as a material slot.
+
+On the channel's prim stands what the columns mean: see `write_columns`.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+
+from stereocell.model.identifiers import to_identifier
+from stereocell.model.mesh import Mesh
+from stereocell.model.object_table import Column, ObjectTable
+from stereocell.objects.table import color_objects
+from stereocell.usd.layer import CHANNELS, set_attribute
+
+OBJECT_ID = "objectId"  # primvar: the place of a face's object in LABELS
+LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
+NAMES = "stereocell:objectNames"  # on a tile's mesh, too
+TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
+COLUMNS, DEFAULT = "stereocell:columns", "stereocell:defaultColumn"
+COLUMN = "stereocell:column:"
+MOST_CLASSES = 32  # categories that are GeomSubsets: each is a prim in each level of each tile
+_FAMILY = UsdShade.Tokens.materialBind
+
+_Types = Sdf.ValueTypeNames
+
+
+def class_name(column: Column, code: int) -> str:
+    """Return the name of the prim of a category."""
+    return f"class_{to_identifier(column.categories[code])}"
+
+
+def classes_of(table: ObjectTable) -> Column | None:
+    """Return the column whose categories are GeomSubsets; None: there is none."""
+    column = table.column(table.default)
+    return column if column is not None and 0 < len(column.categories) <= MOST_CLASSES else None
+
+
+def write_columns(prim: Usd.Prim, table: ObjectTable, roughness: float) -> None:
+    """Write what the columns of a channel's objects mean, and the materials of its classes."""
+    ids = Vt.TokenArray([column.id for column in table.columns])
+    set_attribute(prim, COLUMNS, _Types.TokenArray, ids, custom=True)
+    set_attribute(prim, DEFAULT, _Types.Token, table.default, custom=True)
+    for column in table.columns:
+        name = f"{COLUMN}{column.id}"
+        set_attribute(prim, name, _Types.String, column.name, custom=True)
+        attribute = prim.GetAttribute(name)
+        attribute.SetDocumentation(column.about)
+        if column.unit:
+            attribute.SetCustomDataByKey("unit", column.unit)
+        if column.categories:
+            attribute.SetCustomDataByKey("categories", Vt.StringArray(list(column.categories)))
+            colors = np.array(column.colors, np.float32)
+            attribute.SetCustomDataByKey("colors", Vt.Vec3fArray.FromNumpy(colors))
+    classes = classes_of(table)
+    for code, color in enumerate(classes.colors if classes else ()):
+        assert classes is not None
+        path = prim.GetPath().AppendChild(class_name(classes, code))
+        material = UsdShade.Material.Define(prim.GetStage(), path)
+        material.GetPrim().SetDisplayName(classes.categories[code])
+        surface = UsdShade.Shader.Define(prim.GetStage(), path.AppendChild("surface"))
+        surface.CreateIdAttr("UsdPreviewSurface")
+        surface.CreateInput("diffuseColor", _Types.Color3f).Set(Gf.Vec3f(*color))
+        surface.CreateInput("metallic", _Types.Float).Set(0.0)
+        surface.CreateInput("roughness", _Types.Float).Set(roughness)
+        output = surface.CreateOutput("surface", _Types.Token)
+        material.CreateSurfaceOutput().ConnectToSource(output)
+
+
+def define_objects(
+    mesh: UsdGeom.Mesh,
+    look: Sdf.Path,
+    channel_id: str,
+    table: ObjectTable,
+    touching: NDArray[np.uint64] | None,
+) -> None:
+    """Write what all levels of a tile's objects share: their numbers, names and classes' looks.
+
+    touching  uint64 (m, 2), labels of objects that share a wall, the tile's first; None: not known
+    """
+    prim = mesh.GetPrim()
+    set_attribute(prim, LABELS, _Types.UInt64Array, _uint64(table.labels), custom=True)
+    if table.names:
+        names = Vt.StringArray(list(table.names))
+        set_attribute(prim, NAMES, _Types.StringArray, names, custom=True)
+    if touching is not None:
+        pairs = _uint64(touching.ravel())
+        set_attribute(prim, TOUCHING, _Types.UInt64Array, pairs, custom=True)
+    classes = classes_of(table)
+    for code in range(len(classes.categories) if classes else 0):
+        assert classes is not None
+        name = class_name(classes, code)
+        path = look.ReplaceName(f"{look.name}_{name}")
+        material = UsdShade.Material.Define(prim.GetStage(), path)
+        source = CHANNELS.AppendChild(channel_id).AppendChild(name)
+        material.GetPrim().GetInherits().AddInherit(source)
+
+
+def write_objects(
+    mesh: UsdGeom.Mesh,
+    look: Sdf.Path,
+    made: Mesh,
+    table: ObjectTable,
+) -> None:
+    """Write one level's objects: primvars, colours and classes."""
+    assert made.objects is not None
+    of_face = made.objects[made.triangles[:, 0]].astype(np.int32)
+    count = len(table.labels)
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    indices = Vt.IntArray.FromNumpy(of_face)
+    ids = np.arange(count, dtype=np.int32)
+    _write(primvars, OBJECT_ID, _Types.IntArray, Vt.IntArray.FromNumpy(ids), indices)
+    for column in table.columns:
+        if column.categories:
+            codes = Vt.IntArray.FromNumpy(np.nan_to_num(column.values, nan=-1).astype(np.int32))
+            _write(primvars, column.id, _Types.IntArray, codes, indices)
+        else:
+            values = np.ascontiguousarray(column.values, np.float32)
+            _write(primvars, column.id, _Types.FloatArray, Vt.FloatArray.FromNumpy(values), indices)
+    colors = np.ascontiguousarray(color_objects(table), np.float32)
+    shown = Vt.Vec3fArray.FromNumpy(colors)
+    _write(primvars, "displayColor", _Types.Color3fArray, shown, indices)
+    classes = classes_of(table)
+    if classes is not None:
+        _write_classes(mesh, look, classes, of_face)
+
+
+def _write_classes(
+    mesh: UsdGeom.Mesh, look: Sdf.Path, column: Column, of_face: NDArray[np.int32]
+) -> None:
+    code_of_face = column.values[of_face].astype(np.int64)
+    for code in range(len(column.categories)):
+        faces = np.flatnonzero(code_of_face == code).astype(np.int32)
+        if not len(faces):
+            continue
+        name = class_name(column, code)
+        subset = UsdGeom.Subset.CreateGeomSubset(
+            mesh, name, UsdGeom.Tokens.face, Vt.IntArray.FromNumpy(faces), _FAMILY
+        )
+        binding = UsdShade.MaterialBindingAPI.Apply(subset.GetPrim())
+        path = look.ReplaceName(f"{look.name}_{name}")
+        binding.Bind(UsdShade.Material.Get(mesh.GetPrim().GetStage(), path))
+    UsdGeom.Subset.SetFamilyType(mesh, _FAMILY, UsdGeom.Tokens.nonOverlapping)
+
+
+def _write(
+    primvars: UsdGeom.PrimvarsAPI,
+    name: str,
+    kind: Sdf.ValueTypeName,
+    values: object,
+    indices: Vt.IntArray,
+) -> None:
+    primvar = primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform)
+    primvar.Set(values)
+    primvar.SetIndices(indices)
+
+
+def _uint64(labels: NDArray[np.uint64]) -> Vt.UInt64Array:
+    return Vt.UInt64Array(labels.tolist())

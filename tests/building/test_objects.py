@@ -1,0 +1,352 @@
+"""Builds of label maps from end to end: which tile has which object, the table, edits, resuming."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+import zarr
+from pxr import Sdf, Usd, UsdGeom, Vt
+
+from stereocell import samples
+from stereocell.building.located_objects import CUT
+from stereocell.building.object_passes import locate_objects
+from stereocell.building.out_folder import OutFolder
+from stereocell.cli.__main__ import main
+from stereocell.engine.run import Engine
+from stereocell.formats.gltf_decode import read_glb
+from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
+from support.digests import digests_of
+
+SHAPE = (24, 72, 96)
+PHASES = ("plan", "units", "stage", "bundle")
+
+
+def run(*arguments: object) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+def build(source: Path, out: Path, *flags: object) -> None:
+    assert run("plan", source, "-o", out, *flags) == 0
+    for phase in PHASES[1:]:
+        assert run(phase, out, "--workers", 0) == 0
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("a sample's") / "small tissue.ome.zarr"
+    samples.write_cells(path, seed=3, shape=SHAPE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def out(sample: Path) -> Path:
+    """Two tiles, one image channel, and a table with errors of three kinds."""
+    table = table_beside(sample)
+    lines = table.read_text().splitlines()
+    lines = [lines[0], *lines[2:], "9999,T cell" + ",1" * 12, "8888,B cell" + ",2" * 12]
+    lines[3] = lines[3].replace(lines[3].split(",")[2], "nan")
+    table.write_text("\n".join(lines) + "\n")
+    out = sample.parent / "out"
+    build(
+        sample,
+        out,
+        *("--grid", "2x1", "--channels", "CD3"),
+        *("--labels", "cells", "--table", table),
+    )
+    return out
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> str:
+    return "".join(capsys.readouterr())
+
+
+def objects_of(out: Path) -> dict:
+    return json.loads((out / "bundle/channels/cells/objects.json").read_text())
+
+
+def column_of(out: Path, column_id: str) -> np.ndarray:
+    entry = next(one for one in objects_of(out)["columns"] if one["id"] == column_id)
+    return np.fromfile(out / "bundle" / entry["exact"]["path"], "<f4")
+
+
+def labels_of(out: Path) -> np.ndarray:
+    return np.fromfile(out / "bundle" / objects_of(out)["labels"]["path"], "<u4")
+
+
+def test_each_cell_is_there_once_with_its_voxels_volume(out: Path) -> None:
+    tissue = make_tissue(SHAPE, 3)
+    labels, counts = np.unique(tissue.labels[tissue.labels > 0], return_counts=True)
+    labels, counts = labels[counts >= 27], counts[counts >= 27]
+    found = labels_of(out)
+    assert sorted(found.tolist()) == labels.tolist()
+    expected = dict(zip(labels.tolist(), counts * np.prod(SPACING_UM), strict=True))
+    volumes = column_of(out, "volume_um3")
+    assert volumes == pytest.approx([expected[label] for label in found.tolist()])
+    for axis, letter in enumerate("zyx"):
+        places = column_of(out, f"centroid_{letter}_um")
+        for label, place in zip(found.tolist(), places, strict=True):
+            at = np.argwhere(tissue.labels == label)[:, axis].mean() * SPACING_UM[axis]
+            assert place == pytest.approx(at, abs=1e-3)
+
+
+def test_a_cell_lies_in_the_tile_of_its_centroid(out: Path) -> None:
+    tiles = objects_of(out)["tiles"]
+    assert sorted(tiles) == ["r0_c0", "r0_c1"]
+    x_um = column_of(out, "centroid_x_um")
+    middle = 47.5 * SPACING_UM[2]  # between two voxels
+    for tile, is_left in (("r0_c0", True), ("r0_c1", False)):
+        first, count = tiles[tile]["first"], tiles[tile]["count"]
+        assert count > 5
+        assert ((x_um[first : first + count] < middle) == is_left).all()
+
+
+def test_the_image_is_measured_over_each_cell(out: Path, sample: Path) -> None:
+    tissue = make_tissue(SHAPE, 3)
+    voxels = np.asarray(zarr.open_group(sample, mode="r")["0"][3])  # CD3
+    means, p95s = column_of(out, "mean_CD3"), column_of(out, "p95_CD3")
+    for row, label in enumerate(labels_of(out).tolist()):
+        own = voxels[tissue.labels == label]
+        assert means[row] == pytest.approx(own.mean(), rel=1e-5)
+        assert p95s[row] == pytest.approx(np.percentile(own, 95), rel=1e-5)
+
+
+def test_the_table_is_joined_by_number_and_tells_what_does_not_fit(
+    out: Path, sample: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (out / "phases.json").unlink()
+    assert run("stage", out, "--workers", 0) == 0
+    told = said(capsys)
+    assert "2 rows without an object: CellID 8888, 9999" in told
+    assert "1 object without a row: 1" in told
+    tissue = make_tissue(SHAPE, 3)
+    kinds = objects_of(out)
+    entry = next(one for one in kinds["columns"] if one["id"] == "cell_type")
+    assert kinds["default"] == "cell_type"
+    codes = column_of(out, "cell_type")
+    for row, label in enumerate(labels_of(out).tolist()):
+        name = "" if codes[row] < 0 else entry["categories"][int(codes[row])]
+        truth = ("tumour", "T cell", "B cell", "macrophage")[tissue.types[label - 1]]
+        assert name == ("" if label == 1 else truth)
+    assert np.isnan(column_of(out, "CD8")[labels_of(out) == 1]).all()
+
+
+def test_every_level_of_a_file_names_its_cells(out: Path) -> None:
+    content = objects_of(out)
+    boxes = np.fromfile(out / "bundle" / content["boxes"]["path"], "<f4").reshape(-1, 6)
+    manifest = json.loads((out / "bundle/manifest.json").read_text())
+    (channel,) = (one for one in manifest["channels"] if one["id"] == "cells")
+    farthest = 2 * channel["distances"][-1]["largest_um"]
+    for tile, rows in content["tiles"].items():
+        for file in sorted((out / "bundle/channels/cells" / tile).glob("*.glb")):
+            mesh = read_glb(file)
+            ids = mesh.objects
+            assert sorted(set(ids.tolist())) == list(range(rows["count"]))
+            um = mesh.positions_m * 1e6
+            for number in range(rows["count"]):
+                low, high = um[ids == number].min(axis=0), um[ids == number].max(axis=0)
+                box = boxes[rows["first"] + number]
+                assert (low > box[:3] - farthest).all()
+                assert (high < box[3:] + farthest).all()
+
+
+def test_nothing_is_done_twice_and_a_table_changes_the_stage_alone(
+    out: Path, sample: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for phase in PHASES[1:]:
+        assert run(phase, out, "--workers", 0) == 0
+    said(capsys)
+    for phase in PHASES[1:]:
+        assert run(phase, out, "--workers", 0) == 0
+        assert f"{phase}: up to date" in said(capsys)
+    before = digests_of(out / "units")
+    other = sample.parent / "other.csv"
+    other.write_text("label,score\n2,0.5\n3,0.25\n")
+    assert run(
+        *("plan", sample, "-o", out, "--grid", "2x1", "--channels", "CD3"),
+        *("--labels", "cells", "--table", other),
+    ) == 0  # fmt: skip
+    assert run("units", out, "--workers", 0) == 0
+    units = {name for name in digests_of(out / "units") if "volume" in name or "lod" in name}
+    assert all(digests_of(out / "units")[name] == before[name] for name in units)
+    assert run("stage", out, "--workers", 0) == 0
+    assert "objects without a row" in said(capsys)
+    assert run("bundle", out, "--workers", 0) == 0
+    scores = dict(zip(labels_of(out).tolist(), column_of(out, "score"), strict=True))
+    assert scores[2] == 0.5
+    assert np.isnan(scores[5])
+
+
+def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
+    """A value and a colour, as an artist's layer overrides them."""
+    stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
+    path = "/Specimen/Tiles/r0_c0/cells/cells_r0_c0"
+    layer = Sdf.Layer.CreateNew(str(out / "stage/edit.usda"))
+    layer.subLayerPaths = ["./stage.usda"]
+    edited = Usd.Stage.Open(layer)
+    mesh = UsdGeom.Mesh(edited.GetPrimAtPath(path))
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    volumes = np.array(primvars.GetPrimvar("volume_um3").Get())
+    volumes[0] = 12345
+    primvars.GetPrimvar("volume_um3").Set(Vt.FloatArray.FromNumpy(volumes))
+    colors = np.array(primvars.GetPrimvar("displayColor").Get())
+    colors[0] = (0.0, 0.0, 1.0)
+    primvars.GetPrimvar("displayColor").Set(Vt.Vec3fArray.FromNumpy(colors))
+    layer.Save()
+    del stage, edited
+    assert run("bundle", out, "--stage", out / "stage/edit.usda", "--workers", 0) == 0
+    assert column_of(out, "volume_um3")[0] == 12345
+    mesh = read_glb(out / "bundle/channels/cells/r0_c0/lod1.glb")
+    ids = mesh.objects
+    shown = mesh.colors
+    assert (shown[ids == 0] == (0, 0, 1)).all()
+    assert not (shown[ids == 1] == (0, 0, 1)).all()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_same_bytes_with_any_workers(out: Path, tmp_path: Path, workers: int) -> None:
+    labels = make_tissue(SHAPE, 3).labels.astype(np.uint16)
+    source = tmp_path / "mask.ome.tif"
+    tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
+    made = []
+    for count in (0, workers):
+        place = tmp_path / f"out{count}"
+        flags = ("--labels", "cells=.", "--spacing-um", "1,0.5,0.5", "--tile-size", "24,40,40")
+        assert run("plan", source, "-o", place, *flags) == 0
+        for phase in PHASES[1:]:
+            assert run(phase, place, "--workers", count) == 0
+        made.append(digests_of(place / "bundle"))
+    assert made[0] == made[1]
+
+
+def test_a_large_object_is_cut_at_the_tiles_and_stays_one(tmp_path: Path) -> None:
+    z, y, _x = np.mgrid[:20, :40, :120]
+    labels = ((y - 20) ** 2 + (z - 10) ** 2 < 64).astype(np.uint8) * 5  # a rod through all tiles
+    labels[2:6, 2:8, 50:58] = 9
+    source, out = tmp_path / "rod.tif", tmp_path / "out"
+    tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
+    build(
+        source,
+        out,
+        *("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40"),
+    )
+    folder = out / "bundle/channels/organs"
+    content = json.loads((folder / "objects.json").read_text())
+    assert content["count"] == 2
+    labels_there = np.fromfile(out / "bundle" / content["labels"]["path"], "<u4").tolist()
+    row = labels_there.index(5)
+    assert row == 1  # what is in several tiles comes last
+    held = [
+        [*range(tile["first"], tile["first"] + tile["count"]), *tile.get("more", [])]
+        for tile in content["tiles"].values()
+    ]
+    assert [row in rows for rows in held] == [True, True, True]
+    by_id = {one["id"]: one for one in content["columns"]}
+    volume = np.fromfile(out / "bundle" / by_id["volume_um3"]["exact"]["path"], "<f4")[row]
+    assert volume == (labels == 5).sum()
+    area = np.fromfile(out / "bundle" / by_id["area_um2"]["exact"]["path"], "<f4")[row]
+    radius = np.sqrt(volume / 120 / np.pi)
+    assert area == pytest.approx(2 * np.pi * radius * (radius + 120), rel=0.05)  # no caps inside
+    # the pieces meet: what one ends with, the next begins with
+    ends = []
+    for tile in ("r0_c0", "r0_c1", "r0_c2"):
+        mesh = read_glb(folder / tile / "lod0.glb")
+        ids = mesh.objects
+        place = max(ids)  # pieces are numbered after whole objects
+        ends.append(np.round(mesh.positions_m[ids == place] * 1e6, 3))
+    for (left, right), at in zip(pairwise(ends), (39.5, 79.5), strict=True):
+        shared = set(map(tuple, left.tolist())) & set(map(tuple, right.tolist()))
+        assert len(shared) > 100
+        assert np.mean([one[0] for one in shared]) == pytest.approx(at, abs=0.3)
+
+
+def test_small_objects_and_those_beyond_the_region_are_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    labels = np.zeros((12, 40, 40), np.int64)
+    labels[2:8, 2:10, 2:10] = 2**62
+    labels[2:8, 2:10, 28:38] = 4
+    labels[5, 30, 5:9] = 3
+    labels[9, :3, :] = -1
+    source, out = tmp_path / "l.tif", tmp_path / "out"
+    tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
+    flags = ("--labels", ".", "--spacing-um", "1,1,1", "--region", "0:12,0:40,0:20")
+    assert run("plan", source, "-o", out, *flags) == 0
+    assert run("units", out, "--workers", 0) == 0
+    told = said(capsys)
+    assert "l: 1 object; 1 of too few voxels are left out" in told
+    assert "1 with their centroid outside the region are left out" in told
+    plan = OutFolder(out).plan()
+    located = locate_objects(OutFolder(out), plan, plan.labels[0], Engine(0))
+    assert located.extents.labels.tolist() == [2**62]
+    assert CUT not in located.owners.tolist()
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    assert run(*arguments) in (1, 2)
+    told = capsys.readouterr().err.strip().splitlines()
+    assert len(told) == 1
+    return told[0]
+
+
+def test_what_can_not_be_built_is_told_in_one_line(
+    sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan = ("plan", sample, "-o", tmp_path / "out", "--channels", "DNA")
+    told = refusal(capsys, *plan, "--labels", "nuclei")
+    assert "--labels nuclei" in told
+    assert "--labels nuclei=PATH" in told
+    told = refusal(capsys, *plan, "--labels", "DNA=" + str(sample / "labels/cells"))
+    assert "a channel has that name, expected another one, as DNA_objects=PATH" in told
+    tifffile.imwrite(tmp_path / "m.tif", np.ones((6, 5, 7), np.uint8), metadata={"axes": "ZYX"})
+    told = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
+    assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in told
+    negative = np.full((6, 8, 8), -7, np.int16)
+    tifffile.imwrite(tmp_path / "n.tif", negative, metadata={"axes": "ZYX"})
+    flags = ("--labels", ".", "--spacing-um", "1,1,1")
+    assert run("plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags) == 0
+    assert run("units", tmp_path / "n", "--workers", 0) == 1
+    assert "found -7, expected 0 or more in labels" in capsys.readouterr().err
+    told = refusal(capsys, *plan, "--labels", "cells", "--table", tmp_path / "none.csv")
+    assert "none.csv: can't be read" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: Path) -> None:
+    """Labels at half the image's resolution, in a file of their own with a place of their own."""
+    tissue = make_tissue(SHAPE, 3)
+    coarse = tissue.labels[::2, ::2, ::2]
+    place = tmp_path / "coarse.ome.zarr"
+    group = zarr.open_group(place, mode="w", zarr_format=3)
+    spacing = [2 * s for s in SPACING_UM]
+    group.attrs["ome"] = {
+        "version": "0.5",
+        "multiscales": [
+            {
+                "axes": [
+                    {"name": n, "type": "space", "unit": "micrometer"} for n in ("z", "y", "x")
+                ],
+                "datasets": [
+                    {
+                        "path": "0",
+                        "coordinateTransformations": [
+                            {"type": "scale", "scale": spacing},
+                            {"type": "translation", "translation": [0.0, 0.0, 0.0]},
+                        ],
+                    }
+                ],
+            }
+        ],
+    }
+    group.create_array("0", shape=coarse.shape, dtype="uint32")[...] = coarse
+    out = tmp_path / "out"
+    flags = ("--grid", "2x1", "--channels", "CD3", "--labels", f"cells={place}")
+    build(sample, out, *flags)
+    found, volumes = labels_of(out).tolist(), column_of(out, "volume_um3")
+    for label, volume in zip(found, volumes, strict=True):
+        assert volume == pytest.approx((coarse == label).sum() * np.prod(spacing))
+    voxels = np.asarray(zarr.open_group(sample, mode="r")["0"][3])[::2, ::2, ::2]
+    for label, mean in zip(found, column_of(out, "mean_CD3"), strict=True):
+        assert mean == pytest.approx(voxels[coarse == label].mean(), rel=1e-5)

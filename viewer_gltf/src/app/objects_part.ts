@@ -1,0 +1,139 @@
+/** The objects of label maps, whose code comes with the first bundle that has one. */
+import type { Object3D } from "three";
+import { TemporaryError } from "../bundle/errors";
+import type { Manifest } from "../bundle/generated/bundle";
+import type { Box } from "../math/box";
+import type { Ray } from "../math/vec3";
+import type { Objects } from "../objects/objects";
+import type { MetObject } from "../objects/pick";
+import type { Control, Group } from "../panel/controls";
+import type { Action } from "../state/actions";
+import type { ViewerState } from "../state/viewer_state";
+import type { SurfaceSet } from "../surfaces/surface_set";
+
+const NOT_LOADED =
+  "The part of the page that shows objects could not be loaded. Check the connection and try again.";
+
+export type ObjectsPartOptions = Readonly<{
+  base: string;
+  manifest: Manifest;
+  surfaces: SurfaceSet;
+  specimen: () => Object3D;
+  dispatch: (action: Action, isStep?: boolean) => void;
+  onAim: (box: Box) => void;
+  announce: (text: string) => void;
+  onChange: () => void;
+  onError: (error: unknown) => void;
+}>;
+
+type Items = (
+  objects: Objects,
+  state: ViewerState,
+  channel: string,
+) => readonly (Control | Group)[];
+
+/** An object that a ray meets; `distance`: in lengths of its direction. */
+export type Met = MetObject & Readonly<{ channel: string }>;
+
+export class ObjectsPart {
+  /** By channel. */
+  private readonly objects = new Map<string, Objects>();
+  private readonly coming = new Set<string>();
+  private readonly failed = new Set<string>();
+  private layOut: Items = () => [];
+  private state: ViewerState | null = null;
+
+  constructor(private readonly options: ObjectsPartOptions) {
+    options.surfaces.onSurface = (channel, { scene, tile, blend }) =>
+      this.objects.get(channel)?.adopt(scene, tile, blend);
+  }
+
+  follow(state: ViewerState): void {
+    this.state = state;
+    for (const { id, shown } of state.channels) {
+      const found = this.objects.get(id);
+      if (found !== undefined) found.follow(state);
+      else if (shown && !this.coming.has(id) && !this.failed.has(id)) void this.load(id);
+    }
+  }
+
+  private async load(channel: string): Promise<void> {
+    const { manifest, specimen, onChange, onError } = this.options;
+    const file = manifest.channels.find(({ id }) => id === channel)?.objects;
+    if (file === undefined) return;
+    this.coming.add(channel);
+    try {
+      const [{ Objects }, { objectItems }] = await Promise.all([
+        import("../objects/objects"),
+        import("../panel/sections/objects"),
+      ]).catch((cause) => {
+        throw new TemporaryError(NOT_LOADED, { cause });
+      });
+      this.layOut = objectItems;
+      const options = { ...this.options, specimen: specimen(), channel, file };
+      this.objects.set(channel, await Objects.load(options));
+      if (this.state !== null) this.follow(this.state);
+    } catch (error) {
+      this.failed.add(channel);
+      onError(error);
+    } finally {
+      this.coming.delete(channel);
+      onChange();
+    }
+  }
+
+  get isLoading(): boolean {
+    return this.coming.size > 0 || [...this.objects.values()].some(({ isLoading }) => isLoading);
+  }
+
+  /** The panel's section; empty: no label map is shown. */
+  get items(): readonly (Control | Group)[] {
+    const { state } = this;
+    if (state === null) return [];
+    return state.channels.flatMap(({ id, shown }) => {
+      const objects = shown ? this.objects.get(id) : undefined;
+      return objects === undefined ? [] : this.layOut(objects, state, id);
+    });
+  }
+
+  /** The nearest object along a ray, um; null: none. */
+  meet(ray: Ray): Met | null {
+    let best: Met | null = null;
+    for (const [channel, objects] of this.objects) {
+      const met = objects.meet(ray);
+      if (met !== null && (best === null || met.distance < best.distance))
+        best = { ...met, channel };
+    }
+    return best;
+  }
+
+  /** Open the card of the object along a ray, or close it where it is open; whether there is one. */
+  choose(ray: Ray, isByGaze: boolean): boolean {
+    const met = this.meet(ray);
+    const objects = met && this.objects.get(met.channel);
+    if (!met || !objects) return false;
+    objects.pick(met.row, isByGaze);
+    if (this.state?.objects[met.channel]?.picked === met.row) {
+      this.options.announce(`Object ${objects.table.title(met.row)}`);
+    }
+    return true;
+  }
+
+  /** The objects that are meant, as a table; null: it is on its way, or there is none. */
+  csv(): string | null {
+    for (const { id, shown } of this.state?.channels ?? []) {
+      const objects = shown ? this.objects.get(id) : undefined;
+      if (objects !== undefined) return objects.csv();
+    }
+    return null;
+  }
+
+  retryFailed(): void {
+    this.failed.clear();
+    for (const each of this.objects.values()) each.retryFailed();
+  }
+
+  dispose(): void {
+    for (const each of this.objects.values()) each.dispose();
+  }
+}

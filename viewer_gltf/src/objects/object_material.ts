@@ -1,0 +1,141 @@
+/**
+ * What the surfaces of a label map have beside all others: each object has the colour of its value, or is gone.
+ * Colouring anew is one upload of a byte an object. Each object is drawn in a little from its walls: two
+ * neighbours' common wall would else be two surfaces in one place where a cut looks into them.
+ */
+import {
+  DataTexture,
+  Float32BufferAttribute,
+  type Mesh,
+  NearestFilter,
+  RedFormat,
+  RGBAFormat,
+  SRGBColorSpace,
+} from "three";
+import { includeChunks } from "../gpu/glsl_include";
+import type { SurfacePart } from "../surfaces/blend_material";
+import objectLight from "./chunks/object_light.glsl?raw";
+import objectTexel from "./chunks/object_texel.glsl?raw";
+
+/** Of a vertex: the row of its object, in place of the glb's number in the tile. */
+export const ROW = "object_row";
+const FEATURE = "_feature_id_0";
+/** Rows in a line of a texture. */
+const LINE = 256;
+/** What three's loader makes metres of is um. */
+const UM_PER_METRE = 1e6;
+
+const CHUNKS = { "chunks/object_texel": objectTexel, "chunks/object_light": objectLight };
+const include = (source: string) => includeChunks(source, CHUNKS);
+
+const VERTEX = `attribute float ${ROW};
+flat varying float vObject;
+uniform sampler2D uFlags;
+uniform float uInset;
+#include <chunks/object_texel>
+`;
+const FRAGMENT = `flat varying float vObject;
+uniform sampler2D uFlags;
+uniform sampler2D uColumn;
+uniform sampler2D uColors;
+uniform bool uIsColored;
+#include <chunks/object_texel>
+#include <chunks/object_light>
+`;
+
+function bytesTexture(count: number): DataTexture {
+  const texels = new Uint8Array(LINE * Math.max(1, Math.ceil(count / LINE)));
+  const texture = new DataTexture(texels, LINE, texels.length / LINE, RedFormat);
+  texture.minFilter = texture.magFilter = NearestFilter;
+  texture.unpackAlignment = 1;
+  return texture;
+}
+
+export class ObjectMaterial {
+  private readonly flags: DataTexture;
+  private readonly column: DataTexture;
+  private readonly colors = new DataTexture(new Uint8Array(4 * LINE), LINE, 1, RGBAFormat);
+  private readonly uniforms;
+  private metresPerStep = 0;
+  private gap_um = 0;
+  readonly part: SurfacePart;
+
+  /** @param least_um by which each object is always drawn in */
+  constructor(
+    count: number,
+    private readonly least_um: number,
+  ) {
+    this.flags = bytesTexture(count);
+    this.column = bytesTexture(count);
+    this.colors.colorSpace = SRGBColorSpace;
+    this.uniforms = {
+      uFlags: { value: this.flags },
+      uColumn: { value: this.column },
+      uColors: { value: this.colors },
+      uIsColored: { value: false },
+      uInset: { value: 0 },
+    };
+    this.part = {
+      key: "objects",
+      uniforms: this.uniforms,
+      vertex: {
+        declared: include(VERTEX),
+        place: `vObject = ${ROW};\n\ttransformed -= uInset * normal;`,
+        // a triangle whose corners all lie there is none
+        end: `if (objectTexel(uFlags, ${ROW}) == 0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);`,
+      },
+      fragment: {
+        declared: include(FRAGMENT),
+        color: `if (uIsColored) {
+		diffuseColor.rgb = texelFetch(uColors, ivec2(objectTexel(uColumn, vObject), 0), 0).rgb;
+	}
+	diffuseColor.rgb = objectLight(diffuseColor.rgb, objectTexel(uFlags, vObject));`,
+      },
+    };
+  }
+
+  /** Give a tile's mesh the rows of its vertices; whether it has objects. */
+  adopt({ geometry, matrixWorld: _, scale }: Mesh, rowOf: (feature: number) => number): boolean {
+    const features = geometry.getAttribute(FEATURE);
+    if (features === undefined) return false;
+    const rows = new Float32Array(features.count);
+    for (let i = 0; i < rows.length; i++) rows[i] = rowOf(features.getX(i));
+    geometry.setAttribute(ROW, new Float32BufferAttribute(rows, 1));
+    geometry.deleteAttribute(FEATURE);
+    this.metresPerStep = scale.x; // the same in all files of a bundle
+    this.setGap(this.gap_um);
+    return true;
+  }
+
+  /** Space that each object leaves along its walls, um. */
+  setGap(gap_um: number): void {
+    this.gap_um = gap_um;
+    const inset_um = Math.max(gap_um / 2, this.least_um);
+    const { uInset } = this.uniforms;
+    uInset.value = this.metresPerStep > 0 ? inset_um / (this.metresPerStep * UM_PER_METRE) : 0;
+  }
+
+  setFlags(flags: Uint8Array): void {
+    write(this.flags, flags);
+  }
+
+  /** @param bytes of the column that colours; null: each object has the channel's colour */
+  setColumn(bytes: Uint8Array | null): void {
+    this.uniforms.uIsColored.value = bytes !== null;
+    if (bytes !== null) write(this.column, bytes);
+  }
+
+  /** @param table see palettes.ts */
+  setColors(table: Uint8Array): void {
+    write(this.colors, table);
+  }
+
+  dispose(): void {
+    for (const each of [this.flags, this.column, this.colors]) each.dispose();
+  }
+}
+
+function write(texture: DataTexture, bytes: Uint8Array): void {
+  (texture.image.data as Uint8Array).set(bytes);
+  texture.needsUpdate = true;
+}

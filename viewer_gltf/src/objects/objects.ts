@@ -1,0 +1,223 @@
+/** The objects of one label map: their table, how their surfaces look, and who is met by a ray. */
+import { Matrix4, Mesh, type Object3D } from "three";
+import type { FileRef, Manifest } from "../bundle/generated/bundle";
+import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
+import type { Ray } from "../math/vec3";
+import { type ObjectChange, type ObjectView, START_OBJECTS } from "../state/objects";
+import type { ViewerState } from "../state/viewer_state";
+import type { SurfaceSet } from "../surfaces/surface_set";
+import { objectsCsv } from "./csv";
+import { filtered, flag, GONE } from "./flags";
+import { readLinked } from "./linked";
+import { ObjectMaterial } from "./object_material";
+import { tableOf } from "./palettes";
+import { type MetObject, pickObject } from "./pick";
+import { loadObjects, type ObjectTable } from "./table";
+
+/** By which each object is always drawn in, as a share of the specimen's longest edge. */
+const INSET = 1e-4;
+
+export type ObjectsOptions = Readonly<{
+  base: string;
+  manifest: Manifest;
+  channel: string;
+  file: FileRef;
+  surfaces: SurfaceSet;
+  /** What the surfaces' world is seen by: um to the room. */
+  specimen: Object3D;
+  dispatch: (change: ObjectChange, isStep?: boolean) => void;
+  /** An object is to be flown to; um. */
+  onAim: (box: Box) => void;
+  onChange: () => void;
+  onError: (error: unknown) => void;
+}>;
+
+export class Objects {
+  readonly flags: Uint8Array;
+  /** How many show. */
+  left = 0;
+  private readonly material: ObjectMaterial;
+  private view: ObjectView = START_OBJECTS;
+  private clip: Clip = { box: null, plane: null };
+  private isShown = false;
+  private aimed: ObjectView["aim"] = null;
+  /** What the textures hold: of which column, coloured how, flagged by what. */
+  private drawn: Readonly<Record<"column" | "colors" | "flags", string>> = {
+    column: "",
+    colors: "",
+    flags: "",
+  };
+  private readonly adopted = new WeakSet<Object3D>();
+  private isWaiting = false;
+
+  private constructor(
+    readonly table: ObjectTable,
+    private readonly options: ObjectsOptions,
+  ) {
+    const { min, max } = options.manifest.specimen.bounds_um;
+    const edge_um = Math.max(...max.map((v, i) => v - min[i]));
+    this.material = new ObjectMaterial(table.count, INSET * edge_um);
+    this.flags = new Uint8Array(table.count);
+    this.adoptAll();
+  }
+
+  /** Throws BundleError. */
+  static async load(options: ObjectsOptions): Promise<Objects> {
+    let made: Objects | null = null;
+    const onChange = () => {
+      made?.draw();
+      options.onChange();
+    };
+    const { base, file, onError } = options;
+    made = new Objects(await loadObjects(base, file, onChange, onError), options);
+    return made;
+  }
+
+  get isLoading(): boolean {
+    return this.table.isLoading;
+  }
+
+  /** ID of the column that colours; "": none. */
+  get colorBy(): string {
+    return this.view.colorBy ?? this.table.first;
+  }
+
+  /** Changes with what shows, and how. */
+  get version(): string {
+    return `${this.drawn.flags} ${this.left}`;
+  }
+
+  /** Half of a usual object's width. */
+  get widestGap_um(): number {
+    const { boxes, count } = this.table;
+    const widths = Array.from({ length: Math.min(count, 1000) }, (_, i) => {
+      const row = Math.floor((i * count) / Math.min(count, 1000));
+      return Math.min(...[0, 1, 2].map((k) => boxes[6 * row + 3 + k] - boxes[6 * row + k]));
+    }).sort((one, other) => one - other);
+    return Math.max(0.5 * (widths[widths.length >> 1] ?? 1), 1e-3);
+  }
+
+  /** Rows that show. */
+  get shown(): readonly number[] {
+    const rows: number[] = [];
+    for (let row = 0; row < this.flags.length; row++) if (this.flags[row] !== GONE) rows.push(row);
+    return rows;
+  }
+
+  follow(state: ViewerState): void {
+    const { channel, dispatch } = this.options;
+    this.clip = state.clip;
+    this.isShown = state.channels.some(({ id, shown }) => id === channel && shown);
+    this.view = state.objects[channel] ?? START_OBJECTS;
+    if (this.view.linked !== "") {
+      dispatch(
+        { type: "objects", channel, change: readLinked(this.view.linked, this.table) },
+        false,
+      );
+      return; // which has followed
+    }
+    this.draw();
+    const { aim } = this.view;
+    if (aim !== this.aimed && aim !== null) this.options.onAim(this.box(aim.row));
+    this.aimed = aim;
+  }
+
+  /** The surfaces that are there already; those that come later are handed to `adopt`. */
+  private adoptAll(): void {
+    for (const { scene, tile, blend } of this.options.surfaces.of(this.options.channel)) {
+      this.adopt(scene, tile, blend);
+    }
+  }
+
+  adopt(
+    scene: Object3D,
+    tile: string,
+    blend: Readonly<{ wear: (part: ObjectMaterial["part"]) => void }>,
+  ): void {
+    if (this.adopted.has(scene)) return;
+    this.adopted.add(scene);
+    const rowOf = this.table.rowOf(tile);
+    const done = new Set<unknown>();
+    let hasObjects = false;
+    scene.traverse((object) => {
+      if (!(object instanceof Mesh) || done.has(object.geometry)) return;
+      done.add(object.geometry); // what writes depth alone shares it
+      hasObjects = this.material.adopt(object, rowOf) || hasObjects;
+    });
+    if (hasObjects) blend.wear(this.material.part);
+  }
+
+  /** Bring the textures to the view. What has not come yet is drawn when it has. */
+  private draw(): void {
+    const { table, view, material } = this;
+    const column = table.column(this.colorBy);
+    const bytes = column && table.bytes(column.id);
+    const next = {
+      column: bytes === null ? "" : this.colorBy,
+      colors: `${this.colorBy} ${view.palette} ${view.span} ${view.isLog}`,
+      flags: JSON.stringify([
+        ...[view.ranges, view.without, view.hidden, view.only, view.selected, view.picked],
+        filtered(view).map((id) => table.bytes(id) !== null),
+      ]),
+    };
+    if (
+      this.isFirst ||
+      (next.column !== this.drawn.column && (bytes !== null || column === null))
+    ) {
+      material.setColumn(bytes);
+      this.drawn = { ...this.drawn, column: next.column };
+    }
+    if (next.colors !== this.drawn.colors && column !== null && bytes !== null) {
+      material.setColors(tableOf(column, view));
+      this.drawn = { ...this.drawn, colors: next.colors };
+    }
+    if (this.isFirst || next.flags !== this.drawn.flags) {
+      const neighbours = view.picked === null ? [] : table.neighbours(view.picked);
+      this.left = flag(this.flags, view, (id) => table.bytes(id), neighbours);
+      material.setFlags(this.flags);
+      this.drawn = { ...this.drawn, flags: next.flags };
+    }
+    material.setGap(view.gap_um);
+    this.isFirst = false;
+    this.isWaiting = column !== null && bytes === null;
+  }
+
+  private isFirst = true;
+
+  /** The object along a ray, um; null: none. */
+  meet(ray: Ray): MetObject | null {
+    if (!this.isShown || this.isWaiting) return null;
+    const { surfaces, specimen, channel } = this.options;
+    const meshes = surfaces.meshes.filter((each) => each.channel === channel);
+    const world = new Matrix4().copy(specimen.matrixWorld);
+    return pickObject(ray, world, meshes, this.table.boxes, this.flags, this.clip);
+  }
+
+  /** Open a row's card, or close it where it is open; a gaze that rests closes none, and is no step to undo. */
+  pick(row: number, isByGaze: boolean): void {
+    const { channel, dispatch } = this.options;
+    if (isByGaze && this.view.picked === row) return;
+    const picked = this.view.picked === row ? null : row;
+    dispatch({ type: "objects", channel, change: { picked } }, !isByGaze);
+  }
+
+  box(row: number): Box {
+    const [x, y, z, ...high] = this.table.boxes.subarray(6 * row, 6 * row + 6);
+    return { min: [x, y, z], max: [high[0], high[1], high[2]] };
+  }
+
+  /** The selected ones, or all that show, as text; null: not all of it has come. */
+  csv(): string | null {
+    const { selected } = this.view;
+    return objectsCsv(this.table, selected.length > 0 ? selected : this.shown);
+  }
+
+  retryFailed(): void {
+    this.table.retryFailed();
+  }
+
+  dispose(): void {
+    this.material.dispose();
+  }
+}

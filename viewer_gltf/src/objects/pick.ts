@@ -1,0 +1,129 @@
+/**
+ * The object that a ray meets: first the boxes of the objects that show, then the triangles of those few whose
+ * box is nearer than what was met. What is hidden or cut away is not there. No GPU is asked.
+ */
+import { type BufferAttribute, type InterleavedBufferAttribute, Matrix4, Vector3 } from "three";
+import { type Clip, isKept } from "../math/clip";
+import { along, type Ray } from "../math/vec3";
+import type { ShownSurface } from "../state/on_screen";
+import { GONE } from "./flags";
+import { ROW } from "./object_material";
+
+/** `distance`: in lengths of the ray's direction. */
+export type MetObject = Readonly<{ row: number; distance: number; tile: string }>;
+
+type Attribute = BufferAttribute | InterleavedBufferAttribute;
+/** By row: the first of its indices, and the one after its last. */
+type Ranges = ReadonlyMap<number, readonly [number, number]>;
+
+const made = new WeakMap<object, Ranges>();
+
+/** An object's triangles lie together. */
+function rangesOf(index: BufferAttribute, rows: Attribute): Ranges {
+  const found = made.get(index);
+  if (found !== undefined) return found;
+  const ranges = new Map<number, readonly [number, number]>();
+  let start = 0;
+  for (let i = 3; i <= index.count; i += 3) {
+    const row = rows.getX(index.getX(start));
+    if (i < index.count && rows.getX(index.getX(i)) === row) continue;
+    ranges.set(row, [start, i]);
+    start = i;
+  }
+  made.set(index, ranges);
+  return ranges;
+}
+
+/** Where a ray enters a row's box, and where it leaves it; false: it misses it. */
+function entry(boxes: Float32Array, row: number, { origin, direction }: Ray): number | false {
+  let [from, to] = [0, Number.POSITIVE_INFINITY];
+  for (let k = 0; k < 3; k++) {
+    const [low, high] = [boxes[6 * row + k], boxes[6 * row + 3 + k]];
+    if (direction[k] === 0) {
+      if (origin[k] < low || origin[k] > high) return false;
+      continue;
+    }
+    const a = (low - origin[k]) / direction[k];
+    const b = (high - origin[k]) / direction[k];
+    from = Math.max(from, Math.min(a, b));
+    to = Math.min(to, Math.max(a, b));
+    if (from > to) return false;
+  }
+  return from;
+}
+
+const toMesh = new Matrix4();
+const [start, way] = [new Vector3(), new Vector3()];
+const [a, ab, ac, n, off] = Array.from({ length: 5 }, () => new Vector3());
+
+/**
+ * @param ray um, world
+ * @param world of the space that the ray is in: the specimen's
+ * @param surfaces the meshes on screen, of one channel
+ * @param flags by row: see flags.ts
+ */
+export function pickObject(
+  ray: Ray,
+  world: Matrix4,
+  surfaces: readonly ShownSurface[],
+  boxes: Float32Array,
+  flags: Uint8Array,
+  clip: Clip,
+): MetObject | null {
+  const near: [row: number, from: number][] = [];
+  for (let row = 0; row < flags.length; row++) {
+    if (flags[row] === GONE) continue;
+    const from = entry(boxes, row, ray);
+    if (from !== false) near.push([row, from]);
+  }
+  near.sort((one, other) => one[1] - other[1]);
+  let best: MetObject | null = null;
+  for (const [row, from] of near) {
+    if (best !== null && from > best.distance) break;
+    for (const { mesh, tile } of surfaces) {
+      const { index, attributes } = mesh.geometry;
+      if (index === null || attributes[ROW] === undefined) continue;
+      const range = rangesOf(index, attributes[ROW] as Attribute).get(row);
+      if (range === undefined) continue;
+      toMesh.copy(mesh.matrixWorld).invert().multiply(world);
+      start.fromArray(ray.origin).applyMatrix4(toMesh);
+      way
+        .fromArray(along(ray.origin, ray.direction, 1))
+        .applyMatrix4(toMesh)
+        .sub(start);
+      const limit = best?.distance ?? Number.POSITIVE_INFINITY;
+      const isThere = (t: number) => isKept(along(ray.origin, ray.direction, t), clip);
+      const distance = nearest(index, attributes.position as Attribute, range, limit, isThere);
+      if (distance !== null) best = { row, distance, tile };
+    }
+  }
+  return best;
+}
+
+/** Of the triangles that `start` and `way` meet, from either side. Möller and Trumbore 1997. */
+function nearest(
+  index: BufferAttribute,
+  position: Attribute,
+  [from, to]: readonly [number, number],
+  limit: number,
+  isThere: (distance: number) => boolean,
+): number | null {
+  let best: number | null = null;
+  for (let i = from; i < to; i += 3) {
+    a.fromBufferAttribute(position, index.getX(i));
+    ab.fromBufferAttribute(position, index.getX(i + 1)).sub(a);
+    ac.fromBufferAttribute(position, index.getX(i + 2)).sub(a);
+    n.crossVectors(way, ac);
+    const det = ab.dot(n);
+    if (det === 0) continue;
+    off.subVectors(start, a);
+    const u = off.dot(n) / det;
+    if (u < 0 || u > 1) continue;
+    off.cross(ab);
+    const v = way.dot(off) / det;
+    if (v < 0 || u + v > 1) continue;
+    const t = ac.dot(off) / det;
+    if (t > 0 && t < (best ?? limit) && isThere(t)) best = t;
+  }
+  return best;
+}

@@ -1,0 +1,43 @@
+import { expect, it } from "vitest";
+import { byteAt, categoryAt, countBytes, inLasso, numberText, placeOf, unitText } from "./pictures";
+import { sampleContent } from "./sample_table";
+
+it("bytes are counted, all and those that show", () => {
+  const [all, left] = countBytes(Uint8Array.of(0, 1, 1, 255), Uint8Array.of(1, 0, 3, 1));
+  expect([all[0], all[1], all[255]]).toEqual([1, 2, 1]);
+  expect([left[0], left[1], left[255]]).toEqual([1, 1, 1]);
+});
+
+it("a byte has a place, and a place a byte", () => {
+  for (const byte of [1, 2, 100, 255]) expect(byteAt(placeOf(byte))).toBe(byte);
+  expect([byteAt(-1), byteAt(2)]).toEqual([1, 255]);
+});
+
+it("rows of a picture are categories, the last one those without", () => {
+  const column = sampleContent().columns[1];
+  expect([0, 0.4, 0.7, 1].map((down) => categoryAt(column, 3, down))).toEqual([0, 1, -1, -1]);
+  expect([0.4, 1].map((down) => categoryAt(column, 0, down))).toEqual([0, 1]);
+});
+
+it("a lasso holds the points inside it that show and have both values", () => {
+  const xs = Uint8Array.of(128, 1, 128, 0, 128);
+  const ys = Uint8Array.of(128, 1, 200, 128, 128);
+  const flags = Uint8Array.of(1, 1, 1, 1, 0);
+  const middle = [
+    [0.4, 0.4],
+    [0.6, 0.4],
+    [0.6, 0.6],
+    [0.4, 0.6],
+  ] as const;
+  expect(inLasso(middle, flags, [xs, ys])).toEqual([0]);
+  const upper = middle.map(([x, y]) => [x, y - 0.3] as const); // up is smaller
+  expect(inLasso(upper, flags, [xs, ys])).toEqual([2]);
+});
+
+it("numbers have three digits, and units their signs", () => {
+  const texts = [0, 1.2345, 12.345, 123.45, 12345.6, 1.5e7, 0.000123, -4.5, Number.NaN];
+  expect(texts.map(numberText)).toEqual([
+    ...["0", "1.23", "12.3", "123", "12 346", "1.50e7", "1.23e-4", "-4.5", ""],
+  ]);
+  expect(["um", "um2", "um3", "counts"].map(unitText)).toEqual(["µm", "µm²", "µm³", "counts"]);
+});

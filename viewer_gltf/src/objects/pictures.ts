@@ -1,0 +1,209 @@
+/** What the panel draws of a table: a column's histogram, its categories, two columns against each other. */
+import type { ObjectColumn } from "../bundle/generated/objects";
+import type { ObjectView } from "../state/objects";
+import { GONE, SELECTED } from "./flags";
+import { byteValue } from "./palettes";
+import type { ObjectTable } from "./table";
+
+type Context = CanvasRenderingContext2D;
+
+const BINS = 64;
+/** The page's own: see panel/html/page.css. */
+const [INK, LINE, TEXT, DIM] = ["#0b0d12", "#3a4458", "#e6e9f0", "#a3adbd"];
+const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif";
+/** Most points of a scatter plot: more would be one on the other. */
+const MOST_POINTS = 20_000;
+
+/** Share of a picture's width at which a byte lies. */
+export const placeOf = (byte: number) => (byte - 1) / 254;
+export const byteAt = (place: number) => Math.round(1 + 254 * Math.min(1, Math.max(0, place)));
+
+/** Three digits, and units of their own for what is large: 12.3, 1 230, 4.5 M. */
+export function numberText(value: number): string {
+  if (!Number.isFinite(value)) return "";
+  const size = Math.abs(value);
+  if (size >= 1e6 || (size < 1e-3 && size > 0)) return value.toExponential(2).replace("e+", "e");
+  const digits = size >= 100 ? 0 : Math.max(0, 2 - Math.floor(Math.log10(size || 1)));
+  return Number(value.toFixed(digits)).toLocaleString("en").replaceAll(",", " ");
+}
+
+export function unitText(unit: string): string {
+  return unit.replace(/^um/, "µm").replace(/3$/, "³").replace(/2$/, "²");
+}
+
+/** How many rows have each of 256 bytes: all, and those that show. */
+export function countBytes(
+  bytes: Uint8Array,
+  flags: Uint8Array,
+): readonly [all: Uint32Array, left: Uint32Array] {
+  const all = new Uint32Array(256);
+  const left = new Uint32Array(256);
+  for (let row = 0; row < bytes.length; row++) {
+    all[bytes[row]]++;
+    if (flags[row] !== GONE) left[bytes[row]]++;
+  }
+  return [all, left];
+}
+
+const css = (colors: Uint8Array, byte: number) =>
+  `rgb(${colors[4 * byte]} ${colors[4 * byte + 1]} ${colors[4 * byte + 2]})`;
+
+/** Numbers: what shows in its colour, what does not in grey; the brush's ends, and the palette under it. */
+export function drawHistogram(
+  context: Context,
+  width: number,
+  height: number,
+  column: ObjectColumn,
+  counts: readonly [Uint32Array, Uint32Array],
+  colors: Uint8Array,
+  brush: readonly [number, number],
+): void {
+  const foot = Math.round(0.3 * height);
+  const tall = height - foot;
+  context.fillStyle = INK;
+  context.fillRect(0, 0, width, tall);
+  const binned = counts.map((each) => {
+    const bins = new Array<number>(BINS).fill(0);
+    for (let byte = 1; byte < 256; byte++) bins[((byte - 1) * BINS) >> 8] += each[byte];
+    return bins;
+  });
+  const most = Math.max(1, ...binned[0]);
+  const heightOf = (count: number) =>
+    count === 0 ? 0 : Math.max(2, tall * Math.sqrt(count / most));
+  for (let bin = 0; bin < BINS; bin++) {
+    const x = (bin / BINS) * width;
+    const bar = (count: number, fill: string) => {
+      context.fillStyle = fill;
+      context.fillRect(x, tall - heightOf(count), width / BINS - 1, heightOf(count));
+    };
+    bar(binned[0][bin], LINE);
+    bar(binned[1][bin], css(colors, 1 + Math.floor(((bin + 0.5) / BINS) * 255)));
+  }
+  for (let i = 0; i < 128; i++) {
+    context.fillStyle = css(colors, byteAt(i / 127));
+    context.fillRect((i / 128) * width, tall + 2, width / 128 + 1, 0.2 * foot);
+  }
+  context.fillStyle = TEXT;
+  for (const byte of brush) context.fillRect(placeOf(byte) * (width - 3), 0, 3, tall + 0.2 * foot);
+  const { range, unit } = column;
+  if (range === undefined) return;
+  context.font = `500 ${Math.round(0.48 * foot)}px ${FONT}`;
+  context.textBaseline = "bottom";
+  const places = [
+    ["left", 0, 1],
+    ["center", 0.5, 128],
+    ["right", 1, 255],
+  ] as const;
+  for (const [align, at, byte] of places) {
+    context.textAlign = align;
+    context.fillStyle = DIM;
+    const words = numberText(byteValue(range, byte));
+    context.fillText(at === 1 ? `${words} ${unitText(unit)}`.trim() : words, at * width, height);
+  }
+}
+
+/** A row a category: its colour, name and number; what is left out is dim. The last is what has none. */
+export function drawCategories(
+  context: Context,
+  width: number,
+  height: number,
+  { categories }: ObjectColumn,
+  [all, left]: readonly [Uint32Array, Uint32Array],
+  colors: Uint8Array,
+  without: readonly number[],
+): void {
+  const names = [...(categories ?? []), ...(all[0] > 0 ? ["(none)"] : [])];
+  const count = categories?.length ?? 0;
+  const row = height / names.length;
+  const size = Math.round(0.55 * row);
+  context.font = `500 ${size}px ${FONT}`;
+  context.textBaseline = "middle";
+  names.forEach((name, i) => {
+    const byte = i < count ? i + 1 : 0;
+    const isOut = without.includes(byte - 1);
+    const y = i * row;
+    context.globalAlpha = isOut ? 0.35 : 1;
+    context.fillStyle = css(colors, byte);
+    context.fillRect(0, y + 0.15 * row, 0.9 * row, 0.7 * row);
+    context.fillStyle = TEXT;
+    context.textAlign = "left";
+    context.fillText(name, 1.2 * row, y + row / 2, 0.62 * width);
+    context.textAlign = "right";
+    context.fillStyle = DIM;
+    context.fillText(`${left[byte]} of ${all[byte]}`, width, y + row / 2);
+    context.globalAlpha = 1;
+  });
+}
+
+/** Which category a picture's row is: an index, or -1 for what has none. */
+export function categoryAt({ categories }: ObjectColumn, missing: number, down: number): number {
+  const known = categories?.length ?? 0;
+  const count = known + (missing > 0 ? 1 : 0);
+  const i = Math.min(count - 1, Math.max(0, Math.floor(down * count)));
+  return i < known ? i : -1;
+}
+
+/** Objects as points, those that show; the selected ones light, with the lasso round them. */
+export function drawScatter(
+  context: Context,
+  width: number,
+  height: number,
+  table: ObjectTable,
+  view: ObjectView,
+  flags: Uint8Array,
+  [xs, ys]: readonly [Uint8Array, Uint8Array],
+  colorOf: (row: number) => string,
+): void {
+  context.fillStyle = INK;
+  context.fillRect(0, 0, width, height);
+  const dot = Math.max(2, width / (table.count > 2000 ? 220 : 90));
+  const step = Math.max(1, Math.ceil(table.count / MOST_POINTS));
+  const put = (row: number, by: number) =>
+    context.fillRect(
+      placeOf(xs[row]) * (width - dot) - by,
+      (1 - placeOf(ys[row])) * (height - dot) - by,
+      dot + 2 * by,
+      dot + 2 * by,
+    );
+  for (let row = 0; row < table.count; row += step) {
+    if (flags[row] === GONE || xs[row] === 0 || ys[row] === 0) continue;
+    context.fillStyle = TEXT;
+    if (flags[row] >= SELECTED) put(row, 1.5);
+    context.fillStyle = colorOf(row);
+    put(row, 0);
+  }
+  if (view.lasso.length < 2) return;
+  context.beginPath();
+  view.lasso.forEach(([x, y], i) => {
+    if (i === 0) context.moveTo(x * width, y * height);
+    else context.lineTo(x * width, y * height);
+  });
+  context.closePath();
+  context.strokeStyle = TEXT;
+  context.lineWidth = 2;
+  context.stroke();
+}
+
+/** The rows that show whose points lie in the lasso. */
+export function inLasso(
+  lasso: ObjectView["lasso"],
+  flags: Uint8Array,
+  [xs, ys]: readonly [Uint8Array, Uint8Array],
+): readonly number[] {
+  const rows: number[] = [];
+  for (let row = 0; row < flags.length; row++) {
+    if (flags[row] === GONE || xs[row] === 0 || ys[row] === 0) continue;
+    if (isInside(lasso, placeOf(xs[row]), 1 - placeOf(ys[row]))) rows.push(row);
+  }
+  return rows;
+}
+
+/** Whether a point lies in a polygon: it has an odd number of edges to its right. */
+function isInside(corners: ObjectView["lasso"], x: number, y: number): boolean {
+  let inside = false;
+  corners.forEach(([ax, ay], i) => {
+    const [bx, by] = corners[(i + 1) % corners.length];
+    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) inside = !inside;
+  });
+  return inside;
+}

@@ -1,0 +1,78 @@
+import { describe, expect, it, vi } from "vitest";
+import { BundleError } from "../bundle/errors";
+import { loadedTable, sampleContent, sampleTable } from "./sample_table";
+import { checkObjects, ObjectTable } from "./table";
+
+describe("the table of objects", () => {
+  it("knows the row of a tile's objects, also of those in two tiles", () => {
+    const table = sampleTable();
+    const [first, second] = [table.rowOf("r0_c0"), table.rowOf("r0_c1")];
+    expect([0, 1].map(first)).toEqual([0, 1]);
+    expect([0, 3, 4, 5].map(second)).toEqual([2, 5, 1, -1]);
+    expect(table.rowOf("elsewhere")(0)).toBe(-1);
+  });
+
+  it("fetches a column once it is asked for, and once only", async () => {
+    const changed = vi.fn();
+    const table = sampleTable(changed);
+    expect(table.bytes("size")).toBeNull();
+    expect(table.bytes("size")).toBeNull();
+    expect(table.isLoading).toBe(true);
+    await vi.waitFor(() => expect(changed).toHaveBeenCalledTimes(1));
+    expect([...(table.bytes("size") ?? [])]).toEqual([0, 1, 64, 128, 200, 255]);
+    expect(table.bytes("no such")).toBeNull();
+    expect(table.isLoading).toBe(false);
+  });
+
+  it("reports a column that does not come, and fetches it again when it is told to", async () => {
+    const failed = vi.fn();
+    const ask = vi.fn(() => Promise.reject(new BundleError("gone")));
+    const table = new ObjectTable(
+      sampleContent(),
+      Uint32Array.of(),
+      new Float32Array(),
+      null,
+      ask,
+      () => {},
+      failed,
+    );
+    table.bytes("size");
+    await vi.waitFor(() => expect(failed).toHaveBeenCalledTimes(1));
+    table.bytes("size");
+    expect(ask).toHaveBeenCalledTimes(1);
+    table.retryFailed();
+    table.bytes("size");
+    expect(ask).toHaveBeenCalledTimes(2);
+  });
+
+  it("finds objects by number and by part of a name, what begins with it first", async () => {
+    const table = await loadedTable();
+    expect(table.find("KIDNEY", 5)).toEqual([2, 3]);
+    expect(table.find("l", 2)).toEqual([0, 2]);
+    expect(table.find("104", 5)).toEqual([4]);
+    expect(table.find(" ", 5)).toEqual([]);
+  });
+
+  it("knows neighbours", () => {
+    const table = sampleTable();
+    expect([...table.neighbours(1)]).toEqual([0, 2]);
+    expect([...table.neighbours(5)]).toEqual([]);
+  });
+});
+
+describe("objects.json", () => {
+  it("is refused where a column is too short, and where a tile names rows that are not there", () => {
+    expect(checkObjects(sampleContent(), "o").count).toBe(6);
+    const short = sampleContent();
+    short.columns[0].exact.bytes -= 4;
+    expect(() => checkObjects(short, "o")).toThrow("o: columns: size: expected 6 rows");
+    for (const rows of [
+      { first: 3, count: 4 },
+      { first: 0, count: 1, more: [6] },
+    ]) {
+      const beyond = { ...sampleContent(), tiles: { r0_c0: rows } };
+      expect(() => checkObjects(beyond, "o")).toThrow("o: tiles: r0_c0: a row beyond the 6");
+    }
+    expect(() => checkObjects({ ...sampleContent(), count: -1 }, "o")).toThrow(BundleError);
+  });
+});

@@ -1,0 +1,176 @@
+/** The table of a label map's objects: its rows, and its columns as they are asked for. */
+
+import objectsSchema from "../../../schemas/objects.schema.json";
+import { BundleError } from "../bundle/errors";
+import { fetchFile, parseJson } from "../bundle/fetch";
+import type { FileRef } from "../bundle/generated/bundle";
+import type { ChannelObjects, ObjectColumn } from "../bundle/generated/objects";
+import { checkSchema } from "../bundle/schema_check";
+
+/** Throws BundleError. */
+export function checkObjects(value: unknown, path: string): ChannelObjects {
+  checkSchema(objectsSchema, value, path);
+  const { count, columns, tiles } = value as ChannelObjects;
+  for (const { id, bytes, exact } of columns) {
+    if (bytes.bytes !== count || exact.bytes !== 4 * count) {
+      throw new BundleError(`${path}: columns: ${id}: expected ${count} rows`);
+    }
+  }
+  for (const [tile, { first, count: of, more = [] }] of Object.entries(tiles)) {
+    if (first + of > count || more.some((row) => row >= count)) {
+      throw new BundleError(`${path}: tiles: ${tile}: a row beyond the ${count} that there are`);
+    }
+  }
+  return value as ChannelObjects;
+}
+
+/** Load the list and what is always needed of the table: labels, boxes, neighbours. Throws BundleError. */
+export async function loadObjects(
+  base: string,
+  file: FileRef,
+  onChange: () => void,
+  onError: (error: unknown) => void,
+): Promise<ObjectTable> {
+  const text = new TextDecoder().decode(await fetchFile(base, file));
+  const content = checkObjects(parseJson(text, file.path), file.path);
+  const { labels, boxes, neighbours } = content;
+  const refs = [labels, boxes, ...(neighbours ? [neighbours.first, neighbours.rows] : [])];
+  const [ofLabels, ofBoxes, first, rows] = await Promise.all(
+    refs.map(async (ref) => (await fetchFile(base, ref)).buffer),
+  );
+  const next = first && rows ? [new Uint32Array(first), new Uint32Array(rows)] : null;
+  const fetchOne = async (ref: FileRef) => (await fetchFile(base, ref)).buffer;
+  return new ObjectTable(
+    content,
+    content.label_bytes === 8 ? new BigUint64Array(ofLabels) : new Uint32Array(ofLabels),
+    new Float32Array(ofBoxes),
+    next as [Uint32Array, Uint32Array] | null,
+    fetchOne,
+    onChange,
+    onError,
+  );
+}
+
+export class ObjectTable {
+  private readonly byId: ReadonlyMap<string, ObjectColumn>;
+  private readonly files = new Map<string, ArrayBuffer>();
+  private readonly asked = new Set<string>();
+
+  /** @param fetchOne the bytes of a file of the table */
+  constructor(
+    private readonly content: ChannelObjects,
+    private readonly labels: Uint32Array | BigUint64Array,
+    /** Six a row: least x, y, z and largest, um. */
+    readonly boxes: Float32Array,
+    private readonly next: readonly [first: Uint32Array, rows: Uint32Array] | null,
+    private readonly fetchOne: (file: FileRef) => Promise<ArrayBuffer>,
+    private readonly onChange: () => void,
+    private readonly onError: (error: unknown) => void,
+  ) {
+    this.byId = new Map(content.columns.map((column) => [column.id, column]));
+  }
+
+  get count(): number {
+    return this.content.count;
+  }
+
+  get columns(): readonly ObjectColumn[] {
+    return this.content.columns;
+  }
+
+  /** ID of the column that colours first; "": none does. */
+  get first(): string {
+    return this.byId.has(this.content.default) ? this.content.default : "";
+  }
+
+  /** For people, by row; empty: there are none. */
+  get names(): readonly string[] {
+    return this.content.names;
+  }
+
+  get hasNeighbours(): boolean {
+    return this.next !== null;
+  }
+
+  get isLoading(): boolean {
+    return this.asked.size > 0;
+  }
+
+  column(id: string): ObjectColumn | null {
+    return this.byId.get(id) ?? null;
+  }
+
+  label(row: number): string {
+    return String(this.labels[row]);
+  }
+
+  /** Its name, or its number. */
+  title(row: number): string {
+    return this.content.names[row] || this.label(row);
+  }
+
+  neighbours(row: number): Uint32Array {
+    if (this.next === null) return new Uint32Array();
+    const [first, rows] = this.next;
+    return rows.subarray(first[row], first[row + 1]);
+  }
+
+  /** The row of each feature ID of a tile. */
+  rowOf(tile: string): (feature: number) => number {
+    const { first, count, more = [] } = this.content.tiles[tile] ?? { first: 0, count: 0 };
+    return (feature) => (feature < count ? first + feature : (more[feature - count] ?? -1));
+  }
+
+  /** A byte a row; null: it is on its way. */
+  bytes(id: string): Uint8Array | null {
+    const file = this.file(this.byId.get(id)?.bytes);
+    return file && new Uint8Array(file);
+  }
+
+  /** A number a row; null: they are on their way. */
+  exact(id: string): Float32Array | null {
+    const file = this.file(this.byId.get(id)?.exact);
+    return file && new Float32Array(file);
+  }
+
+  /** Rows whose name or number has these words in it, those that begin with them first. */
+  find(words: string, most: number): readonly number[] {
+    const wanted = words.trim().toLowerCase();
+    if (wanted === "") return [];
+    const starting: number[] = [];
+    const within: number[] = [];
+    for (let row = 0; row < this.count && starting.length < most; row++) {
+      const texts = [this.title(row).toLowerCase(), this.label(row)];
+      if (texts.some((text) => text.startsWith(wanted))) starting.push(row);
+      else if (within.length < most && texts[0].includes(wanted)) within.push(row);
+    }
+    return [...starting, ...within].slice(0, most);
+  }
+
+  private file(ref: FileRef | undefined): ArrayBuffer | null {
+    if (ref === undefined) return null;
+    const found = this.files.get(ref.path);
+    if (found !== undefined) return found;
+    if (this.asked.has(ref.path) || this.failed.has(ref.path)) return null;
+    this.asked.add(ref.path);
+    this.fetchOne(ref)
+      .then(
+        (bytes) => this.files.set(ref.path, bytes),
+        (error) => {
+          this.failed.add(ref.path);
+          this.onError(error);
+        },
+      )
+      .finally(() => {
+        this.asked.delete(ref.path);
+        this.onChange();
+      });
+    return null;
+  }
+
+  private readonly failed = new Set<string>();
+
+  retryFailed(): void {
+    this.failed.clear();
+  }
+}

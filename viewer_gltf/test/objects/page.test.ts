@@ -1,0 +1,248 @@
+/** Objects of a label map in the page: coloured, left out, picked, cut, found, in a link, as a file. */
+import { expect, it } from "vitest";
+import { project } from "../support/browser/camera";
+import { hasColor, isBackground, type Picture, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+import {
+  BEAM,
+  BEAM_MIDDLE,
+  CHANNEL,
+  COLORS,
+  COUNT,
+  centerOf,
+  labelOf,
+  prepareObjects,
+  rowAt,
+} from "../support/object_bundle";
+import { hasPython } from "../support/python";
+
+const FRONT = rowAt(0, 4, 1, 1);
+const BEHIND = rowAt(0, 4, 1, 0);
+
+describeInChromium("the objects of a label map", () => {
+  if (!hasPython) {
+    it.skip("needs Python");
+    return;
+  }
+  const stand = prepareStand({
+    bundle: prepareObjects(),
+    viewport: { width: 900, height: 500 },
+  });
+  const control = (part: string) =>
+    stand.viewer.page.locator(`[data-control="${CHANNEL}/objects-${part}"]`);
+  const view = async () => (await stand.viewer.snapshot()).state.objects[CHANNEL];
+  const shown = () => control("count").innerText();
+
+  /** Where a place shows in the stage's picture. */
+  const spot = (picture: Picture, point: readonly [number, number, number]) =>
+    project(point, stand.manifest.specimen.bounds_um, picture.width, picture.height);
+  const at = (picture: Picture, point: readonly [number, number, number]) => {
+    const { x, y } = spot(picture, point);
+    return picture.at(x, y);
+  };
+  const tap = async (point: readonly [number, number, number]) => {
+    const box = await stand.viewer.page.locator(".stage").boundingBox();
+    if (box === null) throw new Error("no stage");
+    const { x, y } = project(point, stand.manifest.specimen.bounds_um, box.width, box.height);
+    await stand.viewer.page.mouse.click(box.x + x, box.y + y);
+    await stand.viewer.settled();
+  };
+  const choose = async (part: string, value: string) => {
+    await control(part).selectOption(value);
+    await stand.viewer.settled();
+  };
+
+  it("open in the colours of the table's own column, in one draw call a tile", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const picture = await takePicture(stand.viewer.page);
+    for (const row of [
+      rowAt(0, 2, 0, 1),
+      rowAt(0, 3, 1, 1),
+      rowAt(1, 1, 2, 1),
+      rowAt(1, 2, 1, 1),
+    ]) {
+      expect(hasColor(COLORS[row % 3])(at(picture, centerOf(row))), `row ${row}`).toBe(true);
+    }
+    expect(hasColor(COLORS[BEAM % 3])(at(picture, [57, -42.5, 16]))).toBe(true); // in either tile
+    expect(hasColor(COLORS[BEAM % 3])(at(picture, [63, -42.5, 16]))).toBe(true);
+    expect(await shown()).toContain(`${COUNT} of ${COUNT} objects`);
+    expect((await stand.viewer.snapshot()).drawCalls).toBeLessThan(20);
+  });
+
+  it("are coloured anew by one upload of a byte an object", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    await stand.viewer.page.evaluate(() => {
+      const uploads: number[] = [];
+      Object.assign(window, { uploads });
+      const { prototype } = WebGL2RenderingContext;
+      for (const name of ["texImage2D", "texSubImage2D"] as const) {
+        const upload = prototype[name] as (...given: unknown[]) => void;
+        Object.assign(prototype, {
+          [name](this: WebGL2RenderingContext, ...given: unknown[]) {
+            for (const each of given) if (ArrayBuffer.isView(each)) uploads.push(each.byteLength);
+            upload.apply(this, given);
+          },
+        });
+      }
+    });
+    const asked = () => stand.host.requests.map(({ path }) => path);
+    expect(asked().filter((path) => path.includes("CD8"))).toEqual([]);
+    await choose("color-by", "CD8");
+    expect(asked().filter((path) => path.includes("CD8"))).toHaveLength(1);
+    const uploads = () =>
+      stand.viewer.page.evaluate(() =>
+        (window as never as { uploads: number[] }).uploads.splice(0),
+      );
+    expect((await uploads()).sort()).toEqual([1024, 256]); // the palette's table comes with the kind of column
+    await choose("color-by", "x_um");
+    await choose("color-by", "CD8");
+    for (const bytes of await uploads()) expect([256, 1024]).toContain(bytes);
+    const picture = await takePicture(stand.viewer.page);
+    const brightness = (row: number) => at(picture, centerOf(row))[1];
+    expect(brightness(rowAt(1, 4, 1, 1))).toBeGreaterThan(brightness(rowAt(0, 0, 1, 1)) + 40);
+  });
+
+  it("are left out by category and by range, and what is left is counted", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const row = rowAt(0, 3, 1, 1); // 23, of category 2
+    await control("column-cell_type").click({ position: { x: 20, y: 60 } });
+    await stand.viewer.settled();
+    expect((await view()).without.cell_type).toEqual([2]);
+    expect(await shown()).toContain(`${COUNT - 20} of ${COUNT}`);
+    expect(hasColor(COLORS[2])(at(await takePicture(stand.viewer.page), centerOf(row)))).toBe(
+      false,
+    );
+    await choose("filter-by", "x_um");
+    await control("range-x_um-high").fill("127"); // the middle: all of the first tile
+    await stand.viewer.settled();
+    const { ranges } = await view();
+    expect(ranges.x_um[1]).toBe(128);
+    const picture = await takePicture(stand.viewer.page);
+    expect(isBackground(at(picture, centerOf(rowAt(1, 1, 1, 1))))).toBe(true);
+    expect(isBackground(at(picture, centerOf(rowAt(0, 1, 1, 1))))).toBe(false);
+    await control("all").click();
+    await stand.viewer.settled();
+    expect(await shown()).toContain(`${COUNT} of ${COUNT}`);
+  });
+
+  it("open their card by a tap, with all columns; a hidden one lets the tap through", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    await tap(centerOf(FRONT));
+    expect((await view()).picked).toBe(FRONT);
+    await stand.viewer.settled();
+    await expect.poll(() => control("card").innerText()).toContain(String(labelOf(FRONT)));
+    await expect.poll(() => control("card-volume_um3").innerText()).toContain("268 µm³");
+    await expect.poll(() => control("card-cell_type").innerText()).toContain("T cell");
+    await expect.poll(() => control("card-CD8").innerText()).toContain("286 counts");
+    expect(await control("card-next").innerText()).toContain("1");
+    await control("hide").click();
+    await tap(centerOf(FRONT));
+    expect((await view()).picked).toBe(BEHIND);
+    await tap(centerOf(FRONT)); // once more: closed
+    expect((await view()).picked).toBeNull();
+    await tap([63, -42.5, 16]);
+    expect((await view()).picked).toBe(BEAM);
+    await control("only").click();
+    await stand.viewer.settled();
+    const picture = await takePicture(stand.viewer.page);
+    expect(isBackground(at(picture, BEAM_MIDDLE))).toBe(false);
+    expect(isBackground(at(picture, centerOf(BEHIND)))).toBe(true);
+  });
+
+  it("are found by number and flown to", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const { look } = await stand.viewer.snapshot();
+    const wanted = rowAt(1, 4, 2, 1);
+    await control("search").fill(String(labelOf(wanted)));
+    await control(`found-${wanted}`).click();
+    await stand.viewer.settled();
+    const after = await stand.viewer.snapshot();
+    expect(after.state.objects[CHANNEL].picked).toBe(wanted);
+    expect(after.look.target[0]).toBeGreaterThan(look.target[0] + 0.1);
+    const picture = await takePicture(stand.viewer.page);
+    const middle = picture.at(picture.width / 2, picture.height / 2);
+    expect(isBackground(middle)).toBe(false);
+  });
+
+  it("that are cut open are capped in their own colour", async () => {
+    await stand.open("#v=1&cut=0,0,1,18"); // through the middles of those in front
+    await stand.viewer.settled();
+    const picture = await takePicture(stand.viewer.page);
+    for (const row of [rowAt(0, 2, 1, 1), rowAt(0, 3, 1, 1), FRONT, rowAt(1, 2, 1, 1)]) {
+      const [x, y, z] = centerOf(row);
+      const cap = [-2, 0, 2].map((by) => at(picture, [x + by, y, z]));
+      for (const pixel of cap) expect(hasColor(COLORS[row % 3])(pixel), `row ${row}`).toBe(true);
+      const apart = Math.max(...cap[0].map((v, i) => Math.abs(v - cap[2][i])));
+      expect(apart, "flat").toBeLessThan(12);
+    }
+  });
+
+  it("draw in from their walls by the gap", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const drawn = async () =>
+      (await takePicture(stand.viewer.page)).count((pixel) => !isBackground(pixel));
+    const before = await drawn();
+    await control("gap").fill("20");
+    await stand.viewer.settled();
+    expect((await view()).gap_um).toBeCloseTo(2, 1); // half of its 40 steps, of half a ball's width
+    expect(await drawn()).toBeLessThan(0.75 * before);
+  });
+
+  it("are selected by a lasso in the plot, saved as a file, and all of it is in the link", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const { page } = stand.viewer;
+    await choose("scatter-0", "x_um");
+    await choose("scatter-1", "row");
+    const plot = control("scatter");
+    await plot.scrollIntoViewIfNeeded();
+    const box = await plot.boundingBox();
+    if (box === null) throw new Error("no plot");
+    const move = (x: number, y: number) =>
+      page.mouse.move(box.x + x * box.width, box.y + y * box.height, { steps: 3 });
+    await move(0.02, 0.02);
+    await page.mouse.down();
+    for (const [x, y] of [
+      [0.02, 0.98],
+      [0.45, 0.98],
+      [0.45, 0.02],
+      [0.03, 0.02],
+    ])
+      await move(x, y);
+    await page.mouse.up();
+    await stand.viewer.settled();
+    const { selected } = await view();
+    expect(selected).toContain(12);
+    expect(selected.every((row) => centerOf(row)[0] < 0.45 * 108 + 6)).toBe(true);
+    expect(selected.length).toBeGreaterThan(15);
+    const coming = page.waitForEvent("download");
+    await expect
+      .poll(async () => {
+        await page.locator('[data-control="save-objects"]').click();
+        return page.locator("[data-said]").innerText();
+      })
+      .toContain("Saved");
+    const parts: Buffer[] = [];
+    for await (const part of await (await coming).createReadStream()) parts.push(part);
+    const text = Buffer.concat(parts).toString("utf8");
+    const lines = text.trim().split("\r\n");
+    expect(lines[0]).toBe("label,name,volume_um3 (um3),x_um (um),CD8 (counts),row,cell_type");
+    expect(lines).toHaveLength(selected.length + 1);
+    await choose("color-by", "CD8");
+    await page.keyboard.press("l");
+    await expect.poll(() => page.evaluate(() => location.hash)).toContain("objects=");
+    const linked = await view();
+    const hash = await page.evaluate(() => location.hash);
+    await stand.open(hash);
+    await stand.viewer.settled();
+    await expect.poll(async () => (await view()).selected).toEqual(selected);
+    expect(await view()).toEqual({ ...linked, lasso: [], aim: null });
+  });
+});
