@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from support import phantoms
 from support.exhaustive import IS_EXHAUSTIVE
+from support.long_files import LONG_FILES
 from support.object_store import VERSITYGW
 
 CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": "00FF80"}]
@@ -24,15 +25,16 @@ CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave sweeps to `make test-exhaustive`, and let files with slow tests begin.
+    """Leave sweeps to `make test-exhaustive`, and let files that take long begin.
 
-    A process takes files whole and in this order: a slow one at the end would run alone.
+    A process takes files whole and in this order: a long one at the end would run alone.
     """
     if not IS_EXHAUSTIVE:
         of_sweeps = {item: item.get_closest_marker("exhaustive") is not None for item in items}
         config.hook.pytest_deselected(items=[item for item in items if of_sweeps[item]])
         items[:] = [item for item in items if not of_sweeps[item]]
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    slow.update(LONG_FILES)
     items.sort(key=lambda item: -slow[item.path])  # stable: a file's tests stay together
 
 

@@ -1,7 +1,9 @@
+import { availableParallelism } from "node:os";
 import { fileURLToPath } from "node:url";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 import { finishBuild } from "./scripts/finish_build.ts";
+import { LongestFirst } from "./scripts/longest_first.ts";
 import { oneChunk } from "./scripts/one_chunk.ts";
 
 const SERVICE_WORKER = "sw.js";
@@ -112,6 +114,7 @@ export default defineConfig({
     },
   },
   test: {
+    sequence: { sequencer: LongestFirst },
     projects: [
       {
         extends: true,
@@ -132,9 +135,11 @@ export default defineConfig({
           globalSetup: "test/support/browser/shared_fixture.ts",
           testTimeout: 180_000,
           hookTimeout: 180_000,
-          expect: { poll: { timeout: 20_000 } }, // its usual second is short for a busy machine
-          fileParallelism: false, // one software-rendering page at a time
+          expect: { poll: { timeout: 90_000 } }, // its usual second is short for a busy machine
+          // one page for each core: software draws it, mostly in one thread, and it waits between
+          maxWorkers: Math.min(availableParallelism(), 8),
           isolate: false,
+          sequence: { groupOrder: 1 }, // not beside the other project's
           // where others have the cores a browser may miss a moment; what is wrong is wrong twice
           retry: process.env.CI === undefined ? 0 : 1,
         },

@@ -2,10 +2,14 @@
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from support.long_files import LONG_FILES
 
 TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent
@@ -92,3 +96,16 @@ def test_folders_of_browser_tests_are_those_of_the_viewer() -> None:
     mirrored = {name for name in folders(VIEWER / "test") if name.split("/")[0] not in OF_THE_PAGE}
     assert mirrored - folders(VIEWER / "src") == set()
     assert {name.split("/")[0] for name in folders(VIEWER / "test")} >= OF_THE_PAGE
+
+
+def test_files_that_begin_since_they_take_long_exist() -> None:
+    assert [file for file in LONG_FILES if not file.is_file()] == []
+
+
+def test_long_files_begin() -> None:
+    files = ["filters/test_background.py", "isosurface/test_channel_level.py"]
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-o", "addopts="]
+    command += ["--import-mode=importlib", *(str(TESTS / file) for file in files)]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    names = re.findall(r"^tests/(.*?\.py)::", found, re.MULTILINE)
+    assert list(dict.fromkeys(names)) == files[::-1]

@@ -207,7 +207,7 @@ def test_what_can_not_be_is_told_in_a_line(checkout: Path, make: Make) -> None:
         ({"INPUT": "a", "ARGS": 'say "x'}, 'ARGS is say "x: No closing quotation, expected words'),
         ({}, "INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder"),
         ({"INPUT": "a", "OUT": ""}, "OUT is empty, expected OUT=folder"),
-        ({"SAMPLE": "%"}, "SAMPLE is %, expected cycif, brain-cells or mri"),
+        ({"SAMPLE": "%"}, "SAMPLE is %, expected cycif, brain-cells, mri or cells"),
         ({"SAMPLE": "cycif mri"}, "SAMPLE is cycif mri, expected"),
         ({"SAMPLE": "$(shell touch pwned)"}, "SAMPLE is $(shell touch pwned), expected"),
     ):

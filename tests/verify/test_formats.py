@@ -44,9 +44,9 @@ def lines(out):
     return {line.name: line for line in check(out)}
 
 
-def failed(out):
+def failed(found):
     """Names of the lines that fail, but for the plan, which these folders don't have."""
-    return {name for name, line in lines(out).items() if not line.ok} - {"plan"}
+    return {name for name, line in found.items() if not line.ok} - {"plan"}
 
 
 def change_byte(path):
@@ -66,12 +66,14 @@ def node():
 
 @pytest.mark.usefixtures("node")
 def test_what_the_pipeline_writes_passes_all_checks(made):
-    assert failed(made) == set()
-    assert lines(made)["glTF validator"].detail == "3 files"
+    found = lines(made)
+    assert failed(found) == set()
+    assert found["glTF validator"].detail == "3 files"
 
 
 def test_what_needs_no_node_passes(made):
-    assert failed(made) <= {"glTF validator", "KTX2 textures"}
+    found = lines(made)
+    assert failed(found) <= {"glTF validator", "KTX2 textures"}
 
 
 @pytest.mark.parametrize("name", [".", "missing"])
@@ -87,7 +89,8 @@ def test_a_bundle_by_itself_is_checked_as_in_its_build(out):
     assert alone == {name: whole[name] for name in alone}
     assert set(whole) - set(alone) == {"plan", "stage hashes", "stage", "stage files", "usdz"}
     change_byte(out / "bundle" / VOLUME)
-    assert "hashes" in failed(out / "bundle")
+    found = lines(out / "bundle")
+    assert "hashes" in failed(found)
 
 
 def test_a_bundle_by_itself_has_no_source_to_be_held_against(out, capfd):
@@ -107,14 +110,16 @@ def test_a_build_without_anything_in_it_fails_in_every_line(tmp_path):
 @pytest.mark.parametrize("name", [GLB, VOLUME])
 def test_changed_byte_is_found(out, name):
     change_byte(out / "bundle" / name)
-    assert "hashes" in failed(out)
-    assert f"{name}: not the bytes" in lines(out)["hashes"].detail
+    found = lines(out)
+    assert "hashes" in failed(found)
+    assert f"{name}: not the bytes" in found["hashes"].detail
 
 
 def test_changed_byte_of_a_surface_is_not_what_its_tileset_says(out):
     change_byte(out / "bundle" / GLB)
-    assert "tilesets" in failed(out)
-    detail = lines(out)["tilesets"].detail
+    found = lines(out)
+    assert "tilesets" in failed(found)
+    detail = found["tilesets"].detail
     assert "CD31/tileset.json: r0_c0/lod0.glb: expected sha-256-128 " in detail
     assert "lod1.glb" not in detail
 
@@ -122,8 +127,9 @@ def test_changed_byte_of_a_surface_is_not_what_its_tileset_says(out):
 def test_changed_byte_of_a_level_is_not_what_its_list_says(out):
     """The finest level lies last."""
     change_byte(out / "bundle" / VOLUME)
-    assert "volume lists" in failed(out)
-    detail = lines(out)["volume lists"].detail
+    found = lines(out)
+    assert "volume lists" in failed(found)
+    detail = found["volume lists"].detail
     assert f"{VOLUME}: level 0: expected SHA-256 " in detail
     assert "level 1" not in detail
 
@@ -131,38 +137,44 @@ def test_changed_byte_of_a_level_is_not_what_its_list_says(out):
 def test_surface_without_a_hash_is_found(out):
     path = out / "bundle" / "channels/CD31/tileset.json"
     path.write_text(path.read_text().replace("sha-256-128", "md5", 1))
-    assert "has no hash, expected extras.sha-256-128" in lines(out)["tilesets"].detail
+    found = lines(out)
+    assert "has no hash, expected extras.sha-256-128" in found["tilesets"].detail
 
 
 def test_level_without_a_hash_is_found(out):
     path = out / "bundle" / "channels/CD31/volumes.json"
     path.write_text(re.sub(r'("length":\d+),"sha256":"\w+"', r"\1", path.read_text(), count=1))
-    assert "'sha256' is a required property" in lines(out)["volume lists"].detail
+    found = lines(out)
+    assert "'sha256' is a required property" in found["volume lists"].detail
 
 
 def test_missing_and_unlisted_files_are_found(out):
     (out / "bundle" / GLB).rename(out / "bundle" / "lost.glb")
-    assert {"hashes", "tilesets"} <= failed(out)
-    assert f"{GLB}: missing" in lines(out)["hashes"].detail
-    assert "lost.glb: not in files.json" in lines(out)["hashes"].detail
-    assert "no file at r0_c0/lod0.glb" in lines(out)["tilesets"].detail
+    found = lines(out)
+    assert {"hashes", "tilesets"} <= failed(found)
+    assert f"{GLB}: missing" in found["hashes"].detail
+    assert "lost.glb: not in files.json" in found["hashes"].detail
+    assert "no file at r0_c0/lod0.glb" in found["tilesets"].detail
 
 
 def test_reference_to_other_bytes_is_found(out):
     manifest = out / "bundle" / "manifest.json"
     manifest.write_text(manifest.read_text().replace('"sha256": "', '"sha256": "00000000', 1))
-    assert "hashes" in failed(out)
+    found = lines(out)
+    assert "hashes" in failed(found)
 
 
 def test_unknown_version_is_found(out):
     manifest = out / "bundle" / "manifest.json"
     manifest.write_text(manifest.read_text().replace('"version": 1', '"version": 2'))
-    assert lines(out)["manifest"].detail.count("$.version: 1 was expected") == 1
+    found = lines(out)
+    assert found["manifest"].detail.count("$.version: 1 was expected") == 1
 
 
 def test_broken_json_is_found(out):
     (out / "bundle" / "files.json").write_text("{")
-    assert "no JSON" in lines(out)["file list"].detail
+    found = lines(out)
+    assert "no JSON" in found["file list"].detail
 
 
 def test_level_that_lies_elsewhere_is_found(out):
@@ -170,13 +182,15 @@ def test_level_that_lies_elsewhere_is_found(out):
     text = path.read_text()
     offset = text.split('"offset":')[1].split(",")[0]
     path.write_text(text.replace(f'"offset":{offset}', f'"offset":{int(offset) + 1}', 1))
-    assert "lie elsewhere" in lines(out)["volume lists"].detail
+    found = lines(out)
+    assert "lie elsewhere" in found["volume lists"].detail
 
 
 def test_tileset_whose_errors_grow_is_found(out):
     path = out / "bundle" / "channels/CD31/tileset.json"
     path.write_text(path.read_text().replace('"geometricError":0.0', '"geometricError":9.0'))
-    assert "larger geometricError" in lines(out)["tilesets"].detail
+    found = lines(out)
+    assert "larger geometricError" in found["tilesets"].detail
 
 
 @pytest.mark.usefixtures("node")
@@ -192,14 +206,16 @@ def test_a_build_without_any_surface_passes(tmp_path):
     )
     write_list(tmp_path / "stage", {}, tmp_path / "stage")
     write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, run=Engine(0).run)
-    assert failed(tmp_path) == set()
-    assert lines(tmp_path)["glTF validator"].detail == "0 files: no channel has a surface"
+    found = lines(tmp_path)
+    assert failed(found) == set()
+    assert found["glTF validator"].detail == "0 files: no channel has a surface"
 
 
 def test_lost_meshes_are_not_taken_for_a_build_without_any_surface(out):
     for path in (out / "bundle").rglob("*.glb"):
         path.unlink()
-    assert "glTF validator" in failed(out)
+    found = lines(out)
+    assert "glTF validator" in failed(found)
 
 
 @pytest.mark.parametrize(
@@ -208,8 +224,9 @@ def test_lost_meshes_are_not_taken_for_a_build_without_any_surface(out):
 def test_cut_file_of_the_stage_is_found(out, path, capfd):
     spoilt = out / "stage" / path
     spoilt.write_bytes(spoilt.read_bytes()[:-20])
-    assert "stage files" in failed(out)
-    assert f"{path}: can't be read as" in lines(out)["stage files"].detail
+    found = lines(out)
+    assert "stage files" in failed(found)
+    assert f"{path}: can't be read as" in found["stage files"].detail
     assert capfd.readouterr().err == ""
 
 
@@ -246,22 +263,26 @@ def test_closed_copies_are_counted(out, with_copies):
 def test_cut_closed_copy_is_found(out, with_copies):
     data = with_copies.read_bytes()
     with_copies.write_bytes(data[:-50])
-    detail = lines(out)["stage files"].detail
+    found = lines(out)
+    detail = found["stage files"].detail
     assert f"CD31_closed.stl: can't be read as STL: {len(data) - 50} bytes, expected" in detail
     with_copies.write_bytes(data[:60])
-    assert "its header was cut short" in lines(out)["stage files"].detail
+    found = lines(out)
+    assert "its header was cut short" in found["stage files"].detail
 
 
 def test_lost_closed_copy_is_found(out, with_copies):
     with_copies.unlink()
-    detail = lines(out)["stage files"].detail
+    found = lines(out)
+    detail = found["stage files"].detail
     assert detail.startswith(f"{with_copies}: missing, expected as surface.closed_tiles is on")
     assert "Hoechst" not in detail
 
 
 def test_stage_with_a_lost_file_is_found(out):
     (out / "stage" / "tiles" / "r0_c0" / "CD31.vdb").unlink()
-    assert "CD31.vdb" in lines(out)["stage"].detail
+    found = lines(out)
+    assert "CD31.vdb" in found["stage"].detail
 
 
 @pytest.mark.usefixtures("node")
@@ -271,7 +292,8 @@ def test_positions_that_leave_their_bounds_are_found_inside_the_compression(out)
     at = data.index(b'"max":[') + len(b'"max":[')
     digit = b"1" if data[at : at + 1] != b"1" else b"2"
     path.write_bytes(data[:at] + digit + data[at + 1 :])
-    detail = lines(out)["glTF validator"].detail
+    found = lines(out)
+    detail = found["glTF validator"].detail
     assert "decompressed: ACCESSOR_MAX_MISMATCH" in detail
 
 
@@ -279,7 +301,8 @@ def test_positions_that_leave_their_bounds_are_found_inside_the_compression(out)
 def test_cut_texture_is_found(out):
     path = out / "bundle" / "volumes/r0_c0/CD31.ktx2"
     path.write_bytes(path.read_bytes()[:-100])
-    assert "CD31.ktx2" in lines(out)["KTX2 textures"].detail
+    found = lines(out)
+    assert "CD31.ktx2" in found["KTX2 textures"].detail
 
 
 def test_missing_node_is_named(made, monkeypatch):
@@ -292,7 +315,8 @@ def test_missing_node_is_named(made, monkeypatch):
 def test_missing_packages_are_named(made, monkeypatch):
     answer = subprocess.CompletedProcess([], 1, "", "Error [ERR_MODULE_NOT_FOUND]: no package")
     monkeypatch.setattr(subprocess, "run", lambda *args, **options: answer)
-    assert "run `make setup`" in lines(made)["glTF validator"].detail
+    found = lines(made)
+    assert "run `make setup`" in found["glTF validator"].detail
 
 
 @pytest.fixture

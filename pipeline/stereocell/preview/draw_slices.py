@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from matplotlib import get_data_path
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
@@ -282,7 +282,11 @@ def _write_ends(
 @cache
 def find_font(size: int) -> ImageFont.FreeTypeFont:
     """Return a font that ships with matplotlib and that has a micro sign; `size` in pixels."""
-    return ImageFont.truetype(Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf", size)
+    place = find_spec("matplotlib")  # is not imported for a file's name: that takes .2 s
+    if place is None or place.origin is None:
+        raise ModuleNotFoundError("matplotlib is not installed, expected the font that it ships")
+    fonts = Path(place.origin).parent / "mpl-data" / "fonts" / "ttf"
+    return ImageFont.truetype(fonts / "DejaVuSans.ttf", size)
 
 
 def _scale_bar(draw: ImageDraw.ImageDraw, xy: tuple[int, int], scale: float, weight: float) -> None:

@@ -95,8 +95,15 @@ def _reach(
             waiting += imports
     known = _distributions()
     tops = foreign - sys.stdlib_module_names
-    versions = {made.name: made.version for top in tops for made in known[top]}
-    return tuple(sorted(found)), tuple(sorted(versions.items()))
+    versions = {_version(package) for top in tops for package in known[top]}
+    return tuple(sorted(found)), tuple(sorted(versions))
+
+
+@cache
+def _version(package: Distribution) -> tuple[str, str]:
+    """Return a package's name and version; each time they are asked for, its metadata is parsed."""
+    metadata = package.metadata
+    return metadata["Name"], metadata["Version"]
 
 
 def _is_below(name: str, parts: Collection[str]) -> bool:

@@ -35,6 +35,8 @@ export class Hybrid {
   /** The same in the specimen, um. */
   readonly apex_um = new Vector3();
   readonly axis_um = new Vector3(0, 0, -1);
+  /** How far the disc has opened, and how far it can; a frame's budget may show less of it. */
+  private opened_rad = 0;
   private reach_rad = 0;
   private rested_s = 0;
   private readonly toSpecimen = new Matrix4();
@@ -73,7 +75,6 @@ export class Hybrid {
     const before = this.focusTiles;
     const couldRefine = this.mayRefine;
     const set_rad = state.discRadius_deg * RADIANS;
-    const limit_rad = set_rad * this.radiusShare;
     this.focusTiles = advanceFocus(before, {
       gaze: { origin: this.apex_um.toArray(), direction: this.axis_um.toArray() },
       tiles: shownTiles(this.manifest.tiles, state.isolated),
@@ -86,16 +87,16 @@ export class Hybrid {
       before.focusTile === this.focusTiles.focusTile &&
       before.disc.join() === this.focusTiles.disc.join();
     this.rested_s = isSame ? this.rested_s + dt_s : 0;
-    const reach = Math.min(limit_rad, discReach(this.focusTiles, set_rad, isReady));
-    const opened = this.outer_rad + (limit_rad / OPENING_S) * dt_s;
-    this.outer_rad = state.mode === "disc" ? Math.min(reach, opened) : 0;
-    this.reach_rad = reach;
+    this.reach_rad = discReach(this.focusTiles, set_rad, isReady);
+    const opened = this.opened_rad + (set_rad / OPENING_S) * dt_s;
+    this.opened_rad = state.mode === "disc" ? Math.min(this.reach_rad, opened) : 0;
+    this.outer_rad = Math.min(this.opened_rad, set_rad * this.radiusShare);
     return !isSame || couldRefine !== this.mayRefine;
   }
 
   /** Whether the next frame differs though nothing moves. */
   isChanging(state: ViewerState): boolean {
-    const isOpening = state.mode === "disc" && this.outer_rad < this.reach_rad;
+    const isOpening = state.mode === "disc" && this.opened_rad < this.reach_rad;
     return isOpening || !this.mayRefine || isWaiting(this.focusTiles);
   }
 }

@@ -137,7 +137,7 @@ describeInChromium("what the page saves", () => {
 });
 
 describeInChromium("a traced picture that the page saves", () => {
-  const stand = prepareStand({ viewport: { width: 200, height: 160 }, pixelRatio: 0.5 });
+  const stand = prepareStand({ viewport: { width: 120, height: 96 }, pixelRatio: 0.5 });
   const page = () => stand.viewer.page;
   const said = () => page().locator("[data-said]").textContent();
 

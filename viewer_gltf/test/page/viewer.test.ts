@@ -12,14 +12,6 @@ const VIEWPORT = { width: 480, height: 270 };
 const withSurface = ({ manifest }: Stand) =>
   manifest.channels.filter(({ tileset }) => tileset !== null);
 
-async function showOnly({ viewer }: Stand, id: string): Promise<void> {
-  const { state } = await viewer.snapshot();
-  for (const channel of state.channels) {
-    const isShown = channel.id === id;
-    if (channel.shown !== isShown) await viewer.show(channel.id, isShown);
-  }
-}
-
 describeInChromium("the demo", () => {
   const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: VIEWPORT, sharesPage: true });
   /** Of the requests that the page made until it had all: levels of surfaces, in their order. */
@@ -48,7 +40,7 @@ describeInChromium("the demo", () => {
     const all = await takePicture(stand.viewer.page);
     expect(all.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     for (const { id, color } of withSurface(stand)) {
-      await showOnly(stand, id);
+      await stand.viewer.showOnly(id);
       expect((await takePicture(stand.viewer.page)).count(hasColor(color)), id).toBeGreaterThan(
         100,
       );
@@ -90,7 +82,7 @@ describeInChromium("the viewer", () => {
     const { id, color } = withSurface(stand)[0];
     await stand.open();
     await stand.viewer.settled();
-    await showOnly(stand, id);
+    await stand.viewer.showOnly(id);
     expect((await picture()).count(hasColor(color))).toBeGreaterThan(100);
     await stand.viewer.show(id, false);
     expect((await picture()).count((pixel) => !isBackground(pixel))).toBe(0);
@@ -101,7 +93,7 @@ describeInChromium("the viewer", () => {
     const chosen: Pixel = [1, 0, 1];
     await stand.open();
     await stand.viewer.settled();
-    await showOnly(stand, id);
+    await stand.viewer.showOnly(id);
     await stand.viewer.recolor(id, "#ff00ff");
     const surface = await picture();
     expect(surface.count(hasColor(chosen))).toBeGreaterThan(100);
@@ -125,7 +117,7 @@ describeInChromium("the viewer", () => {
   /** One channel, as a volume in one tile alone. */
   async function openTileOf(id: string): Promise<string> {
     await stand.open("&mode=off&switch=9"); // else it may have begun to load others, and this one
-    await showOnly(stand, id);
+    await stand.viewer.showOnly(id);
     const [{ id: tile }] = stand.manifest.tiles;
     await stand.viewer.chooseTile(tile);
     await stand.viewer.chooseMode("tile");

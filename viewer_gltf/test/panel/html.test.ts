@@ -299,9 +299,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
       "4 channels show at once: F body left for Marker 42.",
     );
     expect((await state()).notices).toEqual([]); // it is no fault, and goes by itself
-    await expect
-      .poll(() => page().locator("[data-said]").textContent(), { timeout: 8000 })
-      .toBe("");
+    await expect.poll(() => page().locator("[data-said]").textContent()).toBe("");
     if (SHOTS !== undefined) await page().screenshot({ path: join(SHOTS, "channels-70.png") });
   });
 });

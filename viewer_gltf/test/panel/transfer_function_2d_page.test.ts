@@ -91,7 +91,7 @@ describeInChromium("the editor of value and gradient", () => {
     expect(added.values[0]).toBeCloseTo(0.4 + 2 / 255, 3);
     await page().keyboard.press("l");
     await expect.poll(said).not.toBe("");
-    await expect.poll(said, { timeout: 20_000 }).toBe(""); // it lies over the picture
+    await expect.poll(said).toBe(""); // it lies over the picture
     const own = await picture();
     const address = page().url();
     await page().goto("about:blank");

@@ -6,6 +6,7 @@ import { addClock, holdFrames, tick } from "../support/browser/clock";
 import { isBackground, type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
+import { sweep } from "../support/exhaustive";
 import { BALLS } from "../support/fixture/bodies";
 
 const VIEWPORT = { width: 480, height: 272 };
@@ -32,7 +33,7 @@ function rimOf(disc: Picture, within: Picture, without: Picture) {
 describeInChromium("a channel without a surface", () => {
   const stand = prepareStand({ viewport: VIEWPORT, fixture: { hasReason: true } });
 
-  for (const quality of ["high", "low"]) {
+  for (const quality of sweep(["high", "low"], (each) => each === "high")) {
     it(`is a volume on both sides of the rim, which is nowhere outside both: ${quality}`, async () => {
       const at = async (query: string) => {
         await stand.open(`${query}&disc=${DISC_DEG}&quality=${quality}#v=1&depth=0`);
@@ -119,7 +120,7 @@ describeInChromium("surface or volume", () => {
     expect(apart(disc, off, 0.65 * DISC_DEG, 0.95 * DISC_DEG)).toBeGreaterThan(20); // the feather
   });
 
-  for (const quality of ["high", "low"]) {
+  for (const quality of sweep(["high", "low"], (each) => each === "low")) {
     it(`has a rim that is nowhere outside both pictures, quality ${quality}`, async () => {
       const [disc, all, off] = await inModes(["disc", "all", "off"], quality, "#v=1&depth=0");
       const { outside, between } = rimOf(disc, all, off);
@@ -131,8 +132,8 @@ describeInChromium("surface or volume", () => {
   it("takes another colour in the same frame, surface and volume", async () => {
     const { page } = stand.viewer;
     await addClock(page);
-    await stand.open(`&mode=disc${NEAR}&disc=${DISC_DEG}&quality=high`);
-    for (const { id } of stand.manifest.channels) await stand.viewer.show(id, id === "Balls");
+    await stand.open(`&mode=disc${NEAR}&disc=${DISC_DEG}&quality=high#v=1&c=Balls`);
+    await stand.viewer.settled();
     await stand.viewer.recolor("Balls", "#ff0000");
     expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);
     const count = async (channel: 0 | 1) =>
@@ -287,8 +288,8 @@ describeInChromium("surface or volume", () => {
 
   it("looks alike at fewer pixels and steps", async () => {
     const blockAt = async (quality: string) => {
-      await stand.open(`&mode=all&quality=${quality}`);
-      for (const { id } of stand.manifest.channels) await stand.viewer.show(id, id === "Block");
+      await stand.open(`&mode=all&quality=${quality}#v=1&c=Block`);
+      await stand.viewer.settled();
       return takePicture(stand.viewer.page);
     };
     const [high, low] = [await blockAt("high"), await blockAt("low")];

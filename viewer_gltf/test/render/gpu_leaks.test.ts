@@ -80,7 +80,7 @@ describeInChromium("changing tiles", () => {
     expect(first.Buffer).toBeGreaterThan(0);
     await show(SWITCHES);
     // what a worker still makes is let go a moment later; a leak stays
-    await expect.poll(counts, { timeout: 10_000 }).toEqual(first);
+    await expect.poll(counts).toEqual(first);
     expect(await heapBytes()).toBeLessThan(firstBytes + HEAP_SLACK_BYTES);
   });
 
@@ -102,6 +102,6 @@ describeInChromium("changing tiles", () => {
     await blink(2);
     const first = await counts();
     await blink(4);
-    await expect.poll(counts, { timeout: 10_000 }).toEqual(first);
+    await expect.poll(counts).toEqual(first);
   });
 });

@@ -65,7 +65,7 @@ describeInChromium("the share link", () => {
       return ["eye", "pose"].flatMap((name) => parts.get(name)?.split(",").map(Number) ?? []);
     };
     /** What is announced before the eyes has gone. */
-    const silent = () => expect.poll(told, { timeout: 20_000 }).toEqual([]);
+    const silent = () => expect.poll(told).toEqual([]);
     const told = async () => (await stand.viewer.snapshot()).told;
     const expectSame = (found: readonly number[], wanted: readonly number[]) => {
       expect(found).toHaveLength(wanted.length);

@@ -4,6 +4,7 @@ import { project } from "../support/browser/camera";
 import { difference, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
+import { sweep } from "../support/exhaustive";
 
 const SHOTS = process.env.STEREOCELL_SHOTS;
 
@@ -106,7 +107,7 @@ describeInChromium("planes in the specimen", () => {
   const viewport = { width: 480, height: 272 };
   const stand = prepareStand({ viewport });
 
-  for (const mode of ["off", "all"]) {
+  for (const mode of sweep(["off", "all"], (each) => each === "all")) {
     it(`are not hidden by what lies between them and the eye, volumes ${mode}`, async () => {
       const { min, max } = stand.manifest.specimen.bounds_um;
       const at = async (cut: string) => {

@@ -18,7 +18,7 @@ describeInChromium("the picture of the fixture", () => {
 
   beforeEach(async () => {
     await stand.open();
-    for (const { id } of stand.manifest.channels) await stand.viewer.show(id, false);
+    await stand.viewer.showOnly();
   });
 
   function spotOf({ width, height }: Picture, point: readonly [number, number, number]) {

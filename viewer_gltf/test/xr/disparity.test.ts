@@ -28,7 +28,7 @@ describeInChromium("in stereo", () => {
   it("surfaces hide volumes, and volumes veil surfaces, for both eyes", async () => {
     await addHeadset(stand.viewer.page);
     await stand.open("&mode=all&quality=high");
-    for (const { id } of stand.manifest.channels) await stand.viewer.show(id, false);
+    await stand.viewer.showOnly();
     await stand.viewer.showAs("Block", "volume");
     await stand.viewer.show("Block", false);
     await stand.viewer.showAs("Balls", "surface");
@@ -110,8 +110,7 @@ describeInChromium("in stereo", () => {
   ] as const) {
     it(`a ball's middle lies where both eyes should see it, as a ${as}`, async () => {
       await addHeadset(stand.viewer.page);
-      await stand.open(`${query}&quality=high`);
-      for (const { id } of stand.manifest.channels) await stand.viewer.show(id, id === "Balls");
+      await stand.open(`${query}&quality=high#v=1&c=Balls`);
       await stand.viewer.enterStereo();
       await stand.viewer.settled();
 

@@ -133,13 +133,13 @@ describeInChromium("hands on the picture", () => {
         await stand.viewer.page.mouse.click(box.x + x, box.y + y);
       }
       const points = async () => (await stand.viewer.snapshot()).state.measured.length;
-      await expect.poll(points, { timeout: 15_000 }).toBe(2);
+      await expect.poll(points).toBe(2);
       const values = async () => (await stand.viewer.snapshot()).measuredValues;
       const least = async () => {
         const [one = [], two = []] = await values();
         return Math.min(one.length, two.length);
       };
-      await expect.poll(least, { timeout: 15_000 }).toBeGreaterThan(0);
+      await expect.poll(least).toBeGreaterThan(0);
       await stand.viewer.unfold("measure");
       const [first, second] = (await values()).map((lines) => lines.join(" · "));
       expect([first, second].join()).toMatch(/\d.*,.*\d/);

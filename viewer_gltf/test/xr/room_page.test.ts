@@ -91,7 +91,7 @@ describeInChromium("the specimen in the user's room", () => {
     ["traced paths", "&mode=traced"],
   ])("has nothing behind it: %s", async (what, query) => {
     await enter(query, false);
-    await expect.poll(async () => (await coverage())[0], { timeout: 30_000 }).toBeGreaterThan(0.5);
+    await expect.poll(async () => (await coverage())[0]).toBeGreaterThan(0.5);
     const [clear, opaque, glowing] = await coverage();
     expect(clear).toBeLessThan(0.995);
     if (what === "surfaces") expect(opaque).toBeGreaterThan(0.005);

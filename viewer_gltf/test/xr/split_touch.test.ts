@@ -17,7 +17,7 @@ describeInChromium("fingers in a Cardboard", () => {
     await page.locator('[data-overlay="stereo"]').tap(); // on the picture: a phone has no headset
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
     const told = async () => (await stand.viewer.snapshot()).told.length;
-    await expect.poll(told, { timeout: 30_000 }).toBe(0);
+    await expect.poll(told).toBe(0);
     const chosen = async () => {
       const { selected, isolated } = (await stand.viewer.snapshot()).state;
       return [selected, isolated];

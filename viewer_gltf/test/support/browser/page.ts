@@ -56,6 +56,15 @@ export class ViewerPage {
     await this.settled();
   }
 
+  /** Show these channels and no others; at once, since each picture in between takes a while. */
+  async showOnly(...channels: readonly string[]): Promise<void> {
+    const { state } = await this.snapshot();
+    const others = state.channels.filter(({ id, shown }) => shown && !channels.includes(id));
+    for (const { id } of others) await this.part(id, "shown").setChecked(false);
+    for (const id of channels) await this.part(id, "shown").setChecked(true);
+    await this.settled();
+  }
+
   async drawVolume(channel: string, isVolume: boolean): Promise<void> {
     // The checkbox lies invisible under its label's text, which is what a person clicks.
     await this.part(channel, "volume").setChecked(isVolume, { force: true });

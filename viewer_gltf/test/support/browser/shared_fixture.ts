@@ -1,4 +1,7 @@
-/** What all files of tests share: the browser, and the synthetic bundle, which none changes. */
+/**
+ * What all files of tests share: the synthetic bundle, which none changes, and browsers, one for each
+ * file that runs at a time.
+ */
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -10,8 +13,8 @@ declare module "vitest" {
   interface ProvidedContext {
     /** The bundle's folder. */
     fixture: string;
-    /** The browser's address; null where there is none. */
-    chromium: string | null;
+    /** The browsers' addresses; none where there is no Chromium. */
+    chromium: readonly string[];
   }
 }
 
@@ -19,10 +22,14 @@ export default async function setup(project: TestProject): Promise<() => Promise
   const folder = await mkdtemp(join(tmpdir(), "stereocell-fixture-"));
   await writeFixture(folder);
   project.provide("fixture", folder);
-  const browser = hasChromium() ? await serveChromium() : null;
-  project.provide("chromium", browser?.wsEndpoint() ?? null);
+  const count = hasChromium() ? (project.config.maxWorkers ?? 1) : 0;
+  const browsers = await Promise.all(Array.from({ length: count }, serveChromium));
+  project.provide(
+    "chromium",
+    browsers.map((browser) => browser.wsEndpoint()),
+  );
   return async () => {
-    await browser?.close();
+    await Promise.all(browsers.map((browser) => browser.close()));
     await rm(folder, { recursive: true, force: true });
   };
 }

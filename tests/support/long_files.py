@@ -1,0 +1,20 @@
+"""Files of many tests, none of which is slow: they take 10 to 30 s in all."""
+
+from pathlib import Path
+
+_TESTS = Path(__file__).parents[1]
+LONG_FILES = [
+    _TESTS / f"{name}.py"
+    for name in (
+        "building/test_stated_level",
+        "isosurface/test_channel_level",
+        "objects/test_label_rule",
+        "objects/test_walls",
+        "preview/test_iso_value",
+        "report/test_page",
+        "storage/test_cache_key",
+        "system/test_doctor",
+        "system/test_integrity",
+        "verify/test_formats",
+    )
+]
