@@ -26,7 +26,10 @@ export const TRACED_SAMPLES = 192;
 const POLL_MS = 20;
 /** Longest time that a frame counts, s: nobody looked at a page that slept. */
 const LONGEST_FRAME_S = 0.1;
-/** The same for fades, after a frame that was drawn and took as long: what fades out is not drawn for ever. */
+/**
+ * The same for fades and notices, after a frame that was drawn and took as long: on a slow device, too, they end
+ * when they shall.
+ */
 const LONGEST_FADE_S = 1;
 
 /** Pixels of the volumes, as a share of the picture's along an edge: with fewer they are blocks. */
@@ -168,7 +171,7 @@ export class FrameLoop {
     this.picture.isSeeThrough = stereo.isInUsersRoom;
     const isStereo = inRoom !== null;
     const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
-    if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state);
+    if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state, fade_s);
     const { isChanging, isFading } = this.advance(dt_s, fade_s);
     const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
     const isDue = this.resting.isDue(time_ms) && this.hasCome;

@@ -53,6 +53,8 @@ export class SliceImages {
   /** Changes with every picture. */
   version = 0;
   isLoading = false;
+  /** Whether there is anything to cut: until then the pictures are black. */
+  hasCome = false;
   private readonly cache: TexelCache;
   private state: ViewerState | null = null;
   private layers: readonly Layer[] = [];
@@ -155,6 +157,7 @@ export class SliceImages {
         );
         if (this.isDisposed || wanted !== this.loaded) return; // something else is wanted by now
         this.layers = layers;
+        this.hasCome = true;
         this.sampled = "";
         this.draw();
       }

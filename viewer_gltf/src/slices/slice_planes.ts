@@ -55,6 +55,10 @@ class Planes {
       side: DoubleSide,
       toneMapped: false,
       fog: false,
+      // surfaces end at the planes: their last pixels would be as near as those of the picture
+      polygonOffset: true,
+      polygonOffsetFactor: -2,
+      polygonOffsetUnits: -8,
     });
     this.mesh = new Mesh(geometry, material);
     this.mesh.frustumCulled = false;
@@ -137,8 +141,8 @@ export class SlicePlanes {
   }
 
   follow(areShown: boolean): void {
-    const { frames, box, point } = this.images;
-    this.group.visible = areShown && frames !== null;
+    const { frames, box, point, hasCome } = this.images;
+    this.group.visible = areShown && hasCome && frames !== null;
     if (!this.group.visible || frames === null) return;
     this.planes.place(frames, box);
     const place = JSON.stringify(frames);

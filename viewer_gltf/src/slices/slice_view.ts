@@ -35,6 +35,8 @@ class Picture {
   private pointed: Vec3 | null = null;
   /** For what was measured. */
   private isAsking = false;
+  /** As values. */
+  private written = "";
 
   constructor(
     index: number,
@@ -97,8 +99,14 @@ class Picture {
 
   private writeValues(): void {
     const at = this.place;
-    const text = this.images.valuesAt(at).join(" · ");
-    setText(this.values, text);
+    const values = this.images.valuesAt(at);
+    const text = values.length > 0 || this.images.hasCome ? values.join(" · ") : "loading …";
+    if (text !== this.written) {
+      // a line breaks between channels, never between a value and its name
+      const parts = values.length > 0 ? values : [text];
+      this.values.replaceChildren(...parts.map((textContent) => element("span", { textContent })));
+    }
+    this.written = text;
     const [left, right, top, bottom] = this.frame?.ends ?? [];
     this.plane.ariaLabel =
       `Slice ${this.frame?.name}: ${left} on the left, ${right} on the right, ${top} up, ` +
@@ -217,7 +225,6 @@ export class SliceView {
     this.root.append(...this.pictures.map(({ root }) => root));
     this.root.hidden = true;
     view.append(this.root);
-    images.onPaint = () => this.update(!this.root.hidden);
   }
 
   update(areShown: boolean): void {

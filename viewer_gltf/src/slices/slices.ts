@@ -36,13 +36,18 @@ export class Slices {
       },
       window: (wider, higher) => this.shiftWindow(wider, higher),
     });
+    this.images.onPaint = () => this.show();
   }
 
   follow(state: ViewerState): void {
     this.state = state;
     this.images.follow(state);
-    this.planes.follow(state.hasSlicePlanes);
-    this.pictures.update(state.hasSlicePictures);
+    this.show();
+  }
+
+  private show(): void {
+    this.planes.follow(this.state.hasSlicePlanes);
+    this.pictures.update(this.state.hasSlicePictures);
   }
 
   update(sight: Sight): void {

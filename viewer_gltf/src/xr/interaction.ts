@@ -203,8 +203,12 @@ export class Hands {
     );
   }
 
-  /** Once a frame of stereo, before it is drawn. True if the picture differs from the last one. */
-  update(dt_s: number, head: Matrix4, state: ViewerState): boolean {
+  /**
+   * Once a frame of stereo, before it is drawn. True if the picture differs from the last one.
+   *
+   * @param read_s for which notices could be read, s: of a slow frame more than what hands can move in
+   */
+  update(dt_s: number, head: Matrix4, state: ViewerState, read_s = dt_s): boolean {
     if (!this.isRunning) return false;
     const { xr } = this.options;
     this.gaze = gazeOf(head);
@@ -219,7 +223,7 @@ export class Hands {
     const hasFollowed = this.followHead(dt_s, state);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
     const isRepainted = this.panel.update(dt_s, head, state);
-    const isNoticeNew = this.notice.update(dt_s, head);
+    const isNoticeNew = this.notice.update(read_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
     if (fired?.key === GAZE_SWITCH && state.isDwellOn) this.announce(KEEPS_GAZE);

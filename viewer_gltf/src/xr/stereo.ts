@@ -243,7 +243,9 @@ export class Stereo {
   }
 
   private begin(session: XRSession | null): void {
+    const isInHand = session?.interactionMode === "screen-space";
     this.hands.panel.isTableBelow = this.isInUsersRoom;
+    this.hands.panel.isOverTable = this.isInUsersRoom && !isInHand;
     this.options.onStart();
     this.hands.start(session);
     if (isToBeTold()) this.hands.announce(HOW_IT_WORKS);

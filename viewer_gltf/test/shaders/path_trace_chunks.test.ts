@@ -261,6 +261,10 @@ describeInChromium("the path tracer's chunks", () => {
   });
 
   describe("the medium", () => {
+    /** Planes beyond which nothing lies. */
+    const NOWHERE = Array(3).fill([0, 0, 0, 1]);
+    const cornerOf = (planes: readonly (readonly number[])[]) =>
+      `const vec4 uCorner[3] = vec4[3](${planes.map((each) => vec(...each)).join(", ")});`;
     const entry = (c: number, i: number) => [
       i / 255,
       1 - i / 255,
@@ -270,8 +274,9 @@ describeInChromium("the path tracer's chunks", () => {
     const table = [0, 1].flatMap((c) => Array.from({ length: 256 }, (_, i) => entry(c, i)).flat());
     const medium = (channels: number, intensities: readonly number[]) =>
       run(
-        ["medium"],
+        ["in_corner", "medium"],
         `#define CHANNELS ${channels}
+         ${cornerOf(NOWHERE)}
          const vec3 uTexLow = vec3(0.25, 0.75, 0.25); const vec3 uTexPerUm = vec3(0.5, -0.5, 0.25);
          vec4 sampleIntensities(vec3 p) { return vec4(p, 0.0); }`,
         `oColor = mediumOf(${vec(...intensities)});`,
@@ -302,11 +307,36 @@ describeInChromium("the path tracer's chunks", () => {
     it("is found by the box's um, with rows that run against y", async () => {
       const textures = { uMedium: floats([256, 2], table) };
       const head = `#define CHANNELS 1
+        ${cornerOf(NOWHERE)}
         const vec3 uTexLow = vec3(0.25, 0.75, 0.25); const vec3 uTexPerUm = vec3(0.5, -0.5, 0.25);
         vec4 sampleIntensities(vec3 p) { return vec4(p.y, 0.0, 0.0, 0.0); }`;
       const body = "oColor = mediumAt(vec3(0.3, 0.5, 0.1));"; // texture y 0.5
-      const [red] = await run(["medium"], head, body, textures);
+      const [red] = await run(["in_corner", "medium"], head, body, textures);
       expect(red).toBeCloseTo(0.5, 4);
+    });
+
+    it("is none in the corner before the slices: light that is scattered goes through it", async () => {
+      const at = async (...p: number[]) => {
+        const head = `#define CHANNELS 1
+          ${cornerOf([
+            [1, 0, 0, 2],
+            [0, 1, 0, 3],
+            [0, 0, -1, -1], // z < 1
+          ])}
+          const vec3 uTexLow = vec3(0.0); const vec3 uTexPerUm = vec3(0.1);
+          vec4 sampleIntensities(vec3 p) { return vec4(1.0); }`;
+        const body = `oColor = mediumAt(${vec(...p)});`;
+        const textures = { uMedium: floats([256, 2], table) };
+        return (await run(["in_corner", "medium"], head, body, textures))[3];
+      };
+      expect(await at(2.1, 3.1, 0.9)).toBe(0);
+      for (const p of [
+        [1.9, 3.1, 0.9],
+        [2.1, 2.9, 0.9],
+        [2.1, 3.1, 1.1],
+      ]) {
+        expect(await at(...p)).toBeCloseTo(255 ** 2, 1);
+      }
     });
   });
 

@@ -88,6 +88,14 @@ describeInChromium("the ray-march", () => {
     }
   });
 
+  it("has no light where the benchmark compares it with others", async () => {
+    const through = (isUnlit: boolean) =>
+      bare.call("meanAlong", "over", "uniform", 67, 20, [0, 1], isUnlit);
+    const [[lit], [red, , , alpha]] = [await through(false), await through(true)];
+    expect(red).toBeCloseTo(alpha, 2); // white as it is
+    expect(Math.abs(lit - alpha)).toBeGreaterThan(0.03);
+  });
+
   it("finds the largest value along a ray, whatever lies before it", async () => {
     const [red, , , alpha] = await bare.call("meanAlong", "maximum", "ramp", 67, 20);
     expect(red).toBeGreaterThan(0.97); // the last samples, just before 255

@@ -91,6 +91,45 @@ describeInChromium("slices", () => {
     expect(high - low).toBeCloseTo(0.7, 1);
   });
 
+  it("say all values, and keep letters clear of them and of one another, however little room", async () => {
+    await page().setViewportSize({ width: 560, height: 420 }); // 100 pixels each
+    await plane(1).evaluate((each) => each.style.setProperty("--ratio", "8")); // thin ones
+    const boxes = await page()
+      .locator("figure")
+      .evaluateAll((figures) =>
+        figures.map((figure) => {
+          const boxOf = (each: Element) => {
+            const { left, right, top, bottom } = each.getBoundingClientRect();
+            return { left, right, top, bottom };
+          };
+          const all = (what: string) => [...figure.querySelectorAll(what)].map(boxOf);
+          return { figure: boxOf(figure), letters: all(".end"), values: all(".values span") };
+        }),
+      );
+    await page().setViewportSize({ width: 720, height: 420 });
+    type Box = (typeof boxes)[number]["figure"];
+    const areApart = (a: Box, b: Box) =>
+      a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+    expect(boxes.length).toBe(3);
+    for (const { figure, letters, values } of boxes) {
+      expect(values.length).toBeGreaterThan(2);
+      for (const each of [...letters, ...values]) {
+        expect(each.left).toBeGreaterThanOrEqual(figure.left);
+        expect(each.right).toBeLessThanOrEqual(figure.right);
+        expect(each.top).toBeGreaterThanOrEqual(figure.top);
+        expect(each.bottom).toBeLessThanOrEqual(figure.bottom);
+      }
+      const [left, right, top, bottom] = letters;
+      for (const [a, b] of [
+        [top, bottom],
+        [left, right],
+        ...values.flatMap((each) => [[each, bottom] as const, [each, left] as const]),
+      ] as const) {
+        expect(areApart(a, b), JSON.stringify([a, b])).toBe(true);
+      }
+    }
+  });
+
   it("stand in the specimen as planes", async () => {
     await page().keyboard.press("\\");
     await stand.viewer.still();
@@ -138,6 +177,33 @@ describeInChromium("planes in the specimen", () => {
       expect(alike / 36 ** 2).toBeGreaterThan(0.9);
     });
   }
+});
+
+describeInChromium("planes whose voxels are on their way", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 320 }, pixelRatio: 0.5 });
+
+  it("hide nothing until there is something to see", async () => {
+    const { page } = stand.viewer;
+    let release = (): void => undefined;
+    const gate = new Promise<void>((resolve) => {
+      release = resolve;
+    });
+    await page.route("**/volumes/**", async (route) => {
+      await gate;
+      await route.continue();
+    });
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    const without = await takePicture(page);
+    await page.keyboard.press("|");
+    await expect.poll(() => page.locator(".slices").count()).toBe(1); // the code has come
+    await page.waitForTimeout(1000);
+    expect(difference(await takePicture(page), without)).toBeLessThan(0.001);
+    release();
+    await expect
+      .poll(async () => difference(await takePicture(page), without), { timeout: 30_000 })
+      .toBeGreaterThan(0.1);
+  });
 });
 
 describeInChromium("slices whose code does not come", () => {

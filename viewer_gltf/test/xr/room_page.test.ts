@@ -108,6 +108,23 @@ describeInChromium("the specimen in the user's room", () => {
     expect(at[1]).toBeCloseTo(floor ? 0.95 : -0.5, 2);
   });
 
+  it.each([
+    ["a headset's panel over it", false],
+    ["a phone's panel before it, as its picture shows no more", true],
+  ])("has %s", async (_, isPhone) => {
+    await enter("&mode=off", isPhone);
+    await page().keyboard.press("h");
+    const menu = async () =>
+      (await stand.viewer.snapshot()).menu.filter(({ id }) => id !== "opener");
+    await expect.poll(async () => (await menu()).length).toBeGreaterThan(3);
+    if (SHOTS) await page().screenshot({ path: join(SHOTS, `room_panel_${isPhone}.png`) });
+    const up_deg = (await menu()).map((each) => each.up_deg);
+    const [lowest, highest] = [Math.min(...up_deg), Math.max(...up_deg)];
+    // its middle is 0.65 m under the eyes and 0.9 m ahead: 36 degrees down, and it is 0.48 m long
+    if (isPhone) expect(highest).toBeLessThan(-15);
+    else expect(lowest).toBeGreaterThan(-16);
+  });
+
   it("is one picture on a phone, and a key leads out of it again", async () => {
     await enter("&mode=off", true);
     if (SHOTS) await page().screenshot({ path: join(SHOTS, "room_phone.png") });

@@ -2,6 +2,7 @@
 import type { Page } from "playwright-core";
 import { expect, it } from "vitest";
 import { addHeadset } from "../support/browser/chromium";
+import { addClock, holdFrames, tick } from "../support/browser/clock";
 import { isBackground, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, prepareStand } from "../support/browser/stand";
@@ -200,10 +201,13 @@ describeInChromium("the page in stereo", () => {
     }
     expect(Math.min(...lit)).toBeGreaterThan(100);
     expect(Math.abs(lit[0] - lit[1])).toBeLessThan(0.2 * lit[0]);
-    // The balls' surface, one a tile, is drawn once for both eyes; each change is told before them.
+    // The balls' surface, one a tile, is drawn once for both eyes; what tells of the change has gone
+    const tellings = async () => (await stand.viewer.snapshot()).told.length;
     const draws = [];
     for (let i = 0; i < 2; i++) {
       await stand.viewer.page.keyboard.press("2");
+      await expect.poll(tellings).toBeGreaterThan(0);
+      await expect.poll(tellings, { timeout: 30_000 }).toBe(0);
       await stand.viewer.page.waitForTimeout(1000);
       draws.push((await stand.viewer.snapshot()).drawCalls);
     }
@@ -212,5 +216,20 @@ describeInChromium("the page in stereo", () => {
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
     expect((await stand.viewer.snapshot()).told).toEqual([]);
     expect((await state()).selected).not.toBeNull(); // Escape has done no more than that
+  });
+
+  it("says how to go about for 5 s, however few frames these are", async () => {
+    const { page } = stand.viewer;
+    await addClock(page);
+    await page.addInitScript(() => localStorage.removeItem("stereocell-told"));
+    await stand.open("&mode=off");
+    await page.keyboard.press("t");
+    await page.keyboard.press("P");
+    await expect.poll(async () => (await stand.viewer.snapshot()).told.length).toBeGreaterThan(0);
+    await holdFrames(page);
+    const texts = async () => (await stand.viewer.snapshot()).told;
+    const before = await texts();
+    await tick(page, 700, 8); // 5.6 s: the oldest has gone, the next one has not
+    expect(await texts()).toEqual(before.slice(1));
   });
 });

@@ -15,6 +15,7 @@ import { environmentTables } from "viewer/pathtrace/environment_sampling";
 import { START_TRACE } from "viewer/state/path_trace_settings";
 import { Tracer } from "viewer/pathtrace/path_tracer";
 import { Cuts } from "viewer/gpu/clip_planes";
+import { noCorner } from "viewer/gpu/clip_uniforms";
 import { DepthPass } from "viewer/render/depth_pass";
 import { EncodePass } from "viewer/gpu/encode_pass";
 import { Eyes } from "viewer/gpu/eyes";
@@ -28,6 +29,7 @@ const NO_CLIP = {
   min: new Vector3().setScalar(-1e9),
   max: new Vector3().setScalar(1e9),
   plane: new Vector4(0, 0, 0, 1),
+  corner: noCorner(),
 };
 
 class Traced implements Renderer {

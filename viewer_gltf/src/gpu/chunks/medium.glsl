@@ -16,6 +16,7 @@ vec4 mediumOf(vec4 intensity) {
 }
 
 vec4 mediumAt(vec3 p) {
+  if (isInCorner(p)) return vec4(0.0);
   vec3 at = uTexLow + p * uTexPerUm;
 #ifdef TWO_D
   return mediumOf2d(sampleIntensities(at), steepnessOf(stepsAt(at, uVoxel * abs(uTexPerUm))));

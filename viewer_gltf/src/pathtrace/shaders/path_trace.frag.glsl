@@ -71,6 +71,7 @@ layout(location = 1) out vec4 oMoments;
 #include <chunks/transfer_table_2d>
 #include <chunks/medium_2d>
 #endif
+#include <chunks/in_corner>
 #include <chunks/medium>
 #include <chunks/delta_tracking>
 #include <chunks/reproject_search>

@@ -45,7 +45,14 @@ export type TileMatter = Readonly<{
 }>;
 
 /** What a cut leaves, um, world. */
-export type Cut = Readonly<{ box: Box; plane: readonly [number, number, number, number] }>;
+export type Cut = Readonly<{
+  box: Box;
+  /** Unit normal and offset. */
+  plane: Plane;
+  /** What lies beyond all of them is gone. */
+  corner: readonly Plane[];
+}>;
+type Plane = readonly [number, number, number, number];
 
 /** The finest grid round a box that has no more cells than there may be. */
 export function gridRound({ min, max }: Box, most = MOST_CELLS): Grid {
@@ -143,7 +150,6 @@ function addTile(through: Float32Array, grid: Grid, tile: TileMatter): void {
 /** What is cut away lets all light through. */
 function clear(through: Float32Array, { low, edge, size: [nx, ny, nz] }: Grid, cut: Cut): void {
   const { min, max } = cut.box;
-  const [a, b, c, d] = cut.plane;
   for (let z = 0, at = 0; z < nz; z++) {
     const pz = low[2] + (z + 0.5) * edge;
     for (let y = 0; y < ny; y++) {
@@ -151,7 +157,9 @@ function clear(through: Float32Array, { low, edge, size: [nx, ny, nz] }: Grid, c
       const isOut = pz < min[2] || pz > max[2] || py < min[1] || py > max[1];
       for (let x = 0; x < nx; x++, at++) {
         const px = low[0] + (x + 0.5) * edge;
-        if (isOut || px < min[0] || px > max[0] || a * px + b * py + c * pz > d) through[at] = 1;
+        const isBeyond = ([a, b, c, d]: Plane) => a * px + b * py + c * pz > d;
+        const isGone = isOut || px < min[0] || px > max[0] || isBeyond(cut.plane);
+        if (isGone || cut.corner.every(isBeyond)) through[at] = 1;
       }
     }
   }

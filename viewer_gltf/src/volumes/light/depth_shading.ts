@@ -220,10 +220,11 @@ function middles({ bricks }: Packed, channel: number): Uint8Array {
 /** The same ones for the same ranges: others ask for other shades. */
 const MIDDLES = new WeakMap<Uint8Array, Uint8Array>();
 
-function cutOf({ min, max, plane }: MarchClip): Cut {
+function cutOf({ min, max, plane, corner }: MarchClip): Cut {
   return {
     box: { min: asVec3(min), max: asVec3(max) },
-    plane: [plane.x, plane.y, plane.z, plane.w],
+    plane: plane.toArray(),
+    corner: corner.map((each) => each.toArray()),
   };
 }
 

@@ -160,10 +160,20 @@ describe("the grid of cells", () => {
 
   it("is empty where it is cut away", () => {
     const box = { min: [0, 0, 0], max: [16, 16, 8] } as const;
-    const through = throughCells(grid, [tile(9, 255)], { box, plane: [1, 0, 0, 8] });
+    const through = throughCells(grid, [tile(9, 255)], {
+      box,
+      plane: [1, 0, 0, 8],
+      corner: [
+        [-1, 0, 0, -2],
+        [0, -1, 0, -4],
+        [0, 0, -1, -3],
+      ], // x < 2, y < 4, z < 3
+    });
     const [n] = grid.size;
     expect(through[(4 * n + 8) * n + 4]).toBeCloseTo(0, 3);
     expect(through[(12 * n + 8) * n + 4]).toBe(1); // beyond the box
     expect(through[(4 * n + 8) * n + 12]).toBe(1); // above the plane
+    expect(through[(2 * n + 2) * n + 1]).toBe(1); // in the corner
+    expect(through[(2 * n + 2) * n + 4]).toBeCloseTo(0, 3); // beside it
   });
 });

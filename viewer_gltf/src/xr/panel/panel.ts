@@ -113,6 +113,8 @@ export class RoomPanel {
 
   /** The specimen stands on a table: where the button hangs else it would be before it. */
   isTableBelow = false;
+  /** And the panel, too. A screen in a hand shows the table alone: there it has to be before it. */
+  isOverTable = false;
 
   /** Stereo has begun, or has ended. */
   setShown(isShown: boolean): void {
@@ -145,7 +147,7 @@ export class RoomPanel {
     let isChanged = false;
     if (this.wantsPlace) {
       this.wantsPlace = false;
-      this.open(eye, panelBearing(bearing, this.openerYaw));
+      this.open(eye, panelBearing(bearing, this.openerYaw, this.isOverTable));
       isChanged = true;
     }
     if (!this.isOpen) return isChanged;

@@ -23,6 +23,13 @@ describe("the panel's place", () => {
     }
   });
 
+  it("is over a specimen on a table, between its upper edge and a level gaze", () => {
+    const { pitch } = panelBearing({ yaw: 0, pitch: -0.7 }, 0, true);
+    const upper = Math.atan2(0.24 - 0.5, 0.9); // of 48 cm, their middle half a metre under the eyes
+    expect(pitch - HALF_PITCH).toBeGreaterThan(upper);
+    expect(pitch).toBeLessThan(0);
+  });
+
   it("is where the button was for one who looks straight down, with no heading", () => {
     expect(panelBearing({ yaw: 2, pitch: -85 * DEG }, 0.3).yaw).toBe(0.3);
   });

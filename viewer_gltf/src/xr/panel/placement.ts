@@ -10,6 +10,8 @@ const DEG = Math.PI / 180;
  * and neck go without thinking. While the panel is open the button hangs under it.
  */
 const BELOW = -30 * DEG;
+/** Of the panel behind a specimen on a table, which it stands above: before it, it would hide it. */
+const OVER_TABLE = -5 * DEG;
 /** A head that looks steeper, radians, up or down, has no clear heading. */
 const STEEP = 75 * DEG;
 /** The same below a panel, or below a specimen on a table. */
@@ -53,9 +55,19 @@ function wrapped(angle: number): number {
   return Math.atan2(Math.sin(angle), Math.cos(angle));
 }
 
-/** Where the panel's middle goes: straight below the gaze, whichever way its user has turned. */
-export function panelBearing({ yaw, pitch }: Bearing, openerYaw: number): Bearing {
-  return { yaw: Math.abs(pitch) < STEEP ? yaw : openerYaw, pitch: BELOW };
+/**
+ * Where the panel's middle goes: straight below the gaze, whichever way its user has turned; `isOverTable`: just
+ * below a level gaze.
+ */
+export function panelBearing(
+  { yaw, pitch }: Bearing,
+  openerYaw: number,
+  isOverTable = false,
+): Bearing {
+  return {
+    yaw: Math.abs(pitch) < STEEP ? yaw : openerYaw,
+    pitch: isOverTable ? OVER_TABLE : BELOW,
+  };
 }
 
 /** The button stays where it is until the head has turned away, and while it is looked for. */

@@ -232,6 +232,7 @@ function meanAlong(
   side: number,
   opacity: number,
   window: readonly [number, number] = [0, 1],
+  isUnlit = false,
 ): number[] {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
@@ -247,6 +248,7 @@ function meanAlong(
   const march = marchOf(cube(side), texels, bricks, table, true, depth);
   march.composite(compositing);
   march.setAppearances([{ color: [1, 1, 1], table, window, isInDisc: false }]);
+  if (isUnlit) march.mesh.material.defines.UNLIT = 1;
   const camera = new PerspectiveCamera(0.2, 1, edge, edge * 1000);
   camera.position.set(300 * edge, -edge / 2, edge / 2);
   camera.lookAt(0, -edge / 2, edge / 2);

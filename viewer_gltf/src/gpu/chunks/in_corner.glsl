@@ -1,0 +1,7 @@
+// Whether a point lies in the corner before the slices, in which nothing is.
+bool isInCorner(vec3 p) {
+  for (int i = 0; i < 3; i++) {
+    if (dot(uCorner[i].xyz, p) <= uCorner[i].w) return false;
+  }
+  return true;
+}
