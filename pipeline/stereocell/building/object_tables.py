@@ -120,7 +120,7 @@ def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
         }
         made = category_column(NAMES, texts, "From the label map's file", colors)
         found += [] if made is None else [made]
-    for name, values in notes.properties.items():
+    for name, values in notes.columns.items():
         held = [values.get(label) for label in listed_labels]
         if any(isinstance(value, str) for value in held):
             texts = ["" if value is None else str(value) for value in held]
