@@ -353,3 +353,35 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     voxels = np.asarray(zarr.open_group(sample, mode="r")["0"][3])[::2, ::2, ::2]
     for label, mean in zip(found, column_of(out, "mean_CD3"), strict=True):
         assert mean == pytest.approx(voxels[coarse == label].mean(), rel=1e-5)
+
+
+def test_the_report_and_the_deep_check_tell_of_objects(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    labels = make_tissue(SHAPE, 3).labels
+    source, out = tmp_path / "mask.tif", tmp_path / "out"
+    tifffile.imwrite(source, labels.astype(np.uint16), metadata={"axes": "ZYX"})
+    build(source, out, "--labels", "cells=.", "--spacing-um", "1,0.5,0.5", "--grid", "2x1")
+    count = len(labels_of(out))
+    assert run("report", out) == 0
+    page = (out / "report/index.html").read_text()
+    assert f"cells: {count} objects</h3>" in page
+    said(capsys)
+    assert run("check", out, "--deep", "--workers", 0) == 0
+    told = said(capsys)
+    assert f"ok   cells against source: {count} objects" in told
+    assert "ok   bundle against stage: 8 surfaces" in told
+
+    # a value that nobody counted, in one tile and level, and a surface that is too small
+    layer = Sdf.Layer.FindOrOpen(str(out / "stage/tiles/r0_c0/tile.usdc"))
+    stage = Usd.Stage.Open(layer)
+    stage.GetDefaultPrim().GetVariantSet("lod").SetVariantSelection("lod0")
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/r0_c0/cells/cells_r0_c0"))
+    with stage.GetDefaultPrim().GetVariantSet("lod").GetVariantEditContext():
+        areas = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("area_um2")
+        areas.Set(Vt.FloatArray([2.0, *list(areas.Get())[1:]]))
+    layer.Save()
+    assert run("check", out, "--deep", "--workers", 0) == 1
+    first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
+    wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
+    assert wanted in said(capsys)
