@@ -385,3 +385,26 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
     wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
     assert wanted in said(capsys)
+
+
+@pytest.mark.parametrize("is_alone", [False, True])
+def test_what_is_too_thin_is_named_and_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], is_alone: bool
+) -> None:
+    """Beside a cell, and as all that there is: noise, an empty label map after all."""
+    labels = np.zeros((16, 40, 40), np.uint16)
+    rng = np.random.default_rng(1)
+    labels[:, :, 20:] = rng.integers(0, 2, (16, 40, 20)) * 700
+    if not is_alone:
+        labels[3:12, 5:15, 5:15] = 12
+    source, out = tmp_path / "noise.tif", tmp_path / "out"
+    tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
+    build(source, out, "--labels", "cells=.", "--spacing-um", "1,1,1")
+    told = said(capsys)
+    assert "cells: 1 object left out, too thin to be built, or full of holes: 700" in told
+    assert run("report", out) == 0
+    assert run("check", out, "--deep", "--workers", 0) == 0
+    if is_alone:
+        assert not (out / "bundle/channels/cells/objects.json").exists()
+    else:
+        assert labels_of(out).tolist() == [12]
