@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from corpus.real import data_folder
 from stereocell.meshes.validity import find_defects, label_components
-from stereocell.objects.simplify_walls import simplify_walls
+from stereocell.objects.simplify_walls import keep_volumes, simplify_walls
 from stereocell.objects.walls import Walls, extract_walls, measure_volumes, surfaces_of
 from stereocell.objects.well_composed import make_well_composed
 from support.touching_cells import RADIUS_UM, touching_cells
@@ -173,3 +173,18 @@ def test_masks_of_real_cells(name: str) -> None:
         bias = measure_volumes(walls, objects)[1:] / volumes[1:] - 1
         assert abs(np.median(bias)) < 1e-3
         assert np.abs(np.percentile(bias, [2, 98])).max() < 0.01
+
+
+def test_few_vertices_that_may_move_do_not_go_far() -> None:
+    """However coarse the aim: most of the vertices of so few triangles can't move at all."""
+    levels, volumes, _ = tissue()
+    coarse = levels[-1]
+    low, high = coarse.positions.min(axis=0), coarse.positions.max(axis=0)
+    aim_um = 2.0
+    coarser = simplify_walls(coarse, aim_um, volumes, STEP_UM)
+    assert (coarser.positions > low - 3 * aim_um).all()
+    assert (coarser.positions < high + 3 * aim_um).all()
+    keeps = keep_volumes(
+        coarse, np.arange(len(coarse.positions)) % 9 > 0, aim_um, 3 * volumes, STEP_UM
+    )
+    assert np.abs(keeps.positions - coarse.positions).max() <= aim_um + STEP_UM

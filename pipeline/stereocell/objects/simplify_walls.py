@@ -53,7 +53,9 @@ def simplify_walls(
         fewer = Walls(walls.positions, triangles[~gone], walls.sides[~gone])
         at_fault = find_faults(fewer)
         if not len(at_fault):
-            return keep_volumes(*_compact(fewer, fixed), volumes_um3, step_um)
+            fewer, used = _compact(fewer)
+            most_um = STRAY * max_error_um
+            return keep_volumes(fewer, fixed[used], most_um, volumes_um3, step_um)
         around = np.zeros(len(stays), bool)
         around[at_fault] = True
         around[walls.triangles[around[walls.triangles].any(axis=1)]] = True
@@ -62,9 +64,16 @@ def simplify_walls(
 
 
 def keep_volumes(
-    walls: Walls, fixed: NDArray[np.bool_], volumes_um3: NDArray[np.float64], step_um: float
+    walls: Walls,
+    fixed: NDArray[np.bool_],
+    most_um: float,
+    volumes_um3: NDArray[np.float64],
+    step_um: float,
 ) -> Walls:
     """Return the walls with each object as large as it should be, as far as nothing comes to cross.
+
+    fixed    bool (n,), vertices that stay
+    most_um  how far a vertex may move
 
     Moved is along the volumes' gradients, the least by the areas of the vertices' surroundings: a
     linear system of one unknown an object.
@@ -73,7 +82,7 @@ def keep_volumes(
     positions = walls.positions
     for turn in range(_ROUNDS):
         if turn < _ANEW:  # what can't move makes the others move more
-            positions = put_on_lattice(_moved(walls, volumes_um3, fixed), step_um)
+            positions = put_on_lattice(_moved(walls, volumes_um3, fixed, most_um), step_um)
         at_fault = find_faults(replace(walls, positions=positions))
         if not len(at_fault):
             return replace(walls, positions=positions)
@@ -83,15 +92,22 @@ def keep_volumes(
 
 
 def _moved(
-    walls: Walls, volumes_um3: NDArray[np.float64], fixed: NDArray[np.bool_]
+    walls: Walls,
+    volumes_um3: NDArray[np.float64],
+    fixed: NDArray[np.bool_],
+    most_um: float,
 ) -> NDArray[np.float64]:
-    """Return where the vertices are when each object has its volume (n, 3), um."""
+    """Return where the vertices are when each object has its volume (n, 3), um, if they may go."""
     moved = walls
     for _ in range(_NEWTON):
         missing = volumes_um3[1:] - measure_volumes(moved, len(volumes_um3) - 1)[1:]
         if not (np.abs(missing) > _CLOSE * volumes_um3[1:]).any():
             break
-        moved = replace(moved, positions=moved.positions + _shift(moved, missing, fixed))
+        shift = moved.positions + _shift(moved, missing, fixed) - walls.positions
+        length = np.linalg.norm(shift, axis=1)
+        # few vertices that may move would go anywhere
+        share = np.minimum(1.0, most_um / np.maximum(length, 1e-12))
+        moved = replace(moved, positions=walls.positions + share[:, np.newaxis] * shift)
     return moved.positions
 
 
@@ -160,7 +176,8 @@ def _errors(walls: Walls, max_error_um: float, count: int) -> NDArray[np.float64
     return errors
 
 
-def _compact(walls: Walls, fixed: NDArray[np.bool_]) -> tuple[Walls, NDArray[np.bool_]]:
+def _compact(walls: Walls) -> tuple[Walls, NDArray[np.int32]]:
+    """Return the walls without vertices of none, and which vertices are left."""
     used, triangles = np.unique(walls.triangles, return_inverse=True)
     kept: NDArray[np.int32] = triangles.reshape(-1, 3).astype(np.int32)
-    return Walls(walls.positions[used], kept, walls.sides), fixed[used]
+    return Walls(walls.positions[used], kept, walls.sides), used
