@@ -9,7 +9,6 @@ import numpy as np
 import pydicom
 import pytest
 from numpy.typing import NDArray
-from pydicom.sr.codedict import codes
 from pydicom.sr.coding import Code
 
 from stereocell import read
@@ -17,10 +16,10 @@ from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.label_map import LabelMap
 from support.dicom_reading import lps_mm, whole
-from support.dicom_series import grid, write_series
+from support.dicom_segmentations import SPACING, write_segmentation
+from support.dicom_series import grid
 
 SHAPE = (6, 9, 7)  # of 63 bits a plane, which fill no bytes
-SPACING = (2.5, 2.0, 2.2)
 AFFINE = grid(shape=SHAPE, spacing=SPACING)
 
 
@@ -47,57 +46,6 @@ def numbered(voxels: NDArray[Any]) -> NDArray[Any]:
 
 def labels_of(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
     return LabelMap(dataset, channel).read(dataset.levels[0].box)
-
-
-def complete(ds: Any) -> None:
-    """Add what a segmentation takes over from its images."""
-    ds.PatientName, ds.PatientID, ds.PatientBirthDate, ds.PatientSex = "DOE^JANE", "J1", "", ""
-    ds.StudyID, ds.StudyDate, ds.StudyTime, ds.AccessionNumber = "", "", "", ""
-    ds.ReferringPhysicianName = ""
-    ds.SliceThickness = ds.SpacingBetweenSlices = SPACING[0]
-
-
-def write_segmentation(
-    folder: Path,
-    kind: str,
-    voxels: NDArray[Any],
-    change: Callable[[Any], None] = lambda _: None,
-    *,
-    omit_empty: bool = False,
-    types: Sequence[Code] = (codes.SCT.Lung,),
-) -> Path:
-    """Write a segmentation; `types` by turns. `change` edits it."""
-    files = write_series(folder / "images", AFFINE, SHAPE, change=complete)
-    described = [
-        highdicom.seg.SegmentDescription(
-            number,
-            f"left lung of JANE {number}",
-            codes.SCT.Organ,
-            types[(number - 1) % len(types)],
-            highdicom.seg.SegmentAlgorithmTypeValues.MANUAL,
-            display_color=highdicom.color.CIELabColor(100, 0, 0) if number == 1 else None,
-        )
-        for number in range(1, voxels.shape[-1] + 1)
-    ]
-    found = highdicom.seg.Segmentation(
-        [pydicom.dcmread(path) for path in files],
-        voxels,
-        highdicom.seg.SegmentationTypeValues[kind],
-        described,
-        highdicom.UID(),
-        1,
-        highdicom.UID(),
-        1,
-        "maker",
-        "model",
-        "1",
-        "0",
-        omit_empty_frames=omit_empty,
-    )
-    change(found)
-    path = folder / "seg.dcm"
-    found.save_as(path)
-    return path
 
 
 def on_our_grid(voxels: NDArray[Any], dataset: read.Dataset) -> NDArray[Any]:
