@@ -1,6 +1,7 @@
 """DICOM segmentations: one label map, or a mask of the segment that is asked for."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -283,3 +284,32 @@ def test_of_two_segmentations_one_is_asked_for(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="found 2 segmentations, expected one"):
         read.open(folder)
     assert labels_of(read.open(folder, series=2)).max() == 2
+
+
+def test_numbers_beyond_a_byte_stay(tmp_path: Path) -> None:
+    def change(ds: Any) -> None:
+        ds.SegmentSequence[1].SegmentNumber = 40_000
+        for group in ds.PerFrameFunctionalGroupsSequence:
+            segment = group.SegmentIdentificationSequence[0]
+            if segment.ReferencedSegmentNumber == 2:
+                segment.ReferencedSegmentNumber = 40_000
+
+    dataset = read.open(write_segmentation(tmp_path, "BINARY", apart(), change))
+    expected = on_our_grid(apart() @ np.array([1, 40_000]), dataset)
+    assert np.array_equal(labels_of(dataset), expected)
+    assert dataset.objects.names.keys() == {1, 40_000}
+
+
+@pytest.mark.parametrize("kind", ["BINARY", "LABELMAP"])
+def test_garbled_segmentations_raise_nothing_else(tmp_path: Path, kind: str) -> None:
+    """Bytes are changed at random; a label map is read all the same, or refused in one line."""
+    random = np.random.default_rng(0)
+    path = write_segmentation(tmp_path, kind, apart())
+    content = np.frombuffer(path.read_bytes(), np.uint8)
+    for _ in range(60):
+        garbled = content.copy()
+        places = random.integers(132, len(content), random.integers(1, 12))
+        garbled[places] = random.integers(0, 256, len(places))
+        path.write_bytes(garbled.tobytes())
+        with suppress(SourceError, UsageError):
+            labels_of(read.open(path))

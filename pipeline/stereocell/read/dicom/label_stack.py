@@ -20,7 +20,7 @@ from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.segmentation import BINARY, LABELMAP, Segmentation
 from stereocell.read.plane_stack import DRIFT, REGULAR, NoStackError, normal_of
 
-_AT_ONCE = 1 << 26  # pixels that are decoded together
+_AT_ONCE = 1 << 28  # pixels that are decoded together: a file is read anew for each such part
 _MOST_PLANES = 1 << 16
 _NEAR = 0.2  # planes: a gap that is further from a whole number of them is none
 
@@ -51,12 +51,14 @@ class LabelStack:
         """The dtype of the segments' numbers."""
         if self.segmentation.kind == LABELMAP:
             return dtype_of(self.frames)
-        return np.dtype(np.uint8 if self.numbers[-1] < 1 << 8 else np.uint16)
+        return np.min_scalar_type(self.numbers[-1])
 
     def do_overlap(self, paths: Sequence[Path], shown: str) -> bool:
         """Return whether segments do, as stated; where nothing is, look. Raises SourceError."""
-        if self.segmentation.kind == LABELMAP or self.segmentation.overlap in ("YES", "NO"):
-            return self.segmentation.overlap == "YES" and self.segmentation.kind != LABELMAP
+        if self.segmentation.kind == LABELMAP:
+            return False
+        if self.segmentation.overlap in ("YES", "NO"):
+            return self.segmentation.overlap == "YES"
         plane, drawn = -1, np.zeros(0, self.dtype)
         for at, frame, pixels in self._decoded(self.numbers, paths, shown):
             if at != plane:
@@ -106,7 +108,7 @@ def stack_labels(segmentation: Segmentation, frames: Sequence[Frame]) -> LabelSt
     """
     if segmentation.kind not in (BINARY, LABELMAP):
         raise NoStackError("of fractions (FRACTIONAL), not of bits or numbers")
-    if segmentation.kind == BINARY and not all(frame.segment for frame in frames):
+    if segmentation.kind == BINARY and not all(frame.segment > 0 for frame in frames):
         raise NoStackError("with frames that name no segment")
     groups = find_groups([replace(frame, segment=0, stack=b"") for frame in frames])
     if len(groups) > 1:
