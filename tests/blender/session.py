@@ -91,6 +91,29 @@ def step_import(arguments):
     return describe(import_stage(arguments))
 
 
+def step_objects(arguments):
+    """Return the attributes of a label map's meshes by name, and the faces of each material."""
+    import_stage(arguments)
+    found = {}
+    for block in bpy.data.objects:
+        if block.type != "MESH":
+            continue
+        faces = len(block.data.polygons)
+        columns = {}
+        for attribute in block.data.attributes:
+            if attribute.domain == "FACE" and attribute.data_type in ("FLOAT", "INT"):
+                values = [0.0] * faces
+                attribute.data.foreach_get("value", values)
+                columns[attribute.name] = values
+        slots = [slot.material for slot in block.material_slots]
+        found[block[PRIM]] = {
+            "columns": columns,
+            "classes": [slots[p.material_index].name for p in block.data.polygons],
+            "colors": {material.name: surface_color(material) for material in slots},
+        }
+    return found
+
+
 def step_measured(arguments):
     """Return what Blender's OpenVDB finds in the grid `measured` of a .vdb, at points."""
     bpy.ops.object.volume_import(filepath=arguments["vdb"])

@@ -4,6 +4,7 @@
 STEREOCELL_BLENDER. See blender/session.py for what happens there.
 """
 
+import csv
 import json
 import os
 import re
@@ -18,8 +19,11 @@ from PIL import Image
 from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.bundle.write import write_bundle
+from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.vdb import write_vdb
+from stereocell.model.identifiers import to_identifier
+from stereocell.samples.cells import table_beside, write_cells
 from stereocell.usd.validate import validate_stage
 from support.bundles import load
 from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, leaf, write_whole
@@ -73,6 +77,38 @@ def test_meshes_have_their_size_place_and_colour(stage_path: Path, tmp_path: Pat
         # 1 unit is 1 um, and what is up stays up: Blender's z
         assert mesh["world"] == pytest.approx(np.ptp(points, axis=0), abs=1e-4)
     assert found["unit"] == pytest.approx(1e-6)
+
+
+def test_objects_have_their_columns_and_classes(tmp_path: Path) -> None:
+    """A column is an attribute of faces, a category a material slot in its colour."""
+    sample, out = tmp_path / "small.ome.zarr", tmp_path / "out"
+    write_cells(sample, seed=2, shape=(24, 60, 60))
+    table = table_beside(sample)
+    flags = ["--channels", "DNA", "--labels", "cells", "--table", str(table)]
+    assert main(["plan", str(sample), "-o", str(out), *flags]) == 0
+    for phase in ("units", "stage", "bundle"):
+        assert main([phase, str(out), "--workers", "0"]) == 0
+    found = run("objects", tmp_path, stage=out / "stage/stage.usda", lod="lod1")
+    mesh = found[leaf("r0_c0", "cells")]
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
+    labels = stage.GetPrimAtPath(leaf("r0_c0", "cells")).GetAttribute("stereocell:objectLabels")
+    numbers = [int(label) for label in labels.Get()]
+    objects = [int(place) for place in mesh["columns"]["objectId"]]
+    assert set(objects) == set(range(len(numbers)))
+    kinds = sorted({row["cell_type"] for row in rows})
+    for face in range(0, len(objects), 97):
+        row = rows[numbers[objects[face]] - 1]
+        assert mesh["columns"]["CD3"][face] == pytest.approx(float(row["CD3"]), rel=1e-4)
+        assert kinds[int(mesh["columns"]["cell_type"][face])] == row["cell_type"]
+        assert to_identifier(row["cell_type"]) in mesh["classes"][face]
+    content = json.loads((out / "bundle/channels/cells/objects.json").read_text())
+    (entry,) = (one for one in content["columns"] if one["id"] == "cell_type")
+    for name, color in zip(entry["categories"], entry["colors"], strict=True):
+        (found_color,) = (
+            own for slot, own in mesh["colors"].items() if slot.endswith(to_identifier(name))
+        )
+        assert found_color == pytest.approx(color, abs=1e-3)
 
 
 def test_true_size_is_metres(stage_path: Path, tmp_path: Path) -> None:

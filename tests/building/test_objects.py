@@ -382,3 +382,58 @@ def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> 
     image = np.rint(scene_on(affine, voxels.shape[:3]))
     expected = [image[voxels[..., i] > 0].mean() for i in (0, 1)]
     assert exact(means)[order] == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_report_and_the_deep_check_tell_of_objects(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    labels = make_tissue(SHAPE, 3).labels
+    source, out = tmp_path / "mask.tif", tmp_path / "out"
+    tifffile.imwrite(source, labels.astype(np.uint16), metadata={"axes": "ZYX"})
+    build(source, out, "--labels", "cells=.", "--spacing-um", "1,0.5,0.5", "--grid", "2x1")
+    count = len(labels_of(out))
+    assert run("report", out) == 0
+    page = (out / "report/index.html").read_text()
+    assert f"cells: {count} objects</h3>" in page
+    said(capsys)
+    assert run("check", out, "--deep", "--workers", 0) == 0
+    told = said(capsys)
+    assert f"ok   cells against source: {count} objects" in told
+    assert "ok   bundle against stage: 8 surfaces" in told
+
+    # a value that nobody counted, in one tile and level, and a surface that is too small
+    layer = Sdf.Layer.FindOrOpen(str(out / "stage/tiles/r0_c0/tile.usdc"))
+    stage = Usd.Stage.Open(layer)
+    stage.GetDefaultPrim().GetVariantSet("lod").SetVariantSelection("lod0")
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/r0_c0/cells/cells_r0_c0"))
+    with stage.GetDefaultPrim().GetVariantSet("lod").GetVariantEditContext():
+        areas = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("area_um2")
+        areas.Set(Vt.FloatArray([2.0, *list(areas.Get())[1:]]))
+    layer.Save()
+    assert run("check", out, "--deep", "--workers", 0) == 1
+    first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
+    wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
+    assert wanted in said(capsys)
+
+
+@pytest.mark.parametrize("is_alone", [False, True])
+def test_what_is_too_thin_is_named_and_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], is_alone: bool
+) -> None:
+    """Beside a cell, and as all that there is: noise, an empty label map after all."""
+    labels = np.zeros((16, 40, 40), np.uint16)
+    rng = np.random.default_rng(1)
+    labels[:, :, 20:] = rng.integers(0, 2, (16, 40, 20)) * 700
+    if not is_alone:
+        labels[3:12, 5:15, 5:15] = 12
+    source, out = tmp_path / "noise.tif", tmp_path / "out"
+    tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
+    build(source, out, "--labels", "cells=.", "--spacing-um", "1,1,1")
+    told = said(capsys)
+    assert "cells: 1 object left out, too thin to be built, or full of holes: 700" in told
+    assert run("report", out) == 0
+    assert run("check", out, "--deep", "--workers", 0) == 0
+    if is_alone:
+        assert not (out / "bundle/channels/cells/objects.json").exists()
+    else:
+        assert labels_of(out).tolist() == [12]

@@ -35,6 +35,11 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--iso-scope": (["tile"], "isovalue", "scope", "tile"),
     "--paint": (["CD31=MART1"], "paint", "CD31", "MART1"),
     "--maps": ([], "unwrap", "maps", True),
+    "--labels": (["cells=a=b.tif"], "labels", "cells", "a=b.tif"),
+    "--table": (["t.csv"], "objects", "table", "t.csv"),
+    "--table-key": (["id"], "objects", "table_key", "id"),
+    "--columns": (["CD8, type"], "objects", "columns", ("CD8", "type")),
+    "--color-by": (["CD8"], "objects", "color_by", "CD8"),
 }
 
 

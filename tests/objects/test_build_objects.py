@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from stereocell.meshes.validity import find_defects
-from stereocell.model.errors import SourceError
 from stereocell.model.mesh import Mesh
 from stereocell.objects.build_objects import BuiltObjects, build_objects
 from stereocell.objects.intensities import measure_intensities
@@ -120,20 +119,15 @@ def test_a_ball_has_a_balls_area() -> None:
     assert (z_um, -y_um, x_um) == pytest.approx((119, 115, 115), abs=0.2)
 
 
-def test_a_shell_of_one_voxel_is_refused_by_its_name() -> None:
-    z, y, x = np.mgrid[:30, :30, :30] - 14.5
+def test_a_shell_of_one_voxel_is_left_out_and_its_neighbour_is_not() -> None:
+    z, y, x = np.mgrid[:30, :30, :40] - np.array([14.5, 14.5, 14.5])[:, None, None, None]
     radius = np.sqrt(z * z + y * y + x * x)
-    shell = ((radius < 11) & (radius > 10)).astype(np.int32)
-    with pytest.raises(SourceError, match="object cell 1 touches itself"):
-        build_objects(
-            shell,
-            np.array([1], np.int32),
-            spacing_um=(1, 1, 1),
-            origin_um=(0, 0, 0),
-            step_um=STEP_UM,
-            options=ObjectOptions(),
-            name_of=lambda number: f"cell {number}",
-        )
+    labels = ((radius < 11) & (radius > 10.3)).astype(np.int32)
+    labels[10:20, 10:20, 30:36] = 4
+    built = build(labels, [1, 4])
+    assert built.thin.tolist() == [1]
+    assert built.volumes_um3.tolist() == [10 * 10 * 6 * 0.25]
+    assert not any(find_defects(one_object(built.lods[0].mesh, 0)).counts.values())
 
 
 def test_nothing_owned_has_no_levels() -> None:

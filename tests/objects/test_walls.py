@@ -25,7 +25,7 @@ AIMS_UM = (0.1, 0.2, 0.4, 0.8)
 def levels_of(
     labels: NDArray[np.int32], spacing_um: tuple[float, float, float], aims_um: Sequence[float]
 ) -> tuple[list[Walls], NDArray[np.float64]]:
-    mended, _ = make_well_composed(np.pad(labels, 2))
+    mended, _, _ = make_well_composed(np.pad(labels, 2))
     volumes = np.bincount(mended.ravel()) * np.prod(spacing_um)
     found = [extract_walls(mended, spacing_um, STEP_UM)]
     for aim in aims_um:

@@ -15,6 +15,7 @@ from stereocell.storage.location import Location
 
 SELF = "."  # in place of a path: the input itself
 _ALIGNED = 1e-6  # of rotations: rounding
+_AVERAGED = ("resampled", "interpolated")  # in what a reader says of voxels between others
 
 Triple = tuple[float, float, float]
 
@@ -129,6 +130,12 @@ def _opened(
                 f"{dataset.shown}: states no voxel size: found {_by(dataset.levels[0].shape)} "
                 f"voxels (z, y, x), expected the image's {_by(image.levels[0].shape)}"
             ) from error
+    for remark in dataset.remarks:
+        if any(word in remark for word in _AVERAGED):
+            raise SourceError(
+                f"{dataset.shown}: {remark}: found numbers of objects, which have no means, "
+                "expected labels on a grid that needs none"
+            )
     return dataset, replace(ref, fingerprint=dataset.fingerprint)
 
 

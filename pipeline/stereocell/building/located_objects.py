@@ -15,10 +15,9 @@ from stereocell.building.label_maps import Labels
 from stereocell.building.plan import Plan
 from stereocell.model.tiling import Box
 from stereocell.objects.extents import Extents, merge_extents
-from stereocell.objects.walls import SMOOTHINGS
 
 AROUND = 0.5  # tiles; an object that is whole goes no farther beyond its tile
-HALO = 2 * SMOOTHINGS + 2  # voxels around objects that change where their walls lie
+HALO = 42  # voxels; what lies farther from a wall moves it by less than the lattice's step
 CUT = -1  # the tile of an object that is cut
 
 

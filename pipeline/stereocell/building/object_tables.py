@@ -46,6 +46,7 @@ def make_table(
     Raises UsageError where a column that is asked for isn't there.
     """
     order = _order(located, facts)
+    thin = np.unique(np.concatenate([one.thin for one in facts.values()]))
     known = located.extents
     names = known.labels[order]
     place_of = {label: row for row, label in enumerate(names.tolist())}
@@ -80,7 +81,7 @@ def make_table(
             _default(columns, plan.settings.objects.color_by),
             _walls(facts, rows, names),
         ),
-        remarks + renamed,
+        _told_of_thin(labels, thin) + remarks + renamed,
     )
 
 
@@ -104,7 +105,19 @@ def _walls(
 def _order(located: Located, facts: Mapping[str, ObjectFacts]) -> NDArray[np.int64]:
     """Return the numbers of all objects, those of each tile together, cut ones last."""
     whole = [np.flatnonzero(located.owners == located.tiles.index(tile)) for tile in facts]
-    return np.concatenate([*whole, np.flatnonzero(located.owners == CUT)])
+    order = np.concatenate([*whole, np.flatnonzero(located.owners == CUT)])
+    built = np.concatenate([one.labels for one in facts.values()])
+    return order[np.isin(located.extents.labels[order], built)]
+
+
+def _told_of_thin(labels: Labels, thin: NDArray[np.uint64]) -> list[str]:
+    """Return what is said of objects that could not be built, or nothing."""
+    if not len(thin):
+        return []
+    return [
+        f"{labels.name}: {counted(len(thin), 'object')} left out, too thin to be built, or full of "
+        f"holes: {listed(thin.tolist())}; where labels are finer they can be"
+    ]
 
 
 def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
@@ -120,7 +133,7 @@ def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
         }
         made = category_column(NAMES, texts, "From the label map's file", colors)
         found += [] if made is None else [made]
-    for name, values in notes.properties.items():
+    for name, values in notes.columns.items():
         held = [values.get(label) for label in listed_labels]
         if any(isinstance(value, str) for value in held):
             texts = ["" if value is None else str(value) for value in held]

@@ -29,8 +29,6 @@ def to_json(plan: Plan) -> dict[str, Any]:
         for key in ("source", "fingerprint", "rung", "base"):
             if not channel[key]:
                 del channel[key]
-    if not content["labels"]:
-        del content["labels"]
     return {"format": _FORMAT, "version": _VERSION, **content}
 
 

@@ -35,6 +35,7 @@ class ObjectFacts:
     p95s      float64 (n, channels), their 95th percentiles; NaN: of a piece
     changed   voxels that were changed so that no object touches itself by an edge or a corner
     bias      the largest share of an object's volume that a level has more or less, by level
+    thin      uint64 (k,), the numbers of objects too thin to be built, which are not among the n
     """
 
     labels: NDArray[np.uint64]
@@ -47,6 +48,7 @@ class ObjectFacts:
     p95s: NDArray[np.float64]
     changed: int
     bias: tuple[float, ...]
+    thin: NDArray[np.uint64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,6 @@ both. Its vertices stay as they are at the finest level, so that both tiles have
 further levels are free, since each object is closed by itself.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,6 +38,7 @@ class BuiltObjects:
     walls         int32 (m, 2): an object, and the number of another one that it touches, in the
                   labels; and `wall_um2` float64 (m,), the area of that wall
     changed       voxels that were changed so that no object touches itself by an edge
+    thin          int32 (k,): the objects that can't be built, and are not among the n
     """
 
     lods: tuple[Lod, ...]
@@ -48,6 +48,7 @@ class BuiltObjects:
     walls: NDArray[np.int32]
     wall_um2: NDArray[np.float64]
     changed: int
+    thin: NDArray[np.int32]
 
 
 def build_objects(
@@ -59,7 +60,6 @@ def build_objects(
     step_um: float,
     options: ObjectOptions,
     clock: Clock | None = None,
-    name_of: Callable[[int], str] = str,
 ) -> BuiltObjects:
     """Return the surfaces of some objects of a label map.
 
@@ -67,14 +67,16 @@ def build_objects(
     owned      int32 (n,), ascending: the objects that are built, each as a whole in the array
     spacing_um, origin_um  (z, y, x), of the voxels and of the centre of the first one
     step_um    of the lattice that vertices lie on
-    name_of    names an object for a message
 
-    Raises SourceError where an object is too thin to be built.
+    Objects that are too thin (objects/well_composed.py) are left out.
     """
     clock = clock or Clock()
     with clock("labels mended"):
         padded = np.pad(labels, MARGIN)
-        mended, changed = make_well_composed(padded, name_of)
+        mended, changed, thin = make_well_composed(padded)
+        padded[np.isin(padded, thin)] = 0
+        thin = np.intersect1d(owned, thin)
+        owned = np.setdiff1d(owned, thin)
     z, y, x = (o - MARGIN * s for o, s in zip(origin_um, spacing_um, strict=True))
     with clock("walls"):
         walls = extract_walls(mended, spacing_um, step_um, (z, y, x))
@@ -100,6 +102,7 @@ def build_objects(
         np.stack([place[shared], touching[shared, 1]], axis=1).astype(np.int32),
         areas[shared],
         changed,
+        thin,
     )
 
 

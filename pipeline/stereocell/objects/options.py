@@ -14,7 +14,7 @@ class ObjectOptions:
     """
 
     errors: tuple[float, ...] = setting(
-        (0.15, 0.6, 1.2, 4.0),
+        (0.1, 0.25, 0.6, 1.5),
         "aim of simplifying to lod0, lod1, ..., in finest spacings; at small objects less",
     )
     samples: int = setting(1000, "points of a tile at which distances are measured, each way")

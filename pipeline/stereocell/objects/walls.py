@@ -22,7 +22,7 @@ from stereocell.meshes.self_intersections import find_crossings, find_flat
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import zyx_to_xyz
 
-SMOOTHINGS = 20
+SMOOTHINGS = 40
 _INWARD, _OUTWARD = 0.5, -0.53  # shares of the way to the mean of the neighbours, by turns
 _ROUNDS = 12  # of putting vertices back
 _REACH = 0.5  # voxels; farthest way of a vertex from its cube's centre, along each axis

@@ -52,7 +52,7 @@ class LabelMap:
 
     def _whole(self, stored: NDArray[np.floating]) -> NDArray[np.int64]:
         numbers = np.where(np.isnan(stored), 0, stored)
-        is_whole = np.isfinite(numbers) & (numbers % 1 == 0) & (np.abs(numbers) < _MOST_EXACT)
+        is_whole = (np.abs(numbers) < _MOST_EXACT) & (np.floor(numbers) == numbers)
         if not is_whole.all():
             found = float(numbers[~is_whole][0])
             raise SourceError(f"{self._where}: found {found:g}, expected whole numbers in labels")

@@ -29,9 +29,9 @@ def notes_of_ngff(image_label: Any) -> ObjectNotes:
             if label is None or key == "label-value":
                 continue
             if isinstance(value, str):
-                found.properties.setdefault(_cut(key), {})[label] = _cut(value)
+                found.columns.setdefault(_cut(key), {})[label] = _cut(value)
             elif isinstance(value, bool | int | float):
-                found.properties.setdefault(_cut(key), {})[label] = float(value)
+                found.columns.setdefault(_cut(key), {})[label] = float(value)
     return found
 
 

@@ -34,6 +34,7 @@ from stereocell.preview.views import View, views_of
 from stereocell.report import charts
 from stereocell.report.draw_scenes import Picture, Scene, Surface, draw_scene
 from stereocell.report.facts import Facts, UnitFacts, gather, sum_up
+from stereocell.report.objects import LabelFacts, gather_labels
 from stereocell.report.remarks import find_remarks
 from stereocell.report.select_units import choose_level, choose_units, thin_out
 from stereocell.report.texture_facts import compare, sum_up_maps
@@ -68,7 +69,8 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
     chosen = choose_units(len(plan.tiles), len(plan.channels), MOST_PICTURED)
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
-    scenes = [_scene(facts, None), *(_scene(facts, tile) for tile in tiles)]
+    labels = gather_labels(out_folder, plan)
+    scenes = [_scene(facts, None, labels), *(_scene(facts, tile) for tile in tiles)]
     cards = [
         [
             _card(facts, units[key])
@@ -93,9 +95,12 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         region_um=[n * s for n, s in zip(plan.region.shape, plan.spacing_um, strict=True)],
         tissue=None if tissue is None else _tissue(tissue),
         whole=pictured[0],
-        whole_note=_drawn_note(facts.units, _WHOLE_TRIANGLES),
+        whole_note=_drawn_note(facts.units, _WHOLE_TRIANGLES)
+        if plan.channels
+        else "Objects at their coarsest level",
         remarks=find_remarks(facts),
         channels=_channels(facts),
+        labels=[(one, css_color(one.color)) for one in labels],
         thresholds=_thresholds(facts),
         tiles=[
             {
@@ -309,8 +314,8 @@ def _in_eight_bits(
     return (np.broadcast_to(level, box.shape) - np.float32(low)) * np.float32(255 / (high - low))
 
 
-def _scene(facts: Facts, tile: Tile | None) -> Scene:
-    """Return a tile with all its channels, or the whole specimen."""
+def _scene(facts: Facts, tile: Tile | None, labels: Sequence[LabelFacts] = ()) -> Scene:
+    """Return a tile with its channels, or the whole specimen; label maps if there is no image."""
     tiles = facts.plan.tiles if tile is None else (tile,)
     most = _WHOLE_TRIANGLES if tile is None else _TILE_TRIANGLES
     units = [u for u in facts.units if u.lods and (tile is None or u.tile == tile)]
@@ -324,6 +329,11 @@ def _scene(facts: Facts, tile: Tile | None) -> Scene:
                 u.channel.color,
             )
             for u in (units[i] for i in thin_out(len(units), every))
+        )
+        + tuple(
+            Surface(str(lod_file(folder, len(one.levels) - 1).absolute()), one.color)
+            for one in (labels if not facts.plan.channels else ())
+            for folder in one.units
         ),
         boxes=tuple(boxes),
         frame=(tuple(corners[:, 0].min(axis=0)), tuple(corners[:, 1].max(axis=0))),

@@ -22,6 +22,7 @@ PRIM = "stereocell_prim"
 COLOR = "stereocell_color_"
 VOLUME = "stereocell_volume_"
 PAINTED = "stereocell:paintedBy"  # of a channel: which other is painted on its surface
+COLUMNS = "stereocell:columns"  # of a label map's channel, whose objects have colours
 
 
 class _Hook(bpy.types.USDHook):
@@ -162,8 +163,9 @@ def _color_surfaces(stage, channel, look, group, materials):
         prim = stage.GetPrimAtPath(path)
         if prim.GetParent().GetName() != channel or material.node_tree is None:
             continue
-        if stage.GetPrimAtPath(f"{CHANNELS}/{channel}").GetAttribute(PAINTED).Get():
-            continue  # Blender itself feeds the image, or the mesh's own colours
+        source = stage.GetPrimAtPath(f"{CHANNELS}/{channel}")
+        if source.GetAttribute(PAINTED).Get() or source.GetAttribute(COLUMNS).Get():
+            continue  # Blender itself feeds the image, the mesh's own colours, or those of classes
         own = prim.GetAttribute("inputs:color").Get()
         if own is None or list(own) == look["color"]:
             color_surface(material, group)

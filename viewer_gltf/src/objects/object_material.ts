@@ -4,6 +4,8 @@
  * neighbours' common wall would else be two surfaces in one place where a cut looks into them.
  */
 import {
+  BufferAttribute,
+  type BufferGeometry,
   DataTexture,
   Float32BufferAttribute,
   type Mesh,
@@ -19,6 +21,8 @@ import objectTexel from "./chunks/object_texel.glsl?raw";
 
 /** Of a vertex: the row of its object, in place of the glb's number in the tile. */
 export const ROW = "object_row";
+/** Of a vertex: out of its object, the same for all vertices in one place. */
+const OUTWARDS = "object_outwards";
 const FEATURE = "_feature_id_0";
 /** Rows in a line of a texture. */
 const LINE = 256;
@@ -29,6 +33,7 @@ const CHUNKS = { "chunks/object_texel": objectTexel, "chunks/object_light": obje
 const include = (source: string) => includeChunks(source, CHUNKS);
 
 const VERTEX = `attribute float ${ROW};
+attribute vec3 ${OUTWARDS};
 flat varying float vObject;
 uniform sampler2D uFlags;
 uniform float uInset;
@@ -42,6 +47,39 @@ uniform bool uIsColored;
 #include <chunks/object_texel>
 #include <chunks/object_light>
 `;
+
+/**
+ * Directions out of each object, as signed bytes. At a crease a vertex is there once for each side, with that
+ * side's normal: moved along those the surface would tear. An object's vertices lie together.
+ */
+export function outwards({ attributes }: BufferGeometry, rows: Float32Array): Int8Array {
+  const { position, normal } = attributes;
+  const found = new Int8Array(3 * rows.length);
+  let start = 0;
+  for (let end = 1; end <= rows.length; end++) {
+    if (end < rows.length && rows[end] === rows[start]) continue;
+    const sums = new Map<string, [number, number, number]>();
+    const at = (i: number) => `${position.getX(i)} ${position.getY(i)} ${position.getZ(i)}`;
+    for (let i = start; i < end; i++) {
+      const key = at(i);
+      const sum = sums.get(key) ?? [0, 0, 0];
+      sum[0] += normal.getX(i);
+      sum[1] += normal.getY(i);
+      sum[2] += normal.getZ(i);
+      sums.set(key, sum);
+    }
+    for (let i = start; i < end; i++) {
+      const sum = sums.get(at(i)) ?? [0, 0, 0];
+      const length = Math.hypot(...sum) || 1;
+      found.set(
+        sum.map((v) => Math.round((127 * v) / length)),
+        3 * i,
+      );
+    }
+    start = end;
+  }
+  return found;
+}
 
 function bytesTexture(count: number): DataTexture {
   const texels = new Uint8Array(LINE * Math.max(1, Math.ceil(count / LINE)));
@@ -80,7 +118,7 @@ export class ObjectMaterial {
       uniforms: this.uniforms,
       vertex: {
         declared: include(VERTEX),
-        place: `vObject = ${ROW};\n\ttransformed -= uInset * normal;`,
+        place: `vObject = ${ROW};\n\ttransformed -= uInset * ${OUTWARDS};`,
         // a triangle whose corners all lie there is none
         end: `if (objectTexel(uFlags, ${ROW}) == 0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);`,
       },
@@ -102,6 +140,7 @@ export class ObjectMaterial {
     for (let i = 0; i < rows.length; i++) rows[i] = rowOf(features.getX(i));
     geometry.setAttribute(ROW, new Float32BufferAttribute(rows, 1));
     geometry.deleteAttribute(FEATURE);
+    geometry.setAttribute(OUTWARDS, new BufferAttribute(outwards(geometry, rows), 3, true));
     this.metresPerStep = scale.x; // the same in all files of a bundle
     this.setGap(this.gap_um);
     return true;

@@ -54,6 +54,8 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
       transfer2d: null,
       shapes: {},
       hasSurface: channel.tileset !== null,
+      hasObjects: channel.objects !== undefined,
+      volume: START_CHANNEL.volume && channel.objects === undefined,
       surfaceReason: channel.surface_reason,
     })),
     tiles: manifest.tiles.map((tile) => ({

@@ -91,6 +91,9 @@ describe("the viewer's state", () => {
     const channels = plain.channels.map((one, i) => (i === 5 ? { ...one, objects: table } : one));
     const state = initialState({ ...plain, channels });
     expect(state.channels.filter((c) => c.shown).map((c) => c.id)).toEqual(["c5"]);
+    // which have no volumes, and stay surfaces however near they come
+    expect(state.channels.map((c) => c.volume)).toEqual([true, true, true, true, true, false]);
+    expect(looks(state, "c5", "r0_c2", near("r0_c2"))).toBe("surface");
   });
 
   it("draws an unsure surface from afar as it does a clear one", () => {

@@ -34,6 +34,8 @@ export type ChannelState = Functions &
     /** Part of the volume's intensities, 0..1, that the transfer function is stretched over. */
     window: readonly [number, number];
     hasSurface: boolean;
+    /** A label map: closed objects, and no volume. */
+    hasObjects: boolean;
     /** Why the build made no surface: its volume is drawn from afar too. Empty: it made one. */
     surfaceReason: string;
   }>;

@@ -82,11 +82,12 @@ def run_objects(task: ObjectsTask) -> None:
         step_um=task.step_um,
         options=task.options,
         clock=clock,
-        name_of=lambda number: str(names.labels[number]),
     )
+    thin = names.labels[built.thin]
+    owned = np.setdiff1d(owned, built.thin).astype(np.int32)
     with clock("intensities"):
         measured = [_measure(task, image, compact, owned) for image in task.images]
-    facts = _facts(built, owned, names, measured, compact, task)
+    facts = _facts(built, owned, names, measured, compact, thin)
     reason = "" if built.lods else "no object"
     unit = Unit(built.lods, None, None, reason, 0, 0, clock.seconds, objects=facts)
     save_unit(task.directory, unit)
@@ -175,7 +176,7 @@ def _facts(
     names: _Names,
     measured: Sequence[Measured],
     compact: NDArray[np.int32],
-    task: ObjectsTask,
+    thin: NDArray[np.uint64],
 ) -> ObjectFacts:
     labels = names.labels[owned]
     beside = names.labels[built.walls[:, 1]]
@@ -201,6 +202,7 @@ def _facts(
         p95s,
         built.changed,
         built.largest_bias,
+        thin,
     )
 
 
@@ -218,4 +220,5 @@ def _none(task: ObjectsTask) -> ObjectFacts:
         by_channel,
         0,
         (),
+        np.zeros(0, np.uint64),
     )

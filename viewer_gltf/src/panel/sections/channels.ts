@@ -4,7 +4,7 @@
  */
 
 import { valueText } from "../../annotations/measure";
-import { CHANNEL, COLOR, VOLUME } from "../../state/parameters/channel";
+import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel";
 import { isTwoD } from "../../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
@@ -65,7 +65,7 @@ function cardOf(
   const toWindow = (window: readonly [number, number]) =>
     ({ type: "window", channel: id, window }) as const;
   const range = ranges.get(id);
-  return {
+  const head = {
     kind: "group",
     id,
     label: name,
@@ -73,6 +73,14 @@ function cardOf(
     about: channel.surfaceReason,
     isOpen,
     opener: { panel: "pick", channel: isOpen ? null : id },
+  } as const;
+  if (channel.hasObjects) {
+    const controls = [controlOf(COLOR, channel, id), shownToggle(channel)];
+    const opacity = controlOf(OPACITY, channel, id);
+    return { ...head, controls, more: [opacity, paletteOf(COLOR, channel, `${id}/palette`, id)] };
+  }
+  return {
+    ...head,
     controls: [
       controlOf(COLOR, channel, id),
       shownToggle(channel),

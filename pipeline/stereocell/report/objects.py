@@ -1,0 +1,84 @@
+"""The report's facts of label maps: how many objects, and how true their surfaces are."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan import Plan
+from stereocell.building.unit_files import load_objects, load_record
+from stereocell.storage.workspace import sizes_below
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectLevel:
+    """One level of all objects of a label map.
+
+    bias  largest share that an object's volume has more or less than its voxels
+    distance_um, farthest_um  from the walls between voxels, 99th percentile and largest
+    """
+
+    triangles: int
+    distance_um: float
+    farthest_um: float
+    bias: float
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class LabelFacts:
+    """One label map.
+
+    objects  of it; `pieces`: further pieces of those that tiles cut
+    changed  voxels that were changed, so that no object touches itself by an edge or a corner
+    units    the folders of its units that have a surface
+    """
+
+    name: str
+    color: tuple[float, float, float]
+    objects: int
+    pieces: int
+    changed: int
+    levels: tuple[ObjectLevel, ...]
+    units: tuple[Path, ...]
+
+
+def gather_labels(out_folder: OutFolder, plan: Plan) -> tuple[LabelFacts, ...]:
+    """Return the facts of each label map. Raises OutputError where a unit is damaged."""
+    index = out_folder.index()
+    found = []
+    for labels in plan.labels:
+        folders = {
+            tile.id: out_folder.unit_dir(tile.id, labels.id, index[f"{tile.id}/{labels.id}"])
+            for tile in plan.tiles
+        }
+        facts = {tile: load_objects(folder) for tile, folder in folders.items()}
+        records = {tile: load_record(folder)["lods"] for tile, folder in folders.items()}
+        numbers = [label for one in facts.values() for label in one.labels.tolist()]
+        levels = []
+        for level in range(max((len(one) for one in records.values()), default=0)):
+            lods = {tile: one[level] for tile, one in records.items() if level < len(one)}
+            files = [
+                out_folder.bundle_dir / "channels" / labels.id / tile / f"lod{level}.glb"
+                for tile in lods
+            ]
+            levels.append(
+                ObjectLevel(
+                    sum(lod["triangles"] for lod in lods.values()),
+                    max(lod["distance_um"] for lod in lods.values()),
+                    max(lod["farthest_um"] for lod in lods.values()),
+                    max(facts[tile].bias[level] for tile in lods),
+                    sum(sizes_below(file).get(file, 0) for file in files),
+                )
+            )
+        found.append(
+            LabelFacts(
+                labels.name,
+                labels.color,
+                len(set(numbers)),
+                len(numbers) - len(set(numbers)),
+                sum(one.changed for one in facts.values()),
+                tuple(levels),
+                tuple(folders[tile] for tile, one in records.items() if one),
+            )
+        )
+    return tuple(found)
