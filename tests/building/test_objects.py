@@ -19,6 +19,9 @@ from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
+from support.dicom_segmentations import SPACING, write_segmentation
+from support.dicom_series import grid
+from support.dicom_series import sample as scene_on
 from support.digests import digests_of
 
 SHAPE = (24, 72, 96)
@@ -282,7 +285,7 @@ def test_small_objects_are_counted_and_others_end_with_the_region(
     plan = OutFolder(out).plan()
     located = locate_objects(OutFolder(out), plan, plan.labels[0], Engine(0))
     assert located.extents.labels.tolist() == [6, 2**62]
-    facts = load_objects(next((out / "units/r0_c0/l").iterdir()))
+    facts = load_objects(next(one for one in (out / "units/r0_c0/l").iterdir() if one.is_dir()))
     assert facts.voxels.tolist() == located.extents.voxels.tolist() == [6 * 8 * 6, 6 * 8 * 8]
     assert CUT not in located.owners.tolist()
 
@@ -353,6 +356,32 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     voxels = np.asarray(zarr.open_group(sample, mode="r")["0"][3])[::2, ::2, ::2]
     for label, mean in zip(found, column_of(out, "mean_CD3"), strict=True):
         assert mean == pytest.approx(voxels[coarse == label].mean(), rel=1e-5)
+
+
+@pytest.mark.parametrize("omit_empty", [False, True])
+def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> None:
+    """Two organs by DICOM's own numbers, the first planes of them left out or not."""
+    voxels = np.zeros((12, 16, 14, 2), np.uint8)
+    voxels[4:10, 2:7, 3:11, 0] = 1
+    voxels[5:10, 9:14, 3:8, 1] = 1
+    path = write_segmentation(tmp_path, "BINARY", voxels, omit_empty=omit_empty)
+    out = tmp_path / "out"
+    build(tmp_path / "images", out, "--labels", f"organs={path}")
+    content = json.loads((out / "bundle/channels/organs/objects.json").read_text())
+    by_id = {one["id"]: one for one in content["columns"]}
+
+    def exact(column_id: str) -> np.ndarray:
+        return np.fromfile(out / "bundle" / by_id[column_id]["exact"]["path"], "<f4")
+
+    labels = np.fromfile(out / "bundle" / content["labels"]["path"], "<u4").tolist()
+    order = [labels.index(number) for number in (1, 2)]
+    voxel = float(np.prod(SPACING)) * 1e9
+    assert exact("volume_um3")[order] == pytest.approx([240 * voxel, 125 * voxel], rel=1e-6)
+    means = next(name for name in by_id if name.startswith("mean"))
+    affine = grid(shape=voxels.shape[:3], spacing=SPACING)
+    image = np.rint(scene_on(affine, voxels.shape[:3]))
+    expected = [image[voxels[..., i] > 0].mean() for i in (0, 1)]
+    assert exact(means)[order] == pytest.approx(expected, rel=1e-5)
 
 
 def test_the_report_and_the_deep_check_tell_of_objects(

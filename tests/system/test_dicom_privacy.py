@@ -27,6 +27,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.serve.brick_library import BrickLibrary
 from support import dicom_mosaics, identity_search
+from support.dicom_segmentations import write_segmentation
 from support.dicom_series import compress, grid, write_enhanced, write_series
 
 # Every text has TEXT in it, every UID NUMBER, every date and time its own; a count follows.
@@ -199,6 +200,40 @@ def test_no_identity_is_in_any_byte_of_what_a_build_leaves(
     assert sum(file.stat().st_size for file in out.rglob("*") if file.is_file()) > 100_000
     # the same search, where the words are
     assert {hit.split(" ")[0] for hit in identity_search.find(series, WORDS)} == set(WORDS)
+
+
+def test_no_identity_of_a_segmentation_is_in_what_is_made_of_its_objects(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.DEBUG)
+    folder, out = tmp_path / "in", tmp_path / "out"
+    voxels = np.zeros((10, 14, 12, 2), np.uint8)
+    voxels[2:8, 2:6, 3:9, 0] = voxels[2:8, 8:12, 3:9, 1] = 1
+
+    def change(ds: Dataset) -> None:
+        ds.SegmentSequence[1].SegmentedPropertyTypeCodeSequence[0].CodeValue = f"{TEXT} code"
+        mark_all(ds)
+        ds.SegmentationType = "BINARY"
+        for group in ds.PerFrameFunctionalGroupsSequence:
+            mark(group.FrameContentSequence[0], lambda number: number in (8, 0x18))
+        for item in ds.SegmentSequence:
+            item.SegmentLabel = item.SegmentDescription = item.TrackingID = f"{TEXT} of her"
+            item.TrackingUID = f"1.2.{NUMBER}.6"
+            kind = item.SegmentedPropertyTypeCodeSequence[0]
+            item.SegmentedPropertyCategoryCodeSequence[0].CodeMeaning = f"{TEXT} category"
+            kind.CodeMeaning = f"{TEXT} meaning"
+
+    write_segmentation(folder, "BINARY", voxels, change)
+    shutil.rmtree(folder / "images")
+    source = str(folder)
+    for phase in (["plan", source, "--labels", "."], ["units"], ["stage"], ["bundle"]):
+        assert main([*phase, "-o", str(out)] if phase[0] == "plan" else [*phase, str(out)]) == 0
+    table = (out / "bundle/channels/labels/objects.json").read_text()
+    assert "Segment 2" in table
+    told = capfd.readouterr()
+    texts = {"stdout": told.out, "stderr": told.err, "log": caplog.text}
+    assert identity_search.find(out, WORDS, texts) == []
+    assert {hit.split(" ")[0] for hit in identity_search.find(folder, WORDS)} == set(WORDS)
 
 
 def test_a_leak_put_in_by_hand_is_found(

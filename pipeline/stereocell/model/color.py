@@ -3,6 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
+_D50 = np.array([0.9642, 1.0, 0.8249])  # XYZ of white
+_RGB_OF_D50 = np.array(  # linear sRGB of XYZ under D50
+    [
+        [3.1338561, -1.6168667, -0.4906146],
+        [-0.9787684, 1.9161415, 0.0334540],
+        [0.0719453, -0.2289914, 1.4052427],
+    ]
+)
+
 
 def to_srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return 8-bit sRGB of linear colours (IEC 61966-2-1).
@@ -26,3 +35,15 @@ def linear_color(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
 
 def _linear(value: float) -> float:
     return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+
+
+def linear_color_of_lab(lab: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return linear RGB, 0..1, of a CIELab colour under D50; what sRGB lacks is clipped.
+
+    References: CIE 15; IEC 61966-2-1:1999; adaptation from D50 to D65 by Bradford's matrix.
+    """
+    middle = (lab[0] + 16) / 116
+    bent = np.array([middle + lab[1] / 500, middle, middle - lab[2] / 200])
+    xyz = _D50 * np.where(bent > 6 / 29, bent**3, (bent - 4 / 29) * 3 * (6 / 29) ** 2)
+    red, green, blue = np.clip(_RGB_OF_D50 @ xyz, 0, 1).tolist()
+    return red, green, blue

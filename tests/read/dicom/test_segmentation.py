@@ -1,5 +1,7 @@
-"""DICOM segmentations: told as label maps; a segment is read as a mask where it is asked for."""
+"""DICOM segmentations: one label map, or a mask of the segment that is asked for."""
 
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -8,15 +10,17 @@ import numpy as np
 import pydicom
 import pytest
 from numpy.typing import NDArray
-from pydicom.sr.codedict import codes
+from pydicom.sr.coding import Code
 
 from stereocell import read
 from stereocell.cli.__main__ import main
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.read.label_map import LabelMap
 from support.dicom_reading import lps_mm, whole
-from support.dicom_series import grid, write_series
+from support.dicom_segmentations import SPACING, write_segmentation
+from support.dicom_series import grid
 
 SHAPE = (6, 9, 7)  # of 63 bits a plane, which fill no bytes
-SPACING = (2.5, 2.0, 2.2)
 AFFINE = grid(shape=SHAPE, spacing=SPACING)
 
 
@@ -29,44 +33,20 @@ def masks() -> NDArray[np.uint8]:
     return both
 
 
-def complete(ds: Any) -> None:
-    """Add what a segmentation takes over from its images."""
-    ds.PatientName, ds.PatientID, ds.PatientBirthDate, ds.PatientSex = "DOE^JANE", "J1", "", ""
-    ds.StudyID, ds.StudyDate, ds.StudyTime, ds.AccessionNumber = "", "", "", ""
-    ds.ReferringPhysicianName = ""
-    ds.SliceThickness = ds.SpacingBetweenSlices = SPACING[0]
+def apart() -> NDArray[np.uint8]:
+    """The same, without what they share: the first one has it."""
+    voxels = masks()
+    voxels[..., 1] &= 1 - voxels[..., 0]
+    return voxels
 
 
-def write_segmentation(folder: Path, kind: str, voxels: NDArray[Any]) -> Path:
-    files = write_series(folder / "images", AFFINE, SHAPE, change=complete)
-    described = [
-        highdicom.seg.SegmentDescription(
-            number,
-            f"left lung of JANE {number}",
-            codes.SCT.Organ,
-            codes.SCT.Lung,
-            highdicom.seg.SegmentAlgorithmTypeValues.MANUAL,
-        )
-        for number in range(1, voxels.shape[-1] + 1)
-    ]
-    found = highdicom.seg.Segmentation(
-        [pydicom.dcmread(path) for path in files],
-        voxels,
-        highdicom.seg.SegmentationTypeValues[kind],
-        described,
-        highdicom.UID(),
-        1,
-        highdicom.UID(),
-        1,
-        "maker",
-        "model",
-        "1",
-        "0",
-        omit_empty_frames=False,
-    )
-    path = folder / "seg.dcm"
-    found.save_as(path)
-    return path
+def numbered(voxels: NDArray[Any]) -> NDArray[Any]:
+    """The label map of segments that don't overlap."""
+    return voxels @ np.arange(1, voxels.shape[-1] + 1, dtype=np.uint8)
+
+
+def labels_of(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
+    return LabelMap(dataset, channel).read(dataset.levels[0].box)
 
 
 def on_our_grid(voxels: NDArray[Any], dataset: read.Dataset) -> NDArray[Any]:
@@ -80,9 +60,7 @@ def on_our_grid(voxels: NDArray[Any], dataset: read.Dataset) -> NDArray[Any]:
 def test_a_segmentation_ends_the_plan_by_a_line_without_its_texts(
     tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    voxels = masks()
-    if kind == "LABELMAP":
-        voxels[..., 1] &= 1 - voxels[..., 0]
+    voxels = apart() if kind == "LABELMAP" else masks()
     path = write_segmentation(tmp_path, kind, voxels)
     assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
     told = capsys.readouterr()
@@ -125,3 +103,213 @@ def test_a_segmentation_without_a_place_is_told_as_one(
     told = capsys.readouterr().err
     assert "of a segmentation of 2 segments, without a place in the patient" in told
     assert "expected the image that it was drawn on" in told
+
+
+@pytest.mark.parametrize("overlap", ["NO", "UNDEFINED", None])
+def test_segments_of_bits_are_one_label_map(tmp_path: Path, overlap: str | None) -> None:
+    def change(ds: Any) -> None:
+        ds.SegmentsOverlap = overlap
+        if overlap is None:
+            del ds.SegmentsOverlap
+
+    dataset = read.open(write_segmentation(tmp_path, "BINARY", apart(), change))
+    assert len(dataset.channels) == 1
+    assert np.array_equal(labels_of(dataset), on_our_grid(numbered(apart()), dataset))
+    assert "a DICOM segmentation of 2 segments" in dataset.labels
+
+
+@pytest.mark.parametrize("overlap", ["YES", "UNDEFINED"])
+def test_segments_that_overlap_are_a_channel_each(tmp_path: Path, overlap: str) -> None:
+    def change(ds: Any) -> None:
+        ds.SegmentsOverlap = overlap
+
+    dataset = read.open(write_segmentation(tmp_path, "BINARY", masks(), change))
+    assert [channel.name for channel in dataset.channels] == ["segment 1", "segment 2"]
+    for index in (0, 1):
+        expected = on_our_grid(masks()[..., index] * (index + 1), dataset)
+        assert np.array_equal(labels_of(dataset, index), expected)
+
+
+def test_segments_that_overlap_although_none_shall_are_told(tmp_path: Path) -> None:
+    def change(ds: Any) -> None:
+        ds.SegmentsOverlap = "NO"
+
+    dataset = read.open(write_segmentation(tmp_path, "BINARY", masks(), change))
+    with pytest.raises(SourceError, match="segments that overlap, expected none"):
+        labels_of(dataset)
+
+
+@pytest.mark.parametrize("background", [0, 9])
+def test_a_label_map_keeps_its_numbers(tmp_path: Path, background: int) -> None:
+    def change(ds: Any) -> None:
+        values = np.frombuffer(ds.PixelData, np.uint8)[: np.prod(SHAPE)]
+        padded = np.where(values == 0, background, values).astype(np.uint8).tobytes()
+        ds.PixelData = padded + bytes(len(padded) % 2)
+        ds.PixelPaddingValue = background
+
+    path = write_segmentation(tmp_path, "LABELMAP", apart(), change)
+    for series in (0, 1):
+        dataset = read.open(path, series=series)
+        assert np.array_equal(labels_of(dataset), on_our_grid(numbered(apart()), dataset))
+
+
+def test_a_label_map_with_a_palette_keeps_its_numbers(tmp_path: Path) -> None:
+    def change(ds: Any) -> None:
+        ds.PhotometricInterpretation = "PALETTE COLOR"
+
+    dataset = read.open(write_segmentation(tmp_path, "LABELMAP", apart(), change))
+    assert np.array_equal(labels_of(dataset), on_our_grid(numbered(apart()), dataset))
+
+
+@pytest.mark.parametrize("kind", ["BINARY", "LABELMAP"])
+@pytest.mark.parametrize("kept", [(0, 5), (0, 1, 4), (3,)])
+@pytest.mark.parametrize("states_spacing", [True, False])
+def test_planes_that_are_left_out_are_empty(
+    tmp_path: Path, kind: str, kept: tuple[int, ...], states_spacing: bool
+) -> None:
+    def change(ds: Any) -> None:
+        if not states_spacing:
+            shared = ds.SharedFunctionalGroupsSequence[0]
+            del shared.PixelMeasuresSequence[0].SpacingBetweenSlices
+
+    voxels = apart()
+    voxels[[plane for plane in range(SHAPE[0]) if plane not in kept]] = 0
+    path = write_segmentation(tmp_path, kind, voxels, change, omit_empty=True)
+    if kept == (3,) and not states_spacing:
+        with pytest.raises(UsageError, match="of one plane, without SpacingBetweenSlices"):
+            read.open(path)
+        return
+    if kept == (0, 5) and not states_spacing:  # nothing says that planes lay between
+        assert max(read.open(path).levels[0].spacing_um) == 5 * 1000 * SPACING[0]
+        return
+    dataset = read.open(path)
+    found = labels_of(dataset)
+    assert sorted(dataset.levels[0].spacing_um) == pytest.approx([2000, 2200, 2500])
+    there = found > 0
+    expected = on_our_grid(numbered(np.concatenate([voxels, voxels[:1] * 0])), dataset)
+    assert np.array_equal(found[there], expected[there])
+    assert np.count_nonzero(there) == np.count_nonzero(voxels)
+
+
+def test_fractions_are_no_labels(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    half = masks() * 0.5
+    path = write_segmentation(tmp_path, "FRACTIONAL", half)
+    out = str(tmp_path / "out")
+    images = str(tmp_path / "images")
+    for flags in ([str(path), "--labels", "."], [images, "--labels", f"a={path}"]):
+        assert main(["plan", *flags, "-o", out]) == 2
+        told = capsys.readouterr().err
+        assert "of fractions (FRACTIONAL), not of bits or numbers" in told
+        assert "--series N --as intensity" in told
+    with pytest.raises(SourceError, match=r"found 0\.50.*, expected whole numbers in labels"):
+        labels_of(read.open(path, series=1))
+
+
+def test_objects_have_the_standards_words_alone(tmp_path: Path) -> None:
+    def change(ds: Any) -> None:
+        left = pydicom.Dataset()
+        left.CodeValue, left.CodingSchemeDesignator = "7771000", "SCT"
+        left.CodeMeaning = "JANE"
+        for item in ds.SegmentSequence:
+            item.SegmentDescription = item.TrackingID = "JANE"
+        first = ds.SegmentSequence[0].SegmentedPropertyTypeCodeSequence[0]
+        first.SegmentedPropertyTypeModifierCodeSequence = [left]
+
+    types = [
+        Code("64033007", "SCT", "kidney of JANE"),
+        Code("T-62000", "SRT", "liver of JANE"),
+        Code("1234", "99DOE", "JANE"),
+        Code("39607008", "SCT", "JANE"),
+        Code("39607008", "SCT", "JANE"),
+    ]
+    voxels = np.zeros((*SHAPE, 5), np.uint8)
+    for number in range(5):
+        voxels[:, number, :, number] = 1
+    path = write_segmentation(tmp_path, "BINARY", voxels, change, types=types)
+    notes = read.open(path).objects
+    assert notes.names == {
+        1: "Kidney, left",
+        2: "Liver",
+        3: "Segment 3",
+        4: "Lung (segment 4)",
+        5: "Lung (segment 5)",
+    }
+    assert notes.colors.keys() == {1}
+    assert notes.colors[1] == pytest.approx((1, 1, 1), abs=2e-3)
+
+
+def turned(ds: Any) -> None:
+    group = pydicom.Dataset()
+    group.ImageOrientationPatient = [0, 1, 0, 0, 0, 1]
+    ds.PerFrameFunctionalGroupsSequence[0].PlaneOrientationSequence = [group]
+
+
+def nameless(ds: Any) -> None:
+    for group in ds.PerFrameFunctionalGroupsSequence:
+        del group.SegmentIdentificationSequence
+
+
+def moved(ds: Any, step: Sequence[float]) -> None:
+    place = ds.PerFrameFunctionalGroupsSequence[2].PlanePositionSequence[0]
+    place.ImagePositionPatient = [
+        a + b for a, b in zip(place.ImagePositionPatient, step, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (turned, "with planes of 2 orientations or sizes"),
+        (nameless, "with frames that name no segment"),
+        (lambda ds: moved(ds, AFFINE[:3, 1]), "with planes beside each other"),
+        (lambda ds: moved(ds, 0.4 * AFFINE[:3, 0]), "with uneven gaps between planes"),
+    ],
+)
+def test_planes_that_make_no_label_map_are_told(
+    tmp_path: Path, spoil: Callable[[Any], None], told: str
+) -> None:
+    path = write_segmentation(tmp_path, "BINARY", apart(), spoil)
+    with pytest.raises(UsageError, match=told):
+        read.open(path)
+
+
+def test_of_two_segmentations_one_is_asked_for(tmp_path: Path) -> None:
+    first, second = (
+        write_segmentation(tmp_path / name, "LABELMAP", apart()) for name in ("a", "b")
+    )
+    folder = tmp_path / "both"
+    folder.mkdir()
+    first.rename(folder / "a.dcm")
+    second.rename(folder / "b.dcm")
+    with pytest.raises(UsageError, match="found 2 segmentations, expected one"):
+        read.open(folder)
+    assert labels_of(read.open(folder, series=2)).max() == 2
+
+
+def test_numbers_beyond_a_byte_stay(tmp_path: Path) -> None:
+    def change(ds: Any) -> None:
+        ds.SegmentSequence[1].SegmentNumber = 40_000
+        for group in ds.PerFrameFunctionalGroupsSequence:
+            segment = group.SegmentIdentificationSequence[0]
+            if segment.ReferencedSegmentNumber == 2:
+                segment.ReferencedSegmentNumber = 40_000
+
+    dataset = read.open(write_segmentation(tmp_path, "BINARY", apart(), change))
+    expected = on_our_grid(apart() @ np.array([1, 40_000]), dataset)
+    assert np.array_equal(labels_of(dataset), expected)
+    assert dataset.objects.names.keys() == {1, 40_000}
+
+
+@pytest.mark.parametrize("kind", ["BINARY", "LABELMAP"])
+def test_garbled_segmentations_raise_nothing_else(tmp_path: Path, kind: str) -> None:
+    """Bytes are changed at random; a label map is read all the same, or refused in one line."""
+    random = np.random.default_rng(0)
+    path = write_segmentation(tmp_path, kind, apart())
+    content = np.frombuffer(path.read_bytes(), np.uint8)
+    for _ in range(60):
+        garbled = content.copy()
+        places = random.integers(132, len(content), random.integers(1, 12))
+        garbled[places] = random.integers(0, 256, len(places))
+        path.write_bytes(garbled.tobytes())
+        with suppress(SourceError, UsageError):
+            labels_of(read.open(path))

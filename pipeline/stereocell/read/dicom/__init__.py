@@ -24,17 +24,19 @@ from stereocell.read.beside import or_one_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.header import SEGMENTATION, NoPlaneError, is_dicom, read_frames
+from stereocell.read.dicom.label_stack import stack_labels
 from stereocell.read.dicom.pixels import decode, dtype_of
+from stereocell.read.dicom.segmentation import LABELMAP
 from stereocell.read.dicom.series import Stack, find_stacks
 from stereocell.read.image import Image
-from stereocell.read.plane_stack import StackLayout
+from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
 from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
 from stereocell.storage.first_bytes import identify
 from stereocell.storage.location import Location, first_bytes, is_own
 
-_INSTEAD = "objects can't be built yet: expected the image that it was drawn on"
+_INSTEAD = "expected the image that it was drawn on"
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
@@ -42,10 +44,12 @@ UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 class Found:
     """The DICOM files of a folder in the order of names, their stacks, and counts of the others.
 
+    frames    of all stacks
     left_out  reason -> number of files without a usable plane
     """
 
     paths: tuple[Path, ...]
+    frames: tuple[Frame, ...]
     stacks: tuple[Stack, ...]
     left_out: Counter[str]
 
@@ -53,7 +57,8 @@ class Found:
 def read_image(location: Location, series: int = 0) -> Image:
     """Return one series; 0 is the largest, others count from 1 as `list_series` does.
 
-    Raises SourceError where it makes no volume, UsageError where the source lacks the series.
+    Where there are segmentations alone, 0 is the label map of all segments. Raises SourceError
+    where it makes no volume, UsageError where the source lacks the series.
     """
     found = _find(location)
     if series > len(found.stacks):
@@ -62,12 +67,11 @@ def read_image(location: Location, series: int = 0) -> Image:
             "(`--series list` shows them)"
         )
     stack = found.stacks[max(series, 1) - 1]
-    if stack.layout is None and stack.first.segments:
-        found_one = _labels(stack, len(found.stacks))
-        raise UsageError(
-            f"{location.shown}: is a label map: found {found_one}, of which this is no volume "
-            f"({stack.problem}); {_INSTEAD}"
-        )
+    if (segmentation := stack.first.segmentation) is not None:
+        if not series or segmentation.kind == LABELMAP:  # whose numbers have no mean
+            return _label_map(found, stack, series, location.shown)
+        if stack.layout is None:
+            raise _no_labels(stack, len(found.stacks), location.shown, stack.problem)
     if stack.layout is None:
         raise SourceError(
             f"{location.shown}: {stack.problem}; expected parallel slices of one volume"
@@ -91,6 +95,54 @@ def read_image(location: Location, series: int = 0) -> Image:
         labels=_labels(stack, len(found.stacks)),
         acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
         notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
+    )
+
+
+def _label_map(found: Found, stack: Stack, series: int, shown: str) -> Image:
+    """Return a segmentation as numbers of objects: one channel, or one a segment if they overlap.
+
+    Raises SourceError, UsageError.
+    """
+    own = stack.first.segmentation
+    files = {frame.file for frame in found.frames if frame.segmentation is not None}
+    if len(files) > 1 and not series:
+        raise UsageError(f"{shown}: found {len(files)} segmentations, expected one: name its file")
+    try:
+        assert own is not None
+        labels = stack_labels(own, [f for f in found.frames if f.file == stack.first.file])
+    except NoStackError as error:
+        raise _no_labels(stack, len(found.stacks), shown, str(error)) from None
+    overlap = labels.do_overlap(found.paths, shown)
+    channels = [[number] for number in labels.numbers] if overlap else [labels.numbers]
+    canonical = canonical_of(labels.affine, labels.shape)
+    z, y, x = (labels.shape[axis] for axis in canonical.order)
+
+    def load(channel: int) -> NDArray[Any]:
+        return canonical.apply(labels.load(found.paths, shown, channels[channel]))
+
+    voxels = WholeArray((len(channels), z, y, x), labels.dtype, load)
+    title = stack.first.modality or UNKNOWN
+    return Image(
+        arrays=(VoxelArray(voxels, ("c", "z", "y", "x")),),
+        grids=(Grid((z, y, x), canonical.spacing_um),),
+        names=tuple(f"segment {number}" for (number,) in channels) if overlap else (title,),
+        colors=(None,) * len(channels),
+        images=1,
+        title=title,
+        modality=stack.first.modality,
+        placement=canonical.placement,
+        has_sides=not stack.first.is_quadruped,
+        labels=_labels(stack, len(found.stacks)),
+        objects=own.objects,
+        acquired=Acquired(canonical.order.index(0)),
+        notes=_left_out(found.left_out),
+    )
+
+
+def _no_labels(stack: Stack, stacks: int, shown: str, problem: str) -> UsageError:
+    return UsageError(
+        f"{shown}: is a label map: found {_labels(stack, stacks)}, {problem}; {_INSTEAD}, or a "
+        "mask by --series N --as intensity"
     )
 
 
@@ -145,7 +197,8 @@ def _find(location: Location) -> Found:
             f"{'' if paths else ', or a volume of another format'}"
             f"{or_one_of(root, 'dicom')}"
         )
-    return Found(tuple(paths), find_stacks(frames.values(), compare), left_out)
+    every = tuple(frames.values())
+    return Found(tuple(paths), every, find_stacks(every, compare), left_out)
 
 
 def _files(folder: Path) -> list[Path]:
@@ -191,11 +244,11 @@ def _load(
 
 
 def _labels(stack: Stack, stacks: int) -> str:
-    count = stack.first.segments
-    if not count:
+    segmentation = stack.first.segmentation
+    if segmentation is None:
         return ""
     each = " (each a series of --series list)" * (stack.first.segment > 0 and stacks > 1)
-    return f"a DICOM segmentation of {count} segment{'s' * (count != 1)}{each}"
+    return f"a DICOM segmentation of {segmentation.words}{each}"
 
 
 def _acquired(

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from stereocell.read.dicom.segmentation import Segmentation
+
 Vector = tuple[float, float, float]
 
 
@@ -47,7 +49,7 @@ class Frame:
     spacing            mm between (rows, columns)
     tile, corner       which slice of a mosaic, and its first pixel (row, column) in the image
     segment            the number of the one that it shows, in a segmentation; 0: of none or all
-    segments           how many the file has; 0: it is no segmentation
+    segmentation       the file's; None: it is an image
     is_quadruped       the axes of the place are those of an animal on four legs
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
@@ -71,5 +73,5 @@ class Frame:
     tile: int = 0
     corner: tuple[int, int] = (0, 0)
     segment: int = 0
-    segments: int = 0
+    segmentation: Segmentation | None = None
     is_quadruped: bool = False

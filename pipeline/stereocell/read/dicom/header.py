@@ -16,11 +16,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pydicom
-from pydicom.uid import (
-    UID,
-    DeflatedExplicitVRLittleEndian,
-    SegmentationStorage,
-)
+from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.frame import Encoding, Frame, Vector
@@ -31,6 +27,12 @@ from stereocell.read.dicom.frame_offsets import (
     place_first,
 )
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
+from stereocell.read.dicom.segmentation import (
+    FRACTIONAL,
+    LABELMAP,
+    Segmentation,
+    segmentation_of,
+)
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
 
@@ -61,6 +63,9 @@ _TAGS: list[Any] = [
     "RescaleIntercept",
     "ModalityLUTSequence",
     "SegmentSequence",
+    "SegmentationType",
+    "SegmentsOverlap",
+    "MaximumFractionalValue",
     "DetectorInformationSequence",
     "SliceVector",
     "SpacingBetweenSlices",
@@ -71,7 +76,6 @@ _TAGS: list[Any] = [
     "PerFrameFunctionalGroupsSequence",
 ]
 SEGMENTATION = "of a segmentation"  # how a reason begins
-_SEGMENTATIONS = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")  # and the label map
 _NO_PLACE = "without a place in the patient"
 _NO_SPACING = "without a PixelSpacing above 0"
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
@@ -120,16 +124,15 @@ def read_frames(path: Path, file: int) -> list[Frame]:
             header = pydicom.dcmread(
                 opened, stop_before_pixels=True, force=True, specific_tags=_TAGS
             )
-            segments = _segments(header)
+            segmentation = segmentation_of(header)
             try:
-                return _frames(header, opened, path, file, segments)
+                return _frames(header, opened, path, file, segmentation)
             except NoPlaneError as error:
-                if not segments and str(error) == _NO_PLACE:
+                if segmentation is None and str(error) == _NO_PLACE:
                     raise NoPlaneError(f"{_NO_PLACE}{_kind(header)}") from None
-                if not segments:
+                if segmentation is None:
                     raise
-                many = f"{segments} segment{'s' * (segments != 1)}"
-                raise NoPlaneError(f"{SEGMENTATION} of {many}, {error}") from None
+                raise NoPlaneError(f"{SEGMENTATION} of {segmentation.words}, {error}") from None
     except DICOM_FAULTS:
         raise NoPlaneError("with a damaged header") from None
 
@@ -141,19 +144,24 @@ def _refuse_deflated(path: Path) -> None:
         raise NoPlaneError("deflated as a whole, which is not read")
 
 
-def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int) -> list[Frame]:
+def _frames(
+    header: Any, opened: BinaryIO, path: Path, file: int, segmentation: Segmentation | None
+) -> list[Frame]:
     rows, columns = int(header.get("Rows") or 0), int(header.get("Columns") or 0)
     size = path.stat().st_size
     if opened.tell() >= size or rows < 1 or columns < 1:
         raise NoPlaneError(f"without pixels{_kind(header)}")
-    grey = ("MONOCHROME1", "MONOCHROME2")
+    grey = ["MONOCHROME1", "MONOCHROME2"]
+    if segmentation is not None and segmentation.kind == LABELMAP:
+        grey.append("PALETTE COLOR")  # of numbers
     kind = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
     if int(header.get("SamplesPerPixel") or 1) != 1 or kind not in grey:
         raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
     if "ModalityLUTSequence" in header:
         raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
     count = int(header.get("NumberOfFrames") or 1)
-    is_float = _check_pixels(header, opened, size, rows * columns * count, is_mask=segments > 0)
+    is_mask = segmentation is not None
+    is_float = _check_pixels(header, opened, size, rows * columns * count, is_mask=is_mask)
     place_first(header)
     series, instance, reference = (
         hashlib.sha256(str(header.get(key, "")).encode()).digest()
@@ -200,8 +208,8 @@ def _frames(header: Any, opened: BinaryIO, path: Path, file: int, segments: int)
                 _encoding(header, groups, kind == "MONOCHROME1", is_float, padding),
                 number,
                 tile.corner,
-                int(segment or 0) if segments else 0,
-                segments,
+                int(segment or 0) if is_mask else 0,
+                segmentation,
                 is_quadruped,
             )
             for number, tile in enumerate(mosaic.tiles)
@@ -245,17 +253,6 @@ def _shifted(mosaic: Mosaic, mm: float, directions: tuple[Vector, Vector]) -> Mo
 def _vector(values: Any) -> Vector:
     x, y, z = _numbers(values, 3)
     return x, y, z
-
-
-def _segments(header: Any) -> int:
-    """Return how many segments a segmentation has, its background left out; 0: it is none.
-
-    References: DICOM PS3.3 C.8.20 (Segmentation).
-    """
-    if header.get("SOPClassUID") not in _SEGMENTATIONS and header.get("Modality") != "SEG":
-        return 0
-    listed = header.get("SegmentSequence") or ()
-    return max(1, sum(int(item.get("SegmentNumber") or 0) > 0 for item in listed))
 
 
 def _kind(header: Any) -> str:
@@ -372,6 +369,8 @@ def _encoding(
     intercept = _found(header, groups, sequence, "RescaleIntercept")
     if slope is None and is_dose(header):
         slope = header.get("DoseGridScaling")
+    if header.get("SegmentationType") == FRACTIONAL:
+        slope = 1 / float(header.get("MaximumFractionalValue") or 255)
     slope, intercept = (1.0 if slope is None else float(slope)), float(intercept or 0.0)
     if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:
         raise NoPlaneError("of values that no rescale slope gives")

@@ -81,7 +81,7 @@ def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ..
             stacks,
             key=lambda s: (
                 s.layout is None,
-                s.first.segments > 0,
+                s.first.segmentation is not None,
                 -s.voxels * len(s.times),
                 s.first.file,
                 s.first.index,
