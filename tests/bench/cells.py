@@ -205,7 +205,9 @@ def search_error(labels: NDArray[np.int32], spacing_um: Triple, wanted: float) -
 
 def measure(mesh: Mesh, case: Case) -> Figures:
     """Return the figures of a mesh of all the case's objects."""
-    step, count = case.step_um, len(case.truth.volumes)
+    count = len(case.truth.volumes)
+    # twice what is needed: a mesh that strays farther from its box gets a coarser lattice
+    step = max(case.step_um, choose_step(float(np.ptp(mesh.positions, axis=0).max()) / 2) * 1e6)
     parts = split(mesh, count)
     there = [k for k in range(count) if len(parts[k].triangles)]  # an object may vanish
     near = {k: Nearest(parts[k], SAMPLES) for k in there}
