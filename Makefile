@@ -56,7 +56,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -274,6 +274,13 @@ bench-tissue: setup ## Tissue classes and multi-Otsu on the head phantom
 
 bench-unit: setup ## A whole unit, and meshes of the same solids by the paper's chain, VTK and zmesh
 	$(BIN)/python tests/bench/unit.py
+
+# the peer has a folder of its own: nothing else needs it
+CELLS := out/bench-cells
+bench-cells: setup ## Closed surfaces of touching cells, ours and zmesh's  (ARGS=--large: some 1500 cells)
+	@test -d $(CELLS)/peers || { mkdir -p $(CELLS) && $(BIN)/uv pip install --quiet --no-deps \
+	  --python $(BIN)/python --target $(CELLS)/peers zmesh==1.15.0; } || rm -rf $(CELLS)/peers
+	PYTHONPATH=$(CELLS)/peers $(WITH_ARGS) $(BIN)/python tests/bench/cells.py $(CELLS) ARGS
 
 bench-wrap: setup ## Closing on voxels against the first paper's chain on triangles (CGAL, g++)
 	$(BIN)/python tests/bench/wrap.py

@@ -1,0 +1,336 @@
+"""What `make bench-cells` prints: surfaces of touching cells, ours beside zmesh's.
+
+Ours is what a build makes of a label map, without what it measures: seconds and memory of a level
+are those from the labels to it, with all finer ones. zmesh, which igneous meshes with, makes each
+label's surface by itself. Its `max_error` is searched so that it has as many triangles as our level
+of some 450 a cell; the search isn't counted. igneous's own settings are a row too. Each run is a
+process by itself, by turns, medians of --rounds.
+
+Distances go both ways, of points spread over both surfaces: from the truth, where it is known by
+formula, or else from the faces between voxels. Volumes are compared with the truth's or the
+voxels'. Faults are those of the exact check, object by object, as made and on the lattice of our
+.glb, in which all are stored for the bytes.
+"""
+
+import argparse
+import importlib
+import importlib.util
+import json
+import os
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, astuple, dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import tifffile
+from cell_truth import (
+    BallsCut,
+    Truth,
+    VoxelFaces,
+    measure_overlap,
+    numbered,
+    split,
+    volume_of,
+)
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from stereocell.formats.gltf import Material, choose_step, encode_glb
+from stereocell.meshes.distance import Nearest
+from stereocell.meshes.validity import find_defects
+from stereocell.model.mesh import Mesh
+from stereocell.model.volume import zyx_to_xyz
+from stereocell.objects.build_objects import MARGIN
+from stereocell.objects.options import ObjectOptions
+from stereocell.objects.simplify_walls import simplify_walls
+from stereocell.objects.walls import extract_walls, put_on_lattice, surfaces_of
+from stereocell.objects.well_composed import make_well_composed
+from support.touching_cells import RADIUS_UM, touching_cells
+
+ROUNDS = 3
+SMALL, LARGE = (48, 112, 112), (112, 368, 368)  # voxels of the phantom
+SPACING_UM = (1.0, 0.5, 0.5)  # of the phantom
+NEAR = 450  # triangles a cell at which peers are compared
+SAMPLES = 500  # points of each of a cell's surfaces
+INSIDE = 200_000  # points that are asked which cells they lie in
+IGNEOUS = 100, 0.04  # reduction_factor and max_error, um, when it isn't told otherwise
+MOST = 1000  # a reduction_factor that leaves it to max_error
+HALVINGS = 12
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    name: str
+    labels: NDArray[np.int32]  # (z, y, x), 1 to n
+    spacing_um: Triple
+    truth: Truth
+
+    @property
+    def step_um(self) -> float:
+        """The step of the lattice of a bundle with this one tile."""
+        sizes = np.multiply(self.labels.shape, self.spacing_um)
+        return choose_step(float(sizes.max())) * 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Spent:
+    seconds: float
+    cpu_s: float
+    peak_mb: float  # above what the process held at its start
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Of all objects of a mesh; distances in um, shares in percent."""
+
+    triangles: float  # a cell
+    mean: float
+    p95: float
+    bias: tuple[float, float, float]  # 2nd, 50th and 98th percentile
+    faulty: int  # objects, as made
+    faulty_stored: int  # the same on the lattice
+    overlap: float
+    size: int  # bytes
+
+
+Made = list[tuple[str, Mesh, Spent]]
+
+
+class Meter:
+    """Time and memory since it was made."""
+
+    def __init__(self) -> None:
+        Path("/proc/self/clear_refs").write_text("5")  # the peak is what is held now
+        self._held, _ = _memory_mb()
+        self._start, self._cpu = time.perf_counter(), time.process_time()
+
+    def read(self) -> Spent:
+        seconds, cpu = time.perf_counter() - self._start, time.process_time() - self._cpu
+        return Spent(seconds, cpu, _memory_mb()[1] - self._held)
+
+
+def _memory_mb() -> tuple[float, float]:
+    """Return what the process holds, and the most that it held."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    said = dict(line.split(":", 1) for line in lines)
+    return int(said["VmRSS"].split()[0]) / 1024, int(said["VmHWM"].split()[0]) / 1024
+
+
+def ours(labels: NDArray[np.int32], spacing_um: Triple, step_um: float) -> Made:
+    """Return all levels."""
+    small = np.zeros((9, 9, 9), np.int32)
+    small[3:6, 3:6, 2:7] = 1
+    _levels(small, spacing_um, step_um)  # compiled code is loaded
+    return _levels(labels, spacing_um, step_um)
+
+
+def _levels(labels: NDArray[np.int32], spacing_um: Triple, step_um: float) -> Made:
+    count = int(labels.max())
+    volumes = np.bincount(labels.ravel()) * float(np.prod(spacing_um))
+    z, y, x = (-MARGIN * s for s in spacing_um)
+    meter, made = Meter(), []
+    mended, _ = make_well_composed(np.pad(labels, MARGIN))
+    walls = extract_walls(mended, spacing_um, step_um, (z, y, x))
+    for level, error in enumerate(ObjectOptions().errors):
+        walls = simplify_walls(walls, error * min(spacing_um), volumes, step_um)
+        mesh = surfaces_of(walls, np.arange(1, count + 1, dtype=np.int32))
+        made.append((f"ours, lod{level}", mesh, meter.read()))
+    return made
+
+
+def by_zmesh(
+    labels: NDArray[np.int32], spacing_um: Triple, factor: int, error: float, name: str
+) -> Made:
+    mesher = _mesher(labels, spacing_um)  # it loads what it needs
+    meter = Meter()
+    mesher = _mesher(labels, spacing_um)
+    found = [
+        mesher.get(number, normals=False, reduction_factor=factor, max_error=error)
+        for number in range(1, int(labels.max()) + 1)
+    ]
+    spent = meter.read()
+    counts = [len(part.vertices) for part in found]
+    starts = np.cumsum([0, *counts])
+    at = zyx_to_xyz(np.concatenate([part.vertices for part in found])).astype(np.float32)
+    at -= zyx_to_xyz(np.asarray(spacing_um)).astype(np.float32)  # of the padding
+    faces = [part.faces.astype(np.int64) + starts[k] for k, part in enumerate(found)]
+    triangles = np.concatenate(faces).astype(np.uint32)
+    objects = np.repeat(np.arange(len(found), dtype=np.int32), counts)
+    return [(name, Mesh(at, triangles, _normals(at, triangles), objects=objects), spent)]
+
+
+def _mesher(labels: NDArray[np.int32], spacing_um: Triple) -> Any:
+    mesher = importlib.import_module("zmesh").Mesher(spacing_um)
+    mesher.mesh(np.pad(labels, 1).astype(np.uint32))  # else what ends at the ends stays open
+    return mesher
+
+
+def _normals(at: NDArray[np.float32], triangles: NDArray[np.uint32]) -> NDArray[np.float32]:
+    corners = at.astype(np.float64)[triangles]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    columns = [np.bincount(triangles.ravel(), np.repeat(a, 3), len(at)) for a in area.T]
+    normals = np.stack(columns, axis=1)
+    lengths = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+    return (normals / lengths).astype(np.float32)
+
+
+def search_error(labels: NDArray[np.int32], spacing_um: Triple, wanted: float) -> float:
+    """Return the max_error, um, at which zmesh's triangles a cell are nearest to some number."""
+    mesher = _mesher(labels, spacing_um)
+    some = range(1, int(labels.max()) + 1, max(1, int(labels.max()) // 50))
+
+    def triangles(error: float) -> float:
+        parts = (
+            mesher.get(number, normals=False, reduction_factor=MOST, max_error=error)
+            for number in some
+        )
+        return float(np.mean([len(part.faces) for part in parts]))
+
+    low, high = 0.01 * min(spacing_um), 1000 * max(spacing_um)
+    for _ in range(HALVINGS):
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if triangles(middle) > wanted else (low, middle)
+    return min(low, high, key=lambda error: abs(triangles(error) - wanted))
+
+
+def measure(mesh: Mesh, case: Case) -> Figures:
+    """Return the figures of a mesh of all the case's objects."""
+    count = len(case.truth.volumes)
+    # twice what is needed: a mesh that strays farther from its box gets a coarser lattice
+    step = max(case.step_um, choose_step(float(np.ptp(mesh.positions, axis=0).max()) / 2) * 1e6)
+    parts = split(mesh, count)
+    there = [k for k in range(count) if len(parts[k].triangles)]  # an object may vanish
+    near = {k: Nearest(parts[k], SAMPLES) for k in there}
+    away = np.concatenate([case.truth.distances(k, near[k]) for k in there])
+    volumes = np.array([volume_of(part) for part in parts])
+    low, middle, high = np.percentile(100 * (volumes / case.truth.volumes - 1), [2, 50, 98])
+    glb = encode_glb(mesh, step / 1e6, material=Material((1, 1, 1)), name="cells", extras={})
+    return Figures(
+        len(mesh.triangles) / count,
+        float(away.mean()),
+        float(np.percentile(away, 95)),
+        (float(low), float(middle), float(high)),
+        sum(at_fault(part) for part in parts),
+        sum(at_fault(stored(part, step)) for part in parts),
+        100 * measure_overlap(list(near.values()), INSIDE),
+        len(glb.data),
+    )
+
+
+def at_fault(part: Mesh) -> bool:
+    return not len(part.triangles) or find_defects(part).total > 0
+
+
+def stored(part: Mesh, step_um: float) -> Mesh:
+    """Return a mesh as a bundle has it."""
+    at = put_on_lattice(part.positions.astype(np.float64), step_um)
+    return replace(part, positions=at.astype(np.float32))
+
+
+def alone(make: Callable[..., Made], *given: Any) -> Made:
+    """Return what is made in a process of its own."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(make, *given).result()
+
+
+def compare(case: Case, rounds: int) -> list[dict[str, Any]]:
+    """Print a row for each, and return the rows."""
+    count = len(case.truth.volumes)
+    given = case.labels, case.spacing_um
+    ours_run = ours, *given, case.step_um
+    first = alone(*ours_run)
+    peers: list[tuple[Any, ...]] = []
+    if importlib.util.find_spec("zmesh"):
+        sizes = [len(mesh.triangles) / count for _, mesh, _ in first]
+        error = search_error(*given, min(sizes, key=lambda size: abs(np.log(size / NEAR))))
+        peers = [
+            (by_zmesh, *given, MOST, error, f"zmesh, max_error {error:.2g} um"),
+            (by_zmesh, *given, *IGNEOUS, "zmesh, as igneous asks"),
+        ]
+    spent: dict[str, list[Spent]] = {}
+    meshes: dict[str, Mesh] = {}
+    for turn in range(rounds):
+        made = alone(*ours_run) if turn else first
+        for name, mesh, took in made + [one for peer in peers for one in alone(*peer)]:
+            spent.setdefault(name, []).append(took)
+            meshes[name] = mesh
+    print(f"\n{case.name}: {count} cells, {case.labels.shape} voxels")
+    print("| | triangles a cell | mean / p95 um | volume %, p2 / 50 / 98 | at fault: made, stored "
+          "| overlap % | bytes a cell | CPU s | s | MB |")  # fmt: skip
+    print("|---" * 10 + "|")
+    rows = []
+    for name, mesh in meshes.items():
+        figures = measure(mesh, case)
+        took = Spent(*map(statistics.median, zip(*map(astuple, spent[name]), strict=True)))
+        print(row(name, figures, took, count), flush=True)
+        named = {"case": case.name, "cells": count, "name": name}
+        rows.append(named | asdict(figures) | asdict(took))
+    return rows
+
+
+def row(name: str, found: Figures, took: Spent, cells: int) -> str:
+    bias = " / ".join(f"{share:+.2f}" for share in found.bias)
+    return (
+        f"| {name} | {found.triangles:.0f} | {found.mean:.3f} / {found.p95:.3f} | {bias} "
+        f"| {found.faulty}, {found.faulty_stored} | {found.overlap:.3f} | {found.size / cells:.0f} "
+        f"| {took.cpu_s:.2f} | {took.seconds:.2f} | {took.peak_mb:.0f} |"
+    )
+
+
+def cases(large: bool, only: str) -> Iterator[Case]:
+    """Yield those whose name begins with `only`, one after another."""
+    if "touching cells".startswith(only):
+        labels, centres = touching_cells(LARGE if large else SMALL, SPACING_UM)
+        truth = BallsCut(centres, RADIUS_UM, SAMPLES)
+        yield Case("touching cells, from the truth", labels, SPACING_UM, truth)
+    folder = Path(os.environ.get("STEREOCELL_DATA", ""))
+    masks: tuple[tuple[str, str, Triple, Callable[[Path], Any]], ...] = (
+        # its file says no voxel size
+        ("nuclei", "nuclei_stardist/mask3d.tif", (1.0, 1.0, 1.0), tifffile.imread),
+        ("ovule", "ovule_plantseg/sample_ovule.h5", (0.235, 0.15, 0.15), _ovule),
+    )
+    for name, file, spacing, read in masks:
+        if not name.startswith(only):
+            continue
+        if not (folder / file).is_file():
+            print(f"bench-cells: {name} skipped: no {file} below STEREOCELL_DATA")
+            continue
+        labels = numbered(read(folder / file), ObjectOptions().smallest_voxels)
+        faces = VoxelFaces(labels, spacing, SAMPLES)
+        yield Case(f"{name}, from the faces between voxels", labels, spacing, faces)
+
+
+def _ovule(path: Path) -> Any:
+    with h5py.File(path) as file:
+        return file["label"][:]
+
+
+def main() -> None:
+    """Run all comparisons."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="the folder of cells.json")
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    parser.add_argument("--large", action="store_true", help="a phantom of some 1500 cells")
+    parser.add_argument("--only", default="", help="cases whose name begins so")
+    given = parser.parse_args()
+    if not importlib.util.find_spec("zmesh"):
+        print("bench-cells: zmesh skipped: pip install zmesh (LGPL-3.0)")
+    rows = []
+    for case in cases(given.large, given.only):
+        rows += compare(case, given.rounds)
+    given.out.mkdir(parents=True, exist_ok=True)
+    (given.out / "cells.json").write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
