@@ -139,7 +139,7 @@ def _levels(labels: NDArray[np.int32], spacing_um: Triple, step_um: float) -> Ma
     volumes = np.bincount(labels.ravel()) * float(np.prod(spacing_um))
     z, y, x = (-MARGIN * s for s in spacing_um)
     meter, made = Meter(), []
-    mended, _ = make_well_composed(np.pad(labels, MARGIN))
+    mended, _, _ = make_well_composed(np.pad(labels, MARGIN))
     walls = extract_walls(mended, spacing_um, step_um, (z, y, x))
     for level, error in enumerate(ObjectOptions().errors):
         walls = simplify_walls(walls, error * min(spacing_um), volumes, step_um)
