@@ -186,15 +186,14 @@ test: setup browser ## All tests, in headless Chromium too
 	$(MAKE) --no-print-directory -j2 test-python test-viewer
 
 # A browser is a session of its own, and Linux shares the cores between sessions before it looks at
-# who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice. Only
-# a little: pages that wait for a core go on drawing, but who has too few ends alone, on part of them
-BEHIND := $(if $(CI),setsid --wait sh -c 'echo 5 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 5
-# Two processes for each core: builds, servers and clusters wait for one another. A file's tests share
-# what it has built, so they stay together. In a fresh clone one process compiles all for the others,
-# which would each do it, side by side
+# who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
+BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
+# Three processes for two cores: builds, servers and clusters wait for one another, and each process
+# reads all tests first. A file's tests share what it has built, so they stay together. In a fresh clone
+# one process compiles all for the three, which would each do it, side by side
 test-python: setup
 	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
-	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((2 * WORKERS)) --dist loadfile --no-loadscope-reorder --durations 25
+	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25
 
 test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test

@@ -1,4 +1,3 @@
-import { availableParallelism } from "node:os";
 import { fileURLToPath } from "node:url";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
@@ -136,8 +135,8 @@ export default defineConfig({
           testTimeout: 180_000,
           hookTimeout: 180_000,
           expect: { poll: { timeout: 90_000 } }, // its usual second is short for a busy machine
-          // one page for each core: software draws it, mostly in one thread, and it waits between
-          maxWorkers: Math.min(availableParallelism(), 8),
+          // one software-rendering page at a time: of two, a first visit keeps too little in its 40 s
+          fileParallelism: false,
           isolate: false,
           sequence: { groupOrder: 1 }, // not beside the other project's
           // where others have the cores a browser may miss a moment; what is wrong is wrong twice
