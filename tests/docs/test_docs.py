@@ -47,6 +47,8 @@ PARSED = {
     "tissue": "half a minute: building/test_tissue.py",
     "build big.ome.zarr": "a cluster: engine/test_cluster.py",
     "build s3://": "object storage: storage/test_object_store.py",
+    "build stack.tif": "masks of another program: building/test_objects.py",
+    "build ct.nii.gz": "the same: building/test_label_maps.py",
 }
 # ... and run, but on less
 SMALLER = {
