@@ -49,6 +49,8 @@ PARSED = {
     "build s3://": "object storage: storage/test_object_store.py",
     "build stack.tif": "masks of another program: building/test_objects.py",
     "build ct.nii.gz": "the same: building/test_label_maps.py",
+    "build CT_FOLDER": "the same: read/dicom/test_segmentation.py",
+    "build seg.dcm": "the same",
 }
 # ... and run, but on less
 SMALLER = {
