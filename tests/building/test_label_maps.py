@@ -94,6 +94,15 @@ def test_turned_skewed_and_far_ones_are_refused(scan: tuple[Path, Dataset], tmp_
     skewed[:3, 0] += 0.3 * skewed[:3, 1]
     path = nifti_files.write(tmp_path / "s.nii.gz", skewed, numbered(skewed, SHAPE))
     assert "resampled onto an orthogonal grid: found numbers of objects" in refusal(scan, path)
+    with pytest.raises(SourceError, match="which have no means"):  # by itself, too
+        find_labels(
+            read.open(path),
+            str(path),
+            {"organs": "."},
+            options=PlanOptions(),
+            colors=[(1, 1, 1)],
+            taken=[],
+        )
     far = affine.copy()
     far[:3, 3] += 500
     path = nifti_files.write(tmp_path / "f.nii.gz", far, numbered(affine, SHAPE))

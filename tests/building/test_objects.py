@@ -437,3 +437,34 @@ def test_what_is_too_thin_is_named_and_left_out(
         assert not (out / "bundle/channels/cells/objects.json").exists()
     else:
         assert labels_of(out).tolist() == [12]
+
+
+def test_names_of_columns_that_mean_something_else_and_places_that_tell_too_much(
+    sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Columns called as a mesh's own values are, in a folder that names a patient."""
+    folder = tmp_path / "Doe, Jane's"
+    folder.mkdir()
+    masks, table, out = folder / "masks.tif", folder / "jane.csv", tmp_path / "out"
+    labels = make_tissue(SHAPE, 3).labels
+    tifffile.imwrite(masks, labels.astype(np.uint16), metadata={"axes": "ZYX"})
+    table.write_text("label,normals,st,points,type\n2,1,2,3,\n3,4,5,6,\n")
+    flags = ("--channels", "CD3", "--labels", f"cells={masks}", "--table", table)
+    build(sample, out, *flags, "--grid", "2x1")
+    ids = [one["id"] for one in objects_of(out)["columns"]]
+    assert ids[-4:] == ["normals_2", "st_2", "points_2", "type"]
+    values = dict(zip(labels_of(out).tolist(), column_of(out, "st_2"), strict=True))
+    assert (values[2], values[3]) == (2, 5)
+    assert np.isnan(column_of(out, "type")).all()  # nobody has any
+    assert run("check", out, "--deep", "--workers", 0) == 0
+    for part in ("stage", "bundle"):
+        for file in (out / part).rglob("*"):
+            held = file.read_bytes() if file.is_file() else b""
+            assert b"jane" not in held.lower(), file
+
+    # and what is finished needs the masks no more
+    masks.unlink()
+    said(capsys)
+    for phase in PHASES[1:]:
+        assert run(phase, out, "--workers", 0) == 0
+        assert f"{phase}: up to date" in said(capsys)

@@ -113,7 +113,7 @@ def _opened(
 ) -> tuple[Dataset, SourceRef]:
     """Return a label map's dataset, and how it was opened."""
     if SELF in (name, place):
-        return image, as_asked(source, options, image.fingerprint)
+        return _as_stored(image), as_asked(source, options, image.fingerprint)
     where = Location.of(place or f"{source.rstrip('/')}/labels/{name}").source
     ref = SourceRef(where, 0, ())
     try:
@@ -130,13 +130,18 @@ def _opened(
                 f"{dataset.shown}: states no voxel size: found {_by(dataset.levels[0].shape)} "
                 f"voxels (z, y, x), expected the image's {_by(image.levels[0].shape)}"
             ) from error
+    return _as_stored(dataset), replace(ref, fingerprint=dataset.fingerprint)
+
+
+def _as_stored(dataset: Dataset) -> Dataset:
+    """Return a dataset whose voxels are the file's own. Raises SourceError for any other."""
     for remark in dataset.remarks:
         if any(word in remark for word in _AVERAGED):
             raise SourceError(
                 f"{dataset.shown}: {remark}: found numbers of objects, which have no means, "
                 "expected labels on a grid that needs none"
             )
-    return dataset, replace(ref, fingerprint=dataset.fingerprint)
+    return dataset
 
 
 def _origin(image: Dataset, labels: Dataset) -> Triple:

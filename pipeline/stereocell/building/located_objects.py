@@ -68,10 +68,6 @@ class TileGrid:
         ]
         return np.stack(parts, axis=1)
 
-    def tile_of_planes(self, axis: int, start: int, stop: int) -> NDArray[np.int64]:
-        """Return the place along an axis of each voxel from start to stop."""
-        return np.searchsorted(self.edges[axis], np.arange(start, stop), side="right") - 1
-
 
 @dataclass(frozen=True, slots=True)
 class Located:

@@ -9,7 +9,6 @@ from pydantic import TypeAdapter
 
 from stereocell.building.label_maps import Labels
 from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
-from stereocell.building.open_source import open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
@@ -54,13 +53,16 @@ def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: En
 
 def save_notes(out_folder: OutFolder, labels: Labels) -> None:
     """Keep what a label map's file says of its objects: the stage is made without that file."""
+    if find_sealed(out_folder.notes_file(labels.id, labels.ref.fingerprint), NOTES) is not None:
+        return
     notes = _notes().dump_python(labels.open().notes, mode="json")
-    write_sealed(out_folder.notes_file(labels.id), {"notes": notes})
+    file = out_folder.notes_file(labels.id, labels.ref.fingerprint)
+    write_sealed(file, {"notes": notes})
 
 
 def read_notes(out_folder: OutFolder, labels: Labels) -> ObjectNotes:
     """Return what `save_notes` kept. Raises OutputError."""
-    file = out_folder.notes_file(labels.id)
+    file = out_folder.notes_file(labels.id, labels.ref.fingerprint)
     return _notes().validate_python(read_sealed(file, NOTES, _AGAIN)["notes"])
 
 
@@ -161,10 +163,12 @@ def _images(plan: Plan) -> tuple[ImageRef, ...]:
             continue
         seen.add(channel.voxels_id)
         ref, level = source_of(plan, channel), plan.level_of(channel)
-        shape = open_source(ref).levels[level].shape
-        found.append(ImageRef(ref, channel.index, level, shape, plan.spacing_um, plan.origin_um))
+        found.append(
+            ImageRef(ref, channel.index, level, plan.region, plan.spacing_um, plan.origin_um)
+        )
     return tuple(found)
 
 
 def _image_key(image: ImageRef) -> list[object]:
-    return [image.ref.fingerprint, image.channel, image.level, image.spacing_um, image.origin_um]
+    place = [image.spacing_um, image.origin_um, box_to_json(image.region)]
+    return [image.ref.fingerprint, image.channel, image.level, *place]

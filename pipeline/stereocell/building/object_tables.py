@@ -25,6 +25,7 @@ from stereocell.objects.table import (
 from stereocell.read.tables import Table, read_table
 from stereocell.read.tables.table import TableColumn, listed
 from stereocell.usd.write_appearances import DEFAULT_FUNCTION
+from stereocell.usd.write_objects import RESERVED
 
 NAMES = "name"  # the column of the names that a label map's own file gives
 
@@ -195,14 +196,14 @@ def _column(
 
 
 def _unique(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
-    """Return the columns under IDs of their own: the table's names win over a file's notes."""
+    """Return the columns under IDs of their own, which no primvar of a mesh has."""
     found: dict[str, Column] = {}
     remarks = []
     for column in columns:
         name, number = column.id, 2
-        while name in found:
+        while name in found or name in RESERVED:
             name, number = f"{column.id}_{number}", number + 1
-        if name != column.id:
+        if column.id in found:
             remarks.append(f"column {column.name!r} is there already: the second one is {name}")
         found[name] = replace(column, id=name)
     return list(found.values()), remarks

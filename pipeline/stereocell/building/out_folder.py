@@ -108,9 +108,9 @@ class OutFolder:
         """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
-    def notes_file(self, labels_id: str) -> Path:
+    def notes_file(self, labels_id: str, fingerprint: str) -> Path:
         """Return the path of what a label map's own file says of its objects."""
-        return self.out / "units" / f"notes-{labels_id}.json"
+        return self.out / "units" / f"notes-{labels_id}-{fingerprint[:12]}.json"
 
     def tile_result(self, what: str, tile_id: str, channel_id: str, key: str) -> Path:
         """Return the path of what a pass before the units found of one tile: evidence, solids."""

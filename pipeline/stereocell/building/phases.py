@@ -132,7 +132,7 @@ def settle(source: str, settings: Settings) -> Plan:
 
 def provenance(plan: Plan) -> dict[str, Any]:
     """Return the provenance that results carry: settings and versions, no paths, no identities."""
-    settings = to_dict(plan.settings)
+    settings = _without_places(to_dict(plan.settings))
     readers = [reader.module for reader in READERS.values()]
     return {
         "generator": GENERATOR,
@@ -143,6 +143,13 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "libraries": libraries_of(window, evidence, solids, unit, stage_tasks, *readers),
         **_added(plan),
     }
+
+
+def _without_places(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return settings without the paths in them, which may name a patient or a person."""
+    labels = dict.fromkeys(settings["labels"], "")
+    objects = {**settings["objects"], "table": "table" if settings["objects"]["table"] else ""}
+    return {**settings, "labels": labels, "objects": objects}
 
 
 def _added(plan: Plan) -> dict[str, Any]:

@@ -108,6 +108,8 @@ def category_column(
 ) -> Column | None:
     """Return a column of words; None: of more than MOST_CATEGORIES. An empty one is missing."""
     words = sorted({text for text in texts if text})
+    if not words:  # nobody has any: nothing is known
+        return Column(to_identifier(name), name, np.full(len(texts), np.nan, np.float32), about)
     if len(words) > MOST_CATEGORIES:
         return None
     code = {word: float(place) for place, word in enumerate(words)}

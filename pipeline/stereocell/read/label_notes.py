@@ -26,7 +26,7 @@ def notes_of_ngff(image_label: Any) -> ObjectNotes:
     for entry in _entries(image_label, "properties"):
         label = _label(entry)
         for key, value in entry.items():
-            if label is None or key == "label-value":
+            if label is None or key == "label-value" or not _cut(key):
                 continue
             if isinstance(value, str):
                 found.columns.setdefault(_cut(key), {})[label] = _cut(value)

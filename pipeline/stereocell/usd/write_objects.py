@@ -24,6 +24,19 @@ NAMES = "stereocell:objectNames"  # on a tile's mesh, too
 TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
 COLUMNS, DEFAULT = "stereocell:columns", "stereocell:defaultColumn"
 COLUMN = "stereocell:column:"
+# names of primvars that mean something else on a mesh, to us or to DCC tools
+RESERVED = frozenset(
+    (
+        OBJECT_ID,
+        "displayColor",
+        "displayOpacity",
+        "normals",
+        "occlusion",
+        "st",
+        "tangents",
+        "points",
+    )
+)
 MOST_CLASSES = 32  # categories that are GeomSubsets: each is a prim in each level of each tile
 _FAMILY = UsdShade.Tokens.materialBind
 

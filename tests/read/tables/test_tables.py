@@ -49,6 +49,16 @@ def test_a_byte_order_mark_quotes_and_names_of_all_kinds(tmp_path: Path) -> None
     assert [column.name for column in table.columns] == ["a,b", "../x", "ümlaut 1"]
 
 
+def test_what_spreadsheets_and_pandas_write(tmp_path: Path) -> None:
+    """An index without a name; semicolons with a comma before the fraction; words of two lines."""
+    table = read_table(csv(tmp_path, ",CellID,a\n0,4,1.5\n1,5,2\n"), "", (), "cells")
+    assert [column.name for column in table.columns] == ["column 1", "a"]
+    text = 'label;a;b\n1;1,5;"T\n cell"\n2;0,25;B\n'
+    a, b = read_table(csv(tmp_path, text), "", (), "cells").columns
+    np.testing.assert_array_equal(a.numbers, [1.5, 0.25])
+    assert b.texts == ("T cell", "B")
+
+
 def test_64_bits(tmp_path: Path) -> None:
     table = read_table(csv(tmp_path, f"label,a\n{2**63 + 1},1\n"), "", (), "cells")
     assert table.labels.tolist() == [2**63 + 1]

@@ -22,12 +22,16 @@ from stereocell.objects.options import ObjectOptions
 
 @dataclass(frozen=True, slots=True)
 class ImageRef:
-    """An image channel that is measured over objects; `place`: its voxel (0, 0, 0) and spacing."""
+    """An image channel that is measured over objects.
+
+    region                 voxels (z, y, x) of the level that are built
+    spacing_um, origin_um  (z, y, x), um, of that level's voxels and of the centre of its first one
+    """
 
     ref: SourceRef
     channel: int
     level: int
-    shape: tuple[int, int, int]
+    region: Box
     spacing_um: tuple[float, float, float]
     origin_um: tuple[float, float, float]
 
@@ -159,7 +163,8 @@ def _measure(
         first = task.labels.origin_um[axis] - image.origin_um[axis]
         at = np.arange(task.window.start[axis], task.window.stop[axis])
         nearest = np.rint((first + at * task.labels.spacing_um[axis]) / image.spacing_um[axis])
-        indices.append(nearest.astype(np.int64).clip(0, image.shape[axis] - 1))
+        first_voxel, last_voxel = image.region.start[axis], image.region.stop[axis] - 1
+        indices.append(nearest.astype(np.int64).clip(first_voxel, last_voxel))
     z0, y0, x0 = (int(part.min()) for part in indices)
     z1, y1, x1 = (int(part.max()) + 1 for part in indices)
     read = open_source(image.ref).read(image.channel, Box((z0, y0, x0), (z1, y1, x1)), image.level)

@@ -22,6 +22,7 @@ from stereocell.read.tables.table import (
     choose_key,
     clean,
     keys_of,
+    named,
 )
 from stereocell.read.zarr_store import GuardedStore, open_store, quiet
 from stereocell.storage.library_errors import one_line
@@ -50,7 +51,7 @@ def read_anndata(location: Location, key: str, wanted: tuple[str, ...], labels: 
             if not kept.any():
                 found = ", ".join(sorted({str(region) for region in regions})[:8])
                 raise SourceError(f"{where}: rows of {found}, expected some of {labels}")
-        genes = [clean(str(name)) for name in _index(group["var"])] if "X" in group else []
+        genes = named(_index(group["var"])) if "X" in group else []
         own = [name for name in names if name not in (chosen, about.get("region_key"))]
         every = list(dict.fromkeys([*own, *genes]))
         taken, left_out = choose_columns(where, every, chosen, wanted)
@@ -58,7 +59,7 @@ def read_anndata(location: Location, key: str, wanted: tuple[str, ...], labels: 
         columns = []
         for name in taken:
             if name in own:
-                columns.append(_column(clean(name), _series(obs[name]), kept))
+                columns.append(_column(clean(name) or "column", _series(obs[name]), kept))
             elif numbers is not None:
                 place = genes.index(name)
                 column = numbers[:, [place]]

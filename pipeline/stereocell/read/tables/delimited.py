@@ -3,6 +3,7 @@
 import csv
 import io
 import os
+from collections import Counter
 from collections.abc import Iterator
 
 from stereocell.model.errors import SourceError
@@ -11,8 +12,8 @@ from stereocell.read.tables.table import (
     as_column,
     choose_columns,
     choose_key,
-    clean,
     keys_of,
+    named,
     shown,
 )
 from stereocell.storage.location import Location
@@ -49,10 +50,10 @@ def _read(text: io.TextIOWrapper, where: str, key: str, wanted: tuple[str, ...])
     if not first.strip():
         raise SourceError(f"{where}: found no header, expected names of columns in the first line")
     mark = max("\t,;", key=first.count)
-    names = [clean(name) for name in next(csv.reader([first], delimiter=mark))]
+    names = named(next(csv.reader([first], delimiter=mark)))
     if len(names) > _MOST_NAMES:
         raise SourceError(f"{where}: found {len(names)} columns, expected at most {_MOST_NAMES}")
-    twice = sorted({name for name in names if names.count(name) > 1}) if len(names) < 1000 else []
+    twice = sorted(name for name, times in Counter(names).items() if times > 1)
     if twice:
         raise SourceError(f"{where}: found columns twice ({shown(twice)}), expected each name once")
     chosen_key = choose_key(where, names, key)
@@ -62,8 +63,11 @@ def _read(text: io.TextIOWrapper, where: str, key: str, wanted: tuple[str, ...])
     for row in _rows(text, mark, where, len(names)):
         for held, place in zip(cells, places, strict=True):
             held.append(row[place])
+    point = "," if mark == ";" else "."  # where a comma is the point, it parts no cells
     labels = keys_of(where, chosen_key, cells[0])
-    columns = tuple(as_column(name, texts) for name, texts in zip(taken, cells[1:], strict=True))
+    columns = tuple(
+        as_column(name, texts, point) for name, texts in zip(taken, cells[1:], strict=True)
+    )
     return Table(where, chosen_key, labels, columns, left_out)
 
 

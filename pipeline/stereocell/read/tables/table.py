@@ -11,6 +11,7 @@ from stereocell.model.errors import SourceError
 # Columns of objects' numbers, as MCMICRO, scikit-image, Cellpose, Xenium, SpatialData call them
 KEYS = ("CellID", "label", "cell_id", "instance_id", "object_id", "ObjectNumber", "id")
 MOST_COLUMNS = 128  # that are taken without being named
+_LONGEST = 200  # characters of a category
 _SHOWN = 8  # names that a message lists
 
 
@@ -97,20 +98,24 @@ def keys_of(
     return labels
 
 
-def as_column(name: str, texts: Sequence[str]) -> TableColumn:
-    """Return a column of texts, as numbers where all that are there are numbers."""
+def named(names: Sequence[str]) -> list[str]:
+    """Return the names of a header as they are shown; a nameless column goes by its place."""
+    return [clean(name) or f"column {place}" for place, name in enumerate(names, start=1)]
+
+
+def as_column(name: str, texts: Sequence[str], point: str = ".") -> TableColumn:
+    """Return a column of texts, as numbers where all that are there are numbers.
+
+    point  what stands before a number's fraction
+    """
     numbers = np.full(len(texts), np.nan)
     for row, text in enumerate(texts):
         if text.strip().lower() in _MISSING:
             continue
         try:
-            numbers[row] = float(text)
+            numbers[row] = float(text.replace(point, "."))
         except ValueError:
-            return TableColumn(
-                name,
-                None,
-                tuple(one if one.strip().lower() not in _MISSING else "" for one in texts),
-            )
+            return TableColumn(name, None, tuple(map(_word, texts)))
     return TableColumn(name, numbers, None)
 
 
@@ -128,6 +133,11 @@ def shown(names: Sequence[str]) -> str:
 def clean(name: str) -> str:
     """Return a name as it may be shown: no control characters, one space for several."""
     return " ".join("".join(c if c.isprintable() else " " for c in name).split())
+
+
+def _word(text: str) -> str:
+    """Return a category's name as it is shown; empty: missing."""
+    return "" if text.strip().lower() in _MISSING else clean(text)[:_LONGEST]
 
 
 def _whole(value: float) -> int:
