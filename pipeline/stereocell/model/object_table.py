@@ -42,7 +42,7 @@ class ObjectTable:
              meshes number them (Mesh.objects). An object that is larger than its tile's
              surroundings has a piece in several tiles, and one row
     columns  the properties; `volume_um3` is always the first
-    default  ID of the column that colours objects first; empty: each has its channel's colour
+    default  ID of the column that colours objects first; empty: each has a hue of its own
     walls    int32 (m, 2): rows of two objects that share a wall, each pair once; None: not known
     """
 

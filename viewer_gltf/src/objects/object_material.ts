@@ -158,7 +158,7 @@ export class ObjectMaterial {
     write(this.flags, flags);
   }
 
-  /** @param bytes of the column that colours; null: each object has the channel's colour */
+  /** @param bytes of the column that colours; null: objects have those of the stage */
   setColumn(bytes: Uint8Array | null): void {
     this.uniforms.uIsColored.value = bytes !== null;
     if (bytes !== null) write(this.column, bytes);

@@ -74,7 +74,7 @@ class Layout {
         "Colour by",
         objects.colorBy,
         table.columns,
-        "One colour",
+        "As in the stage",
         (id) => ({
           colorBy: id,
           span: ALL_BYTES,
