@@ -21,8 +21,12 @@ class ObjectOptions:
     smallest_voxels: int = setting(27, "objects of fewer voxels are left out, and counted")
     table: str = setting(
         "",
-        "a table with a row an object: CSV, TSV, or a table of SpatialData",
-        Flag("--table", "a table with a row an object, joined by --table-key: CSV, TSV", "FILE"),
+        "a table with a row an object: CSV, TSV, Parquet, .h5ad, or a table of SpatialData",
+        Flag(
+            "--table",
+            "a table with a row an object, joined by --table-key: CSV, TSV, Parquet, .h5ad",
+            "FILE",
+        ),
     )
     table_key: str = setting(
         "",
