@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 from numpy.typing import NDArray
 
 from stereocell import read
@@ -117,6 +118,24 @@ def test_names_that_are_taken(scan: tuple[Path, Dataset], tmp_path: Path) -> Non
             scan[1],
             str(scan[0]),
             {"CT": str(path)},
+            options=PlanOptions(),
+            colors=[(1, 1, 1)],
+            taken=["CT"],
+        )
+
+
+def test_pictures_of_labels_and_names_that_would_garble_a_terminal(
+    scan: tuple[Path, Dataset], tmp_path: Path
+) -> None:
+    path = tmp_path / "outlines.tif"
+    tifffile.imwrite(path, np.zeros((*scan[1].levels[0].shape, 3), np.uint8), photometric="rgb")
+    with pytest.raises(SourceError, match="found colour pixels, expected labels"):
+        labels_on(scan, path)
+    with pytest.raises(UsageError, match="without control characters"):
+        find_labels(
+            scan[1],
+            str(scan[0]),
+            {"\x1b[31m": str(path)},
             options=PlanOptions(),
             colors=[(1, 1, 1)],
             taken=["CT"],

@@ -13,6 +13,7 @@ import zarr
 from scipy import sparse
 
 from stereocell.model.errors import SourceError
+from stereocell.read.tables import parquet as parquet_tables
 from stereocell.read.tables import read_table
 
 
@@ -106,10 +107,12 @@ def test_other_files(tmp_path: Path) -> None:
     assert "no text" in refusal(str(tmp_path / "b.csv"))
     assert "can't be read (No such file" in refusal(str(tmp_path / "none.csv"))
     assert "unknown kind of table" in refusal(csv(tmp_path, "x", "t.xlsx"))
-    assert "t.parquet: Parquet magic bytes not found" in refusal(
-        csv(tmp_path, "x" * 99, "t.parquet")
+    text = csv(tmp_path, "x" * 99, "t.parquet")
+    assert refusal(text) == f"{text}: found a text file, expected Parquet"
+    assert "found a text file, expected HDF5" in refusal(csv(tmp_path, "x", "t.h5ad"))
+    assert "found a pointer of Git LFS" in refusal(
+        csv(tmp_path, "version https://git-lfs.github.com/spec/v1\n")
     )
-    assert "t.h5ad: " in refusal(csv(tmp_path, "x", "t.h5ad"))
     assert "is not on this machine" in refusal("https://example.org/t.parquet")
     assert "no column 'k', expected one of label, a" in refusal(
         csv(tmp_path, "label,a\n1,2\n"), "k"
@@ -288,3 +291,11 @@ def test_a_text_that_stands_in_a_million_rows_is_kept_once(tmp_path: Path) -> No
     place = parquet(tmp_path, id=pa.array(np.arange(1, rows + 1)), a=column)
     (found,) = read_table(place, "", (), "cells").columns
     assert found.texts == ("x" * 200,) * rows
+
+
+def test_a_column_of_parquet_beyond_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parquet_tables, "_MOST_BYTES", 50_000)
+    place = parquet(tmp_path, id=pa.array([1, 2]), a=pa.array(["x" * 60_000, "y"]), b=[1.5, 2])
+    assert "column 'a': found 60" in refusal(place)
+    (b,) = read_table(place, "", ("b",), "cells").columns
+    np.testing.assert_array_equal(b.numbers, [1.5, 2])

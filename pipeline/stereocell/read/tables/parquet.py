@@ -5,7 +5,7 @@ time, the columns that are taken alone.
 """
 
 from importlib import import_module
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from stereocell.read.tables.table import (
     word_of,
 )
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_file
+from stereocell.storage.location import Location
 
 _BATCH = 1 << 16  # rows
 _MOST_BYTES = 1 << 28  # of a column in a group of rows
@@ -35,41 +35,48 @@ _INDEX = "__index_level_"  # how pandas calls an index without a name
 def read_parquet(location: Location, key: str, wanted: tuple[str, ...]) -> Table:
     """Return a table of Parquet. Raises SourceError."""
     where = location.shown
-    require_file(location)
     parquet = extras.load("pyarrow.parquet", "tables", where, "Parquet")
     with one_line(where, "a Parquet file that is whole"), open(location.source, "rb") as source:
-        file = parquet.ParquetFile(source)
-        stated, schema = file.metadata, file.schema_arrow
-        rows = int(stated.num_rows)
-        if len(schema) > MOST_NAMES or not 0 <= rows <= MOST_ROWS:
+        try:
+            return _read(parquet, source, where, key, wanted)
+        except (import_module("pyarrow").ArrowException, OSError) as error:
+            # names of Arrow's own classes follow
+            raise ValueError(str(error).partition(":")[0]) from error
+
+
+def _read(parquet: Any, source: BinaryIO, where: str, key: str, wanted: tuple[str, ...]) -> Table:
+    file = parquet.ParquetFile(source)
+    stated, schema = file.metadata, file.schema_arrow
+    rows = int(stated.num_rows)
+    if len(schema) > MOST_NAMES or not 0 <= rows <= MOST_ROWS:
+        raise SourceError(
+            f"{where}: found {rows} rows of {len(schema)} columns, expected at most {MOST_ROWS} "
+            f"of {MOST_NAMES}"
+        )
+    require_once(where, schema.names)
+    kinds = {field.name: _kind(field.type) for field in schema}
+    names = [name for name, kind in kinds.items() if kind and not name.startswith(_INDEX)]
+    chosen = choose_key(where, names, key)
+    for name in wanted:
+        if name in kinds and not kinds[name]:
             raise SourceError(
-                f"{where}: found {rows} rows of {len(schema)} columns, expected at most "
-                f"{MOST_ROWS} of {MOST_NAMES}"
+                f"{where}: column {clean(name)!r:.60}: found "
+                f"{clean(str(schema.field(name).type)):.60}, expected numbers or texts"
             )
-        require_once(where, schema.names)
-        kinds = {field.name: _kind(field.type) for field in schema}
-        names = [name for name, kind in kinds.items() if kind and not name.startswith(_INDEX)]
-        chosen = choose_key(where, names, key)
-        for name in wanted:
-            if name in kinds and not kinds[name]:
-                raise SourceError(
-                    f"{where}: column {clean(name)!r:.60}: found "
-                    f"{clean(str(schema.field(name).type)):.60}, expected numbers or texts"
-                )
-        taken, left_out = choose_columns(where, names, chosen, wanted)
-        _require_small(stated, where, {chosen, *taken})
-        # a text that stands in many rows stays one
-        texts = [name for name in (chosen, *taken) if kinds[name] == _TEXT]
-        file = parquet.ParquetFile(source, metadata=stated, read_dictionary=texts)
-        keys: list[str] = []
-        parts: dict[str, list[Any]] = {name: [] for name in taken}
-        for batch in file.iter_batches(batch_size=_BATCH, columns=[chosen, *taken]):
-            keys += [str(value) for value in batch.column(chosen).to_pylist()]
-            for name, found in parts.items():
-                column = batch.column(name)
-                found.append(_numbers(column) if kinds[name] == _NUMBER else _words(column))
-        if len(keys) != rows:
-            raise SourceError(f"{where}: found {len(keys)} rows, expected {rows} as it states")
+    taken, left_out = choose_columns(where, names, chosen, wanted)
+    _require_small(stated, where, {chosen, *taken})
+    # a text that stands in many rows stays one
+    texts = [name for name in (chosen, *taken) if kinds[name] == _TEXT]
+    file = parquet.ParquetFile(source, metadata=stated, read_dictionary=texts)
+    keys: list[str] = []
+    parts: dict[str, list[Any]] = {name: [] for name in taken}
+    for batch in file.iter_batches(batch_size=_BATCH, columns=[chosen, *taken]):
+        keys += [str(value) for value in batch.column(chosen).to_pylist()]
+        for name, found in parts.items():
+            column = batch.column(name)
+            found.append(_numbers(column) if kinds[name] == _NUMBER else _words(column))
+    if len(keys) != rows:
+        raise SourceError(f"{where}: found {len(keys)} rows, expected {rows} as it states")
     columns = tuple(_column(name, kinds[name], found) for name, found in parts.items())
     return Table(where, chosen, keys_of(where, chosen, keys), columns, left_out)
 
