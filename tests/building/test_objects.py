@@ -23,6 +23,7 @@ from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
 from support.dicom_series import sample as scene_on
 from support.digests import digests_of
+from support.phantoms import write_ome_tiff
 
 SHAPE = (24, 72, 96)
 PHASES = ("plan", "units", "stage", "bundle")
@@ -414,6 +415,35 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
     wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
     assert wanted in said(capsys)
+
+
+def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
+    """Of two boxes the first lies in the dark, the second in what is stained."""
+    labels = np.zeros((20, 24, 48), np.uint16)
+    labels[4:16, 4:20, 4:20], labels[4:16, 4:20, 28:44] = 5, 9
+    z, y, x = np.indices(labels.shape) - np.array([9.5, 11.5, 35.5]).reshape(3, 1, 1, 1)
+    image = 1000 * ((z / 14) ** 2 + (y / 18) ** 2 + (x / 13) ** 2 < 1)
+    tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
+    write_ome_tiff(tmp_path / "i.ome.tif", image.astype(np.uint16), names=["DNA"])
+    out = tmp_path / "out"
+    flags = ("--labels", f"cells={tmp_path / 'l.tif'}", "--paint", "cells=DNA", "--grid", "2x1")
+    build(tmp_path / "i.ome.tif", out, *flags)
+    assert objects_of(out)["paint"] == "DNA"
+    for tile, expected in (("r0_c0", 0.0), ("r0_c1", 1.0)):
+        for file in (out / "bundle/channels/cells" / tile).glob("*.glb"):
+            paint = read_glb(file).paint
+            assert paint is not None
+            np.testing.assert_allclose(paint, expected, atol=0.02)
+    stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Specimen/Tiles/r0_c1/cells/cells_r0_c1"))
+    paint = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("paint")
+    assert (paint.GetInterpolation(), len(paint.Get())) == (
+        "vertex",
+        len(mesh.GetPointsAttr().Get()),
+    )
+    assert min(paint.Get()) > 0.98
+    assert run("check", out, "--deep", "--workers", 0) == 0
+    assert run("plan", tmp_path / "i.ome.tif", "-o", tmp_path / "o", *flags[:3], "cells=CD9") == 2
 
 
 @pytest.mark.parametrize("is_alone", [False, True])

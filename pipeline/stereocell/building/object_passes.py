@@ -7,16 +7,18 @@ from functools import cache
 import numpy as np
 from pydantic import TypeAdapter
 
+from stereocell.building.channels import Channel
 from stereocell.building.label_maps import Labels
 from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.source_tasks import box_to_json, run_on_input
+from stereocell.building.survey_file import Survey
 from stereocell.building.tasks import extents as extents_maker
 from stereocell.building.tasks import objects as objects_maker
 from stereocell.building.tasks.extents import ExtentsTask, extents_from_json, write_extents
-from stereocell.building.tasks.objects import ImageRef, ObjectsTask
+from stereocell.building.tasks.objects import ImageRef, ObjectsTask, Painted
 from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted
@@ -84,12 +86,13 @@ def tell_objects(labels: Labels, located: Located) -> None:
 
 
 def object_tasks(
-    out_folder: OutFolder, plan: Plan, located: Mapping[str, Located]
+    out_folder: OutFolder, plan: Plan, located: Mapping[str, Located], survey: Survey
 ) -> Iterator[tuple[str, ObjectsTask, str]]:
     """Yield `<tile>/<labels>`, task and key of the unit of each tile and label map."""
     images = _images(plan)
     step_um = lattice_step_um(plan, located)
     for labels in plan.labels:
+        painted = _painted(plan, labels, survey)
         found = located[labels.id]
         boxes = tile_boxes(found.grid)
         for tile in plan.tiles:
@@ -115,6 +118,7 @@ def object_tasks(
                 [edges.tolist() for edges in found.grid.edges] if is_cut.any() else [],
                 step_um,
                 [_image_key(image) for image in images],
+                painted and [_image_key(painted.image), painted.window, painted.depth_um],
                 asdict(plan.settings.objects)
                 | dict.fromkeys(("table", "table_key", "columns", "color_by")),
             ]
@@ -129,6 +133,7 @@ def object_tasks(
                 edges=found.grid.edges,
                 step_um=step_um,
                 images=images,
+                painted=painted,
                 options=plan.settings.objects,
                 directory=directory,
             )
@@ -162,11 +167,22 @@ def _images(plan: Plan) -> tuple[ImageRef, ...]:
         if channel.voxels_id in seen:
             continue
         seen.add(channel.voxels_id)
-        ref, level = source_of(plan, channel), plan.level_of(channel)
-        found.append(
-            ImageRef(ref, channel.index, level, plan.region, plan.spacing_um, plan.origin_um)
-        )
+        found.append(_image(plan, channel))
     return tuple(found)
+
+
+def _image(plan: Plan, channel: Channel) -> ImageRef:
+    ref, level = source_of(plan, channel), plan.level_of(channel)
+    return ImageRef(ref, channel.index, level, plan.region, plan.spacing_um, plan.origin_um)
+
+
+def _painted(plan: Plan, labels: Labels, survey: Survey) -> Painted | None:
+    """Return what is painted on the objects of a label map; None: nothing."""
+    painter = plan.painter(labels)
+    if painter is None:
+        return None
+    window = survey[painter.id].statistics.window
+    return Painted(_image(plan, painter), window, float(plan.settings.unwrap.paint_um))
 
 
 def _image_key(image: ImageRef) -> list[object]:

@@ -60,7 +60,7 @@ def run_passes(
     keys, others = {}, 0
     every: list[Iterable[tuple[str, UnitTask | ObjectsTask, str]]] = [
         unit_tasks(out_folder, plan, survey),
-        object_tasks(out_folder, plan, located),
+        object_tasks(out_folder, plan, located, survey),
     ]
     for name, task, key in chain(*every):
         keys[name] = key

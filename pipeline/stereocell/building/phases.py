@@ -188,7 +188,11 @@ def run_stage(out: Path, engine: Engine) -> None:
         out_folder.require_units_of(plan)
         index, survey = out_folder.index(), read_survey(out_folder)
         appearances = [survey[channel.id].appearance for channel in plan.channels]
-        appearances += [appearance_of_labels(labels) for labels in plan.labels]
+        appearances += [
+            appearance_of_labels(labels, painter.id if painter else "")
+            for labels in plan.labels
+            for painter in [plan.painter(labels)]
+        ]
         tables = {
             labels.id: _table(out_folder, plan, labels, index, engine) for labels in plan.labels
         }

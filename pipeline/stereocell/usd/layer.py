@@ -20,6 +20,7 @@ from stereocell.storage.atomic_write import replacing
 METERS_PER_UNIT = 1e-6  # a stage unit is 1 um
 UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
+PAINTED_BY = "stereocell:paintedBy"  # on a channel's prim: ID of the channel that is painted on it
 CHANNELS = ROOT.AppendChild("Channels")
 TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.model.object_table import Column
-from stereocell.usd.layer import CHANNELS
+from stereocell.usd.layer import CHANNELS, PAINTED_BY
 from stereocell.usd.write_objects import (
     COLUMN,
     COLUMNS,
@@ -103,6 +103,14 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
     if len(pairs) % 2:
         raise StageError(f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected pairs")
     return TileObjects(np.array(list(labels), np.uint64), names, values, pairs.reshape(-1, 2))
+
+
+def painter_of(stage: Usd.Stage, channel_id: str) -> str:
+    """Return the ID of the channel whose intensity objects' vertices have; empty: none is there."""
+    path = CHANNELS.AppendChild(channel_id)
+    name = str(stage.GetPrimAtPath(path).GetAttribute(PAINTED_BY).Get() or "")
+    is_there = Sdf.Path.IsValidIdentifier(name) and stage.GetPrimAtPath(CHANNELS.AppendChild(name))
+    return name if is_there else ""
 
 
 def objects_of(mesh: UsdGeom.Mesh) -> NDArray[np.int64] | None:

@@ -19,6 +19,7 @@ from stereocell.objects.table import color_objects
 from stereocell.usd.layer import CHANNELS, set_attribute
 
 OBJECT_ID = "objectId"  # primvar: the place of a face's object in LABELS
+PAINT = "paint"  # primvar: intensity of the sampled channel at each vertex, 0..1
 LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
 NAMES = "stereocell:objectNames"  # on a tile's mesh, too
 TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
@@ -28,6 +29,7 @@ COLUMN = "stereocell:column:"
 RESERVED = frozenset(
     (
         OBJECT_ID,
+        PAINT,
         "displayColor",
         "displayOpacity",
         "normals",
@@ -138,6 +140,9 @@ def write_objects(
     colors = np.ascontiguousarray(color_objects(table), np.float32)
     shown = Vt.Vec3fArray.FromNumpy(colors)
     _write(primvars, "displayColor", _Types.Color3fArray, shown, indices)
+    if made.paint is not None:
+        paint = primvars.CreatePrimvar(PAINT, _Types.FloatArray, UsdGeom.Tokens.vertex)
+        paint.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(made.paint, np.float32)))
     classes = classes_of(table)
     if classes is not None:
         _write_classes(mesh, look, classes, of_face)

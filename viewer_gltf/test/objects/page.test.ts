@@ -277,3 +277,43 @@ describeInChromium("the objects of a label map", () => {
     expect(await view()).toEqual({ ...linked, lasso: [], aim: null });
   });
 });
+
+describeInChromium("a stain that is painted on objects", () => {
+  if (!hasPython) {
+    it.skip("needs Python");
+    return;
+  }
+  const stand = prepareStand({
+    bundle: prepareObjects("--painted"),
+    viewport: { width: 900, height: 500 },
+  });
+
+  it("lies over their colour, and can be taken off; a column's colour stays beside it", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const row = rowAt(1, 2, 1, 1);
+    const [x, y, z] = centerOf(row);
+    const spots = async () => {
+      const picture = await takePicture(stand.viewer.page);
+      return [2, -2].map((up) => {
+        const at = project(
+          [x, y + up, z],
+          stand.manifest.specimen.bounds_um,
+          picture.width,
+          picture.height,
+        );
+        return picture.at(at.x, at.y);
+      });
+    };
+    const own = hasColor(COLORS[row % 3]);
+    const [above, below] = await spots();
+    expect(own(below)).toBe(true);
+    expect(own(above)).toBe(false);
+    expect(Math.max(...above) - Math.min(...above)).toBeLessThan(12); // nobody has DNA's colour: white
+    await stand.viewer.page.locator(`[data-control="${CHANNEL}/objects-stain"]`).click();
+    await stand.viewer.settled();
+    const bare = await spots();
+    expect(bare.map(own)).toEqual([true, true]);
+    expect((await stand.viewer.snapshot()).state.objects[CHANNEL].isStained).toBe(false);
+  });
+});
