@@ -69,6 +69,15 @@ describeInChromium("the objects of a label map", () => {
     expect(hasColor(COLORS[BEAM % 3])(at(picture, [63, -42.5, 16]))).toBe(true);
     expect(await shown()).toContain(`${COUNT} of ${COUNT} objects`);
     expect((await stand.viewer.snapshot()).drawCalls).toBeLessThan(20);
+    // and no word of volumes, which there are none of
+    const { page } = stand.viewer;
+    const hint = page.locator('[data-overlay="hint"]');
+    expect(await hint.textContent()).toBe("drag to turn, wheel to zoom");
+    const sections = await page
+      .locator("[data-section]")
+      .evaluateAll((found) => found.map((each) => (each as HTMLElement).dataset.section));
+    expect(sections).toContain("objects");
+    for (const id of ["volumes", "light", "slices"]) expect(sections).not.toContain(id);
   });
 
   it("are coloured anew by one upload of a byte an object", async () => {
