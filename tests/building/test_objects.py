@@ -11,6 +11,7 @@ import zarr
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from stereocell import samples
+from stereocell.building import object_passes
 from stereocell.building.located_objects import CUT
 from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
@@ -226,17 +227,24 @@ def test_the_same_bytes_with_any_workers(out: Path, tmp_path: Path, workers: int
     assert made[0] == made[1]
 
 
-def test_a_large_object_is_cut_at_the_tiles_and_stays_one(tmp_path: Path) -> None:
+def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     z, y, _x = np.mgrid[:20, :40, :120]
     labels = ((y - 20) ** 2 + (z - 10) ** 2 < 64).astype(np.uint8) * 5  # a rod through all tiles
     labels[2:6, 2:8, 50:58] = 9
     source, out = tmp_path / "rod.tif", tmp_path / "out"
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
-    build(
-        source,
-        out,
-        *("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40"),
-    )
+    flags = ("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40")
+    build(source, out, *flags)
+    told = said(capsys)
+    words = "2 objects, 1 of them larger than a tile and half around it, and cut (5)"
+    assert f"plan: organs: {words}" in told
+    assert f"units: organs: {words}" in told
+    # of more voxels it tells which will be, without reading any
+    monkeypatch.setattr(object_passes, "_COUNTED_AT_ONCE", 1000)
+    assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
+    assert "organs: objects larger than a tile and half around it, 40 x 80 x 80 um" in said(capsys)
     folder = out / "bundle/channels/organs"
     content = json.loads((folder / "objects.json").read_text())
     assert content["count"] == 2
@@ -265,6 +273,23 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(tmp_path: Path) -> Non
         shared = set(map(tuple, left.tolist())) & set(map(tuple, right.tolist()))
         assert len(shared) > 100
         assert np.mean([one[0] for one in shared]) == pytest.approx(at, abs=0.3)
+
+
+def test_an_object_in_pieces_has_the_percentile_of_all_its_voxels(tmp_path: Path) -> None:
+    labels = np.zeros((16, 24, 90), np.uint16)
+    labels[3:13, 4:20, 2:88] = 7
+    rng = np.random.default_rng(3)
+    image = (1000 * rng.gamma(2.0, 1 + np.arange(90) / 20, labels.shape)).astype(np.uint16)
+    tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
+    write_ome_tiff(tmp_path / "i.ome.tif", image, names=["DNA"])
+    out = tmp_path / "out"
+    build(tmp_path / "i.ome.tif", out, "--labels", f"cells={tmp_path / 'l.tif'}", "--grid", "3x1")
+    own = image[labels == 7]
+    assert len({len(tile.get("more", [])) for tile in objects_of(out)["tiles"].values()}) == 1
+    assert column_of(out, "mean_DNA") == pytest.approx([own.mean()], rel=1e-5)
+    # within a thousandth of the voxels
+    low, high = np.percentile(own, [94.9, 95.1])
+    assert low <= column_of(out, "p95_DNA")[0] <= high
 
 
 def test_small_objects_are_counted_and_others_end_with_the_region(
@@ -299,7 +324,10 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 
 
 def test_what_can_not_be_built_is_told_in_one_line(
-    sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    sample: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     plan = ("plan", sample, "-o", tmp_path / "out", "--channels", "DNA")
     told = refusal(capsys, *plan, "--labels", "nuclei")
@@ -313,6 +341,10 @@ def test_what_can_not_be_built_is_told_in_one_line(
     negative = np.full((6, 8, 8), -7, np.int16)
     tifffile.imwrite(tmp_path / "n.tif", negative, metadata={"axes": "ZYX"})
     flags = ("--labels", ".", "--spacing-um", "1,1,1")
+    told = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
+    assert "found -7, expected 0 or more in labels" in told
+    assert not (tmp_path / "n").exists()
+    monkeypatch.setattr(object_passes, "_COUNTED_AT_ONCE", 100)  # a map that is too large to look
     assert run("plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags) == 0
     assert run("units", tmp_path / "n", "--workers", 0) == 1
     assert "found -7, expected 0 or more in labels" in capsys.readouterr().err

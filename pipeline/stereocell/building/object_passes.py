@@ -1,5 +1,6 @@
 """The passes over label maps: first where the objects are, then the units that build them."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import cache
@@ -9,7 +10,14 @@ from pydantic import TypeAdapter
 
 from stereocell.building.channels import Channel
 from stereocell.building.label_maps import Labels
-from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
+from stereocell.building.located_objects import (
+    AROUND,
+    CUT,
+    Located,
+    TileGrid,
+    locate,
+    tile_boxes,
+)
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
@@ -17,7 +25,12 @@ from stereocell.building.source_tasks import box_to_json, run_on_input
 from stereocell.building.survey_file import Survey
 from stereocell.building.tasks import extents as extents_maker
 from stereocell.building.tasks import objects as objects_maker
-from stereocell.building.tasks.extents import ExtentsTask, extents_from_json, write_extents
+from stereocell.building.tasks.extents import (
+    ExtentsTask,
+    extents_from_json,
+    find_in_tile,
+    write_extents,
+)
 from stereocell.building.tasks.objects import ImageRef, ObjectsTask, Painted
 from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
@@ -31,6 +44,7 @@ NOTES = "units.schema.json#Notes"
 EXTENTS = "units.schema.json#Extents"
 _AGAIN = "run `stereocell units OUT` again"
 _UM = 1e6  # um a metre
+_COUNTED_AT_ONCE = 1 << 25  # voxels of a label map that `plan` counts: half a second
 
 
 def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> Located:
@@ -74,7 +88,12 @@ def _notes() -> TypeAdapter[ObjectNotes]:
 
 
 def tell_objects(labels: Labels, located: Located) -> None:
-    """Say how many objects there are, which are cut, and how many are left out."""
+    """Print what `told_of` says."""
+    console.print(f"units: {told_of(labels, located)}", markup=False)
+
+
+def told_of(labels: Labels, located: Located) -> str:
+    """Return how many objects there are, which are cut, and how many are left out, in words."""
     told = counted(len(located.owners), "object")
     cut = located.extents.labels[located.owners == CUT]
     if len(cut):
@@ -82,7 +101,27 @@ def tell_objects(labels: Labels, located: Located) -> None:
         told += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
     if located.small:
         told += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
-    console.print(f"units: {labels.name}: {told}", markup=False)
+    return f"{labels.name}: {told}"
+
+
+def told_before(plan: Plan) -> Iterator[str]:
+    """Yield of each label map what its units will cut, from its voxels where these are few.
+
+    Raises SourceError where they are no labels.
+    """
+    for labels in plan.labels:
+        boxes = tile_boxes(TileGrid.of(plan, labels))
+        if math.prod(labels.shape) <= _COUNTED_AT_ONCE:
+            parts = {tile: find_in_tile(ExtentsTask(labels, box)) for tile, box in boxes.items()}
+            found = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
+            yield told_of(labels, found)
+        elif len(plan.tiles) > 1:
+            largest = np.max([box.shape for box in boxes.values()], axis=0) * labels.spacing_um
+            z, y, x = ((1 + 2 * AROUND) * largest).tolist()
+            yield (
+                f"{labels.name}: objects larger than a tile and half around it, {z:.4g} x {y:.4g} "
+                f"x {x:.4g} um (z, y, x), will be cut at the tiles' planes: `units` names them"
+            )
 
 
 def object_tasks(

@@ -15,7 +15,7 @@ from stereocell.building import stage_tasks
 from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
 from stereocell.building.intensities import require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
-from stereocell.building.object_passes import locate_objects, read_notes
+from stereocell.building.object_passes import locate_objects, read_notes, told_before
 from stereocell.building.object_tables import appearance_of_labels, make_table, table_of
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
@@ -124,8 +124,13 @@ def settle(source: str, settings: Settings) -> Plan:
     )
     for one in plan.labels:
         table_of(plan, one)  # what can't be read is told before the build
-    gaps = told_of_gaps(dataset, plan)
-    for note in (*dataset.notes, *gaps, *told_in_vain(settings, channels)):  # an error stands alone
+    gaps, objects = told_of_gaps(dataset, plan), list(told_before(plan))
+    for note in (
+        *dataset.notes,
+        *gaps,
+        *objects,
+        *told_in_vain(settings, channels),
+    ):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan
 

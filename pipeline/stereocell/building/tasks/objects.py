@@ -19,7 +19,7 @@ from stereocell.model.unit import ObjectFacts, Unit
 from stereocell.model.volume import xyz_to_zyx
 from stereocell.objects.build_objects import BuiltObjects, build_objects
 from stereocell.objects.extents import Runs
-from stereocell.objects.intensities import Measured, measure_intensities
+from stereocell.objects.intensities import QUANTILES, Measured, measure_intensities
 from stereocell.objects.options import ObjectOptions
 from stereocell.textures.sample_channel import sample_channel
 
@@ -109,7 +109,9 @@ def run_objects(task: ObjectsTask) -> None:
     thin = names.labels[built.thin]
     owned = np.setdiff1d(owned, built.thin).astype(np.int32)
     with clock("intensities"):
-        measured = [_measure(task, image, compact, owned) for image in task.images]
+        measured = [
+            _measure(task, image, compact, owned, owned[is_piece[owned]]) for image in task.images
+        ]
     facts = _facts(built, owned, names, measured, compact, thin)
     reason = "" if built.lods else "no object"
     lods = built.lods
@@ -177,7 +179,11 @@ def _numbered(
 
 
 def _measure(
-    task: ObjectsTask, image: ImageRef, compact: NDArray[np.int32], owned: NDArray[np.int32]
+    task: ObjectsTask,
+    image: ImageRef,
+    compact: NDArray[np.int32],
+    owned: NDArray[np.int32],
+    pieces: NDArray[np.int32],
 ) -> Measured:
     """Return a channel's mean and percentile over objects, by the image's nearest voxels."""
     assert task.window is not None
@@ -195,7 +201,7 @@ def _measure(
     for axis, (part, start) in enumerate(zip(indices, (z0, y0, x0), strict=True)):
         if len(part) != voxels.shape[axis] or (np.diff(part) != 1).any():
             voxels = np.take(voxels, part - start, axis)
-    return measure_intensities(compact, voxels, owned)
+    return measure_intensities(compact, voxels, owned, pieces)
 
 
 def _paint(lods: Sequence[Lod], painted: Painted) -> tuple[Lod, ...]:
@@ -253,6 +259,9 @@ def _facts(
     )
     p95s = np.stack([one.p95 for one in measured], axis=1) if measured else means.copy()
     p95s[is_piece] = np.nan
+    shape = (int(is_piece.sum()), 0, QUANTILES)
+    quantiles = [one.quantiles for one in measured]
+    held = np.stack(quantiles, axis=1) if quantiles else np.zeros(shape, np.float32)
     return ObjectFacts(
         labels,
         voxels.astype(np.int64),
@@ -262,6 +271,8 @@ def _facts(
         np.bincount(which.ravel(), built.wall_um2[~own], len(found)).astype(np.float64),
         means,
         p95s,
+        np.flatnonzero(is_piece).astype(np.int32),
+        held,
         built.changed,
         built.largest_bias,
         thin,
@@ -280,6 +291,8 @@ def _none(task: ObjectsTask) -> ObjectFacts:
         nothing,
         by_channel,
         by_channel,
+        np.zeros(0, np.int32),
+        np.zeros((0, len(task.images), QUANTILES), np.float32),
         0,
         (),
         np.zeros(0, np.uint64),
