@@ -139,6 +139,13 @@ def test_the_table_is_joined_by_number_and_tells_what_does_not_fit(
     assert np.isnan(column_of(out, "CD8")[labels_of(out) == 1]).all()
 
 
+def test_a_stage_with_classes_is_valid(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
+    classes = stage.GetPrimAtPath("/Specimen/Classes/cells").GetChildren()
+    assert [one.GetName() for one in classes][:2] == ["class_B_x20_cell", "class_T_x20_cell"]
+    assert run("check", out, "--deep", "--workers", 0) == 0, said(capsys)
+
+
 def test_every_level_of_a_file_names_its_cells(out: Path) -> None:
     content = objects_of(out)
     boxes = np.fromfile(out / "bundle" / content["boxes"]["path"], "<f4").reshape(-1, 6)

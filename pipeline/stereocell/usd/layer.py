@@ -22,6 +22,7 @@ UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
 PAINTED_BY = "stereocell:paintedBy"  # on a channel's prim: ID of the channel that is painted on it
 CHANNELS = ROOT.AppendChild("Channels")
+CLASSES = ROOT.AppendChild("Classes")  # by channel: materials of its objects' classes
 TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")
 CHANNEL_API = "StereoCellChannelAPI"
