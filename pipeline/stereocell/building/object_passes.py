@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -36,9 +37,11 @@ from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted
 from stereocell.model.object_notes import ObjectNotes
+from stereocell.read.dicom import read_free_labels
 from stereocell.read.open_dataset import reader_of
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
+from stereocell.storage.location import Location
 
 NOTES = "units.schema.json#Notes"
 EXTENTS = "units.schema.json#Extents"
@@ -67,19 +70,36 @@ def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: En
     return locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
 
 
-def save_notes(out_folder: OutFolder, labels: Labels) -> None:
-    """Keep what a label map's file says of its objects: the stage is made without that file."""
-    if find_sealed(out_folder.notes_file(labels.id, labels.ref.fingerprint), NOTES) is not None:
+def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
+    """Keep what a label map's file says of its objects: the stage is made without that file.
+
+    Raises SourceError.
+    """
+    file = _notes_file(out_folder, plan, labels)
+    if find_sealed(file, NOTES) is not None:
         return
-    notes = _notes().dump_python(labels.open().notes, mode="json")
-    file = out_folder.notes_file(labels.id, labels.ref.fingerprint)
-    write_sealed(file, {"notes": notes})
+    notes = labels.open().notes
+    if _has_free_names(plan, labels):
+        own = read_free_labels(Location.of(labels.ref.source))
+        notes = replace(notes, names=notes.names | own)
+    write_sealed(file, {"notes": _notes().dump_python(notes, mode="json")})
 
 
-def read_notes(out_folder: OutFolder, labels: Labels) -> ObjectNotes:
+def read_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> ObjectNotes:
     """Return what `save_notes` kept. Raises OutputError."""
-    file = out_folder.notes_file(labels.id, labels.ref.fingerprint)
+    file = _notes_file(out_folder, plan, labels)
     return _notes().validate_python(read_sealed(file, NOTES, _AGAIN)["notes"])
+
+
+def _notes_file(out_folder: OutFolder, plan: Plan, labels: Labels) -> Path:
+    kind = f"{labels.id}-free" if _has_free_names(plan, labels) else labels.id
+    return out_folder.notes_file(kind, labels.ref.fingerprint)
+
+
+def _has_free_names(plan: Plan, labels: Labels) -> bool:
+    """Return whether segments are called by what somebody wrote."""
+    is_dicom = Location.of(labels.ref.source).format == "dicom"
+    return plan.settings.objects.segment_labels and is_dicom
 
 
 @cache
@@ -159,7 +179,7 @@ def object_tasks(
                 [_image_key(image) for image in images],
                 painted and [_image_key(painted.image), painted.window, painted.depth_um],
                 asdict(plan.settings.objects)
-                | dict.fromkeys(("table", "table_key", "columns", "color_by")),
+                | dict.fromkeys(("table", "table_key", "columns", "color_by", "segment_labels")),
             ]
             readers = {reader_of(ref.source) for ref in (labels.ref, *(i.ref for i in images))}
             key = key_of(depends, objects_maker, *sorted(readers))

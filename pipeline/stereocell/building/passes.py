@@ -54,7 +54,7 @@ def run_passes(
     wanted = {f"{tile_id}/{channel.id}": channel for tile_id, channel in _select(plan, only)}
     survey = survey_channels(out_folder, plan, engine)
     for labels in plan.labels:
-        save_notes(out_folder, labels)
+        save_notes(out_folder, plan, labels)
     located = {one.id: locate_objects(out_folder, plan, one, engine) for one in plan.labels}
     tasks: list[tuple[str, UnitTask | ObjectsTask]] = []
     keys, others = {}, 0

@@ -264,7 +264,7 @@ def _table(
         for tile, name in names.items()
     }
     located = locate_objects(out_folder, plan, labels, engine)
-    notes = read_notes(out_folder, labels)
+    notes = read_notes(out_folder, plan, labels)
     table, remarks = make_table(plan, labels, located, facts, notes, table_of(plan, labels))
     for remark in remarks:
         console.print(f"stage: {remark}", markup=False, soft_wrap=True)

@@ -43,6 +43,16 @@ class ObjectOptions:
         "columns of the table that are taken; empty: all, up to 128",
         Flag("--columns", "columns of the table that are taken, as CD8,cell_type", "A,B,..."),
     )
+    segment_labels: bool = setting(
+        False,
+        "whether segments of DICOM have their SegmentLabel for a name: free text, which may say "
+        "who the patient is; else the standard's words for their codes",
+        Flag(
+            "--segment-labels",
+            "call segments of DICOM by their SegmentLabel, free text that may say who the patient "
+            "is (default: the standard's words for their codes)",
+        ),
+    )
     color_by: str = setting(
         "",
         "the column that colours objects first; empty: the first of categories",
