@@ -207,9 +207,30 @@ def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
     colors = np.array(primvars.GetPrimvar("displayColor").Get())
     colors[0] = (0.0, 0.0, 1.0)
     primvars.GetPrimvar("displayColor").Set(Vt.Vec3fArray.FromNumpy(colors))
+    # hidden objects, another column that colours, and a class of another name
+    all_labels = [*mesh.GetPrim().GetAttribute("stereocell:objectLabels").Get()]
+    hidden = all_labels[1:3]
+    channel = edited.GetPrimAtPath("/Specimen/Channels/cells")
+    attribute = channel.CreateAttribute("stereocell:hiddenObjects", Sdf.ValueTypeNames.UInt64Array)
+    attribute.Set(Vt.UInt64Array([*hidden, 10**15]))
+    channel.GetAttribute("stereocell:defaultColumn").Set("CD3")
+    kinds = channel.GetAttribute("stereocell:column:cell_type")
+    names = [f"{name} of mine" for name in kinds.GetCustomDataByKey("categories")]
+    kinds.SetCustomDataByKey("categories", Vt.StringArray(names))
     layer.Save()
+    before = labels_of(out).tolist()
+    neighbours = np.fromfile(out / "bundle" / objects_of(out)["neighbours"]["rows"]["path"], "<u4")
     del stage, edited
     assert run("bundle", out, "--stage", out / "stage/edit.usda", "--workers", 0) == 0
+    assert labels_of(out).tolist() == [label for label in before if label not in hidden]
+    content = objects_of(out)
+    fewer = np.fromfile(out / "bundle" / content["neighbours"]["rows"]["path"], "<u4")
+    assert len(fewer) < len(neighbours)
+    assert content["default"] == "CD3"
+    assert names == next(c["categories"] for c in content["columns"] if c["id"] == "cell_type")
+    for level in range(4):
+        drawn = read_glb(out / f"bundle/channels/cells/r0_c0/lod{level}.glb")
+        assert sorted(set(drawn.objects.tolist())) == list(range(len(all_labels) - 2))
     assert column_of(out, "volume_um3")[0] == 12345
     mesh = read_glb(out / "bundle/channels/cells/r0_c0/lod1.glb")
     ids = mesh.objects

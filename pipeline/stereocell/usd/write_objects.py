@@ -24,6 +24,7 @@ PAINT = "paint"  # primvar: intensity of the sampled channel at each vertex, 0..
 LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
 NAMES = "stereocell:objectNames"  # on a tile's mesh, too
 TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
+HIDDEN = "stereocell:hiddenObjects"  # on a channel's prim, by an edit: labels that are left out
 COLUMNS, DEFAULT = "stereocell:columns", "stereocell:defaultColumn"
 COLUMN = "stereocell:column:"
 # names of primvars that mean something else on a mesh, to us or to DCC tools
