@@ -504,6 +504,8 @@ def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
     assert min(paint.Get()) > 0.98
     assert run("check", out, "--deep", "--workers", 0) == 0
     assert run("plan", tmp_path / "i.ome.tif", "-o", tmp_path / "o", *flags[:3], "cells=CD9") == 2
+    alone = ("--labels", ".", "--spacing-um", "1,1,1", "--paint", "labels=DNA")
+    assert run("plan", tmp_path / "l.tif", "-o", tmp_path / "o", *alone) == 2
 
 
 @pytest.mark.parametrize("is_alone", [False, True])

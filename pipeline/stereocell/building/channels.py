@@ -191,6 +191,8 @@ def painted(
 
     Raises UsageError.
     """
+    if paint and not channels:
+        raise UsageError("--paint: found no channel of an image, expected one beside the labels")
     of_objects = {name: key for name, key in paint.items() if name in labels}
     of_channels = {name: key for name, key in paint.items() if name not in labels}
     given = by_name("--paint", of_channels, channels) | of_objects
