@@ -16,6 +16,7 @@ from stereocell.building.located_objects import CUT
 from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import load_objects
+from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
@@ -146,6 +147,21 @@ def test_a_stage_with_classes_is_valid(out: Path, capsys: pytest.CaptureFixture[
     assert run("check", out, "--deep", "--workers", 0) == 0, said(capsys)
 
 
+def test_classes_of_other_names_reach_the_bundle(out: Path, tmp_path: Path) -> None:
+    layer = Sdf.Layer.CreateNew(str(out / "stage/names.usda"))
+    layer.subLayerPaths = ["./stage.usda"]
+    stage = Usd.Stage.Open(layer)
+    kinds = stage.GetPropertyAtPath("/Specimen/Channels/cells.stereocell:column:cell_type")
+    names = [f"{name}, it's" for name in kinds.GetCustomDataByKey("categories")]
+    kinds.SetCustomDataByKey("categories", Vt.StringArray(names))
+    layer.Save()
+    write_bundle(out / "stage/names.usda", tmp_path / "bundle", None, run=Engine(0).run)
+    content = json.loads((tmp_path / "bundle/channels/cells/objects.json").read_text())
+    (column,) = (one for one in content["columns"] if one["id"] == "cell_type")
+    assert column["categories"] == names
+    assert len(column["colors"]) == len(names)
+
+
 def test_every_level_of_a_file_names_its_cells(out: Path) -> None:
     content = objects_of(out)
     boxes = np.fromfile(out / "bundle" / content["boxes"]["path"], "<f4").reshape(-1, 6)
@@ -213,10 +229,7 @@ def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
     channel = edited.GetPrimAtPath("/Specimen/Channels/cells")
     attribute = channel.CreateAttribute("stereocell:hiddenObjects", Sdf.ValueTypeNames.UInt64Array)
     attribute.Set(Vt.UInt64Array([*hidden, 10**15]))
-    channel.GetAttribute("stereocell:defaultColumn").Set("CD3")
-    kinds = channel.GetAttribute("stereocell:column:cell_type")
-    names = [f"{name} of mine" for name in kinds.GetCustomDataByKey("categories")]
-    kinds.SetCustomDataByKey("categories", Vt.StringArray(names))
+    channel.GetAttribute("stereocell:defaultColumn").Set("volume_um3")
     layer.Save()
     before = labels_of(out).tolist()
     neighbours = np.fromfile(out / "bundle" / objects_of(out)["neighbours"]["rows"]["path"], "<u4")
@@ -226,8 +239,7 @@ def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
     content = objects_of(out)
     fewer = np.fromfile(out / "bundle" / content["neighbours"]["rows"]["path"], "<u4")
     assert len(fewer) < len(neighbours)
-    assert content["default"] == "CD3"
-    assert names == next(c["categories"] for c in content["columns"] if c["id"] == "cell_type")
+    assert content["default"] == "volume_um3"
     for level in range(4):
         drawn = read_glb(out / f"bundle/channels/cells/r0_c0/lod{level}.glb")
         assert sorted(set(drawn.objects.tolist())) == list(range(len(all_labels) - 2))
