@@ -114,6 +114,58 @@ def step_objects(arguments):
     return found
 
 
+def step_edit_objects(arguments):
+    """Work on a label map's objects as its panel does, and export; return what was to be seen."""
+    root = import_stage(arguments)
+    (block,) = [one for one in bpy.data.objects if one.get("stereocell_labels")]
+    bpy.context.view_layer.objects.active = root
+    found = {"labels": json.loads(block["stereocell_labels"])}
+
+    def faces():
+        evaluated = block.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return len(evaluated.data.polygons)
+
+    def call(operator, **given):
+        assert getattr(bpy.ops.stereocell, operator)(**given) == {"FINISHED"}
+
+    def ids(chosen):
+        values = block.data.attributes["objectId"].data
+        return sorted({values[face.index].value for face in block.data.polygons if chosen(face)})
+
+    call("color_by", column="CD3")
+    material = block.material_slots[0].material
+    (surface,) = [n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfPrincipled"]
+    found["fed by"] = surface.inputs["Base Color"].links[0].from_node.bl_idname
+    call("select_class", category=arguments["class"])
+    found["selected"] = ids(lambda face: face.select)
+    call("color_selected", color=(0.0, 0.25, 1.0))
+    found["color"] = next(
+        list(block.data.attributes["displayColor"].data[face.loop_start].color)[:3]
+        for face in block.data.polygons
+        if face.select
+    )
+    before = faces()
+    call("hide_by_value", column="CD3", low=arguments["low"])
+    found["faces"] = [before, faces(), len(block.data.polygons)]
+    call("rename_class", category=arguments["class"], name="it's mine")
+    if arguments.get("shown again"):
+        call("show_all")
+        found["faces"].append(faces())
+    if arguments.get("picture"):
+        scene = bpy.context.scene
+        scene.render.engine = "CYCLES"
+        scene.cycles.samples, scene.cycles.device = 8, "CPU"
+        scene.render.use_multiview = False
+        scene.render.resolution_x, scene.render.resolution_y = 480, 320
+        sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
+        sun.rotation_euler = (0.9, 0.2, 0.6)
+        scene.collection.objects.link(sun)
+        scene.render.filepath = arguments["picture"]
+        bpy.ops.render.render(write_still=True)
+    assert bpy.ops.export_scene.stereocell_edits(filepath=arguments["overlay"]) == {"FINISHED"}
+    return found
+
+
 def step_measured(arguments):
     """Return what Blender's OpenVDB finds in the grid `measured` of a .vdb, at points."""
     bpy.ops.object.volume_import(filepath=arguments["vdb"])

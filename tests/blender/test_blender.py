@@ -21,6 +21,7 @@ from pxr import Sdf, Usd, UsdGeom
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
+from stereocell.formats.gltf_decode import read_glb
 from stereocell.formats.vdb import write_vdb
 from stereocell.model.identifiers import to_identifier
 from stereocell.samples.cells import table_beside, write_cells
@@ -53,7 +54,7 @@ def run(step: str, folder: Path, **arguments: Any) -> Any:
     found = json.loads(result.read_text())
     # how an operator's report reaches a terminal
     told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", done.stdout, re.MULTILINE)
-    return {**found, "told": told} if step == "edit" else found
+    return {**found, "told": told} if step.startswith("edit") else found
 
 
 def test_meshes_have_their_size_place_and_colour(stage_path: Path, tmp_path: Path) -> None:
@@ -79,15 +80,77 @@ def test_meshes_have_their_size_place_and_colour(stage_path: Path, tmp_path: Pat
     assert found["unit"] == pytest.approx(1e-6)
 
 
-def test_objects_have_their_columns_and_classes(tmp_path: Path) -> None:
-    """A column is an attribute of faces, a category a material slot in its colour."""
-    sample, out = tmp_path / "small.ome.zarr", tmp_path / "out"
+@pytest.fixture(scope="module")
+def cells(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A build of a small tissue, and its table."""
+    folder = tmp_path_factory.mktemp("a tissue's")
+    sample, out = folder / "small.ome.zarr", folder / "out"
     write_cells(sample, seed=2, shape=(24, 60, 60))
     table = table_beside(sample)
     flags = ["--channels", "DNA", "--labels", "cells", "--table", str(table)]
     assert main(["plan", str(sample), "-o", str(out), *flags]) == 0
     for phase in ("units", "stage", "bundle"):
         assert main([phase, str(out), "--workers", "0"]) == 0
+    return out, table
+
+
+def test_objects_are_coloured_hidden_and_renamed_up_to_the_bundle(
+    cells: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out, table = cells
+    by_label = {row["CellID"]: row for row in csv.DictReader(table.read_text().splitlines())}
+    kinds = sorted({row["cell_type"] for row in by_label.values()})
+    stage, overlay = out / "stage/stage.usda", tmp_path / "edit.usda"
+    found = run(
+        "edit_objects", tmp_path, stage=stage, overlay=overlay, lod="lod1", low=300.0,
+        **{"class": "cell_type/0"},
+    )  # fmt: skip
+    labels = found["labels"]
+    of_class = [i for i, one in enumerate(labels) if by_label[one]["cell_type"] == kinds[0]]
+    assert found["selected"] == of_class
+    assert found["fed by"] == "ShaderNodeValToRGB"
+    assert found["color"] == pytest.approx([0, 0.25, 1], abs=1e-6)
+    gone = {one for one in labels if not float(by_label[one]["CD3"]) >= 300}
+    assert 0 < len(gone) < len(labels)
+    before, after, whole = found["faces"]
+    assert before == whole > after > 0
+    assert validate_stage(overlay) == []
+    bundle = tmp_path / "bundle"
+    write_bundle(overlay, bundle, None, run=Engine(0).run)
+    content = load(bundle / "channels/cells/objects.json")
+    left = np.fromfile(bundle / content["labels"]["path"], "<u4")
+    assert {str(label) for label in left} == set(labels) - gone
+    assert content["default"] == ""  # the objects' own colours are what was meant last
+    (kind,) = (one for one in content["columns"] if one["id"] == "cell_type")
+    assert kind["categories"] == ["it's mine", *kinds[1:]]
+    for level in range(4):
+        drawn = read_glb(bundle / f"channels/cells/r0_c0/lod{level}.glb")
+        own = np.array([by_label[str(label)]["cell_type"] == kinds[0] for label in left])
+        is_blue = np.abs(drawn.colors - [0, 0.25, 1]).max(axis=1) < 0.01
+        assert np.array_equal(is_blue, own[drawn.objects])
+
+
+def test_what_is_only_looked_at_is_no_edit_of_a_material(
+    cells: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """Columns are shown by nodes, hidden objects by a modifier: neither is told as lost."""
+    overlay = tmp_path / "edit.usda"
+    found = run(
+        "edit_objects", tmp_path, stage=cells[0] / "stage/stage.usda", overlay=overlay, low=300.0,
+        **{"class": "cell_type/1", "shown again": True},
+    )  # fmt: skip
+    assert found["faces"][3] == found["faces"][2]
+    attribute = Sdf.Layer.FindOrOpen(str(overlay)).GetAttributeAtPath(
+        "/Specimen/Channels/cells.stereocell:hiddenObjects"
+    )
+    assert attribute is None
+    ((kind, told),) = found["told"]
+    assert kind == "Info", told
+
+
+def test_objects_have_their_columns_and_classes(cells: tuple[Path, Path], tmp_path: Path) -> None:
+    """A column is an attribute of faces, a category a material slot in its colour."""
+    out, table = cells
     found = run("objects", tmp_path, stage=out / "stage/stage.usda", lod="lod1")
     mesh = found[leaf("r0_c0", "cells")]
     rows = list(csv.DictReader(table.read_text().splitlines()))

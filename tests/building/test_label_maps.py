@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 from numpy.typing import NDArray
 
 from stereocell import read
@@ -12,7 +13,8 @@ from stereocell.building.settings import PlanOptions
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import Dataset
 from support import dicom_series, nifti_files
-from support.dicom_series import BODIES, grid, oriented, places, write_series
+from support.dicom_segmentations import write_segmentation
+from support.dicom_series import BODIES, grid, oriented, places, turn, write_series
 
 SHAPE = (24, 30, 28)
 
@@ -117,6 +119,35 @@ def test_names_that_are_taken(scan: tuple[Path, Dataset], tmp_path: Path) -> Non
             scan[1],
             str(scan[0]),
             {"CT": str(path)},
+            options=PlanOptions(),
+            colors=[(1, 1, 1)],
+            taken=["CT"],
+        )
+
+
+def test_a_segmentation_of_oblique_planes_is_refused_on_an_axial_scan(
+    scan: tuple[Path, Dataset], tmp_path: Path
+) -> None:
+    voxels = np.zeros((6, 20, 20, 1), np.uint8)
+    voxels[1:5, 4:16, 4:16] = 1
+    oblique = grid(shape=(6, 20, 20), spacing=(2.5, 2.0, 2.2), rotation=turn((1, 2, -0.5), 23.0))
+    path = write_segmentation(tmp_path, "BINARY", voxels, affine=oblique)
+    with pytest.raises(SourceError, match="lies turned to the image, expected labels along its"):
+        labels_on(scan, path)
+
+
+def test_pictures_of_labels_and_names_that_would_garble_a_terminal(
+    scan: tuple[Path, Dataset], tmp_path: Path
+) -> None:
+    path = tmp_path / "outlines.tif"
+    tifffile.imwrite(path, np.zeros((*scan[1].levels[0].shape, 3), np.uint8), photometric="rgb")
+    with pytest.raises(SourceError, match="found colour pixels, expected labels"):
+        labels_on(scan, path)
+    with pytest.raises(UsageError, match="without control characters"):
+        find_labels(
+            scan[1],
+            str(scan[0]),
+            {"\x1b[31m": str(path)},
             options=PlanOptions(),
             colors=[(1, 1, 1)],
             taken=["CT"],

@@ -11,10 +11,12 @@ import zarr
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from stereocell import samples
+from stereocell.building import object_passes
 from stereocell.building.located_objects import CUT
 from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import load_objects
+from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
@@ -23,6 +25,7 @@ from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
 from support.dicom_series import sample as scene_on
 from support.digests import digests_of
+from support.phantoms import write_ome_tiff
 
 SHAPE = (24, 72, 96)
 PHASES = ("plan", "units", "stage", "bundle")
@@ -137,6 +140,28 @@ def test_the_table_is_joined_by_number_and_tells_what_does_not_fit(
     assert np.isnan(column_of(out, "CD8")[labels_of(out) == 1]).all()
 
 
+def test_a_stage_with_classes_is_valid(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
+    classes = stage.GetPrimAtPath("/Specimen/Classes/cells").GetChildren()
+    assert [one.GetName() for one in classes][:2] == ["class_B_x20_cell", "class_T_x20_cell"]
+    assert run("check", out, "--deep", "--workers", 0) == 0, said(capsys)
+
+
+def test_classes_of_other_names_reach_the_bundle(out: Path, tmp_path: Path) -> None:
+    layer = Sdf.Layer.CreateNew(str(out / "stage/names.usda"))
+    layer.subLayerPaths = ["./stage.usda"]
+    stage = Usd.Stage.Open(layer)
+    kinds = stage.GetPropertyAtPath("/Specimen/Channels/cells.stereocell:column:cell_type")
+    names = [f"{name}, it's" for name in kinds.GetCustomDataByKey("categories")]
+    kinds.SetCustomDataByKey("categories", Vt.StringArray(names))
+    layer.Save()
+    write_bundle(out / "stage/names.usda", tmp_path / "bundle", None, run=Engine(0).run)
+    content = json.loads((tmp_path / "bundle/channels/cells/objects.json").read_text())
+    (column,) = (one for one in content["columns"] if one["id"] == "cell_type")
+    assert column["categories"] == names
+    assert len(column["colors"]) == len(names)
+
+
 def test_every_level_of_a_file_names_its_cells(out: Path) -> None:
     content = objects_of(out)
     boxes = np.fromfile(out / "bundle" / content["boxes"]["path"], "<f4").reshape(-1, 6)
@@ -198,9 +223,26 @@ def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
     colors = np.array(primvars.GetPrimvar("displayColor").Get())
     colors[0] = (0.0, 0.0, 1.0)
     primvars.GetPrimvar("displayColor").Set(Vt.Vec3fArray.FromNumpy(colors))
+    # hidden objects, another column that colours, and a class of another name
+    all_labels = [*mesh.GetPrim().GetAttribute("stereocell:objectLabels").Get()]
+    hidden = all_labels[1:3]
+    channel = edited.GetPrimAtPath("/Specimen/Channels/cells")
+    attribute = channel.CreateAttribute("stereocell:hiddenObjects", Sdf.ValueTypeNames.UInt64Array)
+    attribute.Set(Vt.UInt64Array([*hidden, 10**15]))
+    channel.GetAttribute("stereocell:defaultColumn").Set("volume_um3")
     layer.Save()
+    before = labels_of(out).tolist()
+    neighbours = np.fromfile(out / "bundle" / objects_of(out)["neighbours"]["rows"]["path"], "<u4")
     del stage, edited
     assert run("bundle", out, "--stage", out / "stage/edit.usda", "--workers", 0) == 0
+    assert labels_of(out).tolist() == [label for label in before if label not in hidden]
+    content = objects_of(out)
+    fewer = np.fromfile(out / "bundle" / content["neighbours"]["rows"]["path"], "<u4")
+    assert len(fewer) < len(neighbours)
+    assert content["default"] == "volume_um3"
+    for level in range(4):
+        drawn = read_glb(out / f"bundle/channels/cells/r0_c0/lod{level}.glb")
+        assert sorted(set(drawn.objects.tolist())) == list(range(len(all_labels) - 2))
     assert column_of(out, "volume_um3")[0] == 12345
     mesh = read_glb(out / "bundle/channels/cells/r0_c0/lod1.glb")
     ids = mesh.objects
@@ -225,17 +267,24 @@ def test_the_same_bytes_with_any_workers(out: Path, tmp_path: Path, workers: int
     assert made[0] == made[1]
 
 
-def test_a_large_object_is_cut_at_the_tiles_and_stays_one(tmp_path: Path) -> None:
+def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     z, y, _x = np.mgrid[:20, :40, :120]
     labels = ((y - 20) ** 2 + (z - 10) ** 2 < 64).astype(np.uint8) * 5  # a rod through all tiles
     labels[2:6, 2:8, 50:58] = 9
     source, out = tmp_path / "rod.tif", tmp_path / "out"
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
-    build(
-        source,
-        out,
-        *("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40"),
-    )
+    flags = ("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40")
+    build(source, out, *flags)
+    told = said(capsys)
+    words = "2 objects, 1 of them larger than a tile and half around it, and cut (5)"
+    assert f"plan: organs: {words}" in told
+    assert f"units: organs: {words}" in told
+    # of more voxels it tells which will be, without reading any
+    monkeypatch.setattr(object_passes, "_COUNTED_AT_ONCE", 1000)
+    assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
+    assert "organs: objects larger than a tile and half around it, 40 x 80 x 80 um" in said(capsys)
     folder = out / "bundle/channels/organs"
     content = json.loads((folder / "objects.json").read_text())
     assert content["count"] == 2
@@ -264,6 +313,23 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(tmp_path: Path) -> Non
         shared = set(map(tuple, left.tolist())) & set(map(tuple, right.tolist()))
         assert len(shared) > 100
         assert np.mean([one[0] for one in shared]) == pytest.approx(at, abs=0.3)
+
+
+def test_an_object_in_pieces_has_the_percentile_of_all_its_voxels(tmp_path: Path) -> None:
+    labels = np.zeros((16, 24, 90), np.uint16)
+    labels[3:13, 4:20, 2:88] = 7
+    rng = np.random.default_rng(3)
+    image = (1000 * rng.gamma(2.0, 1 + np.arange(90) / 20, labels.shape)).astype(np.uint16)
+    tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
+    write_ome_tiff(tmp_path / "i.ome.tif", image, names=["DNA"])
+    out = tmp_path / "out"
+    build(tmp_path / "i.ome.tif", out, "--labels", f"cells={tmp_path / 'l.tif'}", "--grid", "3x1")
+    own = image[labels == 7]
+    assert len({len(tile.get("more", [])) for tile in objects_of(out)["tiles"].values()}) == 1
+    assert column_of(out, "mean_DNA") == pytest.approx([own.mean()], rel=1e-5)
+    # within a thousandth of the voxels
+    low, high = np.percentile(own, [94.9, 95.1])
+    assert low <= column_of(out, "p95_DNA")[0] <= high
 
 
 def test_small_objects_are_counted_and_others_end_with_the_region(
@@ -298,7 +364,10 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 
 
 def test_what_can_not_be_built_is_told_in_one_line(
-    sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    sample: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     plan = ("plan", sample, "-o", tmp_path / "out", "--channels", "DNA")
     told = refusal(capsys, *plan, "--labels", "nuclei")
@@ -312,6 +381,10 @@ def test_what_can_not_be_built_is_told_in_one_line(
     negative = np.full((6, 8, 8), -7, np.int16)
     tifffile.imwrite(tmp_path / "n.tif", negative, metadata={"axes": "ZYX"})
     flags = ("--labels", ".", "--spacing-um", "1,1,1")
+    told = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
+    assert "found -7, expected 0 or more in labels" in told
+    assert not (tmp_path / "n").exists()
+    monkeypatch.setattr(object_passes, "_COUNTED_AT_ONCE", 100)  # a map that is too large to look
     assert run("plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags) == 0
     assert run("units", tmp_path / "n", "--workers", 0) == 1
     assert "found -7, expected 0 or more in labels" in capsys.readouterr().err
@@ -414,6 +487,37 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
     wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
     assert wanted in said(capsys)
+
+
+def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
+    """Of two boxes the first lies in the dark, the second in what is stained."""
+    labels = np.zeros((20, 24, 48), np.uint16)
+    labels[4:16, 4:20, 4:20], labels[4:16, 4:20, 28:44] = 5, 9
+    z, y, x = np.indices(labels.shape) - np.array([9.5, 11.5, 35.5]).reshape(3, 1, 1, 1)
+    image = 1000 * ((z / 14) ** 2 + (y / 18) ** 2 + (x / 13) ** 2 < 1)
+    tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
+    write_ome_tiff(tmp_path / "i.ome.tif", image.astype(np.uint16), names=["DNA"])
+    out = tmp_path / "out"
+    flags = ("--labels", f"cells={tmp_path / 'l.tif'}", "--paint", "cells=DNA", "--grid", "2x1")
+    build(tmp_path / "i.ome.tif", out, *flags)
+    assert objects_of(out)["paint"] == "DNA"
+    for tile, expected in (("r0_c0", 0.0), ("r0_c1", 1.0)):
+        for file in (out / "bundle/channels/cells" / tile).glob("*.glb"):
+            paint = read_glb(file).paint
+            assert paint is not None
+            np.testing.assert_allclose(paint, expected, atol=0.02)
+    stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Specimen/Tiles/r0_c1/cells/cells_r0_c1"))
+    paint = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("paint")
+    assert (paint.GetInterpolation(), len(paint.Get())) == (
+        "vertex",
+        len(mesh.GetPointsAttr().Get()),
+    )
+    assert min(paint.Get()) > 0.98
+    assert run("check", out, "--deep", "--workers", 0) == 0
+    assert run("plan", tmp_path / "i.ome.tif", "-o", tmp_path / "o", *flags[:3], "cells=CD9") == 2
+    alone = ("--labels", ".", "--spacing-um", "1,1,1", "--paint", "labels=DNA")
+    assert run("plan", tmp_path / "l.tif", "-o", tmp_path / "o", *alone) == 2
 
 
 @pytest.mark.parametrize("is_alone", [False, True])

@@ -39,6 +39,7 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--table": (["t.csv"], "objects", "table", "t.csv"),
     "--table-key": (["id"], "objects", "table_key", "id"),
     "--columns": (["CD8, type"], "objects", "columns", ("CD8", "type")),
+    "--segment-labels": ([], "objects", "segment_labels", True),
     "--color-by": (["CD8"], "objects", "color_by", "CD8"),
 }
 

@@ -5,6 +5,7 @@ from malformed import (
     build_cases,
     dicom_cases,
     nifti_cases,
+    object_cases,
     plane_cases,
     settings_cases,
     tiff_cases,
@@ -15,7 +16,7 @@ from malformed.cases import Case
 
 MODULES = (
     zarr_cases, tiff_cases, plane_cases, nifti_cases, dicom_cases, array_cases, settings_cases,
-    build_cases, usd_cases,
+    build_cases, usd_cases, object_cases,
 )  # fmt: skip
 
 

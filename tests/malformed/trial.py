@@ -37,7 +37,9 @@ PEAK_MB = 1000
 _SEED = 5
 _LEFT_OUT = ("alphawrap", "__main__")
 # what commands tell on the way, on stderr: "units: 1/4 r0_c0/F", "plan: 0.2 s"
-_PROGRESS = re.compile(r"(plan|windows|iso-values|units|stage|bundle|report|check|tissue|source)\b")
+_PROGRESS = re.compile(
+    r"(plan|windows|evidence|solids|objects|iso-values|units|stage|bundle|report|check|tissue|source)\b"
+)
 _REFUSAL = "stereocell: "
 _FAILED = re.compile(r"^\w+: \d+ of \d+ failed$")
 _BUG = re.compile(r": [A-Z]\w+(Error|Exception): ")  # of a unit: the engine tells it in words
@@ -63,12 +65,14 @@ def import_all() -> None:
         if not module.name.endswith(_LEFT_OUT):
             importlib.import_module(module.name)
     from stereocell.building import stage_tasks
-    from stereocell.building.tasks import evidence, solids, unit, window
+    from stereocell.building.tasks import evidence, extents, objects, solids, unit, window
     from stereocell.storage import cache_key
 
     for maker in (
         window,
         evidence,
+        extents,
+        objects,
         solids,
         unit,
         stage_tasks,

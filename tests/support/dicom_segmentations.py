@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydicom.sr.codedict import codes
 from pydicom.sr.coding import Code
 
-from support.dicom_series import grid, write_series
+from support.dicom_series import Affine, grid, write_series
 
 SPACING = (2.5, 2.0, 2.2)  # mm between slices, rows, columns
 
@@ -31,6 +31,7 @@ def write_segmentation(
     *,
     omit_empty: bool = False,
     types: Sequence[Code] = (codes.SCT.Lung,),
+    affine: Affine | None = None,
 ) -> Path:
     """Write `images` and `seg.dcm` to a folder; return the path of the latter.
 
@@ -39,9 +40,10 @@ def write_segmentation(
     change      edits the file
     omit_empty  planes without a segment are left out
     types       by turns; the texts of a segment name JANE
+    affine      of the voxels; None: axial, SPACING apart
     """
     z, y, x, count = voxels.shape
-    affine = grid(shape=(z, y, x), spacing=SPACING)
+    affine = grid(shape=(z, y, x), spacing=SPACING) if affine is None else affine
     files = write_series(folder / "images", affine, (z, y, x), change=complete)
     described = [
         highdicom.seg.SegmentDescription(

@@ -2,7 +2,8 @@
 
 `python -m support.object_bundle FOLDER [--wide]` writes it. Cells are balls on a grid, their number
 there is their row, so that a test knows where each is. The last object is in both tiles, a box that
-is cut at their common plane. `--wide`: its label needs 64 bits.
+is cut at their common plane. `--wide`: its label needs 64 bits. `--painted`: the upper half of each
+ball is stained.
 """
 
 import sys
@@ -83,7 +84,7 @@ def box(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
     return np.array(points), np.array(normals), np.array(triangles, np.uint32)
 
 
-def tile_mesh(tile: int, rings: int) -> Mesh:
+def tile_mesh(tile: int, rings: int, is_painted: bool = False) -> Mesh:
     """Return a tile's cells, numbered as they come; the piece of the beam is the last."""
     unit, faces = ball(rings)
     rows = range(tile * PER_TILE, (tile + 1) * PER_TILE)
@@ -94,11 +95,13 @@ def tile_mesh(tile: int, rings: int) -> Mesh:
     for store, part in zip((positions, normals, triangles), box(low, high), strict=True):
         store.append(part)
     starts = np.cumsum([0, *(len(part) for part in positions[:-1])])
+    paint = np.concatenate([*([unit[:, 1] > 0.1] * PER_TILE), np.zeros(len(positions[-1]))])
     return Mesh(
         np.vstack(positions).astype(np.float32),
         np.vstack([t + s for t, s in zip(triangles, starts, strict=True)]).astype(np.uint32),
         np.vstack(normals).astype(np.float32),
         objects=np.repeat(np.arange(len(positions)), [len(p) for p in positions]).astype(np.int32),
+        paint=paint.astype(np.float32) if is_painted else None,
     )
 
 
@@ -146,7 +149,7 @@ def make_table(is_wide: bool = False) -> ObjectTable:
     )
 
 
-def write(root: Path, is_wide: bool = False) -> None:
+def write(root: Path, is_wide: bool = False, is_painted: bool = False) -> None:
     """Write the bundle into a folder."""
     table, files = make_table(is_wide), []
 
@@ -158,7 +161,7 @@ def write(root: Path, is_wide: bool = False) -> None:
     for i, tile in enumerate(TILES):
         lods = []
         for level, rings in enumerate(RINGS):
-            mesh = tile_mesh(i, rings)
+            mesh = tile_mesh(i, rings, is_painted)
             glb = encode_glb(
                 mesh,
                 step_m,
@@ -178,7 +181,9 @@ def write(root: Path, is_wide: bool = False) -> None:
     joint = {"gradient_max": 1.0, "functions": {}, "histogram": asdict(histogram), "most": 0}
     transfer2d = put(f"channels/{CHANNEL}/transfer2d.json", compact_json(joint))
     volumes = put(f"channels/{CHANNEL}/volumes.json", compact_json({"volumes": []}))
-    objects, written = write_objects(root, f"channels/{CHANNEL}", table)
+    objects, written = write_objects(
+        root, f"channels/{CHANNEL}", table, "DNA" if is_painted else ""
+    )
     files += written
     channel = {
         **{"id": CHANNEL, "name": "Cells", "color": [0.8, 0.8, 0.8], "window": [0, 1]},
@@ -202,4 +207,4 @@ def write(root: Path, is_wide: bool = False) -> None:
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]), "--wide" in sys.argv)
+    write(Path(sys.argv[1]), "--wide" in sys.argv, "--painted" in sys.argv)

@@ -182,9 +182,21 @@ def windows_of(
     return found
 
 
-def painted(paint: Mapping[str, str], channels: Sequence[Channel]) -> dict[str, str]:
-    """Return channel name -> name of the channel that is sampled onto its surface."""
-    given, names = by_name("--paint", paint, channels), [channel.name for channel in channels]
+def painted(
+    paint: Mapping[str, str], channels: Sequence[Channel], labels: Sequence[str] = ()
+) -> dict[str, str]:
+    """Return channel name -> name of the channel that is sampled onto its surface.
+
+    labels  names of label maps, whose objects may be painted, too
+
+    Raises UsageError.
+    """
+    if paint and not channels:
+        raise UsageError("--paint: found no channel of an image, expected one beside the labels")
+    of_objects = {name: key for name, key in paint.items() if name in labels}
+    of_channels = {name: key for name, key in paint.items() if name not in labels}
+    given = by_name("--paint", of_channels, channels) | of_objects
+    names = [channel.name for channel in channels]
     first = list({channel.index: channel for channel in reversed(channels)}.values())[::-1]
     found = {
         # of voxels with several surfaces any channel has the intensity

@@ -15,6 +15,7 @@ from stereocell.storage.location import Location
 
 SELF = "."  # in place of a path: the input itself
 _ALIGNED = 1e-6  # of rotations: rounding
+_COLOURS = "colour pixels"  # how a reader's remark on them begins
 _AVERAGED = ("resampled", "interpolated")  # in what a reader says of voxels between others
 
 Triple = tuple[float, float, float]
@@ -82,6 +83,8 @@ def find_labels(
     found: list[Labels] = []
     ids = [to_identifier(name) for name in taken]
     for name, place in wanted.items():
+        if not name.isprintable():
+            raise UsageError(f"--labels {name!r:.60}: expected a name without control characters")
         dataset, ref = _opened(image, source, name, place, options)
         title = name
         if name == SELF:  # the name of a patient's file may be the patient's
@@ -136,6 +139,10 @@ def _opened(
 def _as_stored(dataset: Dataset) -> Dataset:
     """Return a dataset whose voxels are the file's own. Raises SourceError for any other."""
     for remark in dataset.remarks:
+        if remark.startswith(_COLOURS):
+            raise SourceError(
+                f"{dataset.shown}: found colour pixels, expected labels: one number a voxel"
+            )
         if any(word in remark for word in _AVERAGED):
             raise SourceError(
                 f"{dataset.shown}: {remark}: found numbers of objects, which have no means, "

@@ -1,34 +1,53 @@
 """The passes over label maps: first where the objects are, then the units that build them."""
 
+import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from pydantic import TypeAdapter
 
+from stereocell.building.channels import Channel
 from stereocell.building.label_maps import Labels
-from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
+from stereocell.building.located_objects import (
+    AROUND,
+    CUT,
+    Located,
+    TileGrid,
+    locate,
+    tile_boxes,
+)
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.source_tasks import box_to_json, run_on_input
+from stereocell.building.survey_file import Survey
 from stereocell.building.tasks import extents as extents_maker
 from stereocell.building.tasks import objects as objects_maker
-from stereocell.building.tasks.extents import ExtentsTask, extents_from_json, write_extents
-from stereocell.building.tasks.objects import ImageRef, ObjectsTask
+from stereocell.building.tasks.extents import (
+    ExtentsTask,
+    extents_from_json,
+    find_in_tile,
+    write_extents,
+)
+from stereocell.building.tasks.objects import ImageRef, ObjectsTask, Painted
 from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted
 from stereocell.model.object_notes import ObjectNotes
+from stereocell.read.dicom import read_free_labels
 from stereocell.read.open_dataset import reader_of
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
+from stereocell.storage.location import Location
 
 NOTES = "units.schema.json#Notes"
 EXTENTS = "units.schema.json#Extents"
 _AGAIN = "run `stereocell units OUT` again"
 _UM = 1e6  # um a metre
+_COUNTED_AT_ONCE = 1 << 25  # voxels of a label map that `plan` counts: half a second
 
 
 def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> Located:
@@ -51,19 +70,36 @@ def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: En
     return locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
 
 
-def save_notes(out_folder: OutFolder, labels: Labels) -> None:
-    """Keep what a label map's file says of its objects: the stage is made without that file."""
-    if find_sealed(out_folder.notes_file(labels.id, labels.ref.fingerprint), NOTES) is not None:
+def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
+    """Keep what a label map's file says of its objects: the stage is made without that file.
+
+    Raises SourceError.
+    """
+    file = _notes_file(out_folder, plan, labels)
+    if find_sealed(file, NOTES) is not None:
         return
-    notes = _notes().dump_python(labels.open().notes, mode="json")
-    file = out_folder.notes_file(labels.id, labels.ref.fingerprint)
-    write_sealed(file, {"notes": notes})
+    notes = labels.open().notes
+    if _has_free_names(plan, labels):
+        own = read_free_labels(Location.of(labels.ref.source))
+        notes = replace(notes, names=notes.names | own)
+    write_sealed(file, {"notes": _notes().dump_python(notes, mode="json")})
 
 
-def read_notes(out_folder: OutFolder, labels: Labels) -> ObjectNotes:
+def read_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> ObjectNotes:
     """Return what `save_notes` kept. Raises OutputError."""
-    file = out_folder.notes_file(labels.id, labels.ref.fingerprint)
+    file = _notes_file(out_folder, plan, labels)
     return _notes().validate_python(read_sealed(file, NOTES, _AGAIN)["notes"])
+
+
+def _notes_file(out_folder: OutFolder, plan: Plan, labels: Labels) -> Path:
+    kind = f"{labels.id}-free" if _has_free_names(plan, labels) else labels.id
+    return out_folder.notes_file(kind, labels.ref.fingerprint)
+
+
+def _has_free_names(plan: Plan, labels: Labels) -> bool:
+    """Return whether segments are called by what somebody wrote."""
+    is_dicom = Location.of(labels.ref.source).format == "dicom"
+    return plan.settings.objects.segment_labels and is_dicom
 
 
 @cache
@@ -72,7 +108,12 @@ def _notes() -> TypeAdapter[ObjectNotes]:
 
 
 def tell_objects(labels: Labels, located: Located) -> None:
-    """Say how many objects there are, which are cut, and how many are left out."""
+    """Print what `told_of` says."""
+    console.print(f"units: {told_of(labels, located)}", markup=False)
+
+
+def told_of(labels: Labels, located: Located) -> str:
+    """Return how many objects there are, which are cut, and how many are left out, in words."""
     told = counted(len(located.owners), "object")
     cut = located.extents.labels[located.owners == CUT]
     if len(cut):
@@ -80,16 +121,37 @@ def tell_objects(labels: Labels, located: Located) -> None:
         told += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
     if located.small:
         told += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
-    console.print(f"units: {labels.name}: {told}", markup=False)
+    return f"{labels.name}: {told}"
+
+
+def told_before(plan: Plan) -> Iterator[str]:
+    """Yield of each label map what its units will cut, from its voxels where these are few.
+
+    Raises SourceError where they are no labels.
+    """
+    for labels in plan.labels:
+        boxes = tile_boxes(TileGrid.of(plan, labels))
+        if math.prod(labels.shape) <= _COUNTED_AT_ONCE:
+            parts = {tile: find_in_tile(ExtentsTask(labels, box)) for tile, box in boxes.items()}
+            found = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
+            yield told_of(labels, found)
+        elif len(plan.tiles) > 1:
+            largest = np.max([box.shape for box in boxes.values()], axis=0) * labels.spacing_um
+            z, y, x = ((1 + 2 * AROUND) * largest).tolist()
+            yield (
+                f"{labels.name}: objects larger than a tile and half around it, {z:.4g} x {y:.4g} "
+                f"x {x:.4g} um (z, y, x), will be cut at the tiles' planes: `units` names them"
+            )
 
 
 def object_tasks(
-    out_folder: OutFolder, plan: Plan, located: Mapping[str, Located]
+    out_folder: OutFolder, plan: Plan, located: Mapping[str, Located], survey: Survey
 ) -> Iterator[tuple[str, ObjectsTask, str]]:
     """Yield `<tile>/<labels>`, task and key of the unit of each tile and label map."""
     images = _images(plan)
     step_um = lattice_step_um(plan, located)
     for labels in plan.labels:
+        painted = _painted(plan, labels, survey)
         found = located[labels.id]
         boxes = tile_boxes(found.grid)
         for tile in plan.tiles:
@@ -115,8 +177,9 @@ def object_tasks(
                 [edges.tolist() for edges in found.grid.edges] if is_cut.any() else [],
                 step_um,
                 [_image_key(image) for image in images],
+                painted and [_image_key(painted.image), painted.window, painted.depth_um],
                 asdict(plan.settings.objects)
-                | dict.fromkeys(("table", "table_key", "columns", "color_by")),
+                | dict.fromkeys(("table", "table_key", "columns", "color_by", "segment_labels")),
             ]
             readers = {reader_of(ref.source) for ref in (labels.ref, *(i.ref for i in images))}
             key = key_of(depends, objects_maker, *sorted(readers))
@@ -129,6 +192,7 @@ def object_tasks(
                 edges=found.grid.edges,
                 step_um=step_um,
                 images=images,
+                painted=painted,
                 options=plan.settings.objects,
                 directory=directory,
             )
@@ -162,11 +226,22 @@ def _images(plan: Plan) -> tuple[ImageRef, ...]:
         if channel.voxels_id in seen:
             continue
         seen.add(channel.voxels_id)
-        ref, level = source_of(plan, channel), plan.level_of(channel)
-        found.append(
-            ImageRef(ref, channel.index, level, plan.region, plan.spacing_um, plan.origin_um)
-        )
+        found.append(_image(plan, channel))
     return tuple(found)
+
+
+def _image(plan: Plan, channel: Channel) -> ImageRef:
+    ref, level = source_of(plan, channel), plan.level_of(channel)
+    return ImageRef(ref, channel.index, level, plan.region, plan.spacing_um, plan.origin_um)
+
+
+def _painted(plan: Plan, labels: Labels, survey: Survey) -> Painted | None:
+    """Return what is painted on the objects of a label map; None: nothing."""
+    painter = plan.painter(labels)
+    if painter is None:
+        return None
+    window = survey[painter.id].statistics.window
+    return Painted(_image(plan, painter), window, float(plan.settings.unwrap.paint_um))
 
 
 def _image_key(image: ImageRef) -> list[object]:

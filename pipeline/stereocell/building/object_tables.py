@@ -234,9 +234,19 @@ def table_of(plan: Plan, labels: Labels) -> Table | None:
     return read_table(options.table, options.table_key, options.columns, labels.name)
 
 
-def appearance_of_labels(labels: Labels) -> Appearance:
-    """Return how the objects of a label map are drawn: by their table, and without a volume."""
+def appearance_of_labels(labels: Labels, painter: str = "") -> Appearance:
+    """Return how the objects of a label map are drawn: by their table, and without a volume.
+
+    painter  ID of the channel that is painted on them; empty: none is
+    """
     window, points = (0.0, 1.0), ((0.0, 0.0), (1.0, 1.0))
     return Appearance(
-        labels.name, labels.color, window, None, 1.0, "clear", {DEFAULT_FUNCTION: points}
+        labels.name,
+        labels.color,
+        window,
+        None,
+        1.0,
+        "clear",
+        {DEFAULT_FUNCTION: points},
+        painted_by=painter,
     )

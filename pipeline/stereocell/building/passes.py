@@ -54,13 +54,13 @@ def run_passes(
     wanted = {f"{tile_id}/{channel.id}": channel for tile_id, channel in _select(plan, only)}
     survey = survey_channels(out_folder, plan, engine)
     for labels in plan.labels:
-        save_notes(out_folder, labels)
+        save_notes(out_folder, plan, labels)
     located = {one.id: locate_objects(out_folder, plan, one, engine) for one in plan.labels}
     tasks: list[tuple[str, UnitTask | ObjectsTask]] = []
     keys, others = {}, 0
     every: list[Iterable[tuple[str, UnitTask | ObjectsTask, str]]] = [
         unit_tasks(out_folder, plan, survey),
-        object_tasks(out_folder, plan, located),
+        object_tasks(out_folder, plan, located, survey),
     ]
     for name, task, key in chain(*every):
         keys[name] = key

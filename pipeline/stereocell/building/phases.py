@@ -15,7 +15,7 @@ from stereocell.building import stage_tasks
 from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
 from stereocell.building.intensities import require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
-from stereocell.building.object_passes import locate_objects, read_notes
+from stereocell.building.object_passes import locate_objects, read_notes, told_before
 from stereocell.building.object_tables import appearance_of_labels, make_table, table_of
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
@@ -124,8 +124,13 @@ def settle(source: str, settings: Settings) -> Plan:
     )
     for one in plan.labels:
         table_of(plan, one)  # what can't be read is told before the build
-    gaps = told_of_gaps(dataset, plan)
-    for note in (*dataset.notes, *gaps, *told_in_vain(settings, channels)):  # an error stands alone
+    gaps, objects = told_of_gaps(dataset, plan), list(told_before(plan))
+    for note in (
+        *dataset.notes,
+        *gaps,
+        *objects,
+        *told_in_vain(settings, channels),
+    ):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan
 
@@ -188,7 +193,11 @@ def run_stage(out: Path, engine: Engine) -> None:
         out_folder.require_units_of(plan)
         index, survey = out_folder.index(), read_survey(out_folder)
         appearances = [survey[channel.id].appearance for channel in plan.channels]
-        appearances += [appearance_of_labels(labels) for labels in plan.labels]
+        appearances += [
+            appearance_of_labels(labels, painter.id if painter else "")
+            for labels in plan.labels
+            for painter in [plan.painter(labels)]
+        ]
         tables = {
             labels.id: _table(out_folder, plan, labels, index, engine) for labels in plan.labels
         }
@@ -255,7 +264,7 @@ def _table(
         for tile, name in names.items()
     }
     located = locate_objects(out_folder, plan, labels, engine)
-    notes = read_notes(out_folder, labels)
+    notes = read_notes(out_folder, plan, labels)
     table, remarks = make_table(plan, labels, located, facts, notes, table_of(plan, labels))
     for remark in remarks:
         console.print(f"stage: {remark}", markup=False, soft_wrap=True)

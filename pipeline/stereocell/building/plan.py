@@ -128,8 +128,8 @@ class Plan:
         """Return the level of its source at which a channel is read."""
         return 0 if channel.source else self.level
 
-    def painter(self, channel: Channel) -> Channel | None:
-        """Return the channel sampled onto a channel's surface; None: none is."""
+    def painter(self, channel: Channel | Labels) -> Channel | None:
+        """Return the channel sampled onto a channel's surface, or objects'; None: none is."""
         painted = self.settings.paint.get(channel.name)
         return next((other for other in self.channels if other.name == painted), None)
 
@@ -221,7 +221,7 @@ def make_plan(
         plan=replace(settings.plan, level=level[0], tile_size=tile_size),
         iso_values=by_name("--iso-value", settings.iso_values, channels),
         windows=windows_of(settings.windows, channels, modality),
-        paint=painted(settings.paint, channels),
+        paint=painted(settings.paint, channels, [one.name for one in labels]),
     )
     _require_planes(settings, chosen.spacing_um)
     require_no_background(settings, channels, modality)

@@ -220,7 +220,7 @@ class Settings:
     )
     paint: Mapping[str, str] = setting(
         {},
-        "channel = channel whose intensity is painted on its surface",
+        "channel or label map = channel whose intensity is painted on its surface",
         Flag(
             "--paint",
             "paint the second channel's intensity on the first one's surface, as CD31=MART1; "

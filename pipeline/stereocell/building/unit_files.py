@@ -197,6 +197,7 @@ def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
             arrays.get("uvs"),
             arrays.get("tangents"),
             objects=arrays.get("objects"),
+            paint=_share(arrays.get("object_paint")),
         )
         quality = stored["quality"] and load_quality(stored["quality"])
         baked = None
@@ -243,8 +244,16 @@ def _arrays(lod: Lod) -> dict[str, Any]:
         "openness": lod.baked and lod.baked.openness,
         "paint": lod.baked and lod.baked.paint,
         "objects": lod.mesh.objects,
+        "object_paint": None
+        if lod.mesh.paint is None
+        else np.rint(lod.mesh.paint * 255).astype("u1"),
     }
     return {name: array for name, array in arrays.items() if array is not None}
+
+
+def _share(stored: NDArray[np.uint8] | None) -> NDArray[np.float32] | None:
+    """Return bytes as 0..1."""
+    return None if stored is None else np.divide(stored, 255, dtype=np.float32)
 
 
 def _remedy(directory: Path) -> str:

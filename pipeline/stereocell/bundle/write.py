@@ -44,7 +44,7 @@ from stereocell.storage.json_files import compact_json
 from stereocell.storage.workspace import is_file, move, remove, sizes_below
 from stereocell.transfer.opacity import evaluate
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
-from stereocell.usd.read_objects import read_columns
+from stereocell.usd.read_objects import painter_of, read_columns
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
@@ -161,7 +161,9 @@ def _fill(
         entry, written = _write_channel(root, appearance, own)
         table = gather_table(read_columns(stage, appearance.id), own)
         if table is not None:
-            index_of_objects, more = write_objects(root, f"channels/{appearance.id}", table)
+            index_of_objects, more = write_objects(
+                root, f"channels/{appearance.id}", table, painter_of(stage, appearance.id)
+            )
             entry["objects"] = asdict(index_of_objects)
             written += more
         channels.append(entry)

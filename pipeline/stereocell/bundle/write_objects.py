@@ -28,8 +28,12 @@ _SPAN = (0.1, 99.9)  # percentiles that bytes 1 and 255 stand for
 _LOG_FROM = 10.0  # least ratio of the span's ends for a logarithmic scale
 
 
-def write_objects(root: Path, folder: str, table: ObjectTable) -> tuple[FileRef, list[FileRef]]:
+def write_objects(
+    root: Path, folder: str, table: ObjectTable, paint: str = ""
+) -> tuple[FileRef, list[FileRef]]:
     """Write a channel's table below `folder` of a bundle; return objects.json, and all files.
+
+    paint  ID of the channel whose intensity is at the vertices; empty: none is
 
     Raises OutputError.
     """
@@ -51,6 +55,8 @@ def write_objects(root: Path, folder: str, table: ObjectTable) -> tuple[FileRef,
         "tiles": {tile: _compact(rows) for tile, rows in table.rows.items()},
         "columns": [],
     }
+    if paint:
+        content["paint"] = paint
     for i, column in enumerate(table.columns):
         data, entry = _describe(column)
         # two IDs may differ by their case alone, and some disks don't tell such names apart

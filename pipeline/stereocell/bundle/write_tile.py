@@ -265,7 +265,7 @@ def _bare(lod: ComposedLod) -> ComposedLod:
 
 def _welded(mesh: Mesh) -> Mesh:
     """Return the mesh without the vertices that are in all like an earlier one."""
-    parts = [mesh.positions, mesh.normals, mesh.colors, mesh.openness, mesh.objects]
+    parts = [mesh.positions, mesh.normals, mesh.colors, mesh.openness, mesh.objects, mesh.paint]
     values = [part.reshape(len(mesh.positions), -1) for part in parts if part is not None]
     _, first, twin = np.unique(
         np.concatenate(values, axis=1), axis=0, return_index=True, return_inverse=True
@@ -280,6 +280,7 @@ def _welded(mesh: Mesh) -> Mesh:
         colors=None if mesh.colors is None else mesh.colors[kept],
         openness=None if mesh.openness is None else mesh.openness[kept],
         objects=None if mesh.objects is None else mesh.objects[kept],
+        paint=None if mesh.paint is None else mesh.paint[kept],
     )
 
 

@@ -137,6 +137,8 @@ def encode_glb(
         attributes["COLOR_0"] = _add_colors(buffers, mesh, order)
     if mesh.objects is not None:
         attributes["_FEATURE_ID_0"] = add_feature_ids(buffers, mesh.objects[order])
+        if mesh.paint is not None:
+            attributes["_PAINT"] = _add_paint(buffers, mesh.paint[order])
     primitive: dict[str, Any] = {
         "attributes": attributes,
         "indices": buffers.add_indices(indices, len(order)),
@@ -245,6 +247,15 @@ def _add_colors(buffers: CompressedBuffers, mesh: Mesh, order: NDArray[Any]) -> 
     values = _padded(np.rint(colors * 255).astype(np.uint8))
     return buffers.add_attribute(
         values, {"componentType": _UNSIGNED_BYTE, "normalized": True, "type": "VEC3"}
+    )
+
+
+def _add_paint(buffers: CompressedBuffers, paint: NDArray[np.float32]) -> int:
+    """Store the intensity of a channel at vertices of objects, whose colour the viewer chooses."""
+    rows = np.zeros((len(paint), 4), dtype=np.uint8)  # vertex strides are multiples of 4 bytes
+    rows[:, 0] = np.rint(np.clip(paint, 0, 1) * 255)
+    return buffers.add_attribute(
+        rows, {"componentType": _UNSIGNED_BYTE, "normalized": True, "type": "SCALAR"}
     )
 
 

@@ -37,6 +37,7 @@ class Drawn:
     uvs          float64 (n, 2), v downwards, or None
     step_m       distance between two possible positions of a vertex, metres
     objects      int64 (n,), which object of its tile a vertex is of, or None
+    paint        float64 (n,), intensity of the channel that is painted on it, 0..1, or None
     """
 
     positions_m: NDArray[np.float32]
@@ -48,6 +49,7 @@ class Drawn:
     uvs: NDArray[np.float64] | None
     step_m: float
     objects: NDArray[np.int64] | None = None
+    paint: NDArray[np.float64] | None = None
 
 
 def read_glb(path: Path) -> Drawn:
@@ -88,6 +90,9 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
     objects = None
     if "_FEATURE_ID_0" in attributes:
         objects = _decode(document, binary, attributes["_FEATURE_ID_0"])[:, 0].astype(np.int64)
+    paint = None
+    if "_PAINT" in attributes:
+        paint = _decode(document, binary, attributes["_PAINT"])[:, 0] / 255.0
     material = document["materials"][primitive["material"]]
     shading = material["pbrMetallicRoughness"]
     red, green, blue, _ = shading["baseColorFactor"]
@@ -106,6 +111,7 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
         uvs,
         float(scale[0]),
         objects,
+        paint,
     )
 
 

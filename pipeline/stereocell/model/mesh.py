@@ -19,6 +19,7 @@ class Mesh:
     openness   float32 (n,)    1 - ambient occlusion as read from a stage, 0..1, or None
     objects    int32   (n,)    which object of its tile a vertex belongs to, from 0, or None: see
                                object_table.py; each object's vertices are its own, and together
+    paint      float32 (n,)    of objects: intensity of the sampled channel, 0..1, or None
     """
 
     positions: NDArray[np.float32]
@@ -29,6 +30,7 @@ class Mesh:
     colors: NDArray[np.float32] | None = None
     openness: NDArray[np.float32] | None = None
     objects: NDArray[np.int32] | None = None
+    paint: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, slots=True)

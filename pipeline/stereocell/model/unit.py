@@ -33,6 +33,8 @@ class ObjectFacts:
               `wall_um2` float64 (m,), the area that they share
     means     float64 (n, channels), of the image's channels over an object's voxels
     p95s      float64 (n, channels), their 95th percentiles; NaN: of a piece
+    pieces    int32 (k,), which of the n are pieces; `quantiles` float32 (k, channels, q), of each,
+              evenly from its least to its largest: the pieces' p95s are found together
     changed   voxels that were changed so that no object touches itself by an edge or a corner
     bias      the largest share of an object's volume that a level has more or less, by level
     thin      uint64 (k,), the numbers of objects too thin to be built, which are not among the n
@@ -46,6 +48,8 @@ class ObjectFacts:
     wall_um2: NDArray[np.float64]
     means: NDArray[np.float64]
     p95s: NDArray[np.float64]
+    pieces: NDArray[np.int32]
+    quantiles: NDArray[np.float32]
     changed: int
     bias: tuple[float, ...]
     thin: NDArray[np.uint64]

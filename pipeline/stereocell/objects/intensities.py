@@ -7,24 +7,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 PERCENTILE = 95.0
+NO_PIECES = np.zeros(0, np.int32)
+QUANTILES = 1001  # of a piece: its share of an object's percentile is known to a thousandth
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Mean and 95th percentile of n objects, float64 (n,), in the voxels' unit."""
+    """Of n objects, in the voxels' unit.
+
+    mean, p95  float64 (n,), mean and 95th percentile
+    quantiles  float32 (k, QUANTILES), of the k pieces
+    """
 
     mean: NDArray[np.float64]
     p95: NDArray[np.float64]
+    quantiles: NDArray[np.float32]
 
 
 def measure_intensities(
-    labels: NDArray[np.int32], voxels: NDArray[Any], numbers: NDArray[np.int32]
+    labels: NDArray[np.int32],
+    voxels: NDArray[Any],
+    numbers: NDArray[np.int32],
+    pieces: NDArray[np.int32] = NO_PIECES,
 ) -> Measured:
     """Return mean and percentile of the voxels of each object.
 
     labels   int32 (z, y, x)
     voxels   (z, y, x), any number type
     numbers  int32 (n,), ascending, of objects that have voxels
+    pieces   int32 (k,), those of them that are pieces of one
 
     The percentile is linear between voxels, as numpy's.
 
@@ -43,8 +54,39 @@ def measure_intensities(
     counts = np.bincount(own, minlength=len(numbers))
     firsts = np.cumsum(counts) - counts
     mean = np.bincount(own[order], values, len(numbers)) / np.maximum(counts, 1)
-    at = PERCENTILE / 100 * (counts - 1)
+    p95 = _quantile(values, firsts, counts, PERCENTILE / 100)
+    cut = np.searchsorted(numbers, pieces)
+    shares = np.linspace(0, 1, QUANTILES)
+    found = [_quantile(values, firsts[cut], counts[cut], share) for share in shares]
+    return Measured(mean, p95, np.stack(found, axis=1).astype(np.float32))
+
+
+def _quantile(
+    values: NDArray[np.float64], firsts: NDArray[np.int64], counts: NDArray[np.int64], share: float
+) -> NDArray[np.float64]:
+    """Return a quantile of each object; its values ascend from `firsts` on, `counts` of them."""
+    at = share * (counts - 1)
     below = np.floor(at).astype(np.int64)
     above = np.minimum(below + 1, counts - 1)
     low, high = values[firsts + below], values[firsts + above]
-    return Measured(mean, low + (at - below) * (high - low))
+    return low + (at - below) * (high - low)
+
+
+def merge_quantiles(
+    quantiles: NDArray[np.float32], voxels: NDArray[np.int64], share: float = PERCENTILE / 100
+) -> float:
+    """Return a quantile of an object of k pieces.
+
+    quantiles  float32 (k, q), of each piece, evenly from its least to its largest value
+    voxels     int64 (k,), of each piece
+
+    >>> pieces = np.array([[0, 1, 2], [10, 11, 12]], np.float32)
+    >>> merge_quantiles(pieces, np.array([30, 10]), 0.9)
+    11.0
+    """
+    count = quantiles.shape[1]
+    weights = np.repeat(voxels / count, count)
+    order = np.argsort(quantiles.ravel(), kind="stable")
+    reached = np.cumsum(weights[order])
+    at = min(int(np.searchsorted(reached, share * reached[-1])), len(order) - 1)
+    return float(quantiles.ravel()[order][at])

@@ -21,8 +21,12 @@ class ObjectOptions:
     smallest_voxels: int = setting(27, "objects of fewer voxels are left out, and counted")
     table: str = setting(
         "",
-        "a table with a row an object: CSV, TSV, or a table of SpatialData",
-        Flag("--table", "a table with a row an object, joined by --table-key: CSV, TSV", "FILE"),
+        "a table with a row an object: CSV, TSV, Parquet, .h5ad, or a table of SpatialData",
+        Flag(
+            "--table",
+            "a table with a row an object, joined by --table-key: CSV, TSV, Parquet, .h5ad",
+            "FILE",
+        ),
     )
     table_key: str = setting(
         "",
@@ -38,6 +42,16 @@ class ObjectOptions:
         (),
         "columns of the table that are taken; empty: all, up to 128",
         Flag("--columns", "columns of the table that are taken, as CD8,cell_type", "A,B,..."),
+    )
+    segment_labels: bool = setting(
+        False,
+        "whether segments of DICOM have their SegmentLabel for a name: free text, which may say "
+        "who the patient is; else the standard's words for their codes",
+        Flag(
+            "--segment-labels",
+            "call segments of DICOM by their SegmentLabel, free text that may say who the patient "
+            "is (default: the standard's words for their codes)",
+        ),
     )
     color_by: str = setting(
         "",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.object_table import MISSING, MOST_CATEGORIES, Column, ObjectTable
 from stereocell.model.unit import ObjectFacts
+from stereocell.objects.intensities import merge_quantiles
 
 Triple = tuple[float, float, float]
 
@@ -36,12 +37,19 @@ def own_columns(
     area, touching, shared = np.zeros(count), np.zeros(count), np.zeros(count)
     voxels = np.zeros(count)
     means, p95s = np.zeros((count, len(channels))), np.full((count, len(channels)), np.nan)
+    cut: dict[int, list[tuple[NDArray[np.float32], int]]] = {}
     for rows, one in facts:
         np.add.at(area, rows, one.area_um2)
         np.add.at(voxels, rows, one.voxels)
         np.add.at(means, rows, one.means * one.voxels[:, np.newaxis])
         p95s[rows] = one.p95s
+        for piece, quantiles in zip(one.pieces.tolist(), one.quantiles, strict=True):
+            cut.setdefault(int(rows[piece]), []).append((quantiles, int(one.voxels[piece])))
         np.add.at(shared, rows[one.walls], one.wall_um2)
+    for row, parts in cut.items():
+        held = np.stack([quantiles for quantiles, _ in parts])
+        counts = np.array([count for _, count in parts])
+        p95s[row] = [merge_quantiles(held[:, k], counts) for k in range(len(channels))]
     # a neighbour of several pieces is one
     pairs = [np.stack([rows[one.walls].astype(np.uint64), one.beside], 1) for rows, one in facts]
     if pairs:
@@ -88,7 +96,7 @@ def own_columns(
                 "counts",
             )
         )
-        about = f"95th percentile of {name} over its voxels; missing of cut objects"
+        about = f"95th percentile of {name} over its voxels"
         made.append((f"p95_{to_identifier(name)}", f"p95 {name}", p95, about, "counts"))
     return [
         Column(id_, name, np.asarray(values, np.float32), about, unit)

@@ -181,15 +181,25 @@ def open_store(location: Location) -> Store:
 
 
 def open_array(
-    location: Location, store: Store, path: str, zarr_format: Any = None
+    location: Location,
+    store: Store,
+    path: str,
+    zarr_format: Any = None,
+    *,
+    title: str = "level",
+    item_bytes: int | None = None,
 ) -> "zarr.Array[Any]":
-    """Return the array at a path of a store, whose chunks are checked. Raises SourceError."""
-    where = f"{location.shown}: level {path!r:.80}" if path else location.shown
+    """Return the array at a path of a store, whose chunks are checked. Raises SourceError.
+
+    title       what it is, for messages
+    item_bytes  of a value in a chunk, where the array's type does not say it: of texts
+    """
+    where = f"{location.shown}: {title} {path!r:.80}" if path else location.shown
     with quiet(), one_line(where, "a Zarr array"):
         guard = GuardedStore(store, location)
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
         codecs = tuple(codec_name(codec) for codec in array.compressors)
-        size = math.prod(array.shards or array.chunks) * array.dtype.itemsize
+        size = math.prod(array.shards or array.chunks) * (item_bytes or array.dtype.itemsize)
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
         # not `path`, which may end in a slash
         guard = GuardedStore(store, location, codecs, size, f"{array.path}/{named}".lstrip("/"))

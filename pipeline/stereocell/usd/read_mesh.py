@@ -16,6 +16,7 @@ from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.usd.read_attributes import require_still
 from stereocell.usd.read_objects import objects_of
+from stereocell.usd.write_objects import PAINT
 
 _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
 
@@ -61,6 +62,8 @@ def read_mesh(
     }
     values = {name: given for name, given in found.items() if given is not None}
     objects = objects_of(mesh)
+    if objects is not None and (paint := _primvar(primvars.GetPrimvar(PAINT))) is not None:
+        values["paint"] = paint
     if objects is not None and len(objects) == len(counts):
         values |= _at_vertices(values, indices, counts, len(points))
         objects = _of_vertices(np.repeat(objects, counts), indices, len(points))
@@ -94,6 +97,7 @@ def read_mesh(
             arrays.get("displayColor"),
             arrays.get("occlusion"),
             None if objects is None else objects.astype(np.int32),
+            arrays.get("paint"),
         ),
         to_world,
     )
@@ -190,8 +194,9 @@ def _split(
     widths = np.cumsum([array.shape[1] for array in columns.values()])[:-1]
     parts = dict(zip(columns, np.hsplit(unique, widths), strict=True))
     split_points = np.ascontiguousarray(parts.pop("points"))
-    if "occlusion" in parts:
-        parts["occlusion"] = parts["occlusion"][:, 0]
+    for name in ("occlusion", "paint"):
+        if name in parts:
+            parts[name] = parts[name][:, 0]
     return vertex_of.reshape(-1)[corners], split_points, parts
 
 
@@ -233,4 +238,5 @@ def move_mesh(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
         mesh.colors,
         mesh.openness,
         mesh.objects,
+        mesh.paint,
     )

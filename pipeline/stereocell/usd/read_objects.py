@@ -1,18 +1,20 @@
 """Read the objects of a composed stage: which vertex is whose, and the table's columns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.model.errors import StageError
+from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import Column
-from stereocell.usd.layer import CHANNELS
+from stereocell.usd.layer import CHANNELS, PAINTED_BY
 from stereocell.usd.write_objects import (
     COLUMN,
     COLUMNS,
     DEFAULT,
+    HIDDEN,
     LABELS,
     NAMES,
     OBJECT_ID,
@@ -72,8 +74,41 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
     return columns, str(prim.GetAttribute(DEFAULT).Get() or "")
 
 
+def shown_objects(mesh: Usd.Prim) -> NDArray[np.bool_] | None:
+    """Return which of a tile's objects an edit has not hidden; None: the mesh has no objects."""
+    labels = mesh.GetAttribute(LABELS).Get()
+    if labels is None:
+        return None
+    channel = mesh.GetStage().GetPrimAtPath(CHANNELS.AppendChild(mesh.GetParent().GetName()))
+    hidden = channel.GetAttribute(HIDDEN).Get() if channel else None
+    own, gone = (np.array(list(one or ()), np.uint64) for one in (labels, hidden))
+    return ~np.isin(own, gone)
+
+
+def without_hidden(mesh: Mesh, prim: Usd.Prim) -> Mesh | None:
+    """Return a tile's mesh without the objects that an edit has hidden; None: nothing is left."""
+    shown = shown_objects(prim)
+    if mesh.objects is None or shown is None or shown.all():
+        return mesh
+    kept = shown[mesh.objects]
+    if not kept.any():
+        return None
+    number = (np.cumsum(kept) - 1).astype(np.uint32)
+    parts = {
+        field.name: None if part is None else part[kept]
+        for field in fields(mesh)
+        if field.name not in ("triangles", "objects")
+        for part in [getattr(mesh, field.name)]
+    }
+    triangles = mesh.triangles[kept[mesh.triangles[:, 0]]]
+    objects = (np.cumsum(shown) - 1).astype(np.int32)[mesh.objects[kept]]
+    return Mesh(triangles=number[triangles], objects=objects, **parts)
+
+
 def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | None:
     """Return what a tile's mesh, at the selected level, knows of its objects; None: nothing.
+
+    Those that an edit has hidden are left out.
 
     Raises StageError where a column has another number of values.
     """
@@ -102,7 +137,22 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
     pairs = np.array(list(mesh.GetAttribute(TOUCHING).Get() or ()), np.uint64)
     if len(pairs) % 2:
         raise StageError(f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected pairs")
-    return TileObjects(np.array(list(labels), np.uint64), names, values, pairs.reshape(-1, 2))
+    shown = shown_objects(mesh)
+    assert shown is not None
+    return TileObjects(
+        np.array(list(labels), np.uint64)[shown],
+        tuple(name for name, is_shown in zip(names, shown, strict=False) if is_shown),
+        {name: column[shown] for name, column in values.items()},
+        pairs.reshape(-1, 2),
+    )
+
+
+def painter_of(stage: Usd.Stage, channel_id: str) -> str:
+    """Return the ID of the channel whose intensity objects' vertices have; empty: none is there."""
+    path = CHANNELS.AppendChild(channel_id)
+    name = str(stage.GetPrimAtPath(path).GetAttribute(PAINTED_BY).Get() or "")
+    is_there = Sdf.Path.IsValidIdentifier(name) and stage.GetPrimAtPath(CHANNELS.AppendChild(name))
+    return name if is_there else ""
 
 
 def objects_of(mesh: UsdGeom.Mesh) -> NDArray[np.int64] | None:

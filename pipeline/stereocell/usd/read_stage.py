@@ -46,6 +46,7 @@ from stereocell.usd.read_attributes import (
     sizes_of,
 )
 from stereocell.usd.read_mesh import read_mesh
+from stereocell.usd.read_objects import without_hidden
 from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice
 from stereocell.usd.written_files import AsWritten
@@ -291,6 +292,7 @@ def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[Comp
             mesh = read_mesh(UsdGeom.Mesh(prim), matrix, fed, is_edited=shape != built)
         except StageError as error:
             raise StageError(f"{error}{_edit_advice(level) if levels else ''}") from error
+        mesh = mesh and without_hidden(mesh, prim)
         if mesh is None:
             continue
         stretch = float(np.linalg.norm(matrix[:3, :3], 2))

@@ -27,6 +27,7 @@ from stereocell.storage.json_files import write_json
 from stereocell.usd.layer import (
     CHANNEL_API,
     CHANNELS,
+    PAINTED_BY,
     ROOT,
     export,
     new_stage,
@@ -119,9 +120,7 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
         _author_level(prim, appearance.level, _level_name(appearance))
     write_numbers(prim, appearance.transfer_2d)
     if appearance.painted_by:
-        set_attribute(
-            prim, "stereocell:paintedBy", _Types.String, appearance.painted_by, custom=True
-        )
+        set_attribute(prim, PAINTED_BY, _Types.String, appearance.painted_by, custom=True)
     if appearance.iso_value is not None:
         set_attribute(prim, "stereocell:isoValue", _Types.Float, appearance.iso_value)
     if appearance.threshold is not None:

@@ -5,7 +5,8 @@ would arrive in Blender as values of the first points; values expanded to the fa
 times the bytes. Categories are codes, and each is a GeomSubset with a material of its own, which
 DCC tools show as a material slot.
 
-On the channel's prim stands what the columns mean: see `write_columns`.
+On the channel's prim stands what the columns mean: see `write_columns`. That prim is a material,
+which holds no other one: the classes' materials are below CLASSES.
 """
 
 import numpy as np
@@ -16,18 +17,21 @@ from stereocell.model.identifiers import to_identifier
 from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import Column, ObjectTable
 from stereocell.objects.table import color_objects
-from stereocell.usd.layer import CHANNELS, set_attribute
+from stereocell.usd.layer import CLASSES, set_attribute
 
 OBJECT_ID = "objectId"  # primvar: the place of a face's object in LABELS
+PAINT = "paint"  # primvar: intensity of the sampled channel at each vertex, 0..1
 LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
 NAMES = "stereocell:objectNames"  # on a tile's mesh, too
 TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
+HIDDEN = "stereocell:hiddenObjects"  # on a channel's prim, by an edit: labels that are left out
 COLUMNS, DEFAULT = "stereocell:columns", "stereocell:defaultColumn"
 COLUMN = "stereocell:column:"
 # names of primvars that mean something else on a mesh, to us or to DCC tools
 RESERVED = frozenset(
     (
         OBJECT_ID,
+        PAINT,
         "displayColor",
         "displayOpacity",
         "normals",
@@ -71,9 +75,12 @@ def write_columns(prim: Usd.Prim, table: ObjectTable, roughness: float) -> None:
             colors = np.array(column.colors, np.float32)
             attribute.SetCustomDataByKey("colors", Vt.Vec3fArray.FromNumpy(colors))
     classes = classes_of(table)
+    if classes is not None:
+        UsdGeom.Scope.Define(prim.GetStage(), CLASSES)
+        UsdGeom.Scope.Define(prim.GetStage(), CLASSES.AppendChild(prim.GetName()))
     for code, color in enumerate(classes.colors if classes else ()):
         assert classes is not None
-        path = prim.GetPath().AppendChild(class_name(classes, code))
+        path = CLASSES.AppendChild(prim.GetName()).AppendChild(class_name(classes, code))
         material = UsdShade.Material.Define(prim.GetStage(), path)
         material.GetPrim().SetDisplayName(classes.categories[code])
         surface = UsdShade.Shader.Define(prim.GetStage(), path.AppendChild("surface"))
@@ -110,7 +117,7 @@ def define_objects(
         name = class_name(classes, code)
         path = look.ReplaceName(f"{look.name}_{name}")
         material = UsdShade.Material.Define(prim.GetStage(), path)
-        source = CHANNELS.AppendChild(channel_id).AppendChild(name)
+        source = CLASSES.AppendChild(channel_id).AppendChild(name)
         material.GetPrim().GetInherits().AddInherit(source)
 
 
@@ -138,6 +145,9 @@ def write_objects(
     colors = np.ascontiguousarray(color_objects(table), np.float32)
     shown = Vt.Vec3fArray.FromNumpy(colors)
     _write(primvars, "displayColor", _Types.Color3fArray, shown, indices)
+    if made.paint is not None:
+        paint = primvars.CreatePrimvar(PAINT, _Types.FloatArray, UsdGeom.Tokens.vertex)
+        paint.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(made.paint, np.float32)))
     classes = classes_of(table)
     if classes is not None:
         _write_classes(mesh, look, classes, of_face)

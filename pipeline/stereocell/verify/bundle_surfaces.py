@@ -154,6 +154,15 @@ def _compare_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[flo
         problems.append(f"drawn in {drawn.color}, the stage's colour is {lod.material.color}")
     problems += _compare_vertex_colors(drawn, lod.mesh, places, decoded)
     problems += _compare_maps(drawn, lod, is_last)
+    if (drawn.paint is None) != (lod.mesh.paint is None):
+        problems.append("what is painted on its objects is lost, or another mesh's")
+    elif drawn.paint is not None and lod.mesh.paint is not None:
+        _, nearest = cKDTree(decoded).query(places)
+        off = np.abs(drawn.paint[np.asarray(nearest)] - np.clip(lod.mesh.paint, 0, 1))
+        if np.mean(off > COLOR_STEP) > _ODD_SHARE:
+            problems.append(
+                f"{np.mean(off > COLOR_STEP):.0%} of its vertices are painted otherwise"
+            )
     return apart / drawn.step_m, problems
 
 

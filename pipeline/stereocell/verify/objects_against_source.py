@@ -51,7 +51,7 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
         )
         for tile in plan.tiles
     }
-    notes = read_notes(out_folder, labels)
+    notes = read_notes(out_folder, plan, labels)
     table, _ = make_table(plan, labels, located, facts, notes, table_of(plan, labels))
     tasks = [(tile.id, _TileTask(out_folder.stage_file, tile.id, labels.id)) for tile in plan.tiles]
     found = engine.run("stage", _read_tile, tasks)

@@ -1,5 +1,6 @@
 """DICOM segmentations: one label map, or a mask of the segment that is asked for."""
 
+import json
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -18,7 +19,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.label_map import LabelMap
 from support.dicom_reading import lps_mm, whole
 from support.dicom_segmentations import SPACING, write_segmentation
-from support.dicom_series import grid
+from support.dicom_series import grid, tilted, turn
 
 SHAPE = (6, 9, 7)  # of 63 bits a plane, which fill no bytes
 AFFINE = grid(shape=SHAPE, spacing=SPACING)
@@ -49,9 +50,11 @@ def labels_of(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
     return LabelMap(dataset, channel).read(dataset.levels[0].box)
 
 
-def on_our_grid(voxels: NDArray[Any], dataset: read.Dataset) -> NDArray[Any]:
+def on_our_grid(
+    voxels: NDArray[Any], dataset: read.Dataset, affine: NDArray[np.float64] = AFFINE
+) -> NDArray[Any]:
     """Return the voxels of stored planes at the places of the dataset's voxels."""
-    step = np.linalg.inv(AFFINE)
+    step = np.linalg.inv(affine)
     index = np.rint(lps_mm(dataset) @ step[:3, :3].T + step[:3, 3]).astype(int)
     return voxels[index[..., 0], index[..., 1], index[..., 2]]
 
@@ -236,6 +239,41 @@ def test_objects_have_the_standards_words_alone(tmp_path: Path) -> None:
     }
     assert notes.colors.keys() == {1}
     assert notes.colors[1] == pytest.approx((1, 1, 1), abs=2e-3)
+
+
+def test_free_text_names_segments_where_it_is_asked_for(tmp_path: Path) -> None:
+    def change(ds: Any) -> None:
+        ds.SegmentSequence[0].SegmentLabel = "node  1\n\x1b[31m"
+        ds.SegmentSequence[1].SegmentLabel = ""
+        for item in ds.SegmentSequence:
+            item.SegmentDescription = item.TrackingID = "secret"
+
+    path = write_segmentation(tmp_path, "BINARY", apart(), change)
+    out = tmp_path / "out"
+    names = []
+    for flags in ([], ["--segment-labels"]):
+        assert main(["plan", str(path), "-o", str(out), "--labels", ".", *flags]) == 0
+        for phase in ("units", "stage", "bundle"):
+            assert main([phase, str(out), "--workers", "0"]) == 0
+        objects = json.loads((out / "bundle/channels/labels/objects.json").read_text())
+        assert "secret" not in json.dumps(objects)
+        names.append(objects["names"])
+    assert names == [["Lung (segment 1)", "Lung (segment 2)"], ["node 1 [31m", "Lung (segment 2)"]]
+    assert main(["check", str(out), "--deep", "--workers", "0"]) == 0
+
+
+def test_planes_that_are_oblique_lie_where_they_are(tmp_path: Path) -> None:
+    affine = grid(shape=SHAPE, spacing=SPACING, rotation=turn((1, 2, -0.5), 23.0))
+    path = write_segmentation(tmp_path, "BINARY", apart(), affine=affine)
+    dataset = read.open(path)
+    assert np.array_equal(labels_of(dataset), on_our_grid(numbered(apart()), dataset, affine))
+
+
+def test_planes_of_a_tilted_gantry_are_refused_in_words(tmp_path: Path) -> None:
+    affine = tilted(AFFINE, SHAPE, 18)
+    path = write_segmentation(tmp_path, "BINARY", apart(), affine=affine)
+    with pytest.raises(UsageError, match="with planes beside each other, not one over the other"):
+        read.open(path)
 
 
 def turned(ds: Any) -> None:

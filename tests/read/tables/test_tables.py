@@ -1,12 +1,19 @@
 """Tables with a row an object: what is read of each kind, and what is refused, in one line."""
 
+import sys
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import zarr
+from scipy import sparse
 
 from stereocell.model.errors import SourceError
+from stereocell.read.tables import parquet as parquet_tables
 from stereocell.read.tables import read_table
 
 
@@ -99,15 +106,31 @@ def test_other_files(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_bytes(b"label,a\n1,\xff\xfe\n")
     assert "no text" in refusal(str(tmp_path / "b.csv"))
     assert "can't be read (No such file" in refusal(str(tmp_path / "none.csv"))
-    assert "unknown kind of table" in refusal(csv(tmp_path, "x", "t.parquet"))
+    assert "unknown kind of table" in refusal(csv(tmp_path, "x", "t.xlsx"))
+    text = csv(tmp_path, "x" * 99, "t.parquet")
+    assert refusal(text) == f"{text}: found a text file, expected Parquet"
+    assert "found a text file, expected HDF5" in refusal(csv(tmp_path, "x", "t.h5ad"))
+    assert "found a pointer of Git LFS" in refusal(
+        csv(tmp_path, "version https://git-lfs.github.com/spec/v1\n")
+    )
+    assert "is not on this machine" in refusal("https://example.org/t.parquet")
     assert "no column 'k', expected one of label, a" in refusal(
         csv(tmp_path, "label,a\n1,2\n"), "k"
     )
 
 
-def anndata(path: Path, version: int, x: str) -> Path:
-    """Write a table as AnnData's format says, without AnnData."""
-    group = zarr.open_group(path, mode="w", zarr_format=version)
+def anndata(path: Path, version: int | str, x: str) -> Path:
+    """Write a table as AnnData's format says, without AnnData; version: of Zarr, or "h5ad"."""
+    if version == "h5ad":
+        path.parent.mkdir(parents=True)
+        with h5py.File(path, "w") as file:
+            fill_anndata(file, x)
+    else:
+        fill_anndata(zarr.open_group(path, mode="w", zarr_format=version), x)
+    return path
+
+
+def fill_anndata(group: Any, x: str) -> None:
     obs = group.create_group("obs")
     obs.attrs.update(
         {
@@ -117,10 +140,12 @@ def anndata(path: Path, version: int, x: str) -> Path:
         }
     )
 
-    def put(to: zarr.Group, name: str, values: object, kind: str = "array") -> None:
+    def put(to: Any, name: str, values: object, kind: str = "array") -> None:
         array = np.asarray(values)
         is_text = array.dtype.kind == "U"
-        held = to.create_array(name, shape=array.shape, dtype=str if is_text else array.dtype)
+        create = to.create_array if hasattr(to, "create_array") else to.create_dataset
+        text = str if hasattr(to, "create_array") else h5py.string_dtype()
+        held = create(name, shape=array.shape, dtype=text if is_text else array.dtype)
         held[...] = array.astype(object) if is_text else array
         held.attrs["encoding-type"] = kind
 
@@ -142,21 +167,22 @@ def anndata(path: Path, version: int, x: str) -> Path:
     if x == "dense":
         put(group, "X", dense)
     else:
+        made = sparse.csr_array(dense) if x == "csr" else sparse.csc_array(dense)
         held = group.create_group("X")
-        held.attrs.update({"encoding-type": "csr_matrix", "shape": [4, 2]})
-        put(held, "data", dense[dense != 0])
-        put(held, "indices", np.array([0, 1, 0, 1, 0, 1], np.int32))
-        put(held, "indptr", np.array([0, 1, 2, 4, 6], np.int32))
+        held.attrs.update({"encoding-type": f"{x}_matrix", "shape": [4, 2]})
+        put(held, "data", made.data)
+        put(held, "indices", made.indices)
+        put(held, "indptr", made.indptr)
     uns = group.create_group("uns").create_group("spatialdata_attrs")
     put(uns, "region_key", np.array("region"), "string")
     put(uns, "instance_key", np.array("id"), "string")
-    return path
 
 
-@pytest.mark.parametrize("version", [2, 3])
-@pytest.mark.parametrize("x", ["dense", "sparse"])
-def test_a_table_of_spatialdata(tmp_path: Path, version: int, x: str) -> None:
-    path = anndata(tmp_path / "s.zarr" / "tables" / "table", version, x)
+@pytest.mark.parametrize("version", [2, 3, "h5ad"])
+@pytest.mark.parametrize("x", ["dense", "csr", "csc"])
+def test_a_table_of_spatialdata(tmp_path: Path, version: int | str, x: str) -> None:
+    name = "it's a table.h5ad" if version == "h5ad" else "table"
+    path = anndata(tmp_path / "s.zarr" / "tables" / name, version, x)
     table = read_table(str(path), "", (), "cells")
     assert (table.key, table.labels.tolist()) == ("id", [4, 2, 9])  # d is a nucleus
     by_name = {column.name: column for column in table.columns}
@@ -171,4 +197,105 @@ def test_a_table_of_spatialdata(tmp_path: Path, version: int, x: str) -> None:
 
 def test_a_zarr_group_without_a_table(tmp_path: Path) -> None:
     zarr.open_group(tmp_path / "s.zarr", mode="w")
-    assert "found no `obs`" in refusal(str(tmp_path / "s.zarr"))
+    assert "found no group `obs`" in refusal(str(tmp_path / "s.zarr"))
+
+
+def test_a_file_of_an_older_anndata(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5ad", "w") as file:
+        obs = file.create_group("obs")
+        obs.attrs["column-order"] = ["id"]
+        obs["id"] = [1]
+        obs.create_group("__categories")
+    assert "as AnnData before 0.8 wrote them" in refusal(str(tmp_path / "a.h5ad"))
+
+
+def test_only_the_genes_that_are_asked_for(tmp_path: Path) -> None:
+    path = str(anndata(tmp_path / "a" / "b.h5ad", "h5ad", "csr"))
+    (only,) = read_table(path, "", ("CD3",), "cells").columns
+    np.testing.assert_array_equal(only.numbers, [0, 2.5, 4])
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "told"),
+    [
+        ("X/indices", lambda a: a.__setitem__(0, 7), "X/indices: found 7, beyond the matrix"),
+        ("X/indptr", lambda a: a.__setitem__(1, 9), "X/indptr: found no rising numbers"),
+        ("obs/type/codes", lambda a: a.__setitem__(0, 5), "found codes -1 to 5, expected -1 to 1"),
+        ("obs/id", lambda a: a.__setitem__(0, 2), "id: found 2 more than once"),
+    ],
+)
+def test_an_h5ad_that_contradicts_itself(tmp_path: Path, name: str, change: Any, told: str) -> None:
+    path = anndata(tmp_path / "a" / "b.h5ad", "h5ad", "csr")
+    with h5py.File(path, "a") as file:
+        change(file[name])
+    assert told in refusal(str(path))
+
+
+def parquet(tmp_path: Path, **columns: Any) -> str:
+    path = tmp_path / "p q's.parquet"
+    pq.write_table(pa.table(columns), path)
+    return str(path)
+
+
+def test_a_table_of_parquet(tmp_path: Path) -> None:
+    place = parquet(
+        tmp_path,
+        label=pa.array([2**63 - 1, 2**64 - 1, 5], pa.uint64()),
+        CD8=pa.array([1.5, None, -2e3]),
+        many=pa.array([1, None, 2**63 - 1], pa.int64()),
+        half=pa.array(np.array([1, 2, 3], np.float16)),
+        ok=pa.array([True, None, False]),
+        kind=pa.array(["T\ncell", "NA", "B"]),
+        coded=pa.array(["x", None, "x"]).dictionary_encode(),
+        day=pa.array([0, 0, 86400], pa.timestamp("s")),
+        none=pa.nulls(3),
+        shape=pa.array([b"1", b"2", b"3"]),
+        parts=pa.array([[1], [2], [3]]),
+        __index_level_0__=pa.array([0, 1, 2]),
+    )
+    table = read_table(place, "", (), "cells")
+    assert (table.key, table.labels.tolist()) == ("label", [2**63 - 1, 2**64 - 1, 5])
+    by_name = {column.name: column for column in table.columns}
+    assert list(by_name) == ["CD8", "many", "half", "ok", "kind", "coded", "day", "none"]
+    np.testing.assert_array_equal(by_name["CD8"].numbers, [1.5, np.nan, -2000])
+    np.testing.assert_array_equal(by_name["many"].numbers, [1, np.nan, 2.0**63])
+    np.testing.assert_array_equal(by_name["half"].numbers, [1, 2, 3])
+    np.testing.assert_array_equal(by_name["ok"].numbers, [1, np.nan, 0])
+    assert by_name["kind"].texts == ("T cell", "", "B")
+    assert by_name["coded"].texts == ("x", "", "x")
+    assert by_name["day"].texts == (
+        "1970-01-01 00:00:00.000",
+        "1970-01-01 00:00:00.000",
+        "1970-01-02 00:00:00.000",
+    )
+    assert np.isnan(by_name["none"].numbers).all()
+    assert "column 'parts': found list<" in refusal(place, "", ("parts",))
+    assert "row 2: found None" in refusal(parquet(tmp_path, id=pa.array([1, None])))
+    empty = read_table(
+        parquet(tmp_path, id=pa.array([], pa.int64()), a=pa.array([], pa.string())), "", (), "c"
+    )
+    assert (len(empty.labels), empty.columns[0].texts) == (0, ())
+
+
+def test_parquet_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = parquet(tmp_path, id=pa.array([1]))
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    assert refusal(place).endswith('expected: pip install "stereocell[tables]"')
+
+
+def test_a_text_that_stands_in_a_million_rows_is_kept_once(tmp_path: Path) -> None:
+    """Decoded to a text a row it would be 2 GB."""
+    rows = 20_000
+    word = pa.array(["x" * 100_000]).dictionary_encode()
+    column = pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), word.dictionary)
+    place = parquet(tmp_path, id=pa.array(np.arange(1, rows + 1)), a=column)
+    (found,) = read_table(place, "", (), "cells").columns
+    assert found.texts == ("x" * 200,) * rows
+
+
+def test_a_column_of_parquet_beyond_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parquet_tables, "_MOST_BYTES", 50_000)
+    place = parquet(tmp_path, id=pa.array([1, 2]), a=pa.array(["x" * 60_000, "y"]), b=[1.5, 2])
+    assert "column 'a': found 60" in refusal(place)
+    (b,) = read_table(place, "", ("b",), "cells").columns
+    np.testing.assert_array_equal(b.numbers, [1.5, 2])

@@ -4,7 +4,8 @@ Blender's own importer has no way to choose variants, drops the materials of vol
 a surface's colour to the material's interface and doesn't read lists of numbers. So this add-on
 chooses before the import, in a layer over the stage (choice.py), lets Blender import it, and builds
 what is missing from the stage's attributes (looks.py, cameras.py). overlay.py writes what the
-artist changed as a layer over the stage, which `stereocell bundle OUT --stage LAYER` takes.
+artist changed as a layer over the stage, which `stereocell bundle OUT --stage LAYER` takes. A label
+map's objects have a panel beside the 3D view (objects.py).
 
 Blender 4.5 or newer. 1 unit is 1 um, or the specimen has its true size.
 """
@@ -15,6 +16,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from .choice import AS_STAGED, Choice
 from .importing import import_stage
+from .objects import CLASSES
 from .overlay import export_edits
 from .problem import StageProblem
 
@@ -105,6 +107,8 @@ def _export_entry(menu, _context):
 def register():
     bpy.utils.register_class(ImportStereoCellStage)
     bpy.utils.register_class(ExportStereoCellEdits)
+    for one in CLASSES:
+        bpy.utils.register_class(one)
     bpy.types.TOPBAR_MT_file_import.append(_import_entry)
     bpy.types.TOPBAR_MT_file_export.append(_export_entry)
 
@@ -112,5 +116,7 @@ def register():
 def unregister():
     bpy.types.TOPBAR_MT_file_export.remove(_export_entry)
     bpy.types.TOPBAR_MT_file_import.remove(_import_entry)
+    for one in reversed(CLASSES):
+        bpy.utils.unregister_class(one)
     bpy.utils.unregister_class(ExportStereoCellEdits)
     bpy.utils.unregister_class(ImportStereoCellStage)

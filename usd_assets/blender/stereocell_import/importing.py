@@ -14,6 +14,7 @@ import bpy
 from .cameras import pair_cameras
 from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
 from .looks import color_surface, make_color_group, make_volume_material, set_surface_color
+from .objects import keep_labels, read_columns
 from .problem import StageProblem
 from .snapshot import take_materials, take_snapshot
 
@@ -101,12 +102,13 @@ def _finish(context, stage, prim_map, scale):
     root.scale *= scale  # Blender's importer takes no scale below 1e-4
     channels = {}
     for prim in stage.GetPrimAtPath(CHANNELS).GetChildren():
-        look = _read_look(prim)
+        look = _read_look(prim) | {"objects": read_columns(prim)}
         channels[prim.GetName()] = look
         group = make_color_group(prim.GetName(), look["color"])
         root[COLOR + prim.GetName()] = group
         _color_surfaces(stage, prim.GetName(), look, group, materials)
         _shade_volumes(stage, root, prim.GetName(), look, group, objects)
+    keep_labels(stage, {name for name, one in channels.items() if one["objects"]}, objects)
     context.view_layer.update()
     pair_cameras(context.scene, stage, objects, scale)
     leaves = [p for p, o in objects.items() if o.type in ("MESH", "VOLUME")]

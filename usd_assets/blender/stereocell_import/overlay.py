@@ -1,7 +1,8 @@
 """Write what an artist changed as a layer over the stage: `stereocell bundle OUT --stage LAYER`.
 
 Colours (in a channel's colour group), opacities (in a volume material's ramp), objects hidden or
-deleted, tiles, meshes and volumes moved, points of meshes moved, and variants chosen at the import.
+deleted, tiles, meshes and volumes moved, points of meshes moved, variants chosen at the import, and
+what objects.py keeps of label maps.
 Whatever else was done to the specimen is lost, and named. Where the whole of it stands in the scene
 is the scene's own affair.
 """
@@ -18,6 +19,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage
 from .importing import COLOR, PRIM, STATE, VOLUME, matrix_of
 from .looks import color_of, points_of
+from .objects import CHANNEL, LABELS, as_staged, kept
 from .problem import StageProblem
 from .shapes import cut_fans, group_seams, turn_with
 from .snapshot import digest_nodes, find_losses, points_of_mesh, take_snapshot
@@ -61,9 +63,11 @@ def export_edits(context, path):
         *_write_hidden(layer, state, objects),
         *_write_moved(layer, state, root, objects, lost),
         *_write_points(layer, stage, state, objects, lost),
+        *_write_objects(layer, stage, root, objects),
     ]
     _write_hints(layer, stage, state, root, objects)
-    lost += _find_losses(context, state, objects)
+    with as_staged(context, root):
+        lost += _find_losses(context, state, objects)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         if not layer.Export(str(temporary)):
@@ -244,6 +248,51 @@ def _write_points(layer, stage, state, objects, lost):
         at = f" at {lod}" if lod else ""
         finer = "; finer levels keep their shape (import lod0 to edit them)"
         yield f"{before['name']}: points{at}" + (finer if lod not in ("", "lod0") else "")
+
+
+def _write_objects(layer, stage, root, objects):
+    """Yield what was done to the objects of label maps."""
+    kind = Sdf.ValueTypeNames
+    for channel, meant in kept(root).items():
+        path = f"{CHANNELS}/{channel}"
+        prim = stage.GetPrimAtPath(path)
+        default = meant.get("default")
+        if default is not None and default != prim.GetAttribute("stereocell:defaultColumn").Get():
+            _set(layer, path, "stereocell:defaultColumn", kind.Token, default)
+            yield f"{channel}: coloured by {default or 'the objects alone'}"
+        if hidden := meant.get("hidden"):
+            labels = Vt.UInt64Array([int(label) for label in hidden])
+            _set(layer, path, "stereocell:hiddenObjects", kind.UInt64Array, labels)
+            yield f"{channel}: {len(hidden)} objects hidden"
+        for column, names in meant.get("classes", {}).items():
+            name = f"stereocell:column:{column}"
+            _set(layer, path, name, kind.String, prim.GetAttribute(name).Get())
+            spec = layer.GetAttributeAtPath(f"{path}.{name}")
+            spec.customData = {"categories": Vt.StringArray(names)}
+            yield f"{channel}: names of {column}"
+        yield from _write_colors(layer, stage, channel, meant.get("colors", {}), objects)
+
+
+def _write_colors(layer, stage, channel, colors, objects):
+    """Yield the meshes whose objects have colours of their own: of all levels of detail."""
+    for path, block in objects.items():
+        if block.get(CHANNEL) != channel:
+            continue
+        labels = json.loads(block[LABELS])
+        own = {place: colors[label] for place, label in enumerate(labels) if label in colors}
+        if not own:
+            continue
+        tile = path.removeprefix(f"{TILES}/").partition("/")[0]
+        stage.GetPrimAtPath(f"{TILES}/{tile}").Load()
+        name = "primvars:displayColor"
+        values = np.array(stage.GetPrimAtPath(path).GetAttribute(name).Get(), np.float32)
+        if len(values) != len(labels):
+            continue  # others than the objects' by now
+        for place, color in own.items():
+            values[place] = color
+        array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values))
+        _set(layer, path, name, Sdf.ValueTypeNames.Color3fArray, array)
+        yield f"{block.name}: colours of {len(own)} objects"
 
 
 def _write_hints(layer, stage, state, root, objects):

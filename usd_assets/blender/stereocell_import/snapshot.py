@@ -9,6 +9,8 @@ import json
 import bpy
 import numpy as np
 
+from .objects import HIDDEN
+
 _LAYOUT = {
     *("name", "label", "width", "height", "hide", "select", "mute", "parent", "show_options"),
     *("show_preview", "show_texture", "use_custom_color", "warning_propagation"),
@@ -17,7 +19,7 @@ _LAYOUT = {
 
 def take_snapshot(block):
     """Return what is to be compared of an object: JSON."""
-    found = {"name": block.name, "modifiers": [one.name for one in block.modifiers]}
+    found = {"name": block.name, "modifiers": _modifiers(block)}
     if block.type == "MESH":
         mesh = block.data
         found |= {
@@ -32,6 +34,10 @@ def take_snapshot(block):
     if block.type in ("MESH", "VOLUME"):
         found["materials"] = [slot.material and slot.material.name for slot in block.material_slots]
     return found
+
+
+def _modifiers(block):
+    return [one.name for one in block.modifiers if one.name != HIDDEN]  # which a layer carries
 
 
 def take_materials(blocks):

@@ -97,7 +97,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
     (state) => {
       controller?.refresh();
       notices.update(state);
-      hint.update(state.mode);
+      hint.update(state);
     },
     () => {
       progress.update(viewer.snapshot().overview);
@@ -114,7 +114,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
   controller.followAddress(location.search, location.hash);
-  hint.update(viewer.state.mode);
+  hint.update(viewer.state);
   whenTouched(() => {
     viewer.stopTurning();
     hint.leave();

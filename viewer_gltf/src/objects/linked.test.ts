@@ -20,6 +20,7 @@ describe("objects in a link", () => {
       only: [1, 2, 3],
       selected: [2],
       picked: 3,
+      isStained: false,
       gap_um: 0.5,
       scatter: ["size", "size"],
     };
@@ -52,7 +53,7 @@ describe("objects in a link", () => {
         selected: { length: 3 },
         ranges: null,
       }),
-      JSON.stringify({ gap_um: -1, span: [0, 999], scatter: 1, without: [1] }),
+      JSON.stringify({ gap_um: -1, isStained: 1, span: [0, 999], scatter: 1, without: [1] }),
     ];
     for (const text of texts) {
       const view = read(text);

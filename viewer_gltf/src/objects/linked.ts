@@ -29,6 +29,7 @@ export function readLinked(text: string, table: Known): Partial<ObjectView> {
       ? [value[0], value[1]]
       : null;
   const { colorBy, palette, span, isLog, ranges, without, only, picked, gap_um, scatter } = given;
+  if (typeof given.isStained === "boolean") change.isStained = given.isStained;
   if (colorBy === "" || isColumn(colorBy)) change.colorBy = colorBy as string;
   change.palette = PALETTES.find((each) => each === palette) ?? START_OBJECTS.palette;
   change.span = spanOf(span) ?? START_OBJECTS.span;

@@ -6,6 +6,7 @@
 import {
   BufferAttribute,
   type BufferGeometry,
+  Color,
   DataTexture,
   Float32BufferAttribute,
   type Mesh,
@@ -15,8 +16,10 @@ import {
   SRGBColorSpace,
 } from "three";
 import { includeChunks } from "../gpu/glsl_include";
+import type { Rgb } from "../math/color";
 import type { SurfacePart } from "../surfaces/blend_material";
 import objectLight from "./chunks/object_light.glsl?raw";
+import objectStain from "./chunks/object_stain.glsl?raw";
 import objectTexel from "./chunks/object_texel.glsl?raw";
 
 /** Of a vertex: the row of its object, in place of the glb's number in the tile. */
@@ -24,28 +27,40 @@ export const ROW = "object_row";
 /** Of a vertex: out of its object, the same for all vertices in one place. */
 const OUTWARDS = "object_outwards";
 const FEATURE = "_feature_id_0";
+/** Of a vertex, as three's loader calls it: intensity of the stain that is painted on it. Absent: 0. */
+const PAINT = "_paint";
 /** Rows in a line of a texture. */
 const LINE = 256;
 /** What three's loader makes metres of is um. */
 const UM_PER_METRE = 1e6;
 
-const CHUNKS = { "chunks/object_texel": objectTexel, "chunks/object_light": objectLight };
+const CHUNKS = {
+  "chunks/object_texel": objectTexel,
+  "chunks/object_light": objectLight,
+  "chunks/object_stain": objectStain,
+};
 const include = (source: string) => includeChunks(source, CHUNKS);
 
 const VERTEX = `attribute float ${ROW};
 attribute vec3 ${OUTWARDS};
+attribute float ${PAINT};
 flat varying float vObject;
+varying float vStain;
 uniform sampler2D uFlags;
 uniform float uInset;
 #include <chunks/object_texel>
 `;
 const FRAGMENT = `flat varying float vObject;
+varying float vStain;
+uniform float uStained;
+uniform vec3 uStain;
 uniform sampler2D uFlags;
 uniform sampler2D uColumn;
 uniform sampler2D uColors;
 uniform bool uIsColored;
 #include <chunks/object_texel>
 #include <chunks/object_light>
+#include <chunks/object_stain>
 `;
 
 /**
@@ -112,13 +127,15 @@ export class ObjectMaterial {
       uColors: { value: this.colors },
       uIsColored: { value: false },
       uInset: { value: 0 },
+      uStained: { value: 0 },
+      uStain: { value: new Color(1, 1, 1) },
     };
     this.part = {
       key: "objects",
       uniforms: this.uniforms,
       vertex: {
         declared: include(VERTEX),
-        place: `vObject = ${ROW};\n\ttransformed -= uInset * ${OUTWARDS};`,
+        place: `vObject = ${ROW};\n\tvStain = ${PAINT};\n\ttransformed -= uInset * ${OUTWARDS};`,
         // a triangle whose corners all lie there is none
         end: `if (objectTexel(uFlags, ${ROW}) == 0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);`,
       },
@@ -127,6 +144,7 @@ export class ObjectMaterial {
         color: `if (uIsColored) {
 		diffuseColor.rgb = texelFetch(uColors, ivec2(objectTexel(uColumn, vObject), 0), 0).rgb;
 	}
+	diffuseColor.rgb = objectStain(diffuseColor.rgb, uStain, uStained * vStain);
 	diffuseColor.rgb = objectLight(diffuseColor.rgb, objectTexel(uFlags, vObject));`,
       },
     };
@@ -152,6 +170,12 @@ export class ObjectMaterial {
     const inset_um = Math.max(gap_um / 2, this.least_um);
     const { uInset } = this.uniforms;
     uInset.value = this.metresPerStep > 0 ? inset_um / (this.metresPerStep * UM_PER_METRE) : 0;
+  }
+
+  /** @param color linear, of the stain that is painted on them; null: none is */
+  setStain(color: Rgb | null): void {
+    this.uniforms.uStained.value = color === null ? 0 : 1;
+    if (color !== null) this.uniforms.uStain.value.setRGB(...color);
   }
 
   setFlags(flags: Uint8Array): void {

@@ -3,9 +3,10 @@ import { Matrix4, Mesh, type Object3D } from "three";
 import type { FileRef, Manifest } from "../bundle/generated/bundle";
 import { type Box, centerOf } from "../math/box";
 import type { Clip } from "../math/clip";
+import type { Rgb } from "../math/color";
 import type { Ray, Vec3 } from "../math/vec3";
 import { type ObjectChange, type ObjectView, START_OBJECTS } from "../state/objects";
-import type { ViewerState } from "../state/viewer_state";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
 import type { SurfaceSet } from "../surfaces/surface_set";
 import { objectsCsv } from "./csv";
 import { filtered, flag, GONE } from "./flags";
@@ -39,6 +40,8 @@ export class Objects {
   left = 0;
   private readonly material: ObjectMaterial;
   private view: ObjectView = START_OBJECTS;
+  /** Whose intensity is painted on the objects. */
+  private painter: Pick<ChannelState, "name" | "color"> | null = null;
   private clip: Clip = { box: null, plane: null };
   private isShown = false;
   private aimed: ObjectView["aim"] = null;
@@ -88,6 +91,15 @@ export class Objects {
     return `${this.drawn.flags} ${this.left}`;
   }
 
+  /** The name of what is painted on the objects; "": nothing is. */
+  get stainName(): string {
+    return this.painter?.name ?? this.table.painter;
+  }
+
+  private get stain(): Rgb {
+    return this.painter?.color ?? [1, 1, 1];
+  }
+
   /** Half of a usual object's width. */
   get widestGap_um(): number {
     const { boxes, count } = this.table;
@@ -110,6 +122,7 @@ export class Objects {
     this.clip = state.clip;
     this.isShown = state.channels.some(({ id, shown }) => id === channel && shown);
     this.view = state.objects[channel] ?? START_OBJECTS;
+    this.painter = state.channels.find(({ id }) => id === this.table.painter) ?? null;
     if (this.view.linked !== "") {
       dispatch(
         { type: "objects", channel, change: readLinked(this.view.linked, this.table) },
@@ -181,6 +194,7 @@ export class Objects {
       material.setFlags(this.flags);
       this.drawn = { ...this.drawn, flags: next.flags };
     }
+    material.setStain(this.table.painter !== "" && view.isStained ? this.stain : null);
     material.setGap(view.gap_um);
     this.isFirst = false;
     this.isWaiting = column !== null && bytes === null;

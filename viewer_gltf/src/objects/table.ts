@@ -88,6 +88,11 @@ export class ObjectTable {
     return this.content.names;
   }
 
+  /** ID of the channel that is painted on the objects; "": none is. */
+  get painter(): string {
+    return this.content.paint ?? "";
+  }
+
   get hasNeighbours(): boolean {
     return this.next !== null;
   }

@@ -336,4 +336,16 @@ describe("the keys", () => {
     expect(after("n")).toBe("Cut by a box and a plane");
     expect(after(".")).toBe("Box: x from 1.00 µm");
   });
+
+  it("of volumes say why they do nothing where there are only objects", () => {
+    const channels = MARCHED.state.channels.map((one) => ({ ...one, hasObjects: true }));
+    const objects = { ...MARCHED, state: { ...MARCHED.state, channels } };
+    for (const name of ["m", "D", "%"]) {
+      expect(wishOf(name, objects)).toEqual({
+        refusal: "There is no volume here, only objects.",
+      });
+      expect(wishOf(name, MARCHED)).not.toHaveProperty("refusal");
+    }
+    expect(wishOf("b", objects)).not.toHaveProperty("refusal");
+  });
 });

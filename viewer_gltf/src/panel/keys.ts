@@ -1,6 +1,8 @@
 /** Every key: the sections' lists, in the order of the list that `?` opens. Pure. */
+
+import { hasVolumes } from "../state/viewer_state";
 import type { Wish } from "./controls";
-import type { Key, KeyContext, KeyGroup, Refusal } from "./key";
+import { type Key, type KeyContext, type KeyGroup, no, type Refusal } from "./key";
 import { CHANNEL_KEYS } from "./sections/channel_keys";
 import { LIGHT_KEYS } from "./sections/path_trace_keys";
 import { SAVE_KEYS } from "./sections/save";
@@ -29,7 +31,13 @@ const BY_KEY: ReadonlyMap<string, Key> = new Map(
   ),
 );
 
+const OF_VOLUMES: ReadonlySet<Key> = new Set([...VOLUME_KEYS, ...SLICE_KEYS, ...LIGHT_KEYS]);
+const NO_VOLUMES = no("There is no volume here, only objects.");
+
 /** What a key asks for, or why it does nothing now; null: there is no such key. */
 export function wishOf(name: string, context: KeyContext): Wish | Refusal | null {
-  return BY_KEY.get(name)?.to(context, name) ?? null;
+  const found = BY_KEY.get(name);
+  if (found === undefined) return null;
+  const isVain = OF_VOLUMES.has(found) && !hasVolumes(context.state);
+  return isVain ? NO_VOLUMES : found.to(context, name);
 }

@@ -66,7 +66,22 @@ const laid = (state: ViewerState, view: PanelView = START_VIEW, facts = FACTS) =
 const channelsOf = (layout: Layout) =>
   layout.sections[0].items.filter((item): item is Group => item.kind === "group");
 
+/** Of label maps alone, whose channels have no volume. */
+const ofObjects = (state: ViewerState): ViewerState => ({
+  ...state,
+  channels: state.channels.map((channel) => ({ ...channel, hasObjects: true })),
+});
+
 describe("the panel's layout", () => {
+  it("has no sections of volumes where there are only objects", () => {
+    const names = (state: ViewerState) => laid(state).sections.map(({ id }) => id);
+    const [all, left] = [names(start()), names(ofObjects(start()))];
+    expect(all.filter((id) => !left.includes(id))).toEqual(["volumes", "light", "slices"]);
+    const [first, ...others] = start().channels;
+    const mixed = { ...start(), channels: [...ofObjects(start()).channels, first, ...others] };
+    expect(names(mixed)).toEqual(all);
+  });
+
   it("gives every control an id of its own, and a name", () => {
     const controls = controlsOf(laid(start(70)));
     const ids = controls.map(({ id }) => id);

@@ -8,7 +8,7 @@ import { VOLUMES } from "../state/parameters/volumes";
 import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import type { QualitySettings } from "../state/quality_controller";
 import type { StereoSupport } from "../state/stereo";
-import type { ViewerState } from "../state/viewer_state";
+import { hasVolumes, type ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import { command, controlsOf } from "./control_templates";
 import type { Control, Layout, PanelView, Section } from "./controls";
@@ -85,6 +85,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
     opener: { panel: "unfold", section: id },
     items,
   });
+  const ofVolumes = (...sections: readonly Section[]) => (hasVolumes(state) ? sections : []);
   return {
     title: facts.title,
     subtitle: facts.subtitle,
@@ -95,8 +96,10 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         : []),
       section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
       ...(facts.objectItems?.length ? [section("objects", "Objects", facts.objectItems)] : []),
-      section("volumes", "Volumes", [...controlsOf(VOLUMES, state), discNow(state, facts)]),
-      section("light", "Light", lightItems(state, view, facts.isStereo)),
+      ...ofVolumes(
+        section("volumes", "Volumes", [...controlsOf(VOLUMES, state), discNow(state, facts)]),
+        section("light", "Light", lightItems(state, view, facts.isStereo)),
+      ),
       section("tiles", "Tiles", tileItems(state, facts.focusTile)),
       section("view", "View", [
         command("front", "Front"),
@@ -110,7 +113,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
       section("stereo", "Stereo", stereoItems(state, facts, view)),
       section("measure", "Measure", measureItems(state, facts.values)),
       section("cut", "Cut open", cutItems(state, facts.shown)),
-      section("slices", "Slices", sliceItems(state, facts.sliceValues)),
+      ...ofVolumes(section("slices", "Slices", sliceItems(state, facts.sliceValues))),
       section("quality", "Quality", qualityItems(state, facts)),
       section("save", "Pictures and video", saveItems(state, facts.isFilming)),
       section("share", "Share", [

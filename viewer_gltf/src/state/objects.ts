@@ -27,6 +27,8 @@ export type ObjectView = Readonly<{
   picked: number | null;
   /** To be flown to; anew with each new object. */
   aim: Readonly<{ row: number }> | null;
+  /** Whether what is painted on them shows, where there is something. */
+  isStained: boolean;
   /** Space that each leaves along its walls, um. */
   gap_um: number;
   search: string;
@@ -52,6 +54,7 @@ export const START_OBJECTS: ObjectView = {
   selected: [],
   picked: null,
   aim: null,
+  isStained: true,
   gap_um: 0,
   search: "",
   scatter: ["", ""],

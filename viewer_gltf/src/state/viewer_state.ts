@@ -77,3 +77,11 @@ export type ViewerState = VolumeSettings &
 export function volumeChannels(state: ViewerState): readonly ChannelState[] {
   return state.channels.filter((c) => c.shown && c.volume);
 }
+
+/** Whether there is a volume at all: label maps have none. */
+export const hasVolumes = ({ channels }: Pick<ViewerState, "channels">): boolean =>
+  channels.some(({ hasObjects }) => !hasObjects);
+
+/** Whether a channel is shown that has one. */
+export const showsVolumes = ({ channels }: Pick<ViewerState, "channels">): boolean =>
+  channels.some(({ shown, hasObjects }) => shown && !hasObjects);

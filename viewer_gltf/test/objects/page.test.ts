@@ -69,6 +69,15 @@ describeInChromium("the objects of a label map", () => {
     expect(hasColor(COLORS[BEAM % 3])(at(picture, [63, -42.5, 16]))).toBe(true);
     expect(await shown()).toContain(`${COUNT} of ${COUNT} objects`);
     expect((await stand.viewer.snapshot()).drawCalls).toBeLessThan(20);
+    // and no word of volumes, which there are none of
+    const { page } = stand.viewer;
+    const hint = page.locator('[data-overlay="hint"]');
+    expect(await hint.textContent()).toBe("drag to turn, wheel to zoom");
+    const sections = await page
+      .locator("[data-section]")
+      .evaluateAll((found) => found.map((each) => (each as HTMLElement).dataset.section));
+    expect(sections).toContain("objects");
+    for (const id of ["volumes", "light", "slices"]) expect(sections).not.toContain(id);
   });
 
   it("are coloured anew by one upload of a byte an object", async () => {
@@ -275,5 +284,45 @@ describeInChromium("the objects of a label map", () => {
     await stand.viewer.settled();
     await expect.poll(async () => (await view()).selected).toEqual(selected);
     expect(await view()).toEqual({ ...linked, lasso: [], aim: null });
+  });
+});
+
+describeInChromium("a stain that is painted on objects", () => {
+  if (!hasPython) {
+    it.skip("needs Python");
+    return;
+  }
+  const stand = prepareStand({
+    bundle: prepareObjects("--painted"),
+    viewport: { width: 900, height: 500 },
+  });
+
+  it("lies over their colour, and can be taken off; a column's colour stays beside it", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const row = rowAt(1, 2, 1, 1);
+    const [x, y, z] = centerOf(row);
+    const spots = async () => {
+      const picture = await takePicture(stand.viewer.page);
+      return [2, -2].map((up) => {
+        const at = project(
+          [x, y + up, z],
+          stand.manifest.specimen.bounds_um,
+          picture.width,
+          picture.height,
+        );
+        return picture.at(at.x, at.y);
+      });
+    };
+    const own = hasColor(COLORS[row % 3]);
+    const [above, below] = await spots();
+    expect(own(below)).toBe(true);
+    expect(own(above)).toBe(false);
+    expect(Math.max(...above) - Math.min(...above)).toBeLessThan(12); // nobody has DNA's colour: white
+    await stand.viewer.page.locator(`[data-control="${CHANNEL}/objects-stain"]`).click();
+    await stand.viewer.settled();
+    const bare = await spots();
+    expect(bare.map(own)).toEqual([true, true]);
+    expect((await stand.viewer.snapshot()).state.objects[CHANNEL].isStained).toBe(false);
   });
 });

@@ -16,7 +16,11 @@ describeInChromium("the chunks of objects", () => {
   const bare = prepareBarePage();
 
   it("are all tested here", async () => {
-    expect((await readdir(FOLDER)).sort()).toEqual(["object_light.glsl", "object_texel.glsl"]);
+    expect((await readdir(FOLDER)).sort()).toEqual([
+      "object_light.glsl",
+      "object_stain.glsl",
+      "object_texel.glsl",
+    ]);
   });
 
   it("read the byte of a row, over the ends of lines", async () => {
@@ -34,6 +38,24 @@ describeInChromium("the chunks of objects", () => {
         uniforms,
       );
       expect(found, `row ${row}`).toBe((row * 7) % 256);
+    }
+  });
+
+  it("lay a stain over a colour by its intensity, no less than none and no more than all", async () => {
+    for (const [intensity, share] of [
+      [0, 0],
+      [0.25, 0.25],
+      [1, 1],
+      [-1, 0],
+      [2, 1],
+    ]) {
+      const body = `oColor = vec4(objectStain(vec3(0.2, 0.4, 0.6), vec3(1.0, 0.0, 0.5), ${intensity.toFixed(2)}), 1.0);`;
+      const head = "#include <chunks/object_stain>\n";
+      const found = await runProgram(bare.page, await chunk("object_stain"), head, body);
+      for (const [i, end] of [1, 0, 0.5].entries()) {
+        const start = [0.2, 0.4, 0.6][i];
+        expect(found[i]).toBeCloseTo(start + share * (end - start), 6);
+      }
     }
   });
 

@@ -40,10 +40,10 @@ export const rowAt = (tile: number, x: number, y: number, z: number) =>
   PER_TILE * tile + x + GRID[0] * (y + GRID[1] * z);
 
 /** Its folder, written before the tests of a `describe`; to be used inside it, before the stand. */
-export function prepareObjects(): string {
+export function prepareObjects(...flags: readonly string[]): string {
   const folder = mkdtempSync(join(tmpdir(), "stereocell-objects-"));
   beforeAll(async () => {
-    await askPython("object_bundle", [folder], "");
+    await askPython("object_bundle", [folder, ...flags], "");
   });
   afterAll(() => rm(folder, { recursive: true, force: true }));
   return folder;

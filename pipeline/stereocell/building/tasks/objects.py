@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 from stereocell.building.label_maps import Labels
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.unit_files import save_unit
+from stereocell.model.lattice import Lattice
+from stereocell.model.mesh import Lod
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.model.unit import ObjectFacts, Unit
+from stereocell.model.volume import xyz_to_zyx
 from stereocell.objects.build_objects import BuiltObjects, build_objects
 from stereocell.objects.extents import Runs
-from stereocell.objects.intensities import Measured, measure_intensities
+from stereocell.objects.intensities import QUANTILES, Measured, measure_intensities
 from stereocell.objects.options import ObjectOptions
+from stereocell.textures.sample_channel import sample_channel
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,19 @@ class ImageRef:
 
 
 @dataclass(frozen=True, slots=True)
+class Painted:
+    """An image channel that is painted on objects.
+
+    window    voxel values that become 0 and 1
+    depth_um  below the surface, within which the largest counts
+    """
+
+    image: ImageRef
+    window: tuple[float, float]
+    depth_um: float
+
+
+@dataclass(frozen=True, slots=True)
 class ObjectsTask:
     """One tile of a label map.
 
@@ -48,6 +65,7 @@ class ObjectsTask:
              left out. Those of them that are cut are among `others_cut`
     edges    by axis (z, y, x): indices of voxels where tiles begin
     step_um  of the lattice
+    painted  on the objects; None: nothing
     """
 
     labels: Labels
@@ -60,6 +78,7 @@ class ObjectsTask:
     edges: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
     step_um: float
     images: tuple[ImageRef, ...]
+    painted: Painted | None
     options: ObjectOptions
     directory: Path
 
@@ -90,10 +109,16 @@ def run_objects(task: ObjectsTask) -> None:
     thin = names.labels[built.thin]
     owned = np.setdiff1d(owned, built.thin).astype(np.int32)
     with clock("intensities"):
-        measured = [_measure(task, image, compact, owned) for image in task.images]
+        measured = [
+            _measure(task, image, compact, owned, owned[is_piece[owned]]) for image in task.images
+        ]
     facts = _facts(built, owned, names, measured, compact, thin)
     reason = "" if built.lods else "no object"
-    unit = Unit(built.lods, None, None, reason, 0, 0, clock.seconds, objects=facts)
+    lods = built.lods
+    if task.painted is not None:
+        with clock("paint"):
+            lods = _paint(lods, task.painted)
+    unit = Unit(lods, None, None, reason, 0, 0, clock.seconds, objects=facts)
     save_unit(task.directory, unit)
 
 
@@ -154,7 +179,11 @@ def _numbered(
 
 
 def _measure(
-    task: ObjectsTask, image: ImageRef, compact: NDArray[np.int32], owned: NDArray[np.int32]
+    task: ObjectsTask,
+    image: ImageRef,
+    compact: NDArray[np.int32],
+    owned: NDArray[np.int32],
+    pieces: NDArray[np.int32],
 ) -> Measured:
     """Return a channel's mean and percentile over objects, by the image's nearest voxels."""
     assert task.window is not None
@@ -172,7 +201,41 @@ def _measure(
     for axis, (part, start) in enumerate(zip(indices, (z0, y0, x0), strict=True)):
         if len(part) != voxels.shape[axis] or (np.diff(part) != 1).any():
             voxels = np.take(voxels, part - start, axis)
-    return measure_intensities(compact, voxels, owned)
+    return measure_intensities(compact, voxels, owned, pieces)
+
+
+def _paint(lods: Sequence[Lod], painted: Painted) -> tuple[Lod, ...]:
+    """Return levels with the intensity of a channel at their vertices."""
+    if not lods:
+        return ()
+    image = painted.image
+    spacing, origin = np.array(image.spacing_um), np.array(image.origin_um)
+    corners = [xyz_to_zyx(lod.mesh.positions.astype(np.float64)) for lod in lods]
+    low = np.min([at.min(axis=0) for at in corners], axis=0) - painted.depth_um
+    high = np.max([at.max(axis=0) for at in corners], axis=0) + painted.depth_um
+    first, last = np.array(image.region.start), np.array(image.region.stop) - 1
+    start = np.floor((low - origin) / spacing).astype(np.int64).clip(first, last)
+    stop = np.ceil((high - origin) / spacing).astype(np.int64).clip(first, last) + 1
+    (z0, y0, x0), (z1, y1, x1) = start.tolist(), stop.tolist()
+    box = Box((z0, y0, x0), (z1, y1, x1))
+    volume = open_source(image.ref).read(image.channel, box, image.level)
+    lattice = Lattice.of_whole(box, image.spacing_um, image.origin_um)
+    return tuple(
+        replace(
+            lod,
+            mesh=replace(
+                lod.mesh,
+                paint=sample_channel(
+                    volume,
+                    lattice,
+                    lod.mesh,
+                    intensity_window=painted.window,
+                    depth_um=painted.depth_um,
+                ),
+            ),
+        )
+        for lod in lods
+    )
 
 
 def _facts(
@@ -196,6 +259,9 @@ def _facts(
     )
     p95s = np.stack([one.p95 for one in measured], axis=1) if measured else means.copy()
     p95s[is_piece] = np.nan
+    shape = (int(is_piece.sum()), 0, QUANTILES)
+    quantiles = [one.quantiles for one in measured]
+    held = np.stack(quantiles, axis=1) if quantiles else np.zeros(shape, np.float32)
     return ObjectFacts(
         labels,
         voxels.astype(np.int64),
@@ -205,6 +271,8 @@ def _facts(
         np.bincount(which.ravel(), built.wall_um2[~own], len(found)).astype(np.float64),
         means,
         p95s,
+        np.flatnonzero(is_piece).astype(np.int32),
+        held,
         built.changed,
         built.largest_bias,
         thin,
@@ -223,6 +291,8 @@ def _none(task: ObjectsTask) -> ObjectFacts:
         nothing,
         by_channel,
         by_channel,
+        np.zeros(0, np.int32),
+        np.zeros((0, len(task.images), QUANTILES), np.float32),
         0,
         (),
         np.zeros(0, np.uint64),

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pydicom
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError, UsageError
@@ -26,8 +27,9 @@ from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.header import SEGMENTATION, NoPlaneError, is_dicom, read_frames
 from stereocell.read.dicom.label_stack import stack_labels
 from stereocell.read.dicom.pixels import decode, dtype_of
-from stereocell.read.dicom.segmentation import LABELMAP
+from stereocell.read.dicom.segmentation import LABELMAP, free_labels
 from stereocell.read.dicom.series import Stack, find_stacks
+from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
@@ -144,6 +146,28 @@ def _no_labels(stack: Stack, stacks: int, shown: str, problem: str) -> UsageErro
         f"{shown}: is a label map: found {_labels(stack, stacks)}, {problem}; {_INSTEAD}, or a "
         "mask by --series N --as intensity"
     )
+
+
+def read_free_labels(location: Location) -> dict[int, str]:
+    """Return the labels of a segmentation's segments by number: free text, which may tell who the
+    patient is. Empty: there are none, or it is no segmentation. Raises SourceError, UsageError.
+    """
+    found = _find(location)
+    first = found.stacks[0].first
+    if first.segmentation is None:
+        return {}
+    try:
+        with quiet():
+            path = found.paths[first.file]
+            header = pydicom.dcmread(
+                path, stop_before_pixels=True, force=True, specific_tags=["SegmentSequence"]
+            )
+            return free_labels(header)
+    except DICOM_FAULTS:
+        raise SourceError(
+            f"{location.shown}: segments' labels can't be read, expected a segmentation that is "
+            "whole"
+        ) from None
 
 
 def list_series(location: Location) -> tuple[str, ...]:

@@ -2,7 +2,8 @@
 
 A segment is called by its coded property type, in the words that pydicom's copy of the standard's
 tables has for that code. The file's own words, which are free text, are not looked at: label,
-description, tracking identifier, and the meaning that stands beside the code.
+description, tracking identifier, and the meaning that stands beside the code. Who asks for the
+labels by name gets those alone (`free_labels`).
 
 References: DICOM PS3.3 C.8.20.2 (Segmentation Image module); PS3.3 C.10.7.1.1 (CIELab values);
 PS3.16 (codes).
@@ -13,14 +14,15 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from pydicom.sr._snomed_dict import mapping as snomed
 from pydicom.sr.codedict import codes
+from pydicom.sr.coding import Code
 from pydicom.uid import SegmentationStorage
 
 from stereocell.model.color import linear_color_of_lab
 from stereocell.model.object_notes import ObjectNotes
 
 BINARY, FRACTIONAL, LABELMAP = "BINARY", "FRACTIONAL", "LABELMAP"
+_LONGEST = 64  # characters of a segment's label: as many as DICOM allows
 _CLASSES = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")  # and the label map
 
 
@@ -63,17 +65,36 @@ def segmentation_of(header: Any) -> Segmentation | None:
         if lab is not None and len(lab) == 3:
             lightness, a, b = (int(part) / 0xFFFF for part in lab)
             colors[number] = linear_color_of_lab((100 * lightness, 255 * a - 128, 255 * b - 128))
-    alike = Counter(names.values())
-    for number, name in names.items():  # ten nodules are ten objects
-        if alike[name] > 1:
-            names[number] = f"{name} (segment {number})"
     return Segmentation(
         str(header.get("SegmentationType") or BINARY).strip(),
         str(header.get("SegmentsOverlap") or "").strip(),
         max(1, len(names)),
         _between_mm(header),
-        ObjectNotes(names, colors),
+        ObjectNotes(_told_apart(names), colors),
     )
+
+
+def free_labels(header: Any) -> dict[int, str]:
+    """Return the segments' labels by number: somebody's words, which may tell who the patient is.
+
+    Raises DICOM_FAULTS.
+    """
+    found = {}
+    for item in header.get("SegmentSequence") or ():
+        number = int(item.get("SegmentNumber") or 0)
+        label = " ".join(str(item.get("SegmentLabel") or "").split())
+        if number > 0 and label:
+            found[number] = "".join(c for c in label if c.isprintable())[:_LONGEST]
+    return _told_apart(found)
+
+
+def _told_apart(names: dict[int, str]) -> dict[int, str]:
+    """Return names of which each is another: ten nodules are ten objects."""
+    alike = Counter(names.values())
+    return {
+        number: f"{name} (segment {number})" if alike[name] > 1 else name
+        for number, name in names.items()
+    }
 
 
 def _name(segment: Any) -> str:
@@ -89,9 +110,23 @@ def _name(segment: Any) -> str:
 def _meaning(coded: Any) -> str:
     """Return the standard's words for a code; empty: it is none of the standard's."""
     scheme, value = str(coded.get("CodingSchemeDesignator")), str(coded.get("CodeValue"))
-    if scheme == "SRT":  # SNOMED's codes of before 2020
-        scheme, value = "SCT", snomed["SRT"].get(value, "")
+    if scheme == "SRT":
+        return _of_before_2020(value)
     return _meanings().get((scheme, value), "")
+
+
+@cache
+def _of_before_2020(value: str) -> str:
+    """Return the words for one of SNOMED's former codes; pydicom says which code is the same."""
+    former = Code(value, "SRT", "")
+    same = (one for (_, one), code in _codes().items() if code == former)
+    return _meanings().get(("SCT", next(same, "")), "")
+
+
+@cache
+def _codes() -> dict[tuple[str, str], Code]:
+    """Return SNOMED's codes, each once."""
+    return {(code.scheme_designator, code.value): code for code in codes.SCT.concepts.values()}
 
 
 @cache

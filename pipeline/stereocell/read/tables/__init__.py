@@ -1,10 +1,15 @@
-"""Tables with a row an object: CSV, TSV, and AnnData's tables in Zarr, as SpatialData has them."""
+"""Tables with a row an object: CSV, TSV, Parquet, and AnnData's in Zarr and HDF5 (.h5ad)."""
+
+import os
 
 from stereocell.model.errors import SourceError
-from stereocell.read.tables.anndata_zarr import read_anndata
+from stereocell.read.file_kind import require_kind
 from stereocell.read.tables.delimited import read_delimited
+from stereocell.read.tables.parquet import read_parquet
+from stereocell.read.tables.stores import read_anndata_zarr, read_h5ad
 from stereocell.read.tables.table import KEYS, Table, TableColumn
-from stereocell.storage.location import Location
+from stereocell.storage.first_bytes import identify, pointer_words
+from stereocell.storage.location import Location, first_bytes
 
 __all__ = ["KEYS", "Table", "TableColumn", "read_table"]
 
@@ -21,11 +26,35 @@ def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Ta
     """
     location = Location.of(place)
     name = location.parts[-1].lower() if location.parts else ""
+    if name.endswith((".csv", ".tsv", ".txt", ".parquet", ".h5ad")) and location.is_local:
+        _require_sound(location, name)
     if name.endswith((".csv", ".tsv", ".txt")):
         return read_delimited(location, key, wanted)
+    if name.endswith((".parquet", ".h5ad")) and not location.is_local:
+        raise SourceError(f"{location.shown}: is not on this machine, expected a file that is")
+    if name.endswith(".parquet"):
+        return read_parquet(location, key, wanted)
+    if name.endswith(".h5ad"):
+        return read_h5ad(location, key, wanted, labels)
     if any(part.endswith(".zarr") for part in location.parts):
-        return read_anndata(location, key, wanted, labels)
+        return read_anndata_zarr(location, key, wanted, labels)
     raise SourceError(
-        f"{location.shown}: unknown kind of table, expected .csv, .tsv, or a table in a .zarr "
-        "(convert .h5ad and .parquet: `adata.write_zarr(...)`, `frame.to_csv(...)`)"
+        f"{location.shown}: unknown kind of table, expected .csv, .tsv, .parquet, .h5ad, or a "
+        "table in a .zarr"
     )
+
+
+def _require_sound(location: Location, name: str) -> None:
+    """Raise SourceError for a folder, for a pipe or a device, which may never end, and for a file
+    that is of another kind than its name says.
+    """
+    path = os.path.realpath(location.source)
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise SourceError(f"{location.shown}: is no regular file, expected a table")
+    head = first_bytes(path)
+    if words := pointer_words(head):
+        raise SourceError(f"{location.shown}: found {words}, expected a table")
+    if name.endswith(".parquet") and head and not head.startswith(b"PAR1"):
+        raise SourceError(f"{location.shown}: found {identify(head).words}, expected Parquet")
+    if name.endswith(".h5ad"):
+        require_kind(location, "hdf5", "HDF5")

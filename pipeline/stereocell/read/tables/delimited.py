@@ -3,24 +3,25 @@
 import csv
 import io
 import os
-from collections import Counter
 from collections.abc import Iterator
 
 from stereocell.model.errors import SourceError
 from stereocell.read.tables.table import (
+    MOST_NAMES,
+    MOST_ROWS,
     Table,
     as_column,
     choose_columns,
     choose_key,
     keys_of,
     named,
-    shown,
+    require_once,
 )
 from stereocell.storage.location import Location
 
 _MOST_BYTES = 4 << 30  # of a table
-_MOST_NAMES = 100_000  # columns of a header
 _LONGEST = 1 << 17  # characters of a cell: the csv module's own limit
+_LONGEST_LINE = 1 << 24  # characters
 
 
 def read_delimited(location: Location, key: str, wanted: tuple[str, ...]) -> Table:
@@ -46,16 +47,15 @@ def read_delimited(location: Location, key: str, wanted: tuple[str, ...]) -> Tab
 
 
 def _read(text: io.TextIOWrapper, where: str, key: str, wanted: tuple[str, ...]) -> Table:
-    first = text.readline(1 << 24)
+    first = text.readline(_LONGEST_LINE)
     if not first.strip():
         raise SourceError(f"{where}: found no header, expected names of columns in the first line")
     mark = max("\t,;", key=first.count)
-    names = named(next(csv.reader([first], delimiter=mark)))
-    if len(names) > _MOST_NAMES:
-        raise SourceError(f"{where}: found {len(names)} columns, expected at most {_MOST_NAMES}")
-    twice = sorted(name for name, times in Counter(names).items() if times > 1)
-    if twice:
-        raise SourceError(f"{where}: found columns twice ({shown(twice)}), expected each name once")
+    header = next(csv.reader([first], delimiter=mark))
+    if len(header) > MOST_NAMES:
+        raise SourceError(f"{where}: found {len(header)} columns, expected at most {MOST_NAMES}")
+    names = named(header)
+    require_once(where, names)
     chosen_key = choose_key(where, names, key)
     taken, left_out = choose_columns(where, names, chosen_key, wanted)
     places = [names.index(name) for name in (chosen_key, *taken)]
@@ -71,8 +71,21 @@ def _read(text: io.TextIOWrapper, where: str, key: str, wanted: tuple[str, ...])
     return Table(where, chosen_key, labels, columns, left_out)
 
 
+def _lines(text: io.TextIOWrapper, where: str) -> Iterator[str]:
+    """Yield the lines of a text, none of which is read where it has no end."""
+    while line := text.readline(_LONGEST_LINE):
+        if len(line) == _LONGEST_LINE:
+            raise SourceError(
+                f"{where}: found a line of {_LONGEST_LINE} characters or more, expected rows of "
+                f"cells of at most {_LONGEST} characters"
+            )
+        yield line
+
+
 def _rows(text: io.TextIOWrapper, mark: str, where: str, width: int) -> Iterator[list[str]]:
-    for number, row in enumerate(csv.reader(text, delimiter=mark), start=2):
+    for number, row in enumerate(csv.reader(_lines(text, where), delimiter=mark), start=2):
+        if number > MOST_ROWS:
+            raise SourceError(f"{where}: found more than {MOST_ROWS} rows, expected at most those")
         if not row:
             continue
         if len(row) != width:

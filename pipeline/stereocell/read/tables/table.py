@@ -1,5 +1,6 @@
 """A table as it was read: texts and numbers by row."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,8 @@ from stereocell.model.errors import SourceError
 # Columns of objects' numbers, as MCMICRO, scikit-image, Cellpose, Xenium, SpatialData call them
 KEYS = ("CellID", "label", "cell_id", "instance_id", "object_id", "ObjectNumber", "id")
 MOST_COLUMNS = 128  # that are taken without being named
+MOST_NAMES = 100_000  # columns of a file
+MOST_ROWS = 1 << 24
 _LONGEST = 200  # characters of a category
 _SHOWN = 8  # names that a message lists
 
@@ -98,6 +101,13 @@ def keys_of(
     return labels
 
 
+def require_once(where: str, names: Sequence[str]) -> None:
+    """Raise SourceError where two columns have one name."""
+    twice = sorted(name for name, times in Counter(names).items() if times > 1)
+    if twice:
+        raise SourceError(f"{where}: found columns twice ({shown(twice)}), expected each name once")
+
+
 def named(names: Sequence[str]) -> list[str]:
     """Return the names of a header as they are shown; a nameless column goes by its place."""
     return [clean(name) or f"column {place}" for place, name in enumerate(names, start=1)]
@@ -115,7 +125,7 @@ def as_column(name: str, texts: Sequence[str], point: str = ".") -> TableColumn:
         try:
             numbers[row] = float(text.replace(point, "."))
         except ValueError:
-            return TableColumn(name, None, tuple(map(_word, texts)))
+            return TableColumn(name, None, tuple(map(word_of, texts)))
     return TableColumn(name, numbers, None)
 
 
@@ -130,14 +140,14 @@ def shown(names: Sequence[str]) -> str:
     return ", ".join(cut) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
 
 
+def word_of(text: str) -> str:
+    """Return a category's name as it is shown; empty: missing."""
+    return "" if text.strip().lower() in _MISSING else clean(text[:_LONGEST])
+
+
 def clean(name: str) -> str:
     """Return a name as it may be shown: no control characters, one space for several."""
     return " ".join("".join(c if c.isprintable() else " " for c in name).split())
-
-
-def _word(text: str) -> str:
-    """Return a category's name as it is shown; empty: missing."""
-    return "" if text.strip().lower() in _MISSING else clean(text)[:_LONGEST]
 
 
 def _whole(value: float) -> int:

@@ -3,7 +3,7 @@
 import { element, setText } from "../../dom/element";
 import { groupNotices } from "../../state/notice_groups";
 import type { Mode } from "../../state/parameters/volumes";
-import type { ViewerState } from "../../state/viewer_state";
+import { showsVolumes, type ViewerState } from "../../state/viewer_state";
 import type { Progress } from "../../surfaces/overview_progress";
 
 /** Time for which an announcement stays, ms; a screen reader reads it at once. */
@@ -86,9 +86,10 @@ export class FirstHint {
 
   constructor(private readonly isTouch: boolean) {}
 
-  update(mode: Mode): void {
+  update(state: Pick<ViewerState, "mode" | "channels">): void {
     const zoom = this.isTouch ? "pinch" : "wheel";
-    setText(this.root, `drag to turn, ${zoom} to zoom${THEN[mode] ?? ""}`);
+    const then = showsVolumes(state) ? (THEN[state.mode] ?? "") : "";
+    setText(this.root, `drag to turn, ${zoom} to zoom${then}`);
   }
 
   /** From the first touch on nobody needs it. */

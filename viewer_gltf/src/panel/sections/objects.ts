@@ -82,6 +82,7 @@ class Layout {
         }),
       ),
       ...(by === null ? [] : this.columnItems(by, true)),
+      ...this.stain(),
       ...others.flatMap((id) => {
         const column = table.column(id);
         return column === null ? [] : this.columnItems(column, false);
@@ -275,6 +276,20 @@ class Layout {
       value: this.view.isLog ?? isUsual,
       to: (isLog) => this.change({ isLog }),
     };
+  }
+
+  private stain(): readonly Control[] {
+    const { stainName } = this.objects;
+    if (stainName === "") return [];
+    return [
+      {
+        kind: "toggle",
+        id: this.id("stain"),
+        label: `${stainName} painted over it`,
+        value: this.view.isStained,
+        to: (isStained) => this.change({ isStained }),
+      },
+    ];
   }
 
   private searchItems(): readonly Control[] {

@@ -1,0 +1,128 @@
+"""Tables in Parquet, by pyarrow (Apache-2.0; the extra `tables`): columns of numbers and texts.
+
+What a file states of its sizes is checked before it is read, and it is read a batch of rows at a
+time, the columns that are taken alone.
+"""
+
+from importlib import import_module
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read import extras
+from stereocell.read.tables.table import (
+    MOST_NAMES,
+    MOST_ROWS,
+    Table,
+    TableColumn,
+    choose_columns,
+    choose_key,
+    clean,
+    keys_of,
+    require_once,
+    word_of,
+)
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location
+
+_BATCH = 1 << 16  # rows
+_MOST_BYTES = 1 << 28  # of a column in a group of rows
+_INDEX = "__index_level_"  # how pandas calls an index without a name
+
+
+def read_parquet(location: Location, key: str, wanted: tuple[str, ...]) -> Table:
+    """Return a table of Parquet. Raises SourceError."""
+    where = location.shown
+    parquet = extras.load("pyarrow.parquet", "tables", where, "Parquet")
+    with one_line(where, "a Parquet file that is whole"), open(location.source, "rb") as source:
+        try:
+            return _read(parquet, source, where, key, wanted)
+        except (import_module("pyarrow").ArrowException, OSError) as error:
+            # names of Arrow's own classes follow
+            raise ValueError(str(error).partition(":")[0]) from error
+
+
+def _read(parquet: Any, source: BinaryIO, where: str, key: str, wanted: tuple[str, ...]) -> Table:
+    file = parquet.ParquetFile(source)
+    stated, schema = file.metadata, file.schema_arrow
+    rows = int(stated.num_rows)
+    if len(schema) > MOST_NAMES or not 0 <= rows <= MOST_ROWS:
+        raise SourceError(
+            f"{where}: found {rows} rows of {len(schema)} columns, expected at most {MOST_ROWS} "
+            f"of {MOST_NAMES}"
+        )
+    require_once(where, schema.names)
+    kinds = {field.name: _kind(field.type) for field in schema}
+    names = [name for name, kind in kinds.items() if kind and not name.startswith(_INDEX)]
+    chosen = choose_key(where, names, key)
+    for name in wanted:
+        if name in kinds and not kinds[name]:
+            raise SourceError(
+                f"{where}: column {clean(name)!r:.60}: found "
+                f"{clean(str(schema.field(name).type)):.60}, expected numbers or texts"
+            )
+    taken, left_out = choose_columns(where, names, chosen, wanted)
+    _require_small(stated, where, {chosen, *taken})
+    # a text that stands in many rows stays one
+    texts = [name for name in (chosen, *taken) if kinds[name] == _TEXT]
+    file = parquet.ParquetFile(source, metadata=stated, read_dictionary=texts)
+    keys: list[str] = []
+    parts: dict[str, list[Any]] = {name: [] for name in taken}
+    for batch in file.iter_batches(batch_size=_BATCH, columns=[chosen, *taken]):
+        keys += [str(value) for value in batch.column(chosen).to_pylist()]
+        for name, found in parts.items():
+            column = batch.column(name)
+            found.append(_numbers(column) if kinds[name] == _NUMBER else _words(column))
+    if len(keys) != rows:
+        raise SourceError(f"{where}: found {len(keys)} rows, expected {rows} as it states")
+    columns = tuple(_column(name, kinds[name], found) for name, found in parts.items())
+    return Table(where, chosen, keys_of(where, chosen, keys), columns, left_out)
+
+
+_NUMBER, _TEXT = "number", "text"
+
+
+def _kind(type_: Any) -> str:
+    """Return what a column of a type holds; empty: neither numbers nor texts."""
+    types = import_module("pyarrow.types")
+    held = type_.value_type if types.is_dictionary(type_) else type_
+    tests = (types.is_integer, types.is_floating, types.is_boolean, types.is_decimal, types.is_null)
+    if held is type_ and any(test(held) for test in tests):
+        return _NUMBER
+    is_text = types.is_string(held) or types.is_large_string(held) or types.is_temporal(held)
+    return _TEXT if is_text else ""
+
+
+def _require_small(stated: Any, where: str, names: set[str]) -> None:
+    for group in range(stated.num_row_groups):
+        parts = stated.row_group(group)
+        for place in range(parts.num_columns):
+            part = parts.column(place)
+            size = int(part.total_uncompressed_size)
+            if part.path_in_schema in names and not 0 <= size <= _MOST_BYTES:
+                raise SourceError(
+                    f"{where}: column {clean(part.path_in_schema)!r:.60}: found {size} bytes in "
+                    f"{parts.num_rows} rows, expected at most {_MOST_BYTES}"
+                )
+
+
+def _numbers(column: Any) -> NDArray[np.float64]:
+    """Return numbers; NaN: missing."""
+    cast = import_module("pyarrow.compute").cast(column, "float64", safe=False)
+    return np.asarray(cast.to_numpy(zero_copy_only=False), np.float64)
+
+
+def _words(column: Any) -> list[str]:
+    """Return texts; empty: missing."""
+    coded = column if hasattr(column, "dictionary") else column.cast("string").dictionary_encode()
+    words = [word_of(str(text)) for text in coded.dictionary.to_pylist()]
+    return ["" if code is None else words[code] for code in coded.indices.to_pylist()]
+
+
+def _column(name: str, kind: str, parts: list[Any]) -> TableColumn:
+    shown = clean(name) or "column"
+    if kind == _NUMBER:
+        return TableColumn(shown, np.concatenate(parts or [np.zeros(0)]), None)
+    return TableColumn(shown, None, tuple(text for part in parts for text in part))
