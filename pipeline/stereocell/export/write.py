@@ -1,0 +1,133 @@
+"""Write one file of a built OUT for another program: the format is chosen by the file's ending."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.export.chosen import Chosen, Report
+from stereocell.export.gltf_scene import write_gltf
+from stereocell.export.options import ExportOptions
+from stereocell.export.print_solids import write_print
+from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.workspace import is_file
+from stereocell.usd.read_stage import dependencies
+
+_LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """How an ending is written, and the options that it takes beside --channels.
+
+    write  is given the level of detail, 0 where the format has none; returns a line about the file
+    """
+
+    write: Callable[[Chosen, Path, int], str]
+    takes: frozenset[str]
+
+    @property
+    def has_levels(self) -> bool:
+        return "lod" in self.takes
+
+
+_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"})
+_PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
+FORMATS = {
+    ".glb": _GLTF,
+    ".gltf": _GLTF,
+    ".stl": _PRINT,
+    ".3mf": _PRINT,
+    ".ply": _PRINT,
+    ".obj": _PRINT,
+}
+
+
+def export(
+    out: Path,
+    file: Path,
+    options: ExportOptions,
+    *,
+    stage: Path | None = None,
+    report: Report = lambda _: None,
+) -> str:
+    """Write `file` from OUT's composed stage, or a layer over it; return a line about it.
+
+    Raises UsageError for an ending or an option that can't be, StageError for a stage that can't be
+    read, OutputError where the file can't be written.
+    """
+    find_ending(file)
+    out_folder = OutFolder(out)
+    out_folder.require_finished("stage")
+    path = stage if stage is not None else out_folder.stage_file
+    if not is_file(path):
+        raise OutputError(f"{path} is missing: expected a USD layer")
+    dependencies(path, out_folder.stage_dir)  # refuses foreign files
+    return export_stage(path, file, options, report)
+
+
+def export_stage(
+    stage_path: Path, file: Path, options: ExportOptions, report: Report = lambda _: None
+) -> str:
+    """Write `file` from a stage; return a line about it, and more of what is to be known.
+
+    The file is written whole or not at all, and has the same bytes each time. Raises as `export`.
+    """
+    ending = find_ending(file)
+    way = FORMATS[ending]
+    _require_takes(ending, way, options)
+    if not file.parent.is_dir():
+        raise OutputError(f"{file.parent}: no such folder")
+    chosen = Chosen(stage_path, options, report)
+    with tempfile.TemporaryDirectory(dir=file.parent, prefix=f".{file.stem}.") as beside:
+        line = _write_smallest(chosen, way, Path(beside) / file.name)
+        # what goes with the file comes first: whoever sees the file sees it whole
+        made = sorted(Path(beside).iterdir(), key=lambda one: one.name == file.name)
+        for one in made:
+            _put(one, file.parent / one.name)
+    return line
+
+
+def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
+    """Write the file at the finest level that --max-bytes lets; return the line about it."""
+    if not way.has_levels:
+        return way.write(chosen, file, 0)
+    most, size = chosen.options.max_bytes, 0
+    for level in chosen.levels():
+        line = way.write(chosen, file, level)
+        size = file.stat().st_size
+        if most is None or size <= most:
+            return line
+        chosen.report(f"lod{level} takes {size} bytes, more than {most}")
+    raise UsageError(
+        f"--max-bytes is {most}: the smallest file has {size}: expected as many, or fewer --tiles "
+        "or --channels"
+    )
+
+
+def _put(made: Path, place: Path) -> None:
+    """Move a file or a folder to its place, instead of what was there."""
+    if place.is_dir():
+        with tempfile.TemporaryDirectory(dir=made.parent) as old:
+            os.replace(place, Path(old) / "old")
+            os.replace(made, place)
+        return
+    os.replace(made, place)
+
+
+def find_ending(file: Path) -> str:
+    """Return the ending by which a format is chosen. Raises UsageError for an unknown one."""
+    name = file.name.lower()
+    for ending in FORMATS:
+        if name.endswith(ending) and len(name) > len(ending):
+            return ending
+    raise UsageError(f"{file}: expected a name that ends in {', '.join(FORMATS)}")
+
+
+def _require_takes(ending: str, way: Format, options: ExportOptions) -> None:
+    for name in sorted(options.given() - way.takes - {"channels"}):
+        able = [other for other, one in FORMATS.items() if name in one.takes]
+        flag = name.replace("_", "-")
+        raise UsageError(f"--{flag} can't be for {ending}, expected one of {', '.join(able)}")

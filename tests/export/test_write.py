@@ -1,0 +1,41 @@
+"""The command: the ending chooses, options that can't be are refused, errors leave nothing."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from stereocell.cli.__main__ import main
+from stereocell.export.options import ExportOptions, parse_region
+from stereocell.export.write import export_stage
+from stereocell.model.errors import UsageError
+
+
+def test_an_unknown_ending_and_an_option_of_others_are_refused(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match=r"s\.fbx: expected a name that ends in \.glb, \.gltf"):
+        export_stage(sphere_stage, tmp_path / "s.fbx", ExportOptions())
+    with pytest.raises(UsageError, match=r"--compress can't be for \.stl, expected one of \.glb"):
+        export_stage(sphere_stage, tmp_path / "s.stl", ExportOptions(compress="draco"))
+
+
+def test_unknown_channels_and_tiles_are_refused(sphere_stage: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--channels: no 'CD4', expected of CD31, Hoechst 33342"):
+        export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions(channels=("CD4",)))
+    with pytest.raises(UsageError, match="--tiles: no 'r9_c9' is visible, expected of r0_c0"):
+        export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions(tiles=("r9_c9",)))
+
+
+@pytest.mark.parametrize("text", ["1:2,3:4", "2:1,:,:", "a:b,:,:", "1:2,:,:,:"])
+def test_a_region_is_three_spans(text: str) -> None:
+    with pytest.raises(UsageError, match="--region is"):
+        parse_region(text)
+
+
+def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(tmp_path), str(tmp_path / "s.glb"), "--json"]) == 1
+    told = capsys.readouterr()
+    assert "stereocell:" in told.err
+    assert json.loads(told.out)["exit_code"] == 1
+    assert not (tmp_path / "s.glb").exists()
