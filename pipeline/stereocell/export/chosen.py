@@ -137,8 +137,10 @@ class Chosen:
         meshes = [UsdGeom.Mesh(prim) for prim in prims if prim is not None]
         return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
 
-    def levels(self) -> list[int]:
+    def levels(self, light: int | None = None) -> list[int]:
         """Return the levels to try, finest first: by --lod one, by --max-triangles those below it.
+
+        light  triangles that are enough if neither is given; a coarsest level of more is taken
 
         Raises UsageError where no level is small enough, StageError where there is no surface.
         """
@@ -149,6 +151,8 @@ class Chosen:
         if self.options.lod is not None:
             return [self.options.lod]
         most = self.options.max_triangles
+        if most is None and light is not None:
+            return [i for i, n in enumerate(counts) if n <= light] or [len(counts) - 1]
         levels = [i for i, n in enumerate(counts) if most is None or n <= most]
         if not levels:
             least = min(counts)

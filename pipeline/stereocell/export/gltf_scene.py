@@ -6,6 +6,7 @@ that a tile's objects are one mesh, in their colours.
 
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -13,11 +14,13 @@ import numpy as np
 
 from stereocell.export.chosen import Chosen, Piece
 from stereocell.export.packed_gltf import packed_buffers
+from stereocell.formats.gltf import Material
 from stereocell.formats.plain_gltf import Buffers, Document, PlainBuffers
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
+from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import specimen_name
 
 MOST_NODES = 5000  # objects; more of them take programs minutes to open
@@ -39,12 +42,13 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
                 where = {"tile": piece.tile, "channel": piece.channel.name, **more}
                 if not np.isfinite(positions).all():
                     raise StageError(f"{piece.tile}/{piece.channel.id}: a point is not finite")
+                mesh, material = _of_one_color(mesh, piece.material)
                 document.add(
                     piece.channel.name,
                     name,
                     mesh,
                     positions,
-                    piece.material,
+                    material,
                     where,
                     occlusion=bool(options.occlusion),
                 )
@@ -54,6 +58,17 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
             raise StageError(f"{chosen.path}: no surface is left to export")
         document.write(path)
     return f"{count} meshes, {triangles} triangles at lod{level}"
+
+
+def _of_one_color(mesh: Mesh, material: Material) -> tuple[Mesh, Material]:
+    """Return a mesh whose vertices have one colour without theirs, and a material that has it.
+
+    More programs show a material's colour than vertices'.
+    """
+    if mesh.colors is None or (mesh.colors != mesh.colors[0]).any():
+        return mesh, material
+    red, green, blue = (shortest(part) for part in mesh.colors[0].clip(0, 1))
+    return replace(mesh, colors=None), replace(material, color=(red, green, blue))
 
 
 def _buffers(chosen: Chosen, file: BinaryIO, level: int) -> Buffers:

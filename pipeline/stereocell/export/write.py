@@ -11,9 +11,11 @@ from stereocell.export.chosen import Chosen, Report
 from stereocell.export.gltf_scene import write_gltf
 from stereocell.export.options import ExportOptions
 from stereocell.export.print_solids import write_print
+from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.workspace import is_file
 from stereocell.usd.read_stage import dependencies
+from stereocell.usd.write_usdz import MAX_TRIANGLES
 
 _LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
 
@@ -22,17 +24,21 @@ _LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "sc
 class Format:
     """How an ending is written, and the options that it takes beside --channels.
 
-    write  is given the level of detail, 0 where the format has none; returns a line about the file
+    write      is given the level of detail, 0 where the format has none; returns a line about the
+               file
+    triangles  the most that are wanted if nothing is said; a coarsest level of more is taken
     """
 
     write: Callable[[Chosen, Path, int], str]
     takes: frozenset[str]
+    triangles: int | None = None
 
     @property
     def has_levels(self) -> bool:
         return "lod" in self.takes
 
 
+_USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes"})
 _GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"})
 _PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
 FORMATS = {
@@ -42,6 +48,9 @@ FORMATS = {
     ".3mf": _PRINT,
     ".ply": _PRINT,
     ".obj": _PRINT,
+    ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES),
+    ".usdc": Format(write_flattened, _USD),
+    ".usda": Format(write_flattened, _USD),
 }
 
 
@@ -95,7 +104,7 @@ def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
     if not way.has_levels:
         return way.write(chosen, file, 0)
     most, size = chosen.options.max_bytes, 0
-    for level in chosen.levels():
+    for level in chosen.levels(way.triangles):
         line = way.write(chosen, file, level)
         size = file.stat().st_size
         if most is None or size <= most:
