@@ -356,6 +356,20 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
         help="vertices of .glb are darker where light is occluded; some programs show these alone",
     )
 
+    volumes = parser.add_argument_group("volumes")
+    volumes.add_argument(
+        "--bits",
+        type=int,
+        choices=[8, 16],
+        help="8: the channel's window; 16: the source's values (default: 16 where OUT has them)",
+    )
+    volumes.add_argument(
+        "--unity",
+        action="store_const",
+        const=True,
+        help="one channel in .raw or .nrrd, upright, as UnityVolumeRendering reads it",
+    )
+
 
 def _names(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(","))

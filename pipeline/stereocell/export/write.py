@@ -12,6 +12,7 @@ from stereocell.export.gltf_scene import write_gltf
 from stereocell.export.options import ExportOptions
 from stereocell.export.print_solids import write_print
 from stereocell.export.usd_files import write_flattened, write_light_copy
+from stereocell.export.volume_files import write_nifti, write_nrrd, write_raw
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.workspace import is_file
 from stereocell.usd.read_stage import dependencies
@@ -39,6 +40,7 @@ class Format:
 
 
 _USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes"})
+_VOLUME = frozenset({"tiles", "region", "units", "bits"})
 _GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"})
 _PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
 FORMATS = {
@@ -51,6 +53,10 @@ FORMATS = {
     ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES),
     ".usdc": Format(write_flattened, _USD),
     ".usda": Format(write_flattened, _USD),
+    ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}),
+    ".raw": Format(write_raw, _VOLUME | {"unity"}),
+    ".nii.gz": Format(write_nifti, _VOLUME),
+    ".nii": Format(write_nifti, _VOLUME),
 }
 
 
