@@ -1,13 +1,14 @@
 """The command: the ending chooses, options that can't be are refused, errors leave nothing."""
 
 import json
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from stereocell.cli.__main__ import main
 from stereocell.export.options import ExportOptions, parse_region
-from stereocell.export.write import export_stage
+from stereocell.export.write import FORMATS, export_stage
 from stereocell.model.errors import UsageError
 
 
@@ -31,6 +32,11 @@ def test_unknown_channels_and_tiles_are_refused(sphere_stage: Path, tmp_path: Pa
 def test_a_region_is_three_spans(text: str) -> None:
     with pytest.raises(UsageError, match="--region is"):
         parse_region(text)
+
+
+def test_every_ending_says_its_own_options_in_the_flags_of_the_command() -> None:
+    known = {field.name for field in fields(ExportOptions)}
+    assert set().union(*(way.takes for way in FORMATS.values())) | {"channels"} == known
 
 
 def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -353,9 +353,15 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
         "--occlusion",
         action="store_const",
         const=True,
-        help="vertices of .glb are darker where light is occluded; some programs show these alone",
+        help="vertices are darker where light is occluded; some programs show these alone",
     )
 
+    surfaces.add_argument(
+        "--width",
+        type=_width,
+        metavar="PIXELS",
+        help="of .png (default 1600), .mp4 and .webm (640)",
+    )
     volumes = parser.add_argument_group("volumes")
     volumes.add_argument(
         "--bits",
@@ -369,6 +375,12 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
         const=True,
         help="one channel in .raw or .nrrd, upright, as UnityVolumeRendering reads it",
     )
+
+
+def _width(text: str) -> int:
+    if not text.isdecimal() or not 64 <= int(text) <= 8192:
+        raise argparse.ArgumentTypeError(f"{text!r} is no width, expected 64 to 8192")
+    return int(text)
 
 
 def _names(text: str) -> tuple[str, ...]:

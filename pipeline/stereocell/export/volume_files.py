@@ -61,11 +61,11 @@ def write_nifti(chosen: Chosen, path: Path, _: int) -> str:
     voxels = values.transpose(3, 2, 1, 0)
     voxels = voxels if len(layout.channels) > 1 else voxels[..., 0]
     affine = _LPS_TO_RAS @ grid.affine
-    image = nibabel.Nifti1Image(voxels, affine, dtype=layout.dtype)
+    image = nibabel.Nifti1Image(voxels, affine, dtype=layout.dtype)  # type: ignore[no-untyped-call]
     code = "scanner" if grid.is_patient else "aligned"
-    image.set_sform(affine, code)
-    image.set_qform(affine, code)
-    image.header.set_xyzt_units(_NIFTI_UNITS[grid.unit])
+    image.set_sform(affine, code)  # type: ignore[no-untyped-call]
+    image.set_qform(affine, code)  # type: ignore[no-untyped-call]
+    image.header.set_xyzt_units(_NIFTI_UNITS[grid.unit])  # type: ignore[no-untyped-call]
     image.header["descrip"] = ", ".join(layout.names).encode()[:79]
     text = json.dumps({"channels": layout.names}).encode()
     image.header.extensions.append(nibabel.nifti1.Nifti1Extension(_COMMENT, text))

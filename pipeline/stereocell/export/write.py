@@ -10,6 +10,12 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.export.chosen import Chosen, Report
 from stereocell.export.gltf_scene import write_gltf
 from stereocell.export.options import ExportOptions
+from stereocell.export.pictures import (
+    PICTURE_TRIANGLES,
+    VIDEO_TRIANGLES,
+    write_picture,
+    write_turntable,
+)
 from stereocell.export.print_solids import write_print
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import write_nifti, write_nrrd, write_raw
@@ -40,6 +46,7 @@ class Format:
 
 
 _USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes"})
+_PICTURE = frozenset({"tiles", "lod", "max_triangles", "region", "occlusion", "width"})
 _VOLUME = frozenset({"tiles", "region", "units", "bits"})
 _GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"})
 _PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
@@ -53,6 +60,9 @@ FORMATS = {
     ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES),
     ".usdc": Format(write_flattened, _USD),
     ".usda": Format(write_flattened, _USD),
+    ".png": Format(write_picture, _PICTURE, PICTURE_TRIANGLES),
+    ".mp4": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES),
+    ".webm": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES),
     ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}),
     ".raw": Format(write_raw, _VOLUME | {"unity"}),
     ".nii.gz": Format(write_nifti, _VOLUME),
