@@ -235,20 +235,26 @@ def _cut(
     return low, high
 
 
+def places_of_world(chosen: Chosen) -> NDArray[np.float64]:
+    """Return the matrix (3, 3) of directions in the world to those of the source."""
+    sides = sides_of(chosen.stage)
+    if sides is None:
+        return _IMAGE_AXES
+    return np.array([sides[name] for name in ("left", "posterior", "superior")])
+
+
 def _grid(
     chosen: Chosen, start: NDArray[np.float64], steps: NDArray[np.float64], size: NDArray[np.int64]
 ) -> VoxelGrid:
-    sides = sides_of(chosen.stage)
-    to_source = _IMAGE_AXES
-    if sides is not None:
-        to_source = np.array([sides[name] for name in ("left", "posterior", "superior")])
+    to_source = places_of_world(chosen)
+    is_patient = sides_of(chosen.stage) is not None
     unit = chosen.options.units or "mm"
     factor = METERS_PER_UNIT / UNITS_M[unit]
     columns = to_source @ steps.T * factor
     spacing = np.linalg.norm(columns, axis=0)
     x, y, z = size.tolist()
     origin = to_source @ start * factor + 0.0  # no -0.0
-    return VoxelGrid((x, y, z), spacing, origin, columns / spacing + 0.0, unit, sides is not None)
+    return VoxelGrid((x, y, z), spacing, origin, columns / spacing + 0.0, unit, is_patient)
 
 
 def _upright(layout: Layout) -> Layout:

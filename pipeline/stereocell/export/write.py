@@ -9,6 +9,7 @@ from pathlib import Path
 from stereocell.building.out_folder import OutFolder
 from stereocell.export.chosen import Chosen, Report
 from stereocell.export.gltf_scene import write_gltf
+from stereocell.export.neuroglancer import write_precomputed
 from stereocell.export.options import ExportOptions
 from stereocell.export.pictures import (
     PICTURE_TRIANGLES,
@@ -67,6 +68,7 @@ FORMATS = {
     ".raw": Format(write_raw, _VOLUME | {"unity"}),
     ".nii.gz": Format(write_nifti, _VOLUME),
     ".nii": Format(write_nifti, _VOLUME),
+    ".precomputed": Format(write_precomputed, frozenset({"tiles", "region", "bits"})),
 }
 
 
