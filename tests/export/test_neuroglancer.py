@@ -23,7 +23,7 @@ from PIL import Image
 
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
-from stereocell.model.errors import UsageError
+from stereocell.model.errors import OutputError, UsageError
 from support import spheres
 
 VIEWER = Path(__file__).parents[2] / "viewer_gltf"
@@ -114,7 +114,11 @@ def test_the_same_stage_gives_the_same_folder_in_place_of_an_older_one(
 ) -> None:
     path = tmp_path / "s.precomputed"
     path.mkdir()
-    (path / "old").touch()
+    (path / "mine.txt").touch()
+    with pytest.raises(OutputError, match="exists and is a folder of something else"):
+        export_stage(sphere_stage, path, ExportOptions())
+    (path / "image").mkdir()
+    (path / "image" / "info").touch()
     export_stage(sphere_stage, path, ExportOptions())
     files = [file.relative_to(folder) for file in sorted(folder.rglob("*")) if file.is_file()]
     again = [file.relative_to(path) for file in sorted(path.rglob("*")) if file.is_file()]

@@ -105,7 +105,9 @@ def test_a_specimen_that_was_turned_lies_obliquely(
 
 
 @pytest.mark.slow
-def test_an_oblique_patient_s_voxels_are_in_the_patient_s_place(tmp_path: Path) -> None:
+def test_an_oblique_patient_s_voxels_are_in_the_patient_s_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     shape = (16, 20, 18)
     affine = grid("sagittal", shape, rotation=turn((1, 2, 3), 25), shift=(5.0, -7.0, 3.0))
     voxels = np.rint(sample(affine, shape)).astype(np.int16)
@@ -115,7 +117,11 @@ def test_an_oblique_patient_s_voxels_are_in_the_patient_s_place(tmp_path: Path) 
     for phase in ("units", "stage"):
         assert main([phase, str(out), "--workers", "0"]) == 0
     for name in ("b.nrrd", "b.nii.gz"):
+        capsys.readouterr()
         assert main(["export", str(out), str(tmp_path / name)]) == 0
+        told = capsys.readouterr()
+        assert told.out.startswith(f"wrote {tmp_path / name}: ")
+        assert "export: 1/1 r0_c0" in told.err
         values, image = read(tmp_path / name)
         k, j, i = np.indices(values.shape)
         index = np.stack([i, j, k], axis=-1).reshape(-1, 3)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from stereocell.cli.__main__ import main
+from stereocell.export import volume_files
 from stereocell.export.options import ExportOptions, parse_region
 from stereocell.export.write import FORMATS, export_stage
 from stereocell.model.errors import UsageError
@@ -32,6 +33,28 @@ def test_unknown_channels_and_tiles_are_refused(sphere_stage: Path, tmp_path: Pa
 def test_a_region_is_three_spans(text: str) -> None:
     with pytest.raises(UsageError, match="--region is"):
         parse_region(text)
+
+
+def test_what_a_killed_command_left_is_removed(sphere_stage: Path, tmp_path: Path) -> None:
+    (tmp_path / ".s.glb.0123abcd.partial").mkdir()
+    (tmp_path / ".t.glb.0123abcd.partial").mkdir()  # of another file
+    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    assert {one.name for one in tmp_path.iterdir()} == {"s.glb", ".t.glb.0123abcd.partial"}
+
+
+def test_a_failure_half_way_leaves_the_older_file(
+    sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "s.raw").write_text("old")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(volume_files, "nrrd_head", fail)
+    with pytest.raises(OSError, match="No space left"):
+        export_stage(sphere_stage, tmp_path / "s.raw", ExportOptions())
+    assert [one.name for one in tmp_path.iterdir()] == ["s.raw"]
+    assert (tmp_path / "s.raw").read_text() == "old"
 
 
 def test_every_ending_says_its_own_options_in_the_flags_of_the_command() -> None:

@@ -1,8 +1,10 @@
 """Write one file of a built OUT for another program: the format is chosen by the file's ending."""
 
 import os
-import tempfile
-from collections.abc import Callable
+import secrets
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +23,7 @@ from stereocell.export.print_solids import write_print
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import write_nifti, write_nrrd, write_raw
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import is_file
 from stereocell.usd.read_stage import dependencies
 from stereocell.usd.write_usdz import MAX_TRIANGLES
@@ -107,11 +110,12 @@ def export_stage(
     _require_takes(ending, way, options)
     if not file.parent.is_dir():
         raise OutputError(f"{file.parent}: no such folder")
+    _require_replaceable(file)
     chosen = Chosen(stage_path, options, report)
-    with tempfile.TemporaryDirectory(dir=file.parent, prefix=f".{file.stem}.") as beside:
-        line = _write_smallest(chosen, way, Path(beside) / file.name)
+    with _folder_beside(file) as beside:
+        line = _write_smallest(chosen, way, beside / file.name)
         # what goes with the file comes first: whoever sees the file sees it whole
-        made = sorted(Path(beside).iterdir(), key=lambda one: one.name == file.name)
+        made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
         for one in made:
             _put(one, file.parent / one.name)
     return line
@@ -134,13 +138,30 @@ def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
     )
 
 
+@contextmanager
+def _folder_beside(file: Path) -> Iterator[Path]:
+    """Yield an empty folder beside a file; one that a killed command left there is removed."""
+    clear_beside(file)
+    folder = file.with_name(f".{file.name}.{secrets.token_hex(4)}.partial")
+    folder.mkdir()
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _require_replaceable(file: Path) -> None:
+    """Raise OutputError where a folder is in the way that no export made."""
+    if not file.is_dir() or not any(file.iterdir()):
+        return
+    if not any(file.glob("*/info")) or file.suffix.lower() != ".precomputed":
+        raise OutputError(f"{file}: exists and is a folder of something else")
+
+
 def _put(made: Path, place: Path) -> None:
     """Move a file or a folder to its place, instead of what was there."""
     if place.is_dir():
-        with tempfile.TemporaryDirectory(dir=made.parent) as old:
-            os.replace(place, Path(old) / "old")
-            os.replace(made, place)
-        return
+        os.replace(place, made.with_name("old"))
     os.replace(made, place)
 
 
