@@ -9,6 +9,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 from pxr import Gf, Usd
@@ -17,6 +18,7 @@ from stereocell.export import pictures
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import UsageError
+from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
 from support import spheres
 from support.bundles import CD31
 
@@ -90,8 +92,6 @@ def test_without_its_package_a_turntable_says_how_to_install_it(
 
 
 def test_the_eye_s_way_round_is_to_the_right_of_the_specimen() -> None:
-    from stereocell.report.draw_scenes import Shape, draw_image
-
     mesh = spheres.sphere(8, slice(None))
     moved = mesh.positions - spheres.CENTER.astype(np.float32)
     dot = Shape(
@@ -105,3 +105,20 @@ def test_the_eye_s_way_round_is_to_the_right_of_the_specimen() -> None:
 
     # before the specimen, seen from ever more to the right, it wanders to the left
     assert middle(0) > middle(30) > middle(60)
+
+
+@pytest.mark.parametrize("turned", [0.0, 40.0, 95.0, 140.0, 337.2])
+def test_a_long_box_fits_however_it_is_turned(turned: float) -> None:
+    low, high = np.array([-30.0, -4.0, -8.0]), np.array([30.0, 4.0, 8.0])
+    box = trimesh.creation.box(bounds=(low, high))
+    shape = Shape(
+        box.vertices.astype(np.float32),
+        box.faces.astype(np.uint32),
+        np.ones((8, 3), np.float32),
+        np.ones(3),
+    )
+    image = draw_image([shape], turning_frame(low, high), (200, 200), turned_deg=turned)
+    seen = covered(np.asarray(image))
+    assert seen.sum() > 1000
+    borders = (seen[0], seen[-1], seen[:, 0], seen[:, -1])
+    assert not any(border.any() for border in borders)

@@ -12,7 +12,7 @@ import numpy as np
 from stereocell.export.chosen import Chosen
 from stereocell.formats.gltf import vertex_colors
 from stereocell.model.errors import OutputError, StageError, UsageError
-from stereocell.report.draw_scenes import Box, Shape, draw_image
+from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
 
 PICTURE_TRIANGLES = 2_000_000  # more do not show on 1600 pixels
 VIDEO_TRIANGLES = 200_000  # some 0.6 s of CPU a frame, of 640 pixels
@@ -52,7 +52,7 @@ def write_turntable(chosen: Chosen, path: Path, level: int) -> str:
 def _encode(chosen: Chosen, path: Path, shapes: list[Shape], ffmpeg: str) -> tuple[int, int]:
     """Draw the frames, each straight into ffmpeg; return their width and height."""
     width = chosen.options.width or _VIDEO_WIDTH
-    frame = _turning_frame(chosen)
+    frame = turning_frame(*chosen.box)
     first = draw_image(shapes, frame, (width, width))
     size = first.width // 2 * 2, first.height // 2 * 2  # of colours in fours
     taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{_FPS}"]
@@ -76,14 +76,6 @@ def _encode(chosen: Chosen, path: Path, shapes: list[Shape], ffmpeg: str) -> tup
         last = told.splitlines()[-1] if told else f"exit code {encoder.returncode}"
         raise OutputError(f"{path.name}: ffmpeg: {last}")
     return size
-
-
-def _turning_frame(chosen: Chosen) -> Box:
-    """Return a box that holds the specimen however it is turned round its upright axis."""
-    low, high = chosen.box
-    middle, half = (low + high) / 2, (high - low) / 2
-    half[[0, 2]] = np.hypot(half[0], half[2]) / np.sqrt(2)
-    return tuple((middle - half).tolist()), tuple((middle + half).tolist())
 
 
 def _shapes(chosen: Chosen, level: int) -> Iterator[Shape]:

@@ -142,6 +142,14 @@ def draw_image(
     return Image.fromarray(to_srgb8(mean.astype(np.float32)))
 
 
+def turning_frame(low: Vector, high: Vector) -> Box:
+    """Return the frame that a box (x, y, z) never leaves, however far it is turned."""
+    middle, half = (low + high) / 2, (high - low) / 2
+    aside = np.abs(_EYE[[0, 2]]).sum() / np.hypot(_EYE[0], _EYE[2])
+    half[[0, 2]] = np.hypot(half[0], half[2]) / aside
+    return tuple((middle - half).tolist()), tuple((middle + half).tolist())
+
+
 def _look_at(frame: Box, size: tuple[int, int], turned_deg: float) -> _View:
     low, high = (np.array(corner) for corner in frame)
     to_eye = _EYE / np.linalg.norm(_EYE)
