@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from pxr import Gf
+from pxr import Gf, Usd, UsdGeom, Vt
 
 from stereocell.export.options import ExportOptions, parse_region
 from stereocell.export.write import export_stage
@@ -74,6 +74,29 @@ def test_an_edit_over_the_stage_is_in_it(edited: Callable[..., Path], tmp_path: 
     export_stage(layer, tmp_path / "s.glb", ExportOptions())
     (material,) = document(tmp_path / "s.glb")["materials"]
     assert material["pbrMetallicRoughness"]["baseColorFactor"] == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
+    edited: Callable[..., Path], tmp_path: Path
+) -> None:
+    def change(stage: Usd.Stage) -> None:
+        tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+        lod = tile.GetVariantSet("lod")
+        lod.SetVariantSelection("lod0")
+        with lod.GetVariantEditContext():
+            mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{tile.GetPath()}/CD31/CD31_r0_c0"))
+            points = np.array(mesh.GetPointsAttr().Get())
+            mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points + np.float32([0, 2, 0])))
+        other = stage.GetPrimAtPath("/Specimen/Tiles/r0_c1").GetVariantSet("lod")
+        other.SetVariantSelection("lod2")
+
+    layer = edited(change)
+    for lod in (0, 1):  # coarser levels are made anew from what was edited
+        export_stage(layer, tmp_path / "s.glb", ExportOptions(lod=lod))
+        meshes = trimesh.load(tmp_path / "s.glb").geometry
+        high = meshes["CD31 r0_c0"].bounds[1] * 1e6
+        assert high[1] == pytest.approx(spheres.CENTER[1] + spheres.RADIUS + 2, abs=0.05)
+        assert len(meshes["CD31 r0_c1"].faces) < 2.2 * spheres.LEVELS[2][0] ** 2
 
 
 def test_the_finest_level_within_the_bounds_is_taken(sphere_stage: Path, tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from pxr import Gf, UsdGeom
 from stereocell.export.options import ExportOptions, parse_region
 from stereocell.export.unite import cut_to, to_solid, weld
 from stereocell.export.write import export_stage
+from stereocell.formats.body import Body
+from stereocell.formats.threemf import write_3mf
 from stereocell.model.errors import StageError
 from support import spheres
 
@@ -140,3 +142,15 @@ def test_cut_through_vertices_leaves_no_solid_that_touches_itself() -> None:
     places = mesh.vert_properties[:, :3]
     assert len(np.unique(places, axis=0)) == len(places)
     assert cut_to(solid, boxes).volume() == pytest.approx(0.75 * solid.volume(), rel=2e-3)
+
+
+def test_any_name_can_stand_in_a_3mf(tmp_path: Path) -> None:
+    cube = trimesh.creation.box()
+    name = 'a<b> & "c"\x01\N{GREEK SMALL LETTER EPSILON}'
+    body = Body(name, (1, 2, 3), cube.vertices.astype(np.float32), cube.faces.astype(np.uint32))
+    write_3mf(tmp_path / "c.3mf", [body], title=name, unit="mm")
+    model = lib3mf.get_wrapper().CreateModel()
+    model.QueryReader("3mf").ReadFromFile(str(tmp_path / "c.3mf"))
+    bodies = model.GetMeshObjects()
+    assert bodies.MoveNext()
+    assert bodies.GetCurrentMeshObject().GetName() == name.replace("\x01", "\ufffd")

@@ -149,7 +149,7 @@ class Chosen:
             channels = ", ".join(channel.name for channel in self.channels)
             raise StageError(f"{self.path}: no surface is drawn of {channels}")
         if self.options.lod is not None:
-            return [self.options.lod]
+            return [min(self.options.lod, len(counts) - 1)]
         most = self.options.max_triangles
         if most is None and light is not None:
             return [i for i, n in enumerate(counts) if n <= light] or [len(counts) - 1]

@@ -155,7 +155,9 @@ def _write_image(folder: Path, chosen: Chosen, layout: Layout) -> int:
         while max(scales[-1][0].shape[1:]) > CHUNK:
             scales.append(_halved(*scales[-1], Path(scratch) / str(len(scales))))
         write_volume(folder, scales)
-        return len(scales)
+        count = len(scales)
+        del values, scales  # mapped files can't be removed everywhere
+        return count
 
 
 def _halved(

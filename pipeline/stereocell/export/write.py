@@ -93,7 +93,8 @@ def export(
     out_folder.require_finished("stage")
     path = stage if stage is not None else out_folder.stage_file
     if not is_file(path):
-        raise OutputError(f"{path} is missing: expected a USD layer")
+        remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
+        raise OutputError(f"{path} is missing: {remedy}")
     dependencies(path, out_folder.stage_dir)  # refuses foreign files
     return export_stage(path, file, options, report)
 

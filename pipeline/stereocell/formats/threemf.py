@@ -6,10 +6,11 @@ bytes.
 References: 3MF Consortium, 3D Manufacturing Format, Core Specification 1.3.
 """
 
+import re
 import zipfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ _RELATIONS = (
     '<Relationship Target="/3D/3dmodel.model" Id="rel0" '
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>'
 )
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _ROWS = 10_000  # rows of numbers that are turned into text at a time
 
 
@@ -52,6 +54,11 @@ def _entry(name: str) -> zipfile.ZipInfo:
     return info
 
 
+def _attribute(text: str) -> str:
+    """Return a quoted attribute; characters that XML can't have become U+FFFD."""
+    return quoteattr(_NOT_XML.sub("\N{REPLACEMENT CHARACTER}", text))
+
+
 def _model(bodies: list[Body], title: str, unit: str) -> Iterator[str]:
     yield f'{_HEAD}<model unit="{unit}" xml:lang="en-US" xmlns="{_CORE}">\n'
     yield f'<metadata name="Title">{_escaped(title)}</metadata>\n'
@@ -59,10 +66,10 @@ def _model(bodies: list[Body], title: str, unit: str) -> Iterator[str]:
     yield '<basematerials id="1">\n'
     for body in bodies:
         color = "".join(f"{part:02X}" for part in body.srgb)
-        yield f'<base name={quoteattr(body.name)} displaycolor="#{color}FF"/>\n'
+        yield f'<base name={_attribute(body.name)} displaycolor="#{color}FF"/>\n'
     yield "</basematerials>\n"
     for number, body in enumerate(bodies):
-        yield f'<object id="{number + 2}" name={quoteattr(body.name)} type="model" pid="1" '
+        yield f'<object id="{number + 2}" name={_attribute(body.name)} type="model" pid="1" '
         yield f'pindex="{number}"><mesh><vertices>\n'
         yield from _rows('<vertex x="%.9g" y="%.9g" z="%.9g"/>\n', body.positions)
         yield "</vertices><triangles>\n"
@@ -81,4 +88,4 @@ def _rows(form: str, rows: NDArray[np.float32] | NDArray[np.uint32]) -> Iterator
 
 
 def _escaped(text: str) -> str:
-    return quoteattr(text, {'"': "&quot;"})[1:-1]
+    return escape(_NOT_XML.sub("\N{REPLACEMENT CHARACTER}", text))
