@@ -7,14 +7,17 @@ import lib3mf
 import numpy as np
 import pytest
 import trimesh
-from pxr import Gf, UsdGeom
+from pxr import Gf, Usd, UsdGeom, Vt
 
+from stereocell.export.cap import close_cuts
 from stereocell.export.options import ExportOptions, parse_region
-from stereocell.export.unite import cut_to, to_solid, weld
+from stereocell.export.unite import cut_to, to_mesh, to_solid, unite, weld
 from stereocell.export.write import export_stage
 from stereocell.formats.body import Body
 from stereocell.formats.threemf import write_3mf
+from stereocell.meshes.clip import clip_mesh
 from stereocell.model.errors import StageError
+from stereocell.model.mesh import Mesh
 from support import spheres
 
 VOLUME_UM3 = 4 / 3 * np.pi * spheres.RADIUS**3
@@ -106,14 +109,82 @@ def test_what_is_thinner_than_a_wall_is_named(sphere_stage: Path, tmp_path: Path
     assert "6.9 mm at (10, -5, 4)" in line or "7 mm at (10, -5, 4)" in line
 
 
-def test_tiles_that_an_edit_took_apart_are_refused_in_a_line(
+def test_a_solid_that_touches_itself_is_closed_to_programs_that_join_places() -> None:
+    cube = trimesh.creation.box()
+    faces = cube.faces.astype(np.uint32)
+    for by in ((1.0, 1.0, 0.0), (1.0, 1.0, 1.0)):  # an edge in common, and a corner
+        places = (cube.vertices, cube.vertices + by)
+        solids = [to_solid(at.astype(np.float32), faces, "cube") for at in places]
+        found = trimesh.Trimesh(*to_mesh(unite(solids)), process=True)
+        assert found.is_watertight
+        assert len(found.split()) == 2
+        assert found.volume == pytest.approx(2, rel=1e-4)
+
+
+def test_neighbours_of_hidden_and_moved_tiles_are_closed_at_the_cut(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:
-    def hide(stage: object) -> None:
-        UsdGeom.Imageable(stage.GetPrimAtPath("/Specimen/Tiles/r0_c1")).MakeInvisible()
+    tile = "/Specimen/Tiles/r0_c1"
+    half = VOLUME_UM3 / 2
+    for change, volume, count in (
+        (lambda s: UsdGeom.Imageable(s.GetPrimAtPath(tile)).MakeInvisible(), half, 1),
+        (lambda s: _move(s, tile, (3, 0, 0)), 2 * half, 2),
+        (lambda s: _move(s, tile, (0, 20, 0)), 2 * half, 2),
+        (lambda s: _move(s, tile, (-1, 0, 0)), 2 * half - np.pi * spheres.RADIUS**2, 1),
+    ):
+        (tmp_path / "edited.usda").unlink(missing_ok=True)
+        export_stage(edited(change), tmp_path / "s.stl", ExportOptions(scale=1000))
+        found = read(tmp_path / "s.stl")
+        assert found.is_watertight
+        assert len(found.split()) == count
+        assert found.volume == pytest.approx(volume, rel=0.03)
 
-    with pytest.raises(StageError, match=r"CD31: its surface is open at \d+ edges, one at \(10, "):
-        export_stage(edited(hide), tmp_path / "s.stl", ExportOptions())
+
+def _move(stage: Usd.Stage, tile: str, by: tuple[float, float, float]) -> None:
+    UsdGeom.XformCommonAPI(stage.GetPrimAtPath(tile)).SetTranslate(by)
+
+
+def test_a_corner_that_is_missing_is_closed_along_the_lines_where_planes_meet() -> None:
+    ball = trimesh.creation.icosphere(3, 5.0)
+    # three of four quarters, each cut from the same sphere; the middle lies beside the planes
+    planes = ((0, 0.7), (1, -0.4))
+    parts = []
+    for low, high in (
+        ((-9, -9, -9), (0.7, -0.4, 9)),
+        ((-9, -0.4, -9), (0.7, 9, 9)),
+        ((0.7, -9, -9), (9, -0.4, 9)),
+    ):  # fmt: skip
+        normals = ball.vertex_normals.astype(np.float32)
+        whole = Mesh(ball.vertices.astype(np.float32), ball.faces.astype(np.uint32), normals)
+        part = clip_mesh(whole, low, high)
+        places = np.round(part.positions, 4)
+        for axis, value in planes:
+            places[np.abs(places[:, axis] - value) < 1e-3, axis] = value
+        parts.append((places.astype(np.float32), part.triangles))
+    positions, triangles = weld(parts)
+    closed = close_cuts(positions.astype(np.float64), triangles, planes)
+    solid = to_solid(positions, closed, "x")
+    whole = to_solid(ball.vertices.astype(np.float32), ball.faces.astype(np.uint32), "ball")
+    boxes = [((-9, -9, -9), (0.7, 9, 9)), ((0.7, -9, -9), (9, -0.4, 9))]
+    wanted = cut_to(whole, [(np.array(a, float), np.array(b, float)) for a, b in boxes]).volume()
+    assert solid.volume() == pytest.approx(wanted, rel=2e-3)
+
+
+def test_a_surface_that_an_edit_opened_is_refused_in_a_line(
+    edited: Callable[..., Path], tmp_path: Path
+) -> None:
+    def drop(stage: Usd.Stage) -> None:
+        tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+        lod = tile.GetVariantSet("lod")
+        lod.SetVariantSelection("lod0")
+        with lod.GetVariantEditContext():
+            mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{tile.GetPath()}/CD31/CD31_r0_c0"))
+            corners = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
+            mesh.GetFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(corners[100:].ravel()))
+            mesh.GetFaceVertexCountsAttr().Set(Vt.IntArray(len(corners) - 100, 3))
+
+    with pytest.raises(StageError, match=r"CD31: its surface is open at \d+ edges, one at \("):
+        export_stage(edited(drop), tmp_path / "s.stl", ExportOptions())
     assert not (tmp_path / "s.stl").exists()
 
 

@@ -20,6 +20,7 @@ from stereocell.formats.gltf import Material
 from stereocell.meshes.clip import clip_mesh
 from stereocell.model.errors import StageError, UsageError
 from stereocell.model.mesh import Mesh
+from stereocell.usd.layer import move_box
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
 from stereocell.usd.read_stage import (
@@ -42,7 +43,9 @@ class Piece:
     """The surface of a channel in a tile, world um, with what maps had at its vertices.
 
     objects  of a label map's tile: `mesh.objects` counts in it
-    moved    the matrix from its own space to the world: tiles with the same fit each other
+    moved    the matrix (4, 4) for row vectors from its own space to the world, row by row: tiles
+             with the same fit each other
+    cuts     the faces of the tile's box, in its own space: the axis and where
     """
 
     tile: str
@@ -51,6 +54,7 @@ class Piece:
     material: Material
     objects: TileObjects | None = None
     moved: tuple[float, ...] = ()
+    cuts: tuple[tuple[int, float], ...] = ()
 
     @property
     def object_names(self) -> list[str]:
@@ -203,7 +207,19 @@ class Chosen:
         if objects is None:
             mesh = replace(mesh, objects=None)
         moved = tuple(np.round(lod.matrix, 9).ravel().tolist())
-        return Piece(str(tile.GetName()), channel, mesh, lod.material, objects, moved)
+        ends = self._own_box(tile, channel, lod.matrix)
+        cuts = tuple((axis, float(end[axis])) for axis in range(3) for end in ends)
+        return Piece(str(tile.GetName()), channel, mesh, lod.material, objects, moved, cuts)
+
+    def _own_box(
+        self, tile: Usd.Prim, channel: ComposedAppearance, matrix: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the corners of a tile's box before it was moved."""
+        volume = read_volume(tile, channel.id)
+        if volume is not None:
+            return np.array(volume.low), np.array(volume.high)
+        low, high = self.all_tiles[str(tile.GetName())]
+        return move_box(low, high, np.linalg.inv(matrix).astype(np.float64))
 
     def volumes(self) -> Iterator[tuple[str, ComposedAppearance, ComposedVolume]]:
         """Yield the volumes, a tile after another."""

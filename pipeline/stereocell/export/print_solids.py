@@ -7,13 +7,14 @@ that the specimen fits a hand, if --scale says nothing else.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.export.cap import close_cuts
 from stereocell.export.chosen import Chosen, Piece
 from stereocell.export.options import UNITS_M
 from stereocell.export.thin_walls import describe_thin
@@ -34,13 +35,25 @@ WALL_MM = 0.8  # two lines of the usual nozzle of 0.4 mm
 Color = tuple[float, float, float]
 
 
+Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]  # positions and triangles
+
+
+@dataclass(slots=True)
+class _Surface:
+    """Meshes of tiles that fit each other, and where these were cut; see `Piece`."""
+
+    moved: tuple[float, ...]
+    meshes: list[Mesh] = field(default_factory=list)
+    cuts: set[tuple[int, float]] = field(default_factory=set)
+
+
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """What becomes one body: surfaces of several tiles. `color`: linear RGB."""
+    """What becomes one body. `color`: linear RGB. Surfaces by label and by how tiles were moved."""
 
     name: str
     color: Color
-    meshes: list[tuple[NDArray[np.float32], NDArray[np.uint32]]]
+    surfaces: dict[tuple[int | None, tuple[float, ...]], _Surface] = field(default_factory=dict)
 
 
 def write_print(chosen: Chosen, path: Path, level: int) -> str:
@@ -96,8 +109,8 @@ def _solids(
     """Yield the bodies; `is_one`: one of all."""
     boxes = _boxes(chosen)
     found = []
-    for part, own in _parts(chosen, level, is_one):
-        solid = unite([to_solid(*weld(one.meshes), one.name) for one in own])
+    for part in _parts(chosen, level, is_one):
+        solid = unite([_close(one, part.name) for one in part.surfaces.values()])
         if boxes:
             solid = cut_to(solid, boxes)
         if solid.is_empty():
@@ -111,35 +124,35 @@ def _solids(
         yield replace(found[0][0], name=name), unite([solid for _, solid in found])
 
 
-def _parts(chosen: Chosen, level: int, is_one: bool) -> Iterator[tuple[_Part, list[_Part]]]:
-    """Yield each body, and the closed surfaces that it is united from."""
+def _close(surface: _Surface, name: str) -> manifold3d.Manifold:
+    positions, triangles = weld(surface.meshes)
+    back = np.linalg.inv(np.array(surface.moved).reshape(4, 4))
+    own = positions.astype(np.float64) @ back[:3, :3] + back[3, :3]
+    return to_solid(positions, close_cuts(own, triangles, sorted(surface.cuts)), name)
+
+
+def _parts(chosen: Chosen, level: int, is_one: bool) -> Iterator[_Part]:
+    """Yield what becomes a body: a channel, or an object of a label map unless `is_one`."""
     for channel in chosen.channels:
-        found: dict[object, _Part] = {}
-        color: Color | None = None
+        parts: dict[int | None, _Part] = {}
         for piece in chosen.pieces(level, whole=True, channel=channel.id):
-            color = color or _color_of(piece)
-            for key, name, own, mesh in _surfaces(piece):
-                part = found.setdefault(key, _Part(name, own, []))
-                part.meshes.append(mesh)
-        if color is None:
-            continue
-        parts = list(found.values())
-        if len(parts) == 1 or is_one or not all(isinstance(key, int) for key in found):
-            yield _Part(channel.name, color, []), parts
-        else:
-            yield from ((part, [part]) for part in parts)
+            for label, name, color, mesh in _meshes(piece):
+                key = None if is_one else label
+                if key is None:
+                    name, color = channel.name, _color_of(piece)
+                part = parts.setdefault(key, _Part(name, color))
+                same = label, piece.moved
+                surface = part.surfaces.setdefault(same, _Surface(piece.moved))
+                surface.meshes.append(mesh)
+                surface.cuts.update(piece.cuts)
+        yield from parts.values()
 
 
-def _surfaces(
-    piece: Piece,
-) -> Iterator[tuple[object, str, Color, tuple[NDArray[np.float32], NDArray[np.uint32]]]]:
-    """Yield a piece's surfaces: the key of what they are a part of, its name and colour, the mesh.
-
-    The key of an object is its number; that of a tile how it was moved: equally moved tiles fit.
-    """
+def _meshes(piece: Piece) -> Iterator[tuple[int | None, str, Color, Mesh]]:
+    """Yield a piece's surface, or each object's: label, name, colour, mesh."""
     mesh = piece.mesh
     if piece.objects is None or mesh.objects is None:
-        yield piece.moved, piece.channel.name, _color_of(piece), (mesh.positions, mesh.triangles)
+        yield None, "", piece.material.color, (mesh.positions, mesh.triangles)
         return
     names, labels = piece.object_names, piece.objects.labels.tolist()
     for number, part in split_objects(mesh):

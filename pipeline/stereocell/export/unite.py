@@ -3,7 +3,8 @@
 Neighbouring tiles have the same vertices where they meet, bit by bit and at each level, and a
 surface is closed where the specimen ends (isosurface/extract.py). So the union of all tiles takes
 no boolean operation: equal places become one vertex. What is not wanted is cut off then, by solid
-boxes. Tiles that an edit moved are united by manifold3d.
+boxes. Where a tile is hidden, or was moved, its neighbours are closed at the cut (cap.py), and
+moved tiles are united with the others by manifold3d.
 """
 
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.meshes.validity import border
 from stereocell.model.errors import StageError
 
 # share of a solid's size; shorter edges that an operation left are closed: as float32 their ends
@@ -48,38 +50,50 @@ def to_solid(
         solid = manifold3d.Manifold(mesh)  # vertices of open edges that were a hair apart
     if solid.status() == manifold3d.Error.NoError:
         return solid
-    edges = open_edges(triangles)
+    edges = border(triangles)
     if not len(edges):
         raise StageError(f"{name}: can't be made one solid: {solid.status().name}")
     x, y, z = positions[edges[0, 0]].tolist()
     raise StageError(
         f"{name}: its surface is open at {len(edges)} edges, one at ({x:.4g}, {y:.4g}, {z:.4g}) um:"
-        " an edit moved, hid or opened a part of it: expected a closed surface"
+        " an edit opened it: expected a closed surface"
     )
 
 
 def to_mesh(solid: manifold3d.Manifold) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Return positions float32 (n, 3) and triangles uint32 (m, 3) of a solid.
 
-    Vertices that float32 can't tell apart are one, unless the solid touches itself there.
+    No two vertices are at one place: those that float32 can't tell apart are joined, and where the
+    solid touches itself it is drawn in by a hair. Other programs join equal places, and would find
+    an edge of four triangles.
     """
     found = solid.to_mesh()
     positions = np.ascontiguousarray(found.vert_properties[:, :3], np.float32)
     triangles = np.ascontiguousarray(found.tri_verts, np.uint32)
     joined = weld([(positions, triangles)])
+    if len(joined[0]) == len(positions):
+        return positions, triangles
     edges = np.sort(joined[1][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     _, counts = np.unique(edges, axis=0, return_counts=True)
-    is_closed = len(joined[0]) < len(positions) and bool((counts == 2).all())
-    return joined if is_closed else (positions, triangles)
+    return joined if (counts == 2).all() else (_drawn_in(positions, triangles), triangles)
 
 
-def open_edges(triangles: NDArray[np.uint32]) -> NDArray[np.int64]:
-    """Return the edges (n, 2) that only one triangle has."""
-    wide = triangles.astype(np.int64)
-    edges = np.concatenate([wide[:, [0, 1]], wide[:, [1, 2]], wide[:, [2, 0]]])
-    count = int(wide.max()) + 1
-    here, back = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
-    return edges[~np.isin(here, back)]
+def _drawn_in(positions: NDArray[np.float32], triangles: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """Return the positions, those that are the same moved against their own surface's normals."""
+    _, number, counts = np.unique(positions, axis=0, return_inverse=True, return_counts=True)
+    shared = np.flatnonzero(counts[number.ravel()] > 1)
+    a, b, c = positions[triangles].astype(np.float64).transpose(1, 0, 2)
+    facing = np.cross(b - a, c - a)
+    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-30)
+    normals = np.zeros((len(positions), 3))
+    for corner in range(3):
+        np.add.at(normals, triangles[:, corner], facing)
+    inwards = -normals[shared] / np.maximum(
+        np.linalg.norm(normals[shared], axis=1, keepdims=True), 1e-30
+    )
+    moved = positions.copy()
+    moved[shared] += _HAIR * float(np.ptp(positions, axis=0).max()) * inwards.astype(np.float32)
+    return moved
 
 
 def unite(solids: Sequence[manifold3d.Manifold]) -> manifold3d.Manifold:
