@@ -92,7 +92,10 @@ def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
 
     layer = edited(change)
     for lod in (0, 1):  # coarser levels are made anew from what was edited
-        export_stage(layer, tmp_path / "s.glb", ExportOptions(lod=lod))
+        told: list[str] = []
+        export_stage(layer, tmp_path / "s.glb", ExportOptions(lod=lod), told.append)
+        assert any(line.startswith("r0_c0/CD31: edited by hand: lod0") for line in told)
+        assert told[-1] == "2/2 r0_c1"
         meshes = trimesh.load(tmp_path / "s.glb").geometry
         high = meshes["CD31 r0_c0"].bounds[1] * 1e6
         assert high[1] == pytest.approx(spheres.CENTER[1] + spheres.RADIUS + 2, abs=0.05)

@@ -1,6 +1,7 @@
 """The command: the ending chooses, options that can't be are refused, errors leave nothing."""
 
 import json
+import shutil
 from dataclasses import fields
 from pathlib import Path
 
@@ -55,6 +56,26 @@ def test_a_failure_half_way_leaves_the_older_file(
         export_stage(sphere_stage, tmp_path / "s.raw", ExportOptions())
     assert [one.name for one in tmp_path.iterdir()] == ["s.raw"]
     assert (tmp_path / "s.raw").read_text() == "old"
+
+
+def test_no_part_of_a_build_and_no_edit_is_written_over(
+    sphere_stage: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(sphere_stage.parent, out / "stage")
+    edit = tmp_path / "edit.usda"
+    edit.write_text("#usda 1.0\n(subLayers = [@./out/stage/stage.usda@])\n")
+    for file in (out / "stage" / "stage.usda", out / "stage" / "new.glb", out / "bundle" / "a.glb"):
+        assert main(["export", str(out), str(file)]) == 2
+        assert "a part of the build lies there" in capsys.readouterr().err
+    assert main(["export", str(out), str(edit), "--stage", str(edit)]) == 2
+    assert edit.read_text().startswith("#usda 1.0\n(subLayers")
+    assert main(["export", str(out), str(out / "s.glb"), "--json"]) == 0
+    told = capsys.readouterr()
+    lines = json.loads(told.out)["lines"]
+    assert len(lines) == 1
+    assert lines[0].startswith("2 meshes, ")
+    assert "export: 2/2 r0_c1" in told.err
 
 
 def test_every_ending_says_its_own_options_in_the_flags_of_the_command() -> None:

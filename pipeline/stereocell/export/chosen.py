@@ -191,7 +191,10 @@ class Chosen:
             self.report(f"{number}/{len(tiles)} {name}" + (f"/{channel}" if channel else ""))
 
     def _piece(self, tile: Usd.Prim, channel: ComposedAppearance, level: int) -> Piece | None:
-        lods = [lod for lod in shown_lods(tile, channel.id).lods if len(lod.mesh.triangles)]
+        shown = shown_lods(tile, channel.id)
+        if shown.edit:
+            self.report(f"{tile.GetName()}/{channel.id}: {shown.edit}")
+        lods = [lod for lod in shown.lods if len(lod.mesh.triangles)]
         if not lods:
             return None
         finer = [lod for lod in lods if lod.level <= level]

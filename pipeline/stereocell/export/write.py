@@ -3,7 +3,7 @@
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +27,7 @@ from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import is_file
 from stereocell.usd.read_stage import dependencies
 from stereocell.usd.write_usdz import MAX_TRIANGLES
+from stereocell.usd.written_files import CHANGED
 
 _LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
 
@@ -95,7 +96,8 @@ def export(
     if not is_file(path):
         remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
         raise OutputError(f"{path} is missing: {remedy}")
-    dependencies(path, out_folder.stage_dir)  # refuses foreign files
+    files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
+    _require_outside(file, out_folder, files)
     return export_stage(path, file, options, report)
 
 
@@ -119,6 +121,8 @@ def export_stage(
         made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
         for one in made:
             _put(one, file.parent / one.name)
+    for layer in sorted(chosen.as_written.changed):
+        report(f"{layer}: {CHANGED}: taken as it is")
     return line
 
 
@@ -149,6 +153,16 @@ def _folder_beside(file: Path) -> Iterator[Path]:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -> None:
+    """Raise UsageError where FILE would take the place of what a build made, or of an edit."""
+    place = file.resolve()
+    made = [out_folder.out / name for name in ("stage", "bundle", "units", "report")]
+    if place in {one.resolve() for one in files} or any(
+        place.is_relative_to(folder.resolve()) for folder in made
+    ):
+        raise UsageError(f"{file}: a part of the build lies there, expected another place")
 
 
 def _require_replaceable(file: Path) -> None:
