@@ -45,7 +45,7 @@ def test_another_library_finds_the_sphere_in_metres_with_colour_and_names(
     assert "extensionsUsed" not in found
     assert [node["name"] for node in found["nodes"][:2]] == ["two tiles", "CD31"]
     triangles = sum(len(mesh.faces) for mesh in scene.geometry.values())
-    assert line == f"2 meshes, {triangles} triangles at lod0"
+    assert line == f"2 meshes, {triangles:,} triangles at lod0"
 
 
 def test_tiles_meet_without_a_gap(sphere_stage: Path, tmp_path: Path) -> None:

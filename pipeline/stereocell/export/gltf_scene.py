@@ -16,6 +16,7 @@ from stereocell.export.chosen import Chosen, Piece
 from stereocell.export.packed_gltf import packed_buffers
 from stereocell.formats.gltf import Material
 from stereocell.formats.plain_gltf import Buffers, Document, PlainBuffers
+from stereocell.model.counted import counted
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.objects.split import split_objects
@@ -57,7 +58,7 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
         if not count:
             raise StageError(f"{chosen.path}: no surface is left to export")
         document.write(path)
-    return f"{count} meshes, {triangles} triangles at lod{level}"
+    return f"{counted(count, 'mesh', 'meshes')}, {triangles:,} triangles at lod{level}"
 
 
 def _of_one_color(mesh: Mesh, material: Material) -> tuple[Mesh, Material]:

@@ -25,6 +25,7 @@ from stereocell.formats.ply import write_ply
 from stereocell.formats.stl import write_stl_file
 from stereocell.formats.threemf import write_3mf
 from stereocell.model.color import to_srgb8
+from stereocell.model.counted import counted
 from stereocell.model.errors import StageError
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
@@ -87,12 +88,8 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
     x, y, z = np.ptp(np.concatenate([body.positions for body in bodies]), axis=0).tolist()
     count = sum(len(body.triangles) for body in bodies)
     size = f"{x:.3g} x {y:.3g} x {z:.3g} {unit}, {scale:g} times the specimen"
-    line = f"{_counted(len(bodies), 'body', 'bodies')}, {count} triangles at lod{level}, {size}"
+    line = f"{counted(len(bodies), 'body', 'bodies')}, {count:,} triangles at lod{level}, {size}"
     return "\n".join([line, *thin])
-
-
-def _counted(count: int, one: str, many: str) -> str:
-    return f"{count} {one if count == 1 else many}"
 
 
 def _handy(chosen: Chosen) -> float:

@@ -11,6 +11,7 @@ from pathlib import Path
 from pxr import Sdf, Usd, UsdGeom, UsdUtils
 
 from stereocell.export.chosen import Chosen
+from stereocell.model.counted import counted
 from stereocell.model.errors import OutputError
 from stereocell.storage.workspace import is_mirrored
 from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, UP_AXIS, export
@@ -24,7 +25,7 @@ def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
     channels = {channel.id for channel in chosen.channels}
     tiles = chosen.tiles
     write_usdz(chosen.path, path, chosen.as_written, level=level, tiles=tiles, channels=channels)
-    return f"{len(tiles)} tiles at lod{level}, the size of a hand"
+    return f"{counted(len(tiles), 'tile')} at lod{level}, the size of a hand"
 
 
 def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
@@ -57,7 +58,8 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
     folder = path.parent.parent.resolve()
     UsdUtils.ModifyAssetPaths(flat, lambda asset: _relative(asset, folder))
     export(flat, path)
-    return f"{len(chosen.tiles)} tiles at lod{level}; volumes and maps stay in {chosen.path.parent}"
+    tiles = counted(len(chosen.tiles), "tile")
+    return f"{tiles} at lod{level}; volumes and maps stay in {chosen.path.parent}"
 
 
 def _channels(stage: Usd.Stage, place: Sdf.Path) -> list[str]:
