@@ -46,6 +46,8 @@ PARSED = {
     "serve": "does not end: serve/test_server.py, serve/test_brick_session.py",
     "tissue": "half a minute: building/test_tissue.py",
     "build big.ome.zarr": "a cluster: engine/test_cluster.py",
+    "publish out/mine s3://": "object storage: publish/test_publish.py",
+    "publish out/mine ../pages": "another host: the same",
     "build s3://": "object storage: storage/test_object_store.py",
     "build stack.tif": "masks of another program: building/test_objects.py",
     "build ct.nii.gz": "the same: building/test_label_maps.py",

@@ -192,6 +192,12 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         flags.declare_export,
         commands.export,
     ),
+    "publish": (
+        "put the bundle on a web host, and hold what it sends against every hash",
+        "publish out/mine s3://bucket/mine",
+        flags.declare_publish,
+        commands.publish,
+    ),
     "report": (
         "write a page with pictures, sizes and times",
         "report out/mine",
@@ -245,7 +251,13 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
 # Commands that write into OUT: one of them at a time
 WRITERS = frozenset({"build", "plan", "units", "stage", "bundle", "report", "tissue"})
 # Commands that read an OUT on object storage -> the part that is fetched first; "": all of it
-READERS = {"check": "", "export": "stage", "view": "bundle", "serve": "bundle"}
+READERS = {
+    "check": "",
+    "export": "stage",
+    "publish": "bundle",
+    "view": "bundle",
+    "serve": "bundle",
+}
 # Commands that import no large library
 LIGHT = frozenset({"settings", "doctor"})
 

@@ -317,6 +317,33 @@ def export(options: argparse.Namespace) -> Answer:
     )
 
 
+def publish(options: argparse.Namespace) -> Answer:
+    """Put the bundle on a web host."""
+    from stereocell.engine.run import console
+    from stereocell.publish.publish import publish as put
+    from stereocell.serve.lan import draw_qr
+    from stereocell.storage.location import Location
+
+    done = put(
+        options.out,
+        options.target,
+        options.url,
+        is_public=not options.private,
+        report=lambda line: console.print(f"publish: {line}", markup=False),
+    )
+    shown = Location.of(options.target).shown
+    print_unless_json(
+        options,
+        f"{shown}: {done.files} files, {done.bytes:,} bytes: {done.uploaded} uploaded "
+        f"({done.uploaded_bytes:,} bytes), {done.removed} removed",
+    )
+    if done.address is not None:
+        if done.address.startswith("https://") and not options.json:
+            print_line(draw_qr(done.address, sys.stdout.encoding or "utf-8"))
+        print_unless_json(options, f"look at it: {done.address}")
+    return Answer({"out": str(options.shown), "target": shown, **asdict(done)})
+
+
 def doctor(options: argparse.Namespace) -> Answer:
     """Examine this machine; the exit code is 1 where a needed part is missing."""
     from stereocell.cli.doctor import examine

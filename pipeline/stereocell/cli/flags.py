@@ -377,6 +377,23 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def declare_publish(parser: argparse.ArgumentParser) -> None:
+    declare_out(parser)
+    parser.add_argument(
+        "target", metavar="TARGET", help="a folder, or an address, as s3://bucket/specimen"
+    )
+    parser.add_argument(
+        "--url",
+        help="https:// address at which browsers find TARGET: every file is fetched from there, "
+        "and a link and a QR code are printed (default: S3's own)",
+    )
+    parser.add_argument(
+        "--private",
+        action="store_true",
+        help="do not ask S3 to let everybody read it (ACL public-read): a policy does, or nobody",
+    )
+
+
 def _width(text: str) -> int:
     if not text.isdecimal() or not 64 <= int(text) <= 8192:
         raise argparse.ArgumentTypeError(f"{text!r} is no width, expected 64 to 8192")

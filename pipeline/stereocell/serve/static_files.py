@@ -22,23 +22,11 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
+from stereocell.formats.media_types import media_type
 from stereocell.serve.headers import policy
 
 BRICKS_HEADER = {"Stereocell-Bricks": "version=1"}  # announces /bricks to a page
 _HEADERS = {"Cache-Control": "no-cache"}
-_TYPES = {
-    ".css": "text/css; charset=utf-8",
-    ".glb": "model/gltf-binary",
-    ".html": "text/html; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".json": "application/json",
-    ".ktx2": "image/ktx2",
-    ".png": "image/png",
-    ".svg": "image/svg+xml",
-    ".usdz": "model/vnd.usdz+zip",
-    ".wasm": "application/wasm",
-    ".webmanifest": "application/manifest+json",
-}
 _ENCODINGS = {"br": ".br", "gzip": ".gz"}  # the shorter first
 _RANGE = re.compile(r"bytes=(\d*)-(\d*)", re.ASCII)
 _DIGITS = 18  # digits of a number in a Range header: no file has more bytes
@@ -69,7 +57,7 @@ class BundleFiles:
         if found is None:
             return PlainTextResponse("not found", 404)
         path, status = found
-        kind = _TYPES.get(path.suffix, "application/octet-stream")
+        kind = media_type(path)
         headers = {**self._headers, **policy(kind)}
         beside = await anyio.to_thread.run_sync(_compressed, path)
         if beside:

@@ -1,0 +1,213 @@
+"""Puts a bundle at a target, and no more than has changed since the last time.
+
+What was put there is listed beside it. So a second run knows what it may overwrite and remove: what
+somebody else put there is left alone, and refused by name where a file of the bundle would take its
+place. Files that lead to others come last, so that whoever opens the page meanwhile sees the
+earlier one or the new one.
+"""
+
+import gzip
+import json
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from stereocell.model.errors import OutputError, UsageError
+from stereocell.publish.over_http import fetch_faults
+from stereocell.publish.targets import Target, digest, target_of
+from stereocell.storage.file_list import find_faults, read_list, to_json
+from stereocell.storage.workspace import cached
+
+PUBLISHED = "stereocell-published.json"
+FILES = "files.json"
+_LAST = ("sw.js", "manifest.json", FILES, "index.html")
+_REMEDY = "run `stereocell bundle OUT` first"
+_AT_ONCE = 8  # requests: most of each is waiting
+_SMALL_BYTES = 1000  # JSON below is as short as it is
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """What a run has done. address: where browsers find it, or None."""
+
+    address: str | None
+    files: int
+    bytes: int
+    uploaded: int
+    uploaded_bytes: int
+    removed: int
+
+
+@dataclass(frozen=True, slots=True)
+class _File:
+    """A file of the bundle, or one that is made of it."""
+
+    entry: Mapping[str, Any]  # bytes, sha256
+    read: Callable[[], bytes]
+
+
+def publish(
+    out: Path, text: str, url: str | None, *, is_public: bool, report: Callable[[str], None]
+) -> Published:
+    """Put OUT's bundle at a target, and hold every file there against its hash.
+
+    text       a folder, or an address that fsspec opens
+    url        where browsers find it; None: of S3 its own address, else files are read again
+    is_public  ask S3 to let everybody read each object (ACL public-read)
+    report     takes lines of progress
+
+    Raises UsageError for a url that is none; OutputError where the bundle is damaged, the target
+    can't be written, holds files of others in the bundle's place, or answers with something else.
+    """
+    if url is not None and not url.startswith(("https://", "http://")):
+        raise UsageError(f"--url is {url}, expected an address as https://me.example/mine")
+    bundle = out / "bundle"
+    files = _files_of(bundle)
+    target = target_of(text, is_public=is_public)
+    if isinstance(folder := getattr(target, "folder", None), Path):
+        _require_apart(folder, out)
+    there = target.sizes()
+    before = _read_published(target, there)
+    _refuse_others(target, files, there, before)
+    changed = [
+        path
+        for path, file in files.items()
+        if before.get(path) != file.entry or there.get(path) != file.entry["bytes"]
+    ]
+    gone = [path for path in before if path not in files]
+    entries = {path: file.entry for path, file in files.items()}
+    if changed or gone or before != entries:
+        # what is about to be there is ours, too, should this run be killed
+        unsure = dict.fromkeys((*gone, *changed))
+        target.write(PUBLISHED, _list({**before, **entries, **unsure}))
+        _upload(target, files, changed, report)
+        for path in gone:
+            if path in there:
+                target.remove(path)
+        target.write(PUBLISHED, _list(entries))
+    address = (url and url.rstrip("/") + "/") or target.address
+    faults = (
+        fetch_faults(address, entries, report)
+        if address
+        else {p: "is another" for p in files if digest(target.read(p)) != entries[p]["sha256"]}
+    )
+    if faults:
+        path, fault = next(iter(sorted(faults.items())))
+        raise OutputError(
+            f"{address or target.shown + '/'}{path}: {fault}, expected the bundle's file of "
+            f"{entries[path]['bytes']} bytes"
+            + (f" ({len(faults)} such)" if len(faults) > 1 else "")
+        )
+    size = sum(entry["bytes"] for entry in entries.values())
+    sent = sum(entries[path]["bytes"] for path in changed)
+    return Published(address, len(files), size, len(changed), sent, len(gone))
+
+
+def _files_of(bundle: Path) -> dict[str, _File]:
+    """Return the bundle's files by path, and JSON packed for hosts that send such files."""
+    listed = read_list(bundle / FILES, _REMEDY)
+    if faults := find_faults(bundle, listed):
+        path, fault = next(iter(faults.items()))
+        raise OutputError(f"{bundle / path}: {fault}: {_REMEDY}")
+    files = {path: _File(entry, partial(_content, bundle / path)) for path, entry in listed.items()}
+    index = _content(bundle / FILES)
+    files[FILES] = _made(index)
+    for path, file in list(files.items()):
+        is_long = file.entry["bytes"] >= _SMALL_BYTES
+        if path.endswith(".json") and is_long and f"{path}.gz" not in files:
+            files[f"{path}.gz"] = _made(gzip.compress(file.read(), 9, mtime=0))
+    return files
+
+
+def _content(file: Path) -> bytes:
+    with cached(file):
+        return file.read_bytes()
+
+
+def _made(content: bytes) -> _File:
+    return _File({"bytes": len(content), "sha256": digest(content)}, lambda: content)
+
+
+def _require_apart(folder: Path, out: Path) -> None:
+    if folder.resolve().is_relative_to(out.resolve()):
+        raise OutputError(f"TARGET is {folder}, inside OUT, expected a folder elsewhere")
+
+
+def _list(entries: Mapping[str, Any]) -> bytes:
+    content = {
+        "format": "stereocell-published",
+        "version": 1,
+        "files": dict(sorted(entries.items())),
+    }
+    return to_json(content)
+
+
+def _read_published(target: Target, there: Mapping[str, int]) -> dict[str, Any]:
+    """Return what an earlier run has put there; of what it may have put: None."""
+    if PUBLISHED not in there:
+        return {}
+    where = f"{target.shown}/{PUBLISHED}"
+    try:
+        found = json.loads(target.read(PUBLISHED))
+        files = dict(found["files"])
+        is_known = found["format"] == "stereocell-published" and found["version"] == 1
+    except (ValueError, TypeError, KeyError, RecursionError):
+        is_known, files = False, {}
+    # the list says what may be removed: a path in it may lead nowhere else
+    if not is_known or not all(_is_inside(path) for path in files):
+        raise OutputError(f"{where}: damaged, expected a list of published files; remove it")
+    return files
+
+
+def _is_inside(path: str) -> bool:
+    parts = PurePosixPath(path).parts
+    return (
+        bool(parts)
+        and not path.startswith("/")
+        and not {"..", ".git"} & {*parts}
+        and "\\" not in path
+    )
+
+
+def _refuse_others(
+    target: Target,
+    files: Mapping[str, _File],
+    there: Mapping[str, int],
+    before: Mapping[str, Any],
+) -> None:
+    """Raise OutputError where somebody else's file is in the place of one of the bundle."""
+    for path, file in files.items():
+        if path in before or path not in there:
+            continue
+        is_same = there[path] == file.entry["bytes"]
+        if not (is_same and digest(target.read(path)) == file.entry["sha256"]):
+            raise OutputError(
+                f"{target.shown}/{path}: is there, and was not put there by this command, "
+                "expected a place of the bundle's own"
+            )
+
+
+def _upload(
+    target: Target,
+    files: Mapping[str, _File],
+    paths: Iterable[str],
+    report: Callable[[str], None],
+) -> None:
+    paths = list(paths)
+    done = 0
+
+    def put(path: str) -> None:
+        nonlocal done
+        target.write(path, files[path].read())
+        done += 1
+        if done % max(1, len(paths) // 10) == 0:
+            report(f"{done}/{len(paths)} files")
+
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        list(pool.map(put, (path for path in paths if path not in _LAST)))
+    for path in _LAST:
+        if path in paths:
+            put(path)

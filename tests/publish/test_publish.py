@@ -1,0 +1,277 @@
+"""A bundle at a host: what is uploaded, removed and refused, and what the host then sends."""
+
+import hashlib
+import http.server
+import json
+import threading
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+from stereocell.cli.__main__ import main
+from stereocell.publish.targets import AGAIN, FOREVER, FolderTarget
+from stereocell.storage.file_list import encode, list_files
+from support.object_store import ObjectStore, serving
+
+FILES = {
+    "index.html": b"<!doctype html>",
+    "sw.js": b"self;",
+    "manifest.json": b'{"a": "' + b"b" * 2000 + b'"}',
+    "assets/page-abc123.js": b"1;",
+    "channels/CD31/it's 1.glb": b"glTF" + bytes(3000),
+    "volumes/r0_c0.ktx2": bytes(range(256)) * 40,
+}
+LIST = "stereocell-published.json"
+Run = Callable[..., tuple[int, dict[str, Any], str]]
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    out = tmp_path / "my out"
+    write(out, FILES)
+    return out
+
+
+def write(out: Path, files: dict[str, bytes]) -> None:
+    """A bundle of these files."""
+    for path, content in files.items():
+        file = out / "bundle" / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+    bundle = out / "bundle"
+    (bundle / "files.json").unlink(missing_ok=True)
+    (bundle / "files.json").write_bytes(encode(list_files(bundle, root=bundle)))
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    def publish(out: Path, target: object, *more: str) -> tuple[int, dict[str, Any], str]:
+        code = main(["publish", str(out), str(target), *more, "--json"])
+        told = capsys.readouterr()
+        return code, json.loads(told.out or "{}"), told.err.splitlines()[-1] if told.err else ""
+
+    return publish
+
+
+def below(folder: Path) -> dict[str, bytes]:
+    files = (file for file in folder.rglob("*") if file.is_file())
+    return {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
+
+
+def test_a_folder_gets_the_bundle_and_then_what_has_changed(
+    out: Path, run: Run, tmp_path: Path
+) -> None:
+    site = tmp_path / "a site"
+    site.mkdir()
+    (site / "CNAME").write_text("me.example")
+    code, first, _ = run(out, site)
+    assert code == 0
+    there = below(site)
+    assert {path: there[path] for path in FILES} == FILES
+    assert {"files.json", "manifest.json.gz", LIST, "CNAME"} < there.keys()
+    assert (first["uploaded"], first["removed"]) == (len(there) - 2, 0)
+
+    _, again, _ = run(out, site)
+    assert (again["uploaded"], again["uploaded_bytes"], again["removed"]) == (0, 0, 0)
+    assert below(site) == there
+
+    (out / "bundle/channels/CD31/it's 1.glb").unlink()
+    write(out, {"volumes/r0_c0.ktx2": b"other"})
+    _, third, _ = run(out, site)
+    after = below(site)
+    assert third["removed"] == 1
+    assert not (site / "channels").exists()
+    assert {path for path in after if after[path] != there[path]} == {
+        *("volumes/r0_c0.ktx2", "files.json", LIST)
+    }
+    assert third["uploaded"] == 2
+    assert after["CNAME"] == b"me.example"
+
+
+def test_what_others_put_there_stays_and_ends_the_run_before_it_writes(
+    out: Path, run: Run, tmp_path: Path
+) -> None:
+    site = tmp_path / "site"
+    site.mkdir()
+    (site / "index.html").write_text("mine")
+    code, _, said = run(out, site)
+    assert code == 1
+    assert "site/index.html: is there, and was not put there by this command" in said
+    assert below(site) == {"index.html": b"mine"}
+
+
+def test_a_killed_run_goes_on(
+    out: Path, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = tmp_path / "site"
+    put, count = FolderTarget.write, []
+
+    def fails(self: FolderTarget, path: str, content: bytes) -> None:
+        count.append(path)
+        if len(count) > 4:
+            raise KeyboardInterrupt
+        put(self, path, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(FolderTarget, "write", fails)
+        assert main(["publish", str(out), str(site)]) == 130
+    half = below(site)
+    assert "index.html" not in half
+    assert len(half) > 1
+    assert run(out, site)[0] == 0
+    there = below(site)
+    assert {path: there[path] for path in FILES} == FILES
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"{", "damaged"),
+        (b"[]", "damaged"),
+        (b'{"format": "other", "version": 1, "files": {}}', "damaged"),
+        (
+            b'{"format": "stereocell-published", "version": 1, "files": {"../secret": null}}',
+            "damaged",
+        ),
+        (
+            b'{"format": "stereocell-published", "version": 1, "files": {"/etc/x": null}}',
+            "damaged",
+        ),
+    ],
+)
+def test_a_list_that_is_none_removes_nothing(
+    out: Path, run: Run, tmp_path: Path, content: bytes, words: str
+) -> None:
+    site = tmp_path / "site"
+    site.mkdir()
+    (tmp_path / "secret").write_text("kept")
+    (site / LIST).write_bytes(content)
+    code, _, said = run(out, site)
+    assert code == 1
+    assert f"{LIST}: {words}" in said
+    assert (tmp_path / "secret").exists()
+    assert below(site) == {LIST: content}
+
+
+def test_a_link_in_the_target_leads_nowhere_else(out: Path, run: Run, tmp_path: Path) -> None:
+    site, other = tmp_path / "site", tmp_path / "other"
+    site.mkdir()
+    other.mkdir()
+    (site / "assets").symlink_to(other)
+    code, _, said = run(out, site)
+    assert code == 1
+    assert "leads to" in said
+    assert not below(other)
+
+
+def test_a_damaged_bundle_is_not_published(out: Path, run: Run, tmp_path: Path) -> None:
+    (out / "bundle/sw.js").write_bytes(b"Self;")
+    code, _, said = run(out, tmp_path / "site")
+    assert code == 1
+    assert "bundle/sw.js: damaged: run `stereocell bundle OUT` first" in said
+    assert not (tmp_path / "site").exists()
+    assert run(tmp_path / "nothing", tmp_path / "site")[0] == 1
+
+
+def test_a_place_in_out_or_a_plain_host_is_refused(out: Path, run: Run) -> None:
+    assert "inside OUT" in run(out, out / "bundle" / "x")[2]
+    assert "nothing can be put there by http" in run(out, "https://me.example/x")[2]
+    assert run(out, "nowhere://x/y")[0] == 1
+    code, _, said = run(out, out.parent / "site", "--url", "file:///etc")
+    assert (code, "expected an address as https://" in said) == (2, True)
+
+
+@pytest.fixture
+def host(tmp_path: Path) -> Iterator[str]:
+    """A web server of the folder `site`."""
+    (tmp_path / "site").mkdir()
+    handler = partial(_Quiet, directory=str(tmp_path / "site"))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    extensions_map: ClassVar[dict[str, str]] = {
+        **http.server.SimpleHTTPRequestHandler.extensions_map,
+        ".js": "text/javascript",
+    }
+
+    def log_message(self, *_: Any) -> None:
+        pass
+
+
+def test_every_file_is_fetched_as_browsers_do(
+    out: Path, run: Run, host: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = tmp_path / "site" / "my specimen"
+    url = f"{host}/my%20specimen"
+    code, done, said = run(out, site, "--url", url)
+    assert (code, done["address"]) == (0, f"{url}/"), said
+    (site / "volumes/r0_c0.ktx2").write_bytes(bytes(256 * 40))  # of the same size
+    code, _, said = run(out, site, "--url", url)
+    assert code == 1
+    assert f"{url}/volumes/r0_c0.ktx2: found other bytes" in said
+    code, _, said = run(out, site, "--url", f"{host}/elsewhere")
+    assert code == 1
+    assert "answered with 404" in said
+    (site / "volumes/r0_c0.ktx2").write_bytes(FILES["volumes/r0_c0.ktx2"])
+    monkeypatch.setitem(_Quiet.extensions_map, ".js", "text/plain")
+    code, _, said = run(out, site, "--url", url)
+    assert code == 1
+    assert "found the type text/plain, which browsers don't take for text/javascript" in said
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
+    with serving(tmp_path_factory.mktemp("objects")) as store, pytest.MonkeyPatch.context() as m:
+        for name, value in store.environment.items():
+            m.setenv(name, value)
+        store.files().mkdir("bucket")
+        yield store
+
+
+def test_an_object_store_gets_types_and_a_second_run_nothing(
+    out: Path, run: Run, store: ObjectStore
+) -> None:
+    files = store.files()
+    files.pipe_file("bucket/mine/notes.txt", b"mine")
+    code, done, said = run(out, "s3://bucket/mine")
+    assert code == 0, said
+    assert done["address"] == f"{store.endpoint}/bucket/mine/"
+    for path, content in FILES.items():
+        assert files.cat_file(f"bucket/mine/{path}") == content
+    about = {
+        path: files.call_s3("head_object", Bucket="bucket", Key=f"mine/{path}") for path in FILES
+    }
+    assert about["index.html"]["ContentType"] == "text/html; charset=utf-8"
+    assert about["index.html"]["CacheControl"] == AGAIN
+    assert about["assets/page-abc123.js"]["CacheControl"] == FOREVER
+    assert about["volumes/r0_c0.ktx2"]["ContentType"] == "image/ktx2"
+
+    _, again, _ = run(out, "s3://bucket/mine")
+    assert (again["uploaded"], again["uploaded_bytes"], again["removed"]) == (0, 0, 0)
+
+    (out / "bundle/channels/CD31/it's 1.glb").unlink()
+    write(out, {"index.html": b"<!doctype html>other"})
+    _, third, _ = run(out, "s3://bucket/mine")
+    assert (third["uploaded"], third["removed"]) == (2, 1)
+    assert not files.exists("bucket/mine/channels/CD31/it's 1.glb")
+    assert files.cat_file("bucket/mine/notes.txt") == b"mine"
+    listed = json.loads(files.cat_file(f"bucket/mine/{LIST}"))["files"]
+    assert listed["index.html"]["sha256"] == hashlib.sha256(b"<!doctype html>other").hexdigest()
+
+
+def test_any_file_system_of_fsspec_will_do(out: Path, run: Run) -> None:
+    import fsspec
+
+    code, done, said = run(out, "memory://a site")
+    assert code == 0, said
+    assert done["address"] is None
+    files = fsspec.filesystem("memory")
+    assert files.cat_file("/a site/volumes/r0_c0.ktx2") == FILES["volumes/r0_c0.ktx2"]
+    assert run(out, "memory://a site")[1]["uploaded"] == 0
