@@ -21,6 +21,7 @@ FILES = {
     "sw.js": b"self;",
     "manifest.json": b'{"a": "' + b"b" * 2000 + b'"}',
     "assets/page-abc123.js": b"1;",
+    **{f"assets/part-{i}.js": b"%d;" % i for i in range(40)},
     "channels/CD31/it's 1.glb": b"glTF" + bytes(3000),
     "volumes/r0_c0.ktx2": bytes(range(256)) * 40,
 }
@@ -85,9 +86,9 @@ def test_a_folder_gets_the_bundle_and_then_what_has_changed(
     assert third["removed"] == 1
     assert not (site / "channels").exists()
     assert {path for path in after if after[path] != there[path]} == {
-        *("volumes/r0_c0.ktx2", "files.json", LIST)
+        *("volumes/r0_c0.ktx2", "files.json", "files.json.gz", LIST)
     }
-    assert third["uploaded"] == 2
+    assert third["uploaded"] == 3
     assert after["CNAME"] == b"me.example"
 
 
@@ -259,7 +260,7 @@ def test_an_object_store_gets_types_and_a_second_run_nothing(
     (out / "bundle/channels/CD31/it's 1.glb").unlink()
     write(out, {"index.html": b"<!doctype html>other"})
     _, third, _ = run(out, "s3://bucket/mine")
-    assert (third["uploaded"], third["removed"]) == (2, 1)
+    assert (third["uploaded"], third["removed"]) == (3, 1)  # and the list, with its packed copy
     assert not files.exists("bucket/mine/channels/CD31/it's 1.glb")
     assert files.cat_file("bucket/mine/notes.txt") == b"mine"
     listed = json.loads(files.cat_file(f"bucket/mine/{LIST}"))["files"]

@@ -25,7 +25,6 @@ PUBLISHED = "stereocell-published.json"
 FILES = "files.json"
 _LAST = ("sw.js", "manifest.json", FILES, "index.html")
 _REMEDY = "run `stereocell bundle OUT` first"
-_AT_ONCE = 8  # requests: most of each is waiting
 _SMALL_BYTES = 1000  # JSON below is as short as it is
 
 
@@ -206,7 +205,7 @@ def _upload(
         if done % max(1, len(paths) // 10) == 0:
             report(f"{done}/{len(paths)} files")
 
-    with ThreadPoolExecutor(_AT_ONCE) as pool:
+    with ThreadPoolExecutor(target.at_once) as pool:
         list(pool.map(put, (path for path in paths if path not in _LAST)))
     for path in _LAST:
         if path in paths:

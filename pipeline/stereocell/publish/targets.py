@@ -25,6 +25,7 @@ class Target(Protocol):
     """Files at a host. Paths have forward slashes; all methods raise OutputError."""
 
     shown: str
+    at_once: int  # files that may be written at a time
 
     @property
     def address(self) -> str | None:
@@ -65,6 +66,7 @@ class FolderTarget:
     """A folder of this machine: of a web server, or of a checked out `gh-pages` branch."""
 
     address = None
+    at_once = 1  # of a folder each writer clears what killed ones have left
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -110,6 +112,8 @@ class FolderTarget:
 
 class StoreTarget:
     """What fsspec opens: object storage, mostly."""
+
+    at_once = 8  # most of a request is waiting
 
     def __init__(self, location: Location, is_public: bool) -> None:
         self.location = location
