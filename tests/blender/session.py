@@ -371,6 +371,21 @@ def step_render(arguments):
     return {"engine": scene.render.engine}
 
 
+def step_gltf(arguments):
+    """Open a glTF file by Blender's own importer; lengths in metres, z up."""
+    assert bpy.ops.import_scene.gltf(filepath=arguments["file"]) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    meshes = [block for block in bpy.data.objects if block.type == "MESH"]
+    places = [block.matrix_world @ v.co for block in meshes for v in block.data.vertices]
+    materials = [slot.material for block in meshes for slot in block.material_slots]
+    shaders = {one.name: one.node_tree.nodes["Principled BSDF"] for one in materials}
+    return {
+        "parents": {block.name: block.parent.name for block in meshes},
+        "colors": {name: list(n.inputs["Base Color"].default_value) for name, n in shaders.items()},
+        "bounds": [[end(p[k] for p in places) for k in range(3)] for end in (min, max)],
+    }
+
+
 def main():
     step, file = sys.argv[1:]
     arguments = json.loads(Path(file).read_text())

@@ -21,13 +21,15 @@ from pxr import Sdf, Usd, UsdGeom
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
+from stereocell.export.options import ExportOptions
+from stereocell.export.write import export_stage
 from stereocell.formats.gltf_decode import read_glb
 from stereocell.formats.vdb import write_vdb
 from stereocell.model.identifiers import to_identifier
 from stereocell.samples.cells import table_beside, write_cells
 from stereocell.usd.validate import validate_stage
 from support.bundles import load
-from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, leaf, write_whole
+from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, NAMES, TILES, leaf, write_whole
 
 PYTHON = os.environ.get("STEREOCELL_BLENDER", "")
 SESSION = Path(__file__).with_name("session.py")
@@ -465,3 +467,15 @@ def test_a_picture_shows_mesh_volume_and_the_new_colour(stage_path: Path, tmp_pa
     for half in (left, right):  # volumes on the left, meshes on the right
         assert letter[:, half].sum() > 50
         assert ball[:, half].sum() > 50
+
+
+def test_its_own_importer_opens_an_exported_gltf(stage_path: Path, tmp_path: Path) -> None:
+    for packing in (None, "draco"):
+        export_stage(stage_path, tmp_path / "f.glb", ExportOptions(lod=0, compress=packing))
+        found = run("gltf", tmp_path, file=tmp_path / "f.glb")
+        assert found["parents"] == {f"{name} {tile}": name for name in NAMES[:2] for tile in TILES}
+        for name, color in zip(NAMES[:2], COLORS[:2], strict=True):
+            assert found["colors"][name] == pytest.approx([*color, 1], abs=1e-6)
+        # the F: 36 voxels of .25 um upright, which is z in Blender
+        low, high = (np.array(end) * 1e6 for end in found["bounds"])
+        assert high[2] - low[2] == pytest.approx(36 * 0.25, rel=0.03)

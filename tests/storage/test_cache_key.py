@@ -17,7 +17,7 @@ from stereocell.building.tasks import evidence, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.read.open_dataset import READERS
 from stereocell.report import page
-from stereocell.storage import assets, cache_key
+from stereocell.storage import assets, cache_key, source_code
 
 ROOT = Path(__file__).parents[2]
 ZARR, TIFF = READERS["ome-zarr"].module, READERS["tiff"].module
@@ -188,7 +188,7 @@ def test_code_changes_the_code(old: str, new: str) -> None:
 
 
 def code(text: str) -> str:
-    return cache_key._code(text.encode())
+    return source_code.read_source(text.encode()).code
 
 
 def test_only_libraries_that_can_change_a_byte_are_in_a_unit_s_key() -> None:

@@ -84,6 +84,20 @@ def marks(store: ObjectStore, prefix: str) -> dict[str, str]:
     }
 
 
+def test_exports_from_there_are_those_from_a_folder(
+    store: ObjectStore, there: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store.files().get("bucket/there", str(tmp_path / "here"), recursive=True)
+    for name in ("f.glb", "f.nrrd", "f.usdz"):
+        for out, folder in ((there, "a"), (str(tmp_path / "here"), "b")):
+            (tmp_path / folder).mkdir(exist_ok=True)
+            assert main(["export", out, str(tmp_path / folder / name)]) == 0
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+    capsys.readouterr()
+    assert main(["export", there, str(tmp_path / "f.usda")]) == 1
+    assert "it names files of OUT by their paths" in capsys.readouterr().err
+
+
 def of_parts(found: dict[str, str]) -> dict[str, str]:
     return {
         key: digest

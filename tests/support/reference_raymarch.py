@@ -142,23 +142,23 @@ def encode(
     """
     alpha = picture[..., 3:]
     if adds_light:
-        light = picture[..., :3] + (1 - alpha) * _decoded(np.asarray(background))
-        blended = _encoded(light)
+        light = picture[..., :3] + (1 - alpha) * decoded(np.asarray(background))
+        blended = encoded(light)
     else:
         clear = np.zeros_like(picture[..., :3])
         color = np.divide(picture[..., :3], alpha, out=clear, where=alpha > 0)
-        blended = _encoded(color) * alpha + (1 - alpha) * np.asarray(background)
+        blended = encoded(color) * alpha + (1 - alpha) * np.asarray(background)
     pixels: NDArray[np.uint8] = np.rint(255 * blended).astype(np.uint8)
     return pixels
 
 
-def _encoded(light: Values) -> Values:
+def encoded(light: Values) -> Values:
     light = np.clip(light, 0.0, 1.0)
     high = 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(light <= 0.0031308, 12.92 * light, high)
 
 
-def _decoded(color: Values) -> Values:
+def decoded(color: Values) -> Values:
     return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
 
 

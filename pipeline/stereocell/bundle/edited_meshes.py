@@ -16,6 +16,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -168,7 +169,9 @@ def _make(
     """Return the coarser levels recomputed from the finest, by level, and their defect counts."""
     fine, first = lods[0], lods[0].level + 1
     spacing = _spacing(tile, channel_id, fine)
-    mesh, _ = _certified(_with_values(read_local(tile, channel_id, fine.level), fine), planes)
+    mesh, _ = _certified(
+        with_vertex_values(read_local(tile, channel_id, fine.level), fine.maps), planes
+    )
     bare = Mesh(mesh.positions, mesh.triangles, mesh.normals)
     openness = np.ones(len(bare.positions), np.float32) if mesh.openness is None else mesh.openness
     paints = [] if mesh.colors is None else list(np.ascontiguousarray(mesh.colors.T))
@@ -250,12 +253,12 @@ def _compose(
     )
 
 
-def _with_values(mesh: Mesh, fine: ComposedLod) -> Mesh:
+def with_vertex_values(mesh: Mesh, maps: ComposedMaps | MadeMaps) -> Mesh:
     """Return the mesh with the occlusion and colours of its maps at its vertices."""
     if mesh.uvs is None:
         return mesh
 
-    def at_vertices(path: Any) -> NDArray[np.float64]:
+    def at_vertices(path: Path | NDArray[np.uint8]) -> NDArray[np.float64]:
         image = read_image(path).astype(np.float64) / 255
         height, width = image.shape[:2]
         assert mesh.uvs is not None
@@ -263,11 +266,11 @@ def _with_values(mesh: Mesh, fine: ComposedLod) -> Mesh:
         rows = np.minimum(((1 - v) * height).astype(int), height - 1)
         return np.asarray(image[rows, np.minimum((u * width).astype(int), width - 1)])
 
-    if fine.maps.occlusion is not None and mesh.openness is None:
-        openness = at_vertices(fine.maps.occlusion)[:, 0].astype(np.float32)
+    if maps.occlusion is not None and mesh.openness is None:
+        openness = at_vertices(maps.occlusion)[:, 0].astype(np.float32)
         mesh = replace(mesh, openness=openness)
-    if fine.maps.color is not None and mesh.colors is None:
-        bent = at_vertices(fine.maps.color)
+    if maps.color is not None and mesh.colors is None:
+        bent = at_vertices(maps.color)
         linear = np.where(bent <= 0.04045, bent / 12.92, ((bent + 0.055) / 1.055) ** 2.4)
         mesh = replace(mesh, colors=linear.astype(np.float32))
     return mesh

@@ -186,6 +186,12 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         flags.declare_bundle,
         commands.one_phase("bundle"),
     ),
+    "export": (
+        "write one file for another program: Blender, a 3D printer, Slicer, PowerPoint, ...",
+        "export out/mine cells.glb --channels CD31 --max-triangles 200000",
+        flags.declare_export,
+        commands.export,
+    ),
     "report": (
         "write a page with pictures, sizes and times",
         "report out/mine",
@@ -239,7 +245,7 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
 # Commands that write into OUT: one of them at a time
 WRITERS = frozenset({"build", "plan", "units", "stage", "bundle", "report", "tissue"})
 # Commands that read an OUT on object storage -> the part that is fetched first; "": all of it
-READERS = {"check": "", "view": "bundle", "serve": "bundle"}
+READERS = {"check": "", "export": "stage", "view": "bundle", "serve": "bundle"}
 # Commands that import no large library
 LIGHT = frozenset({"settings", "doctor"})
 

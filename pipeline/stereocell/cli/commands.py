@@ -292,6 +292,31 @@ def _deep(options: argparse.Namespace) -> "Iterator[CheckLine]":
         engine.close()
 
 
+def export(options: argparse.Namespace) -> Answer:
+    """Write one file for another program."""
+    from dataclasses import fields
+
+    from stereocell.engine.run import console
+    from stereocell.export.options import ExportOptions, parse_region
+    from stereocell.export.write import export as write
+
+    given: dict[str, Any] = {
+        field.name: getattr(options, field.name, None) for field in fields(ExportOptions)
+    }
+    given["region"] = None if options.region is None else parse_region(options.region)
+    about = write(
+        options.out,
+        options.file,
+        ExportOptions(**given),
+        stage=options.stage,
+        report=lambda line: console.print(f"export: {line}", markup=False),
+    )
+    print_unless_json(options, f"wrote {options.file}: {about}")
+    return Answer(
+        {"out": str(options.shown), "file": str(options.file), "lines": about.split("\n")}
+    )
+
+
 def doctor(options: argparse.Namespace) -> Answer:
     """Examine this machine; the exit code is 1 where a needed part is missing."""
     from stereocell.cli.doctor import examine

@@ -197,4 +197,14 @@ LOOKS: tuple[Callable[[], Finding], ...] = (
         "onnxruntime",
         "optional, for `stereocell tissue --model` alone (pip install 'stereocell[onnx]')",
     ),
+    _extra(
+        "DracoPy",
+        "DracoPy",
+        "optional, to export .precomputed and Draco's .glb (pip install 'stereocell[draco]')",
+    ),
+    _extra(
+        "imageio-ffmpeg",
+        "imageio_ffmpeg",
+        "optional, to export .mp4 and .webm (pip install 'stereocell[video]')",
+    ),
 )

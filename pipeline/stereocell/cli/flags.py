@@ -313,5 +313,92 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def declare_export(parser: argparse.ArgumentParser) -> None:
+    declare_out(parser)
+    parser.add_argument("file", type=Path, metavar="FILE", help="what to write, by its ending")
+    parser.add_argument("--channels", type=_names, default=(), metavar="A,B", help="these alone")
+    parser.add_argument(
+        "--tiles", type=_names, default=(), metavar="r0_c0,r0_c1", help="these alone"
+    )
+    parser.add_argument("--region", metavar="x0:x1,y0:y1,z0:z1", help="in um, as the stage has it")
+    parser.add_argument("--stage", type=Path, help="an edited stage, instead of OUT/stage")
+    surfaces = parser.add_argument_group("surfaces")
+    surfaces.add_argument("--lod", type=_count, help="level of detail (default 0: the finest)")
+    surfaces.add_argument(
+        "--max-triangles", type=_count, metavar="N", help="the finest level of at most as many"
+    )
+    surfaces.add_argument(
+        "--max-bytes", type=_count, metavar="N", help="the finest level whose file is no larger"
+    )
+    surfaces.add_argument(
+        "--scale",
+        type=_positive,
+        help="times the specimen (default: life-size; in print the size of a hand)",
+    )
+    surfaces.add_argument(
+        "--units",
+        choices=["um", "mm", "m"],
+        help="of the numbers in .stl .3mf .ply .obj .nrrd .nii .raw (default mm)",
+    )
+    surfaces.add_argument(
+        "--wall-mm",
+        type=_positive,
+        metavar="MM",
+        help="name what is thinner in print (default 0.8)",
+    )
+    surfaces.add_argument(
+        "--compress", choices=["meshopt", "draco"], help=".glb of a fifth, for fewer programs"
+    )
+    surfaces.add_argument(
+        "--occlusion",
+        action="store_const",
+        const=True,
+        help="vertices are darker where light is occluded; some programs show these alone",
+    )
+
+    surfaces.add_argument(
+        "--width",
+        type=_width,
+        metavar="PIXELS",
+        help="of .png (default 1600), .mp4 and .webm (640)",
+    )
+    volumes = parser.add_argument_group("volumes")
+    volumes.add_argument(
+        "--bits",
+        type=int,
+        choices=[8, 16],
+        help="8: the channel's window; 16: the source's values (default: 16 where OUT has them)",
+    )
+    volumes.add_argument(
+        "--unity",
+        action="store_const",
+        const=True,
+        help="one channel in .raw or .nrrd, upright, as UnityVolumeRendering reads it",
+    )
+
+
+def _width(text: str) -> int:
+    if not text.isdecimal() or not 64 <= int(text) <= 8192:
+        raise argparse.ArgumentTypeError(f"{text!r} is no width, expected 64 to 8192")
+    return int(text)
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names):
+        raise argparse.ArgumentTypeError(f"{text!r} has an empty name")
+    return names
+
+
+def _positive(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
+    return number
+
+
 def declare_nothing(_: argparse.ArgumentParser) -> None:
     """A command without flags of its own."""

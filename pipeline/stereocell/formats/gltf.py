@@ -117,7 +117,7 @@ def encode_glb(
     buffers = CompressedBuffers()
     attributes = {
         "POSITION": buffers.add_attribute(
-            _padded(offsets.astype(np.uint16)),
+            padded(offsets.astype(np.uint16)),
             {
                 "componentType": _UNSIGNED_SHORT,
                 "type": "VEC3",
@@ -133,8 +133,9 @@ def encode_glb(
         attributes["TEXCOORD_0"] = _add_uvs(buffers, mesh.uvs[order])
         if mesh.tangents is not None and "normalTexture" in maps:
             attributes["TANGENT"] = _add_tangents(buffers, mesh.tangents[order])
-    if mesh.colors is not None or mesh.openness is not None:
-        attributes["COLOR_0"] = _add_colors(buffers, mesh, order)
+    colors = vertex_colors(mesh)
+    if colors is not None:
+        attributes["COLOR_0"] = _add_colors(buffers, colors[order])
     if mesh.objects is not None:
         attributes["_FEATURE_ID_0"] = add_feature_ids(buffers, mesh.objects[order])
         if mesh.paint is not None:
@@ -232,21 +233,28 @@ def _pick(textures: Textures) -> dict[str, bytes]:
     return {name: data for name, data in named.items() if data is not None}
 
 
-def _add_colors(buffers: CompressedBuffers, mesh: Mesh, order: NDArray[Any]) -> int:
-    """Store the factors of the base colour: the mesh's colours, darker where light is occluded.
+def vertex_colors(mesh: Mesh, occlusion: bool = True) -> NDArray[np.uint8] | None:
+    """Return the factors of the base colour, uint8 (n, 3): the mesh's colours, darker where light
+    is occluded. None: the mesh has neither.
 
     glTF has no occlusion at vertices. An occlusion map dims ambient light only, while a factor of
     the colour dims all light. So the occlusion is multiplied by the share of ambient light.
     """
-    colors = np.ones((len(order), 3))
+    openness = mesh.openness if occlusion else None
+    if mesh.colors is None and openness is None:
+        return None
+    colors = np.ones((len(mesh.positions), 3))
     if mesh.colors is not None:
-        colors *= np.clip(mesh.colors[order], 0, 1)
-    if mesh.openness is not None:
-        hidden = 1 - np.clip(mesh.openness[order].astype(np.float64), 0, 1)
+        colors *= np.clip(mesh.colors, 0, 1)
+    if openness is not None:
+        hidden = 1 - np.clip(openness.astype(np.float64), 0, 1)
         colors *= (1 - AMBIENT_SHARE * hidden)[:, np.newaxis]
-    values = _padded(np.rint(colors * 255).astype(np.uint8))
+    return np.rint(colors * 255).astype(np.uint8)
+
+
+def _add_colors(buffers: CompressedBuffers, colors: NDArray[np.uint8]) -> int:
     return buffers.add_attribute(
-        values, {"componentType": _UNSIGNED_BYTE, "normalized": True, "type": "VEC3"}
+        padded(colors), {"componentType": _UNSIGNED_BYTE, "normalized": True, "type": "VEC3"}
     )
 
 
@@ -272,7 +280,7 @@ def _unit(vectors: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     return wide / np.where(lengths == 0, 1.0, lengths)
 
 
-def _padded(values: NDArray[Any]) -> NDArray[Any]:
+def padded(values: NDArray[Any]) -> NDArray[Any]:
     """Return rows of 3 numbers with a zero appended: vertex strides are multiples of 4 bytes."""
     return np.pad(values, ((0, 0), (0, 1)))
 

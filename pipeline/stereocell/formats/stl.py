@@ -1,13 +1,17 @@
 """Write a mesh as binary STL, for slicers of 3D printers and mesh editors.
 
-STL has no unit. Numbers are um, as everywhere: a slicer reads them as mm, 1000 times the size.
+STL has no unit: slicers read its numbers as mm. Closed tiles are in um, as everywhere, so they are
+1000 times as large in print; what `stereocell export` writes is in the unit that its head states.
 """
 
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from stereocell.formats.body import Body
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.model.version import GENERATOR
@@ -24,15 +28,31 @@ def write_stl(path: Path, mesh: Mesh) -> None:
 
     Raises OutputError if the file can't be written.
     """
-    triangles = np.zeros(len(mesh.triangles), _TRIANGLE)
-    corners = mesh.positions[mesh.triangles]
-    a, b, c = corners.astype(np.float64).transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    triangles["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-    triangles["corners"] = corners
-    head = f"{GENERATOR}, um".encode().ljust(_HEAD - 4)
     with replacing(path) as file:
-        file.write_bytes(head + np.uint32(len(triangles)).tobytes() + triangles.tobytes())
+        _write(file, [(mesh.positions, mesh.triangles)], "um")
+
+
+def write_stl_file(path: Path, bodies: Sequence[Body], *, unit: str) -> None:
+    """Write bodies one after another; STL can't tell them apart, nor their colours."""
+    _write(path, [(body.positions, body.triangles) for body in bodies], unit)
+
+
+def _write(
+    path: Path, meshes: Sequence[tuple[NDArray[np.float32], NDArray[np.uint32]]], unit: str
+) -> None:
+    head = f"{GENERATOR}, {unit}".encode().ljust(_HEAD - 4)
+    count = sum(len(triangles) for _, triangles in meshes)
+    with path.open("wb") as file:
+        file.write(head + np.uint32(count).tobytes())
+        for positions, corner_numbers in meshes:
+            triangles = np.zeros(len(corner_numbers), _TRIANGLE)
+            corners = positions[corner_numbers]
+            a, b, c = corners.astype(np.float64).transpose(1, 0, 2)
+            normal = np.cross(b - a, c - a)
+            lengths = np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+            triangles["normal"] = normal / lengths
+            triangles["corners"] = corners
+            file.write(triangles.tobytes())
 
 
 def check_stl(path: Path) -> None:

@@ -4,6 +4,7 @@ Parallel projection from the front, above and the right. One lamp stands over th
 a weaker one on the right; light comes from the sky and the ground as well.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from stereocell.preview.draw_slices import encode
 from stereocell.textures.rasterize import find_pixels
 
 Vector = NDArray[np.float64]
+Box = tuple[tuple[float, ...], tuple[float, ...]]
 
 # Direction of the eye, from the front, above and the right: x right, y up, z towards the viewer.
 _EYE = np.array([0.42, 0.5, 1.0])
@@ -38,6 +40,16 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True)
+class Shape:
+    """A mesh in memory, and the linear RGB of all of it (3,) or of its vertices (n, 3), 0..1."""
+
+    positions: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+    normals: NDArray[np.float32]
+    color: Vector
+
+
+@dataclass(frozen=True, slots=True)
 class Scene:
     """The content of one picture. Boxes are (min, max) corners (x, y, z) in world um.
 
@@ -47,8 +59,8 @@ class Scene:
     """
 
     surfaces: tuple[Surface, ...]
-    boxes: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]
-    frame: tuple[tuple[float, ...], tuple[float, ...]]
+    boxes: tuple[Box, ...]
+    frame: Box
     size: tuple[int, int]
 
 
@@ -82,43 +94,77 @@ class _View:
 
 def draw_scene(scene: Scene) -> Picture:
     """Return a picture of the scene."""
-    view = _look_at(scene)
+    image = draw_image(map(_load, scene.surfaces), scene.frame, scene.size, boxes=scene.boxes)
+    return Picture(encode(image), *image.size)
+
+
+def _load(surface: Surface) -> Shape:
+    with np.load(surface.file) as arrays:
+        positions, triangles, normals = (
+            arrays[name] for name in ("positions", "triangles", "normals")
+        )
+    return Shape(positions, triangles, normals, np.array(surface.color))
+
+
+def draw_image(
+    shapes: Iterable[Shape],
+    frame: Box,
+    size: tuple[int, int],
+    *,
+    boxes: Iterable[Box] = (),
+    turned_deg: float = 0.0,
+) -> Image.Image:
+    """Return a picture of meshes; see Scene.
+
+    turned_deg  the eye goes round the upright axis by this; `frame` fills the picture at 0
+    """
+    view = _look_at(frame, size, turned_deg)
     picture = np.empty((view.size[0] * view.size[1], 3))
     picture[:] = _BACKGROUND
     nearest = np.full(view.size, -np.inf)
-    for surface in scene.surfaces:
-        with np.load(surface.file) as arrays:
-            positions, triangles, normals = (
-                arrays[name] for name in ("positions", "triangles", "normals")
-            )
-        places, depth = view.place(positions)
-        corners = places[triangles]
-        pixel, triangle, weights = find_pixels(corners, depth[triangles], view.size, nearest)
-        shaded = np.einsum("nk,nkj->nj", weights, normals[triangles[triangle]].astype(np.float64))
+    for shape in shapes:
+        places, depth = view.place(shape.positions)
+        corners = places[shape.triangles]
+        pixel, triangle, weights = find_pixels(corners, depth[shape.triangles], view.size, nearest)
+        at = shape.triangles[triangle]
+        shaded = np.einsum("nk,nkj->nj", weights, shape.normals[at].astype(np.float64))
         shaded = shaded @ view.axes
         shaded[_are_turned_away(corners[triangle])] *= -1  # the inside is drawn, too
-        picture[pixel] = _light(shaded, np.array(surface.color))
-    for low, high in scene.boxes:
+        color = shape.color
+        if color.ndim == 2:
+            color = np.einsum("nk,nkj->nj", weights, color[at])
+        picture[pixel] = _light(shaded, color)
+    for low, high in boxes:
         _outline(picture, nearest, view, np.array([low, high]))
     drawn = picture.reshape(*view.size, 3)
     parts = [drawn[down::_FINE, on::_FINE] for down in range(_FINE) for on in range(_FINE)]
     mean = sum(parts[1:], parts[0]) / len(parts)  # a third of what .mean over two axes takes
-    image = Image.fromarray(to_srgb8(mean.astype(np.float32)))
-    return Picture(encode(image), *image.size)
+    return Image.fromarray(to_srgb8(mean.astype(np.float32)))
 
 
-def _look_at(scene: Scene) -> _View:
-    low, high = (np.array(corner) for corner in scene.frame)
+def turning_frame(low: Vector, high: Vector) -> Box:
+    """Return the frame that a box (x, y, z) never leaves, however far it is turned."""
+    middle, half = (low + high) / 2, (high - low) / 2
+    aside = np.abs(_EYE[[0, 2]]).sum() / np.hypot(_EYE[0], _EYE[2])
+    half[[0, 2]] = np.hypot(half[0], half[2]) / aside
+    return tuple((middle - half).tolist()), tuple((middle + half).tolist())
+
+
+def _look_at(frame: Box, size: tuple[int, int], turned_deg: float) -> _View:
+    low, high = (np.array(corner) for corner in frame)
     to_eye = _EYE / np.linalg.norm(_EYE)
     right = np.cross(_UP, to_eye)
     right /= np.linalg.norm(right)
     up = np.cross(to_eye, right)
     # width and height of the frame's box from the eye
     across, upright = float(np.abs(right) @ (high - low)), float(np.abs(up) @ (high - low))
-    width, most = scene.size
+    width, most = size
     height = int(np.clip(width * upright / across, min(0.3 * width, most), most))
     scale = _FINE * min(width / across, height / upright) / _MARGIN
     axes = np.stack([right, up, to_eye], axis=1)
+    if turned_deg:
+        sin, cos = np.sin(np.radians(turned_deg)), np.cos(np.radians(turned_deg))
+        axes = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]]) @ axes
     return _View(axes, (low + high) / 2, scale, (height * _FINE, width * _FINE))
 
 

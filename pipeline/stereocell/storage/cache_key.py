@@ -7,7 +7,6 @@ result's content. In all others, comments, docstrings and texts of messages don'
 counts by its version where a module of the walk imports it.
 """
 
-import ast
 import hashlib
 import json
 import sys
@@ -19,6 +18,7 @@ from types import ModuleType
 from typing import Any
 
 from stereocell.storage.assets import find_asset
+from stereocell.storage.source_code import keep_sources, read_source
 
 # packages and modules below `stereocell` whose code changes no byte of a result
 NEUTRAL = (
@@ -35,9 +35,6 @@ NEUTRAL = (
 )
 _PACKAGE = Path(__file__).parents[1]
 _NAME = _PACKAGE.name
-_FINDER = find_asset.__name__
-_LOG_METHODS = {"print", "log", "debug", "info", "warning", "warn", "error"}
-_LOG_OBJECTS = {"console", "logger", "logging", "log", "warnings"}
 
 
 def key_of(content: Any, *makers: ModuleType | str) -> str:
@@ -47,6 +44,7 @@ def key_of(content: Any, *makers: ModuleType | str) -> str:
     makers   the modules, or their dotted names, whose code makes it
     """
     digests = [_digest(_name(maker)) for maker in makers]
+    keep_sources()
     return hashlib.sha256(json.dumps([content, digests], sort_keys=True).encode()).hexdigest()[:20]
 
 
@@ -68,7 +66,7 @@ def _digest(module: str) -> str:
     digest = hashlib.sha256(json.dumps(libraries).encode())
     for file in files:
         content = file.read_bytes()
-        digest.update(_code(content).encode() if file.suffix == ".py" else content)
+        digest.update(read_source(content).code.encode() if file.suffix == ".py" else content)
     return digest.hexdigest()
 
 
@@ -112,72 +110,6 @@ def _is_below(name: str, parts: Collection[str]) -> bool:
 
 
 @cache
-def _code(content: bytes) -> str:
-    """Return a module's syntax tree as text, without docstrings and texts of messages."""
-    return ast.dump(_Bare(has_settings=b"setting" in content).visit(ast.parse(content)))
-
-
-class _Bare(ast.NodeTransformer):
-    """Removes from a syntax tree all parts that change no result.
-
-    has_settings  whether the module may define settings, the one such part of an expression; most
-        modules don't, and expressions are most of a tree
-    """
-
-    def __init__(self, *, has_settings: bool) -> None:
-        self.has_settings = has_settings
-
-    def visit(self, node: ast.AST) -> Any:
-        """Visit statements, and expressions where one may hold such a part."""
-        if isinstance(node, ast.expr) and not self.has_settings:
-            return node
-        return super().visit(node)
-
-    def generic_visit(self, node: ast.AST) -> ast.AST:
-        """Visit a node's own; a body of which nothing is left does nothing."""
-        super().generic_visit(node)
-        if getattr(node, "body", None) == []:
-            node.body = [ast.Pass()]  # type: ignore[attr-defined]
-        return node
-
-    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
-        """Remove docstrings (any lone constant), prints and log lines."""
-        match node.value:
-            case ast.Constant():
-                return None
-            case ast.Call(func=ast.Name(id="print")):
-                return None
-            case ast.Call(func=ast.Attribute(value=ast.Name(id=owner), attr=method)) if (
-                owner in _LOG_OBJECTS and method in _LOG_METHODS
-            ):
-                return None
-        return self.generic_visit(node)
-
-    def visit_Pass(self, node: ast.Pass) -> None:
-        """Remove statements without effect."""
-
-    def visit_Raise(self, node: ast.Raise) -> ast.AST:
-        """Remove an error's text; keep its class and the statement."""
-        return _Wordless().visit(node)
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        """Remove the comment of a setting, which follows its default."""
-        if isinstance(node.func, ast.Name) and node.func.id == "setting":
-            node.args, node.keywords = node.args[:1], []
-        return self.generic_visit(node)
-
-
-class _Wordless(ast.NodeTransformer):
-    """Removes the texts from an expression."""
-
-    def visit_Constant(self, node: ast.Constant) -> ast.AST:
-        return ast.Constant(None) if isinstance(node.value, str) else node
-
-    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
-        return ast.Constant(None)
-
-
-@cache
 def _distributions() -> Mapping[str, tuple[Distribution, ...]]:
     """Return the installed packages by the names under which they are imported.
 
@@ -209,28 +141,11 @@ def _modules() -> Mapping[str, Path]:
 @cache
 def _needs(file: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """Return the shipped files and the modules that a file of ours names."""
-    code = file.read_bytes()
-    tree = ast.parse(code)
-    assets = _assets(tree) if _FINDER.encode() in code else ()
-    return tuple(assets), tuple(_imports(tree.body))
+    source = read_source(file.read_bytes())
+    return tuple(_files(source.assets)), source.imports
 
 
-def _assets(tree: ast.Module) -> Iterator[Path]:
-    """Yield the shipped files that a module finds by a literal name."""
-    for node in ast.walk(tree):
-        match node:
-            case ast.Call(func=ast.Name(id=id), args=[ast.Constant(value=name)]) if id == _FINDER:
-                asset = find_asset(str(name))
-                yield from asset.rglob("*.*") if asset.is_dir() else [asset]
-
-
-def _imports(statements: Iterable[ast.AST]) -> Iterator[str]:
-    """Yield the imports of statements and of those inside them; expressions contain none."""
-    for node in statements:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module is not None:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        for inside in ("body", "handlers", "cases", "orelse", "finalbody"):
-            yield from _imports(getattr(node, inside, ()))
+def _files(assets: Iterable[str]) -> Iterator[Path]:
+    for name in assets:
+        asset = find_asset(name)
+        yield from asset.rglob("*.*") if asset.is_dir() else [asset]

@@ -1,6 +1,7 @@
 """Read the objects of a composed stage: which vertex is whose, and the table's columns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,22 +95,15 @@ def without_hidden(mesh: Mesh, prim: Usd.Prim) -> Mesh | None:
     if not kept.any():
         return None
     number = (np.cumsum(kept) - 1).astype(np.uint32)
+    parts: dict[str, Any] = {
+        field.name: None if part is None else part[kept]
+        for field in fields(mesh)
+        if field.name not in ("triangles", "objects")
+        for part in [getattr(mesh, field.name)]
+    }
     triangles = mesh.triangles[kept[mesh.triangles[:, 0]]]
-
-    def left(values: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
-        return None if values is None else values[kept]
-
-    return Mesh(
-        mesh.positions[kept],
-        number[triangles],
-        mesh.normals[kept],
-        left(mesh.uvs),
-        left(mesh.tangents),
-        left(mesh.colors),
-        left(mesh.openness),
-        (np.cumsum(shown) - 1).astype(np.int32)[mesh.objects[kept]],
-        left(mesh.paint),
-    )
+    objects = (np.cumsum(shown) - 1).astype(np.int32)[mesh.objects[kept]]
+    return Mesh(triangles=number[triangles], objects=objects, **parts)
 
 
 def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | None:

@@ -15,7 +15,7 @@ References: OpenUSD, Usdz File Format Specification, https://openusd.org/release
 import struct
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,22 +60,33 @@ class _Part:
     lod: ComposedLod
 
 
-def write_usdz(stage_path: Path, path: Path, as_written: AsWritten | None = None) -> int | None:
+def write_usdz(
+    stage_path: Path,
+    path: Path,
+    as_written: AsWritten | None = None,
+    *,
+    level: int | None = None,
+    tiles: Collection[str] = (),
+    channels: Collection[str] = (),
+) -> int | None:
     """Write the meshes of a stage, or of a layer over it, as `path`; return the level of detail.
 
     as_written  the lists to compare the stage's files with; None: no comparison
+    level       of detail; None: the finest that is light enough
+    tiles, channels  IDs of those that are written; empty: all
 
     Returns None where no mesh is drawn; then no file is left at `path`. Raises StageError where
     the stage can't be read, OutputError where the file can't be written.
     """
     as_written = as_written or AsWritten({stage_path.parent: {}})
     stage = open_stage(stage_path)
-    level = _choose_level(stage, as_written)
+    level = _choose_level(stage, as_written) if level is None else level
     if level is None:
         remove(path)
         return None
-    parts = list(_read_parts(stage, level))
-    boxes = [hinted_box(prim) for prim in tile_prims(stage)]
+    prims = [prim for prim in tile_prims(stage) if not tiles or prim.GetName() in tiles]
+    parts = list(_read_parts(stage, prims, channels, level))
+    boxes = [hinted_box(prim) for prim in prims]
     low = np.min([box[0] for box in boxes], axis=0)
     high = np.max([box[1] for box in boxes], axis=0)
     flat = _new_stage(specimen_name(stage), float((high - low).max()), level)
@@ -113,12 +124,16 @@ def _is_drawn(mesh: UsdGeom.Mesh) -> bool:
     return bool(mesh.ComputeVisibility() != UsdGeom.Tokens.invisible)
 
 
-def _read_parts(stage: Usd.Stage, level: int) -> Iterator[_Part]:
+def _read_parts(
+    stage: Usd.Stage, prims: list[Usd.Prim], wanted: Collection[str], level: int
+) -> Iterator[_Part]:
     """Yield every drawn mesh with triangles at a level, or at its coarsest where it has fewer."""
     channels = [str(prim.GetName()) for prim in stage.GetPrimAtPath(CHANNELS).GetChildren()]
-    for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
+    for name in [str(prim.GetName()) for prim in prims]:
         with loaded(stage, name) as (tile, _):
             for channel in channels:
+                if wanted and channel not in wanted:
+                    continue
                 lods = [lod for lod in read_lods(tile, channel) if lod.level <= level]
                 if lods and len(lods[-1].mesh.triangles):
                     yield _Part(name, channel, lods[-1])

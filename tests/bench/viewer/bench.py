@@ -4,7 +4,9 @@ The same volume, transfer function, camera and 512 x 512 picture in one headless
 NiiVue, three's own example and ours, ROUNDS rounds of each in turn. Given are the median time, and
 the median of the rounds' ratios to ours. Software draws it unless STEREOCELL_GPU_FLAGS holds
 Chromium's flags for a GPU: only ratios mean anything. PSNR is against the float64 reference, of the
-whole picture and of the pixels where the reference shows something. The pictures stay in OUT.
+whole picture, of the pixels where the reference shows something, and there of the opacity that a
+picture shows: ours adds light, where a little opacity is ten times as much of 8 bits as where
+encoded colours are blended, as peers do it. The pictures stay in OUT.
 
 Light is off where peers are compared: each has its own. No peer lets its settings be matched more
 closely than scene.py and src/*.ts say.
@@ -28,14 +30,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from scene import SIZE_PX, Scene, brain_cells, head, nuclei, reference
 
-from support.reference_raymarch import encode, path_voxels, psnr
+from support.reference_raymarch import decoded, encode, encoded, path_voxels, psnr
 
 HERE = Path(__file__).parent
 ROUNDS = int(os.environ.get("ROUNDS", "15"))
 RIVALS = {"parallel": "narrow"}  # the camera of ours that a peer's is compared with
 HEAD = (
-    ("scene", "camera", "ms", "of ours", "samples", "PSNR", "where"),
-    ("", "", "", "", "a ray", "dB", "drawn"),
+    ("scene", "camera", "ms", "of ours", "samples", "PSNR", "where", "of its"),
+    ("", "", "", "", "a ray", "dB", "drawn", "opacity"),
 )
 NIIVUE_OPAQUE = 0.95  # its rays end here, and are scaled to 1
 
@@ -134,6 +136,21 @@ def unblended(picture: NDArray[np.uint8], color: NDArray[np.uint8]) -> NDArray[n
     return pixels
 
 
+def psnr_of_opacity(
+    picture: NDArray[np.uint8],
+    opacity: NDArray[np.float64],
+    color: NDArray[np.float64],
+    *,
+    adds_light: bool,
+) -> str:
+    """Return in dB how near the opacity is that a picture of one colour shows, where any is."""
+    k = int(np.argmax(color))
+    level = picture[..., k] / 255
+    shown = decoded(level) / color[k] if adds_light else level / encoded(color)[k]
+    error = (np.clip(shown, 0, 1) - opacity)[opacity > 0]
+    return f"{-10 * np.log10(np.mean(error**2)):.1f}"
+
+
 def row(run: Run, scene: Scene, timings: dict[str, Timing], folder: Path) -> str:
     """Return a run's line of the table."""
     timing = timings[run.name]
@@ -153,7 +170,8 @@ def row(run: Run, scene: Scene, timings: dict[str, Timing], folder: Path) -> str
         ratio = f"{statistics.median(its / ours for its, ours in pairs):.2f}"
     text = (
         f"{run.scene:15} {run.says:32} {run.camera:12} {ms:7.0f} {ratio:>7} {samples:>8} "
-        f"{psnr(found, expected):7.1f} {psnr(found, expected, there):7.1f}"
+        f"{psnr(found, expected):7.1f} {psnr(found, expected, there):7.1f} "
+        f"{psnr_of_opacity(found, ideal[..., 3], scene.block.colors[0], adds_light=is_ours):>7}"
     )
     if run.renderer != "niivue":
         return text

@@ -1,4 +1,4 @@
-/** Headless Chromium with software WebGL. */
+/** Headless Chromium, with software WebGL or a GPU's. */
 import { existsSync } from "node:fs";
 import { readFile } from "node:fs/promises";
 import { type BrowserContext, type BrowserServer, chromium, type Page } from "playwright-core";
@@ -23,9 +23,11 @@ const FLAGS = [
   "--disable-background-networking",
   "--disable-component-update",
   "--disable-sync",
+  "--ignore-gpu-blocklist",
+];
+const SOFTWARE = [
   "--use-angle=swiftshader",
   "--enable-unsafe-swiftshader",
-  "--ignore-gpu-blocklist",
   // what is round the canvas is drawn without the software GPU, which takes most of it otherwise
   "--disable-gpu-compositing",
   "--disable-gpu-rasterization",
@@ -48,13 +50,20 @@ export type Surroundings = Readonly<{
   serviceWorkers?: "allow" | "block";
 }>;
 
-/** Start the browser, in a profile that goes when it closes. */
+/**
+ * Start the browser, in a profile that goes when it closes. Software draws, unless STEREOCELL_GPU_FLAGS
+ * holds Chromium's flags for a GPU.
+ */
 export function serveChromium(): Promise<BrowserServer> {
   if (!hasChromium()) throw new Error(HOW_TO_GET);
   return chromium.launchServer({
     executablePath: CHROMIUM,
     headless: false, // playwright's own switch is the old mode; the flag below is the new one
-    args: ["--headless=new", ...FLAGS],
+    args: [
+      "--headless=new",
+      ...FLAGS,
+      ...(process.env.STEREOCELL_GPU_FLAGS?.split(" ") ?? SOFTWARE),
+    ],
   });
 }
 

@@ -1,0 +1,1 @@
+"""One file for other programs, made from the composed stage: `stereocell export OUT FILE`."""

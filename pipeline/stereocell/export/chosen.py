@@ -1,0 +1,244 @@
+"""What of a composed stage is exported: its channels, tiles and level, read a tile at a time.
+
+The stage is read as the bundle reads it, with all layers over it: surfaces that were edited by hand
+come with coarser levels made anew, and files that are damaged end the export.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from stereocell.bundle.edited_meshes import shown_lods, with_vertex_values
+from stereocell.bundle.write_tile import find_bounds
+from stereocell.export.options import ExportOptions, Region
+from stereocell.formats.gltf import Material
+from stereocell.meshes.clip import clip_mesh
+from stereocell.model.errors import StageError, UsageError
+from stereocell.model.mesh import Mesh
+from stereocell.usd.layer import move_box
+from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
+from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
+from stereocell.usd.read_stage import (
+    ComposedVolume,
+    hinted_box,
+    loaded,
+    mesh_at,
+    open_stage,
+    read_volume,
+    tile_prims,
+)
+from stereocell.usd.read_variants import TileChoice, lod_levels
+from stereocell.usd.written_files import AsWritten
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """The surface of a channel in a tile, world um, with what maps had at its vertices.
+
+    objects  of a label map's tile: `mesh.objects` counts in it
+    moved    the matrix (4, 4) for row vectors from its own space to the world, row by row: tiles
+             with the same fit each other
+    cuts     the faces of the tile's box, in its own space: the axis and where
+    """
+
+    tile: str
+    channel: ComposedAppearance
+    mesh: Mesh
+    material: Material
+    objects: TileObjects | None = None
+    moved: tuple[float, ...] = ()
+    cuts: tuple[tuple[int, float], ...] = ()
+
+    @property
+    def object_names(self) -> list[str]:
+        """The names of a label map's objects, by their number in the tile."""
+        if self.objects is None:
+            return []
+        names = self.objects.names or ("",) * len(self.objects.labels)
+        labelled = zip(names, self.objects.labels.tolist(), strict=True)
+        return [name or f"{self.channel.name} {label}" for name, label in labelled]
+
+
+class Chosen:
+    """The part of a stage that is exported.
+
+    Raises UsageError for a channel or a tile that the stage does not have.
+    """
+
+    def __init__(
+        self, stage_path: Path, options: ExportOptions, report: Report = lambda _: None
+    ) -> None:
+        self.path, self.options, self.report = stage_path, options, report
+        self.as_written = AsWritten()
+        self.as_written.require_layers(stage_path.parent)
+        self.stage = open_stage(stage_path)
+        for layer in self.stage.GetUsedLayers():
+            if layer.realPath:
+                self.as_written.require(Path(layer.realPath))
+        self.channels = self._channels()
+        self.all_tiles = {str(prim.GetName()): hinted_box(prim) for prim in tile_prims(self.stage)}
+        if not self.all_tiles:
+            raise StageError(f"{stage_path}: no tile is visible")
+        unknown = [name for name in options.tiles if name not in self.all_tiles]
+        if unknown:
+            known = ", ".join(self.all_tiles)
+            raise UsageError(f"--tiles: no {unknown[0]!r} is visible, expected of {known}")
+        self.tiles = [name for name in self.all_tiles if name in options.tiles or not options.tiles]
+
+    @contextmanager
+    def _loaded(self, name: str) -> Iterator[tuple[Usd.Prim, TileChoice]]:
+        """Yield a tile and what the stage selects of it, not what was selected to read it."""
+        try:
+            with loaded(self.stage, name, self.as_written) as found:
+                yield found
+        finally:
+            self.stage.GetSessionLayer().Clear()
+
+    def _channels(self) -> list[ComposedAppearance]:
+        found, wanted = read_appearances(self.stage), self.options.channels
+        for name in wanted:
+            if not any(name in (one.name, one.id) for one in found):
+                known = ", ".join(one.name for one in found)
+                raise UsageError(f"--channels: no {name!r}, expected of {known}")
+        return [one for one in found if not wanted or one.name in wanted or one.id in wanted]
+
+    @property
+    def region(self) -> Region | None:
+        return self.options.region
+
+    @property
+    def box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return least and largest (x, y, z), world um, of the tiles within the region."""
+        low, high = (np.array([self.all_tiles[tile][end] for tile in self.tiles]) for end in (0, 1))
+        box = low.min(axis=0), high.max(axis=0)
+        if self.region is None:
+            return box
+        low, high = np.maximum(box[0], self.region.low), np.minimum(box[1], self.region.high)
+        if not (low < high).all():
+            raise UsageError("--region: no tile is in it")
+        return low, high
+
+    def count_triangles(self) -> list[int]:
+        """Return the triangles of the chosen tiles and channels at each level, finest first."""
+        by_tile: list[list[int]] = []
+        for name in self.tiles:
+            with self._loaded(name) as (tile, choice):
+                levels = range(max([*lod_levels(tile), 0]) + 1)
+                counts = [self._count(tile, max(level, choice.finest_lod)) for level in levels]
+                by_tile.append(counts)
+        longest = max(map(len, by_tile))
+        return [sum(n[min(level, len(n) - 1)] for n in by_tile) for level in range(longest)]
+
+    def _count(self, tile: Usd.Prim, level: int) -> int:
+        prims = [mesh_at(tile, channel.id, level) for channel in self.channels]
+        meshes = [UsdGeom.Mesh(prim) for prim in prims if prim is not None]
+        return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
+
+    def levels(self, light: int | None = None) -> list[int]:
+        """Return the levels to try, finest first: by --lod one, by --max-triangles those below it.
+
+        light  triangles that are enough if neither is given; a coarsest level of more is taken
+
+        Raises UsageError where no level is small enough, StageError where there is no surface.
+        """
+        counts = self.count_triangles()
+        if not any(counts):
+            channels = ", ".join(channel.name for channel in self.channels)
+            raise StageError(f"{self.path}: no surface is drawn of {channels}")
+        if self.options.lod is not None:
+            return [min(self.options.lod, len(counts) - 1)]
+        most = self.options.max_triangles
+        if most is None and light is not None:
+            return [i for i, n in enumerate(counts) if n <= light] or [len(counts) - 1]
+        levels = [i for i, n in enumerate(counts) if most is None or n <= most]
+        if not levels:
+            least = min(counts)
+            raise UsageError(
+                f"--max-triangles is {most}: the coarsest level has {least}: expected as many, or "
+                "fewer --tiles or --channels"
+            )
+        return levels
+
+    def pieces(
+        self, level: int, *, whole: bool = False, channel: str | None = None
+    ) -> Iterator[Piece]:
+        """Yield the surfaces at a level, a tile after another.
+
+        whole    of all tiles, and beyond the region: what a solid is cut from
+        channel  the ID of the one that is read; None: all that are chosen
+        """
+        tiles = list(self.all_tiles) if whole else self.tiles
+        for number, name in enumerate(tiles, 1):
+            with self._loaded(name) as (tile, choice):
+                for one in self.channels:
+                    if channel not in (None, one.id):
+                        continue
+                    piece = self._piece(tile, one, max(level, choice.finest_lod))
+                    if piece is None:
+                        continue
+                    if self.region is not None and not whole:
+                        mesh = clip_mesh(piece.mesh, self.region.low, self.region.high)
+                        piece = replace(piece, mesh=mesh)
+                    if len(piece.mesh.triangles):
+                        yield piece
+            self.report(f"{number}/{len(tiles)} {name}" + (f"/{channel}" if channel else ""))
+
+    def _piece(self, tile: Usd.Prim, channel: ComposedAppearance, level: int) -> Piece | None:
+        shown = shown_lods(tile, channel.id)
+        if shown.edit:
+            self.report(f"{tile.GetName()}/{channel.id}: {shown.edit}")
+        lods = [lod for lod in shown.lods if len(lod.mesh.triangles)]
+        if not lods:
+            return None
+        finer = [lod for lod in lods if lod.level <= level]
+        lod = finer[-1] if finer else lods[0]
+        for image in lod.maps.files:
+            self.as_written.require(image)
+        mesh = with_vertex_values(lod.mesh, lod.images or lod.maps)
+        described = read_columns(self.stage, channel.id) if mesh.objects is not None else None
+        prim = mesh_at(tile, channel.id, lod.level)
+        objects = None
+        if described is not None and prim is not None:
+            objects = read_tile_objects(prim, described[0])
+        if objects is None:
+            mesh = replace(mesh, objects=None)
+        moved = tuple(np.round(lod.matrix, 9).ravel().tolist())
+        ends = self._own_box(tile, channel, lod.matrix)
+        cuts = tuple((axis, float(end[axis])) for axis in range(3) for end in ends)
+        return Piece(str(tile.GetName()), channel, mesh, lod.material, objects, moved, cuts)
+
+    def _own_box(
+        self, tile: Usd.Prim, channel: ComposedAppearance, matrix: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the corners of a tile's box before it was moved."""
+        volume = read_volume(tile, channel.id)
+        if volume is not None:
+            return np.array(volume.low), np.array(volume.high)
+        low, high = self.all_tiles[str(tile.GetName())]
+        return move_box(low, high, np.linalg.inv(matrix).astype(np.float64))
+
+    def volumes(self) -> Iterator[tuple[str, ComposedAppearance, ComposedVolume]]:
+        """Yield the volumes, a tile after another."""
+        for number, name in enumerate(self.tiles, 1):
+            with self._loaded(name) as (tile, _):
+                for channel in self.channels:
+                    volume = read_volume(tile, channel.id)
+                    if volume is not None:
+                        yield name, channel, volume
+            self.report(f"{number}/{len(self.tiles)} {name}")
+
+    def tile_boxes(self) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Return where each visible tile is cut from its neighbours, world um."""
+        boxes = {}
+        for name in self.all_tiles:
+            with self._loaded(name) as (tile, _):
+                low, high = find_bounds(tile, [read_volume(tile, c.id) for c in self.channels])
+                boxes[name] = np.array(low), np.array(high)
+        return boxes

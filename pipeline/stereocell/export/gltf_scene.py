@@ -1,0 +1,91 @@
+"""The whole specimen as one glTF file, metres, y up: a node a channel, below it one a tile.
+
+Of a label map each object is a node of its own, with its name, up to MOST_NODES of them; beyond
+that a tile's objects are one mesh, in their colours.
+"""
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from stereocell.export.chosen import Chosen, Piece
+from stereocell.export.packed_gltf import packed_buffers
+from stereocell.formats.gltf import Material
+from stereocell.formats.plain_gltf import Buffers, Document, PlainBuffers
+from stereocell.model.counted import counted
+from stereocell.model.errors import StageError
+from stereocell.model.mesh import Mesh
+from stereocell.objects.split import split_objects
+from stereocell.usd.layer import METERS_PER_UNIT
+from stereocell.usd.read_attributes import shortest
+from stereocell.usd.read_stage import specimen_name
+
+MOST_NODES = 5000  # objects; more of them take programs minutes to open
+
+
+def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
+    """Write .glb or .gltf; return what is in it. Raises OutputError and StageError."""
+    options = chosen.options
+    scale = METERS_PER_UNIT * (options.scale or 1.0)
+    with tempfile.TemporaryFile(dir=path.parent) as file:
+        buffers = _buffers(chosen, file, level)
+        extras = {"lod": level, "metres_per_um": scale}
+        document = Document(specimen_name(chosen.stage), buffers, extras)
+        count = triangles = 0
+        for piece in chosen.pieces(level):
+            is_split = count + len(piece.object_names) <= MOST_NODES
+            for name, mesh, more in _parts(piece, is_split):
+                positions = mesh.positions.astype(np.float64) * scale
+                where = {"tile": piece.tile, "channel": piece.channel.name, **more}
+                if not np.isfinite(positions).all():
+                    raise StageError(f"{piece.tile}/{piece.channel.id}: a point is not finite")
+                mesh, material = _of_one_color(mesh, piece.material)
+                document.add(
+                    piece.channel.name,
+                    name,
+                    mesh,
+                    positions,
+                    material,
+                    where,
+                    occlusion=bool(options.occlusion),
+                )
+                count += 1
+                triangles += len(mesh.triangles)
+        if not count:
+            raise StageError(f"{chosen.path}: no surface is left to export")
+        document.write(path)
+    return f"{counted(count, 'mesh', 'meshes')}, {triangles:,} triangles at lod{level}"
+
+
+def _of_one_color(mesh: Mesh, material: Material) -> tuple[Mesh, Material]:
+    """Return a mesh whose vertices have one colour without theirs, and a material that has it.
+
+    More programs show a material's colour than vertices'.
+    """
+    if mesh.colors is None or (mesh.colors != mesh.colors[0]).any():
+        return mesh, material
+    red, green, blue = (shortest(part) for part in mesh.colors[0].clip(0, 1))
+    return replace(mesh, colors=None), replace(material, color=(red, green, blue))
+
+
+def _buffers(chosen: Chosen, file: BinaryIO, level: int) -> Buffers:
+    if chosen.options.compress is None:
+        return PlainBuffers(file)
+    low, high = chosen.box
+    scale = METERS_PER_UNIT * (chosen.options.scale or 1.0)
+    return packed_buffers(chosen.options.compress, low * scale, high * scale)
+
+
+def _parts(piece: Piece, is_split: bool) -> Iterator[tuple[str, Mesh, dict[str, str | int]]]:
+    """Yield the meshes of a piece: one, or one an object."""
+    objects, mesh = piece.objects, piece.mesh
+    if objects is None or mesh.objects is None or not is_split:
+        yield f"{piece.channel.name} {piece.tile}", mesh, {}
+        return
+    names = piece.object_names
+    for number, part in split_objects(mesh):
+        yield names[number], part, {"label": int(objects.labels[number])}

@@ -1,0 +1,183 @@
+"""A folder for Neuroglancer, NAME.precomputed: the image, and surfaces as meshes of all levels.
+
+    image/    all channels with volumes, by scale
+    mesh/     a segment a channel: 1, 2, ...
+    CHANNEL/  of a label map: a segment an object, by its label
+
+Voxel (0, 0, 0) spans 0 to 1 there. The format knows no turned volumes: of a turned specimen the
+image's own axes stay, and meshes are turned back onto them.
+"""
+
+import tempfile
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.export.chosen import Chosen
+from stereocell.export.options import UNITS_M
+from stereocell.export.unite import weld
+from stereocell.export.voxels import Layout, fill, find_layout, map_file, places_of_world
+from stereocell.formats.precomputed import (
+    CHUNK,
+    Level,
+    write_mesh,
+    write_meshes_info,
+    write_volume,
+)
+from stereocell.model.errors import StageError, UsageError
+from stereocell.objects.split import split_objects
+from stereocell.usd.layer import METERS_PER_UNIT
+
+_NM = 1e-9  # m
+Surface = tuple[NDArray[np.float32], NDArray[np.uint32]]
+
+
+def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
+    """Write the folder; return a line about it. Raises UsageError without DracoPy."""
+    try:
+        import DracoPy
+    except ModuleNotFoundError:
+        raise UsageError(
+            f"{path.suffix} takes the package DracoPy: pip install 'stereocell[draco]'"
+        ) from None
+    path.mkdir()
+    layout = find_layout(chosen) if _has_volumes(chosen) else None
+    told = []
+    if layout is not None:
+        count = _write_image(path / "image", chosen, layout)
+        told.append(f"image: {layout.about}, {count} scales")
+    to_nm = _places(chosen, layout)
+    levels = len(chosen.count_triangles())
+    channels: dict[int, str] = {}
+    for number, channel in enumerate(chosen.channels, 1):
+        found = _gather(chosen, channel.id, levels)
+        if not found.surfaces:
+            continue
+        folder = path / (channel.id if found.names else "mesh")
+        folder.mkdir(exist_ok=True)
+        for segment, by_level in found.surfaces.items():
+            made = [_level(parts, to_nm) for parts in by_level if parts]
+            write_mesh(folder, segment or number, _different(made), DracoPy.encode)
+        if found.names:
+            write_meshes_info(folder, found.names)
+            told.append(f"{folder.name}: {len(found.names)} meshes")
+        else:
+            channels[number] = channel.name
+    if channels:
+        write_meshes_info(path / "mesh", channels)
+        told.append(f"mesh: {', '.join(channels.values())}, up to {levels} levels")
+    if not told:
+        raise StageError(f"{chosen.path}: neither a volume nor a surface is left to export")
+    return "; ".join(told)
+
+
+@dataclass(slots=True)
+class _Found:
+    """The surfaces of a channel by segment and level, and names of a label map's segments.
+
+    The segment of a channel that is no label map is 0.
+    """
+
+    surfaces: dict[int, list[list[Surface]]] = field(default_factory=dict)
+    names: dict[int, str] = field(default_factory=dict)
+
+
+def _gather(chosen: Chosen, channel_id: str, levels: int) -> _Found:
+    found = _Found()
+    for level in range(levels):
+        for piece in chosen.pieces(level, channel=channel_id):
+            mesh, objects = piece.mesh, piece.objects
+            parts = [(0, mesh)]
+            if objects is not None and mesh.objects is not None:
+                labels, names = objects.labels.tolist(), piece.object_names
+                parts = [(labels[number], part) for number, part in split_objects(mesh)]
+                found.names |= dict(zip(labels, names, strict=True))
+            for segment, part in parts:
+                kept = found.surfaces.setdefault(segment, [[] for _ in range(levels)])
+                kept[level].append((part.positions, part.triangles))
+    return found
+
+
+def _level(parts: list[Surface], to_nm: NDArray[np.float64]) -> Level:
+    """Return surfaces of several tiles as one mesh; `to_nm`: (4, 4), of world um."""
+    positions, triangles = weld(parts)
+    places = positions.astype(np.float64) @ to_nm[:3, :3].T + to_nm[:3, 3]
+    if np.linalg.det(to_nm[:3, :3]) < 0:
+        triangles = np.ascontiguousarray(triangles[:, ::-1])
+    return Level(places, triangles)
+
+
+def _different(levels: list[Level]) -> list[Level]:
+    """Return the levels without those that repeat a finer one."""
+    kept = levels[:1]
+    for level in levels[1:]:
+        if len(level.triangles) < len(kept[-1].triangles):
+            kept.append(level)
+    return kept
+
+
+def _has_volumes(chosen: Chosen) -> bool:
+    return next(iter(chosen.volumes()), None) is not None
+
+
+def _places(chosen: Chosen, layout: Layout | None) -> NDArray[np.float64]:
+    """Return the matrix (4, 4) of world um to Neuroglancer's nm, where the image lies."""
+    to_source = np.eye(4)
+    to_source[:3, :3] = places_of_world(chosen)
+    if layout is None:
+        to_source[:3] *= METERS_PER_UNIT / _NM
+        return to_source
+    grid = layout.grid
+    to_source[:3] *= METERS_PER_UNIT / UNITS_M[grid.unit]
+    to_index = np.linalg.inv(grid.affine) @ to_source
+    to_index[:3, 3] += 0.5  # a voxel's centre
+    return np.diag([*_resolution(layout), 1.0]) @ to_index
+
+
+def _resolution(layout: Layout) -> tuple[float, float, float]:
+    """Return the voxel spacing (x, y, z) in nm."""
+    x, y, z = np.round(layout.grid.spacing * UNITS_M[layout.grid.unit] / _NM, 6).tolist()
+    return x, y, z
+
+
+def _write_image(folder: Path, chosen: Chosen, layout: Layout) -> int:
+    """Write the image; return the number of its scales, each from the last, on disk."""
+    with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
+        file = Path(scratch) / "0"
+        file.touch()
+        values = map_file(file, layout, 0)
+        fill(layout, chosen, values)
+        scales = [(values, _resolution(layout))]
+        while max(scales[-1][0].shape[1:]) > CHUNK:
+            scales.append(_halved(*scales[-1], Path(scratch) / str(len(scales))))
+        write_volume(folder, scales)
+        count = len(scales)
+        del values, scales  # mapped files can't be removed everywhere
+        return count
+
+
+def _halved(
+    values: NDArray[Any], spacing: tuple[float, float, float], file: Path
+) -> tuple[NDArray[Any], tuple[float, float, float]]:
+    """Return means of two voxels along each axis that isn't much coarser than the finest."""
+    factors = [
+        2 if s < 1.5 * min(spacing) and n > 1 else 1
+        for s, n in zip(spacing, values.shape[:0:-1], strict=True)
+    ]
+    fx, fy, fz = factors
+    shape = (
+        len(values),
+        *(-(-n // f) for n, f in zip(values.shape[1:], (fz, fy, fx), strict=True)),
+    )
+    made = np.memmap(file, values.dtype, "w+", shape=shape)
+    for channel, z in product(range(shape[0]), range(shape[1])):
+        slab = values[channel, z * fz : (z + 1) * fz].astype(np.float32).mean(axis=0)
+        padded = np.pad(slab, [(0, -slab.shape[0] % fy), (0, -slab.shape[1] % fx)], mode="edge")
+        blocks = padded.reshape(shape[2], fy, shape[3], fx)
+        made[channel, z] = np.rint(blocks.mean(axis=(1, 3))).astype(values.dtype)
+    sx, sy, sz = spacing
+    return made, (sx * fx, sy * fy, sz * fz)

@@ -1,0 +1,92 @@
+"""A picture of the surfaces, .png, and a turntable of them, .mp4 and .webm.
+
+Drawn as the report draws, without OpenGL: alike on every machine.
+"""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from stereocell.export.chosen import Chosen
+from stereocell.formats.gltf import vertex_colors
+from stereocell.model.errors import OutputError, StageError, UsageError
+from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
+
+PICTURE_TRIANGLES = 2_000_000  # more do not show on 1600 pixels
+VIDEO_TRIANGLES = 200_000  # some 0.6 s of CPU a frame, of 640 pixels
+_PICTURE_WIDTH, _VIDEO_WIDTH = 1600, 640  # pixels
+_FRAMES, _FPS = 120, 24  # once round in 5 s
+_CODECS = {
+    ".mp4": ["libx264", "-crf", "18", "-movflags", "+faststart"],
+    ".webm": ["libvpx-vp9", "-crf", "28", "-b:v", "0"],
+}
+# several threads, the clock and the version of the program would make other bytes
+_SAME_BYTES = ["-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]
+
+
+def write_picture(chosen: Chosen, path: Path, level: int) -> str:
+    """Write .png; return a line about it."""
+    width = chosen.options.width or _PICTURE_WIDTH
+    low, high = chosen.box
+    frame = tuple(low.tolist()), tuple(high.tolist())
+    image = draw_image(_shapes(chosen, level), frame, (width, width))
+    image.save(path, optimize=True)
+    return f"{image.width} x {image.height} pixels at lod{level}"
+
+
+def write_turntable(chosen: Chosen, path: Path, level: int) -> str:
+    """Write .mp4 or .webm; return a line about it. Raises UsageError without imageio-ffmpeg."""
+    try:
+        import imageio_ffmpeg
+    except ModuleNotFoundError:
+        raise UsageError(
+            f"{path.suffix} takes the package imageio-ffmpeg: pip install 'stereocell[video]'"
+        ) from None
+    shapes = list(_shapes(chosen, level))
+    size = _encode(chosen, path, shapes, imageio_ffmpeg.get_ffmpeg_exe())
+    return f"{size[0]} x {size[1]} pixels, {_FRAMES} frames, {_FPS} a second, at lod{level}"
+
+
+def _encode(chosen: Chosen, path: Path, shapes: list[Shape], ffmpeg: str) -> tuple[int, int]:
+    """Draw the frames, each straight into ffmpeg; return their width and height."""
+    width = chosen.options.width or _VIDEO_WIDTH
+    frame = turning_frame(*chosen.box)
+    first = draw_image(shapes, frame, (width, width))
+    size = first.width // 2 * 2, first.height // 2 * 2  # of colours in fours
+    taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{_FPS}"]
+    made = ["-an", "-pix_fmt", "yuv420p", "-c:v", *_CODECS[path.suffix.lower()], *_SAME_BYTES]
+    command = [ffmpeg, "-y", "-loglevel", "error", *taken, "-i", "-", *made, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
+        assert encoder.stdin is not None
+        assert encoder.stderr is not None
+        try:
+            for number in range(_FRAMES):
+                turned = number * 360 / _FRAMES
+                image = draw_image(shapes, frame, (width, width), turned_deg=turned)
+                encoder.stdin.write(np.asarray(image)[: size[1], : size[0]].tobytes())
+                if number % _FPS == 0:
+                    chosen.report(f"frame {number}/{_FRAMES}")
+            encoder.stdin.close()
+        except BrokenPipeError:
+            pass  # ffmpeg says why
+        told = encoder.stderr.read().decode(errors="replace").strip()
+    if encoder.returncode:
+        last = told.splitlines()[-1] if told else f"exit code {encoder.returncode}"
+        raise OutputError(f"{path.name}: ffmpeg: {last}")
+    return size
+
+
+def _shapes(chosen: Chosen, level: int) -> Iterator[Shape]:
+    count = 0
+    for piece in chosen.pieces(level):
+        count += 1
+        color = np.array(piece.material.color)
+        factors = vertex_colors(piece.mesh, bool(chosen.options.occlusion))
+        if factors is not None:
+            color = factors / 255 * color
+        mesh = piece.mesh
+        yield Shape(mesh.positions, mesh.triangles, mesh.normals, color)
+    if not count:
+        raise StageError(f"{chosen.path}: no surface is left to export")

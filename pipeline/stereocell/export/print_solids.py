@@ -1,0 +1,191 @@
+"""Closed solids for 3D printers and mesh programs: .stl, .3mf, .ply, .obj.
+
+A body a channel, all tiles united; of a label map a body an object. STL has no names: there all
+channels become one body, or they would be solid twice where they overlap. Lengths are scaled so
+that the specimen fits a hand, if --scale says nothing else.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import manifold3d
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.export.cap import close_cuts
+from stereocell.export.chosen import Chosen, Piece
+from stereocell.export.options import UNITS_M
+from stereocell.export.thin_walls import describe_thin
+from stereocell.export.unite import Corners, cut_to, to_mesh, to_solid, unite, weld
+from stereocell.formats.body import Body
+from stereocell.formats.obj import write_obj
+from stereocell.formats.ply import write_ply
+from stereocell.formats.stl import write_stl_file
+from stereocell.formats.threemf import write_3mf
+from stereocell.model.color import to_srgb8
+from stereocell.model.counted import counted
+from stereocell.model.errors import StageError
+from stereocell.objects.split import split_objects
+from stereocell.usd.layer import METERS_PER_UNIT
+from stereocell.usd.read_stage import specimen_name
+
+HAND_M = 0.1  # longest edge of a specimen in print, if no --scale is given
+WALL_MM = 0.8  # two lines of the usual nozzle of 0.4 mm
+Color = tuple[float, float, float]
+
+
+Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]  # positions and triangles
+
+
+@dataclass(slots=True)
+class _Surface:
+    """Meshes of tiles that fit each other, and where these were cut; see `Piece`."""
+
+    moved: tuple[float, ...]
+    meshes: list[Mesh] = field(default_factory=list)
+    cuts: set[tuple[int, float]] = field(default_factory=set)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What becomes one body. `color`: linear RGB. Surfaces by label and by how tiles were moved."""
+
+    name: str
+    color: Color
+    surfaces: dict[tuple[int | None, tuple[float, ...]], _Surface] = field(default_factory=dict)
+
+
+def write_print(chosen: Chosen, path: Path, level: int) -> str:
+    """Write the solids; return a line about them. Raises StageError and OutputError."""
+    options = chosen.options
+    scale = options.scale or _handy(chosen)
+    unit = options.units or "mm"
+    factor = scale * METERS_PER_UNIT / UNITS_M[unit]
+    wall = options.wall_mm if options.wall_mm is not None else WALL_MM
+    ending = path.suffix.lower()
+    bodies: list[Body] = []
+    thin: list[str] = []
+    for part, solid in _solids(chosen, level, is_one=ending == ".stl"):
+        thin += describe_thin(
+            solid, part.name, wall_um=wall * 1e-3 / scale / METERS_PER_UNIT, um_per_mm=1e3 / scale
+        )
+        places, triangles = to_mesh(solid)
+        red, green, blue = to_srgb8(np.array(part.color, np.float32)).tolist()
+        positions = (places.astype(np.float64) * factor).astype(np.float32)
+        bodies.append(Body(part.name, (red, green, blue), positions, triangles))
+    if not bodies:
+        raise StageError(f"{chosen.path}: no surface is left to export")
+    if ending == ".3mf":
+        write_3mf(path, bodies, title=specimen_name(chosen.stage), unit=unit)
+    elif ending == ".ply":
+        write_ply(path, bodies, unit=unit)
+    elif ending == ".obj":
+        write_obj(path, bodies, unit=unit)
+    else:
+        write_stl_file(path, bodies, unit=unit)
+    x, y, z = np.ptp(np.concatenate([body.positions for body in bodies]), axis=0).tolist()
+    count = sum(len(body.triangles) for body in bodies)
+    size = f"{x:.3g} x {y:.3g} x {z:.3g} {unit}, {scale:g} times the specimen"
+    line = f"{counted(len(bodies), 'body', 'bodies')}, {count:,} triangles at lod{level}, {size}"
+    return "\n".join([line, *thin])
+
+
+def _handy(chosen: Chosen) -> float:
+    """Return 1, 2 or 5 times a power of ten, by which the specimen fits a hand."""
+    low, high = chosen.box
+    most = HAND_M / (float((high - low).max()) * METERS_PER_UNIT)
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(step * power for step in (1, 2, 5) if step * power <= most)
+
+
+def _solids(
+    chosen: Chosen, level: int, *, is_one: bool
+) -> Iterator[tuple[_Part, manifold3d.Manifold]]:
+    """Yield the bodies; `is_one`: one of all."""
+    boxes = _boxes(chosen)
+    found = []
+    for part in _parts(chosen, level, is_one):
+        solid = unite([_close(one, part.name) for one in part.surfaces.values()])
+        if boxes:
+            solid = cut_to(solid, boxes)
+        if solid.is_empty():
+            continue
+        if is_one:
+            found.append((part, solid))
+        else:
+            yield part, solid
+    if found:
+        name = " ".join(part.name for part, _ in found)
+        yield replace(found[0][0], name=name), unite([solid for _, solid in found])
+
+
+def _close(surface: _Surface, name: str) -> manifold3d.Manifold:
+    positions, triangles = weld(surface.meshes)
+    back = np.linalg.inv(np.array(surface.moved).reshape(4, 4))
+    own = positions.astype(np.float64) @ back[:3, :3] + back[3, :3]
+    return to_solid(positions, close_cuts(own, triangles, sorted(surface.cuts)), name)
+
+
+def _parts(chosen: Chosen, level: int, is_one: bool) -> Iterator[_Part]:
+    """Yield what becomes a body: a channel, or an object of a label map unless `is_one`."""
+    for channel in chosen.channels:
+        parts: dict[int | None, _Part] = {}
+        for piece in chosen.pieces(level, whole=True, channel=channel.id):
+            for label, name, color, mesh in _meshes(piece):
+                key = None if is_one else label
+                if key is None:
+                    name, color = channel.name, _color_of(piece)
+                part = parts.setdefault(key, _Part(name, color))
+                same = label, piece.moved
+                surface = part.surfaces.setdefault(same, _Surface(piece.moved))
+                surface.meshes.append(mesh)
+                surface.cuts.update(piece.cuts)
+        yield from parts.values()
+
+
+def _meshes(piece: Piece) -> Iterator[tuple[int | None, str, Color, Mesh]]:
+    """Yield a piece's surface, or each object's: label, name, colour, mesh."""
+    mesh = piece.mesh
+    if piece.objects is None or mesh.objects is None:
+        yield None, "", piece.material.color, (mesh.positions, mesh.triangles)
+        return
+    names, labels = piece.object_names, piece.objects.labels.tolist()
+    for number, part in split_objects(mesh):
+        color = piece.material.color
+        if part.colors is not None:
+            red, green, blue = part.colors.mean(axis=0).astype(float).tolist()
+            color = red, green, blue
+        yield labels[number], names[number], color, (part.positions, part.triangles)
+
+
+def _color_of(piece: Piece) -> Color:
+    """Return the colour of a body: a channel's own, though vertices may have colours."""
+    return piece.channel.color if piece.mesh.colors is not None else piece.material.color
+
+
+def _boxes(chosen: Chosen) -> list[Corners]:
+    """Return the boxes that solids are cut to; none: they stay whole."""
+    options = chosen.options
+    if not options.tiles and options.region is None:
+        return []
+    all_boxes = chosen.tile_boxes()
+    lows, highs = (np.array([box[end] for box in all_boxes.values()]) for end in (0, 1))
+    low, high = lows.min(axis=0), highs.max(axis=0)
+    far = float((high - low).max())  # surfaces are closed a voxel beyond the outermost tiles
+    boxes = []
+    for name in chosen.tiles:
+        start, end = all_boxes[name]
+        start, end = (
+            np.where(start <= low, low - far, start),
+            np.where(end >= high, high + far, end),
+        )
+        if options.region is not None:
+            start = np.maximum(start, options.region.low)
+            end = np.minimum(end, options.region.high)
+        if (start < end).all():
+            boxes.append((start, end))
+    if not boxes:
+        raise StageError(f"{chosen.path}: no tile is in --region")
+    return boxes

@@ -1,0 +1,80 @@
+"""USD in one file: a light copy for viewers of augmented reality, or the stage flattened.
+
+.usdz         surfaces at one level, the size of a hand, as the bundle has it (write_usdz.py)
+.usdc, .usda  all that the stage composes, without layers, payloads and variants: meshes at one
+              level, volumes, materials. Volumes and maps stay files of OUT, by relative paths
+"""
+
+import os
+from pathlib import Path
+
+from pxr import Sdf, Usd, UsdGeom, UsdUtils
+
+from stereocell.export.chosen import Chosen
+from stereocell.model.counted import counted
+from stereocell.model.errors import OutputError
+from stereocell.storage.workspace import is_mirrored
+from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, UP_AXIS, export
+from stereocell.usd.read_attributes import select_variant
+from stereocell.usd.read_variants import lod_levels
+from stereocell.usd.write_usdz import write_usdz
+
+
+def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
+    """Write .usdz; return a line about it."""
+    channels = {channel.id for channel in chosen.channels}
+    tiles = chosen.tiles
+    write_usdz(chosen.path, path, chosen.as_written, level=level, tiles=tiles, channels=channels)
+    return f"{counted(len(tiles), 'tile')} at lod{level}, the size of a hand"
+
+
+def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
+    """Write .usdc or .usda; return a line about it. Raises OutputError."""
+    if is_mirrored(chosen.path):
+        raise OutputError(
+            f"{path.name}: it names files of OUT by their paths, expected OUT in a folder, or .usdz"
+        )
+    stage = chosen.stage
+    kept = {channel.id for channel in chosen.channels}
+    for name in chosen.tiles:
+        prim = stage.Load(TILES.AppendChild(name))
+        levels = [one for one in lod_levels(prim) if one <= level]
+        if levels:
+            select_variant(prim, "lod", f"lod{levels[-1]}")
+    flat = stage.Flatten(addSourceFileComment=False)
+    for name in chosen.all_tiles:
+        if name not in chosen.tiles:
+            _remove(flat, TILES.AppendChild(name))
+    for place in (CHANNELS, *map(TILES.AppendChild, chosen.tiles)):
+        for one in _channels(stage, place):
+            if one not in kept:
+                _remove(flat, place.AppendChild(one))
+    stage.GetSessionLayer().Clear()
+    # a layer of an artist's may state none of these
+    flat.defaultPrim = ROOT.name
+    flat.pseudoRoot.SetInfo(UsdGeom.Tokens.metersPerUnit, METERS_PER_UNIT)
+    flat.pseudoRoot.SetInfo(UsdGeom.Tokens.upAxis, UP_AXIS)
+    # where the file will be: it is written in a folder beside its place
+    folder = path.parent.parent.resolve()
+    UsdUtils.ModifyAssetPaths(flat, lambda asset: _relative(asset, folder))
+    export(flat, path)
+    tiles = counted(len(chosen.tiles), "tile")
+    return f"{tiles} at lod{level}; volumes and maps stay in {chosen.path.parent}"
+
+
+def _channels(stage: Usd.Stage, place: Sdf.Path) -> list[str]:
+    return [str(prim.GetName()) for prim in stage.GetPrimAtPath(place).GetAllChildren()]
+
+
+def _remove(layer: Sdf.Layer, path: Sdf.Path) -> None:
+    parent = layer.GetPrimAtPath(path.GetParentPath())
+    if parent is not None and path.name in parent.nameChildren:
+        del parent.nameChildren[path.name]
+
+
+def _relative(asset: str, folder: Path) -> str:
+    """Return a path as USD looks it up beside the layer."""
+    if not os.path.isabs(asset):
+        return asset
+    found = Path(os.path.relpath(asset, folder)).as_posix()
+    return found if found.startswith("../") else f"./{found}"

@@ -1,0 +1,274 @@
+"""Put the volumes of all tiles together on the lattice that they share, on disk, tile by tile.
+
+Axes are the source's: x to the right, y downwards, z from plane to plane, as a microscope or a
+scanner stored them. Places are the source's, too: the world's y, which grows upwards, is turned
+over again; a patient's are DICOM's (left, posterior, superior).
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.bundle.windowed_voxels import read_measured, read_windowed
+from stereocell.export.chosen import Chosen
+from stereocell.export.options import UNITS_M, Region
+from stereocell.formats.exr import read_atlas
+from stereocell.formats.voxel_grid import VoxelGrid
+from stereocell.model.errors import StageError, UsageError
+from stereocell.usd.layer import METERS_PER_UNIT
+from stereocell.usd.read_appearances import ComposedAppearance
+from stereocell.usd.read_stage import ComposedVolume, sides_of
+
+_OFF = 1e-2  # voxels by which a tile may lie beside the lattice of the first
+_IMAGE_AXES = np.diag([1.0, -1.0, 1.0])  # places in an image, of the world's
+_AS_BYTES = (0.0, 255.0)  # the window of 8-bit sources, of which the stage keeps these bytes alone
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What a volume's file will hold.
+
+    first, size  voxels (x, y, z) on the lattice whose (0, 0, 0) is the first tile's first voxel
+    firsts       of each tile
+    is_measured  values are the source's; else the channel's window spans the whole type
+    is_upright   y grows upwards and z away from the viewer, as in Unity
+    """
+
+    grid: VoxelGrid
+    channels: tuple[ComposedAppearance, ...]
+    dtype: np.dtype[np.integer[Any]]
+    first: NDArray[np.int64]
+    firsts: dict[str, NDArray[np.int64]]
+    is_measured: bool
+    is_upright: bool = False
+
+    @property
+    def names(self) -> list[str]:
+        return [channel.name for channel in self.channels]
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """(channel, z, y, x)"""
+        x, y, z = self.grid.size
+        return len(self.channels), z, y, x
+
+    @property
+    def about(self) -> str:
+        """Return a line: size, channels, and what the values are."""
+        x, y, z = self.grid.size
+        if self.is_measured:
+            values = "the source's values"
+        else:
+            windows = (f"{c.name} {c.window[0]:g} to {c.window[1]:g}" for c in self.channels)
+            values = f"0 to {np.iinfo(self.dtype).max} for {', '.join(windows)}"
+        return f"{x} x {y} x {z} voxels of {self.dtype.name}, {', '.join(self.names)}: {values}"
+
+
+def find_layout(chosen: Chosen) -> Layout:
+    """Return how the chosen volumes lie together; the voxels are read for 16 bits.
+
+    Raises StageError where tiles lie on no common lattice or have no volumes, UsageError where the
+    options can't be.
+    """
+    options = chosen.options
+    bits = options.bits or (8 if options.unity else None)
+    start: NDArray[np.float64] | None = None
+    steps = np.eye(3)
+    firsts: dict[str, NDArray[np.int64]] = {}
+    ends: list[NDArray[np.int64]] = []
+    found: dict[str, ComposedAppearance] = {}
+    span = _Span()
+    for tile, channel, volume in chosen.volumes():
+        place, own = _place(volume)
+        if start is None:
+            start, steps = place, own
+        if not np.allclose(own, steps, rtol=1e-5, atol=1e-5 * np.abs(steps).max()):
+            raise StageError(f"{tile}: an edit turned or scaled it, expected all tiles alike")
+        at = (place - start) @ np.linalg.inv(steps)
+        if np.abs(at - np.rint(at)).max() > _OFF:
+            raise StageError(
+                f"{tile}: an edit moved it by a part of a voxel, expected tiles on one lattice"
+            )
+        firsts[tile] = np.rint(at).astype(np.int64)
+        ends.append(firsts[tile] + np.array(volume.size) - 2 * volume.apron)
+        found[channel.id] = channel
+        if bits != 8:
+            span.add(channel, volume, chosen, is_needed=bits == 16)
+    if start is None:
+        names = ", ".join(channel.name for channel in chosen.channels)
+        raise StageError(f"{chosen.path}: no volume of {names}")
+    channels = tuple(channel for channel in chosen.channels if channel.id in found)
+    if options.unity and len(channels) > 1:
+        names = ", ".join(channel.name for channel in channels)
+        raise UsageError(f"--unity takes one channel, expected --channels with one of {names}")
+    first, end = np.min(list(firsts.values()), axis=0), np.max(ends, axis=0)
+    first, end = _cut(chosen.region, start, steps, first, end)
+    dtype = np.dtype("u1") if bits == 8 or not span.is_known else span.dtype
+    grid = _grid(chosen, start + first @ steps, steps, end - first)
+    is_measured = dtype != np.dtype("u1") and span.are_whole
+    layout = Layout(grid, channels, dtype, first, firsts, is_measured)
+    return _upright(layout) if options.unity else layout
+
+
+def fill(layout: Layout, chosen: Chosen, values: NDArray[np.generic]) -> None:
+    """Write the voxels, a tile after another, into an array (channel, z, y, x) of zeros."""
+    into = values[:, ::-1, ::-1] if layout.is_upright else values
+    number = {channel.id: i for i, channel in enumerate(layout.channels)}
+    size = np.array(layout.grid.size)
+    for tile, channel, volume in chosen.volumes():
+        voxels = _read(layout, chosen, channel, volume)
+        low = layout.firsts[tile] - layout.first
+        high = low + voxels.shape[::-1]
+        start, stop = low.clip(0, size), high.clip(0, size)
+        if (start < stop).all():
+            (x0, y0, z0), (x1, y1, z1) = start, stop
+            i, j, k = start - low
+            part = voxels[k : k + z1 - z0, j : j + y1 - y0, i : i + x1 - x0]
+            into[number[channel.id], z0:z1, y0:y1, x0:x1] = part
+
+
+def _place(volume: ComposedVolume) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the world's place of a tile's first voxel, and the steps along x, y and z (rows)."""
+    low, high = np.array(volume.low), np.array(volume.high)
+    spacing = (high - low) / (np.array(volume.size) - 2 * volume.apron - 1)
+    turned = volume.matrix[:3, :3]
+    place = np.array([low[0], high[1], low[2]]) @ turned + volume.matrix[3, :3]
+    return place, (spacing * (1, -1, 1))[:, np.newaxis] * turned
+
+
+class _Span:
+    """The values that 16 bits have to hold."""
+
+    def __init__(self) -> None:
+        self._low, self._high = np.inf, -np.inf
+        self._are_whole = True
+        self.is_known = True  # the stage has the values
+
+    def add(
+        self,
+        channel: ComposedAppearance,
+        volume: ComposedVolume,
+        chosen: Chosen,
+        *,
+        is_needed: bool,
+    ) -> None:
+        if not self.is_known:
+            return
+        values = _measured(channel, volume, chosen)
+        if values is None:
+            self.is_known = False
+            if is_needed:
+                raise UsageError(
+                    f"--bits 16: the stage has no more than 8 of {channel.name}: it was built with "
+                    "--bits 8"
+                )
+            return
+        self._low = min(self._low, float(values.min()))
+        self._high = max(self._high, float(values.max()))
+        self._are_whole &= bool((values == np.rint(values)).all())
+
+    @property
+    def are_whole(self) -> bool:
+        """Whether all values are whole numbers of 16 bits."""
+        is_near = self._high - min(self._low, 0) <= 0xFFFF and self._low >= -0x8000
+        is_signed = self._low < 0
+        return self._are_whole and is_near and (not is_signed or self._high <= 0x7FFF)
+
+    @property
+    def dtype(self) -> np.dtype[np.integer[Any]]:
+        return np.dtype("<i2" if self.are_whole and self._low < 0 else "<u2")
+
+
+def _measured(
+    channel: ComposedAppearance, volume: ComposedVolume, chosen: Chosen
+) -> NDArray[np.float32] | NDArray[np.uint8] | None:
+    """Return the voxels as they were measured, without the apron; None: the stage has none."""
+    if volume.measured is not None:
+        chosen.as_written.require(volume.measured)
+        return _without_apron(read_measured(volume), volume)
+    if channel.volume_window != _AS_BYTES:
+        return None
+    chosen.as_written.require(volume.atlas)
+    return _without_apron(read_atlas(volume.atlas), volume)
+
+
+def _read(
+    layout: Layout, chosen: Chosen, channel: ComposedAppearance, volume: ComposedVolume
+) -> NDArray[np.generic]:
+    if layout.dtype == np.dtype("u1"):
+        return _without_apron(read_windowed(volume, channel, chosen.as_written), volume)
+    values = _measured(channel, volume, chosen)
+    assert values is not None
+    if layout.is_measured:
+        return values.astype(layout.dtype)
+    low, high = channel.window
+    share = np.clip((values.astype(np.float64) - low) / (high - low), 0, 1)
+    return np.rint(share * 0xFFFF).astype(layout.dtype)
+
+
+def _without_apron(voxels: NDArray[Any], volume: ComposedVolume) -> NDArray[Any]:
+    own = slice(volume.apron, -volume.apron or None)
+    return voxels[own, own, own]
+
+
+def _cut(
+    region: Region | None,
+    start: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    first: NDArray[np.int64],
+    end: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the lattice's voxels whose centres lie in a region of the world."""
+    if region is None:
+        return first, end
+    along = np.diag(steps)
+    if np.abs(steps - np.diag(along)).max() > 1e-6 * np.abs(along).min():
+        raise UsageError("--region: the volumes lie turned in the world, expected none")
+    ends = np.sort((np.array([region.low, region.high]) - start) / along, axis=0)
+    low = np.maximum(first, np.ceil(ends[0] - _OFF).clip(-1e15, 1e15).astype(np.int64))
+    high = np.minimum(end, np.floor(ends[1] + _OFF).clip(-1e15, 1e15).astype(np.int64) + 1)
+    if not (low < high).all():
+        raise UsageError("--region: no voxel is in it")
+    return low, high
+
+
+def places_of_world(chosen: Chosen) -> NDArray[np.float64]:
+    """Return the matrix (3, 3) of directions in the world to those of the source."""
+    sides = sides_of(chosen.stage)
+    if sides is None:
+        return _IMAGE_AXES
+    return np.array([sides[name] for name in ("left", "posterior", "superior")])
+
+
+def _grid(
+    chosen: Chosen, start: NDArray[np.float64], steps: NDArray[np.float64], size: NDArray[np.int64]
+) -> VoxelGrid:
+    to_source = places_of_world(chosen)
+    is_patient = sides_of(chosen.stage) is not None
+    unit = chosen.options.units or "mm"
+    factor = METERS_PER_UNIT / UNITS_M[unit]
+    columns = to_source @ steps.T * factor
+    spacing = np.linalg.norm(columns, axis=0)
+    x, y, z = size.tolist()
+    origin = to_source @ start * factor + 0.0  # no -0.0
+    return VoxelGrid((x, y, z), spacing, origin, columns / spacing + 0.0, unit, is_patient)
+
+
+def _upright(layout: Layout) -> Layout:
+    """Return the layout with y and z from the other end: as Unity's axes, which are left-handed."""
+    grid = layout.grid
+    _, height, depth = grid.size
+    columns = grid.direction * grid.spacing
+    origin = grid.origin + columns[:, 1] * (height - 1) + columns[:, 2] * (depth - 1)
+    direction = grid.direction * np.array([1.0, -1.0, -1.0]) + 0.0
+    return replace(layout, grid=replace(grid, origin=origin, direction=direction), is_upright=True)
+
+
+def map_file(file: Path, layout: Layout, offset: int) -> NDArray[np.generic]:
+    """Return an array of zeros (channel, z, y, x) that lies in a file behind its head."""
+    with file.open("r+b") as opened:
+        opened.truncate(offset + int(np.prod(layout.shape)) * layout.dtype.itemsize)
+    return np.memmap(file, layout.dtype, "r+", offset, layout.shape)

@@ -1,0 +1,196 @@
+"""Write one file of a built OUT for another program: the format is chosen by the file's ending."""
+
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.export.chosen import Chosen, Report
+from stereocell.export.gltf_scene import write_gltf
+from stereocell.export.neuroglancer import write_precomputed
+from stereocell.export.options import ExportOptions
+from stereocell.export.pictures import (
+    PICTURE_TRIANGLES,
+    VIDEO_TRIANGLES,
+    write_picture,
+    write_turntable,
+)
+from stereocell.export.print_solids import write_print
+from stereocell.export.usd_files import write_flattened, write_light_copy
+from stereocell.export.volume_files import write_nifti, write_nrrd, write_raw
+from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.temporary_names import clear_beside
+from stereocell.storage.workspace import is_file
+from stereocell.usd.read_stage import dependencies
+from stereocell.usd.write_usdz import MAX_TRIANGLES
+from stereocell.usd.written_files import CHANGED
+
+_LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """How an ending is written, and the options that it takes beside --channels.
+
+    write      is given the level of detail, 0 where the format has none; returns a line about the
+               file
+    triangles  the most that are wanted if nothing is said; a coarsest level of more is taken
+    """
+
+    write: Callable[[Chosen, Path, int], str]
+    takes: frozenset[str]
+    triangles: int | None = None
+
+    @property
+    def has_levels(self) -> bool:
+        return "lod" in self.takes
+
+
+_USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes"})
+_PICTURE = frozenset({"tiles", "lod", "max_triangles", "region", "occlusion", "width"})
+_VOLUME = frozenset({"tiles", "region", "units", "bits"})
+_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"})
+_PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
+FORMATS = {
+    ".glb": _GLTF,
+    ".gltf": _GLTF,
+    ".stl": _PRINT,
+    ".3mf": _PRINT,
+    ".ply": _PRINT,
+    ".obj": _PRINT,
+    ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES),
+    ".usdc": Format(write_flattened, _USD),
+    ".usda": Format(write_flattened, _USD),
+    ".png": Format(write_picture, _PICTURE, PICTURE_TRIANGLES),
+    ".mp4": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES),
+    ".webm": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES),
+    ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}),
+    ".raw": Format(write_raw, _VOLUME | {"unity"}),
+    ".nii.gz": Format(write_nifti, _VOLUME),
+    ".nii": Format(write_nifti, _VOLUME),
+    ".precomputed": Format(write_precomputed, frozenset({"tiles", "region", "bits"})),
+}
+
+
+def export(
+    out: Path,
+    file: Path,
+    options: ExportOptions,
+    *,
+    stage: Path | None = None,
+    report: Report = lambda _: None,
+) -> str:
+    """Write `file` from OUT's composed stage, or a layer over it; return a line about it.
+
+    Raises UsageError for an ending or an option that can't be, StageError for a stage that can't be
+    read, OutputError where the file can't be written.
+    """
+    find_ending(file)
+    out_folder = OutFolder(out)
+    out_folder.require_finished("stage")
+    path = stage if stage is not None else out_folder.stage_file
+    if not is_file(path):
+        remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
+        raise OutputError(f"{path} is missing: {remedy}")
+    files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
+    _require_outside(file, out_folder, files)
+    return export_stage(path, file, options, report)
+
+
+def export_stage(
+    stage_path: Path, file: Path, options: ExportOptions, report: Report = lambda _: None
+) -> str:
+    """Write `file` from a stage; return a line about it, and more of what is to be known.
+
+    The file is written whole or not at all, and has the same bytes each time. Raises as `export`.
+    """
+    ending = find_ending(file)
+    way = FORMATS[ending]
+    _require_takes(ending, way, options)
+    if not file.parent.is_dir():
+        raise OutputError(f"{file.parent}: no such folder")
+    _require_replaceable(file)
+    chosen = Chosen(stage_path, options, report)
+    with _folder_beside(file) as beside:
+        line = _write_smallest(chosen, way, beside / file.name)
+        # what goes with the file comes first: whoever sees the file sees it whole
+        made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
+        for one in made:
+            _put(one, file.parent / one.name)
+    for layer in sorted(chosen.as_written.changed):
+        report(f"{layer}: {CHANGED}: taken as it is")
+    return line
+
+
+def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
+    """Write the file at the finest level that --max-bytes lets; return the line about it."""
+    if not way.has_levels:
+        return way.write(chosen, file, 0)
+    most, size = chosen.options.max_bytes, 0
+    for level in chosen.levels(way.triangles):
+        line = way.write(chosen, file, level)
+        size = file.stat().st_size
+        if most is None or size <= most:
+            return line
+        chosen.report(f"lod{level} takes {size} bytes, more than {most}")
+    raise UsageError(
+        f"--max-bytes is {most}: the smallest file has {size}: expected as many, or fewer --tiles "
+        "or --channels"
+    )
+
+
+@contextmanager
+def _folder_beside(file: Path) -> Iterator[Path]:
+    """Yield an empty folder beside a file; one that a killed command left there is removed."""
+    clear_beside(file)
+    folder = file.with_name(f".{file.name}.{secrets.token_hex(4)}.partial")
+    folder.mkdir()
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -> None:
+    """Raise UsageError where FILE would take the place of what a build made, or of an edit."""
+    place = file.resolve()
+    made = [out_folder.out / name for name in ("stage", "bundle", "units", "report")]
+    if place in {one.resolve() for one in files} or any(
+        place.is_relative_to(folder.resolve()) for folder in made
+    ):
+        raise UsageError(f"{file}: a part of the build lies there, expected another place")
+
+
+def _require_replaceable(file: Path) -> None:
+    """Raise OutputError where a folder is in the way that no export made."""
+    if not file.is_dir() or not any(file.iterdir()):
+        return
+    if not any(file.glob("*/info")) or file.suffix.lower() != ".precomputed":
+        raise OutputError(f"{file}: exists and is a folder of something else")
+
+
+def _put(made: Path, place: Path) -> None:
+    """Move a file or a folder to its place, instead of what was there."""
+    if place.is_dir():
+        os.replace(place, made.with_name("old"))
+    os.replace(made, place)
+
+
+def find_ending(file: Path) -> str:
+    """Return the ending by which a format is chosen. Raises UsageError for an unknown one."""
+    name = file.name.lower()
+    for ending in FORMATS:
+        if name.endswith(ending) and len(name) > len(ending):
+            return ending
+    raise UsageError(f"{file}: expected a name that ends in {', '.join(FORMATS)}")
+
+
+def _require_takes(ending: str, way: Format, options: ExportOptions) -> None:
+    for name in sorted(options.given() - way.takes - {"channels"}):
+        able = [other for other, one in FORMATS.items() if name in one.takes]
+        flag = name.replace("_", "-")
+        raise UsageError(f"--{flag} can't be for {ending}, expected one of {', '.join(able)}")

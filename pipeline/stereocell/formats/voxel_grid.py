@@ -1,0 +1,34 @@
+"""Where the voxels of an exported volume lie, as image formats say it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class VoxelGrid:
+    """A lattice of voxels; x is the fastest axis.
+
+    size        voxels (x, y, z)
+    spacing     float64 (3,), distance of neighbours along each axis, in `unit`
+    origin      float64 (3,), centre of voxel (0, 0, 0), in `unit`
+    direction   float64 (3, 3), a column an axis: its unit vector
+    unit        um, mm or m
+    is_patient  places are DICOM's: to the left, to the back, upwards
+    """
+
+    size: tuple[int, int, int]
+    spacing: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    unit: str
+    is_patient: bool
+
+    @property
+    def affine(self) -> NDArray[np.float64]:
+        """Return the matrix (4, 4) of an index (i, j, k, 1) to its place."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.direction * self.spacing
+        matrix[:3, 3] = self.origin
+        return matrix

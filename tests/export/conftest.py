@@ -1,0 +1,29 @@
+"""The stage that exports are made from: two tiles, a sphere across their border."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from pxr import Sdf, Usd
+
+from support.bundles import write_tiles
+
+
+@pytest.fixture(scope="session")
+def sphere_stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A stage of the sphere, to be read only."""
+    return write_tiles(tmp_path_factory.mktemp("stage"))
+
+
+@pytest.fixture
+def edited(sphere_stage: Path, tmp_path: Path) -> Callable[[Callable[[Usd.Stage], object]], Path]:
+    """Write a layer over the stage: `edited(lambda stage: ...)`."""
+
+    def write(change: Callable[[Usd.Stage], object]) -> Path:
+        layer = Sdf.Layer.CreateNew(str(tmp_path / "edited.usda"))
+        layer.subLayerPaths = [str(sphere_stage)]
+        change(Usd.Stage.Open(layer))
+        layer.Save()
+        return tmp_path / "edited.usda"
+
+    return write

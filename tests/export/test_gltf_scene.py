@@ -1,0 +1,231 @@
+"""A plain glTF: what other programs read of it, held against the sphere that it shows."""
+
+import json
+import shutil
+import struct
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from pxr import Gf, Usd, UsdGeom, Vt
+
+from stereocell.export.options import ExportOptions, parse_region
+from stereocell.export.write import export_stage
+from stereocell.model.errors import UsageError
+from support import spheres
+from support.bundles import CD31
+
+VIEWER = Path(__file__).parents[2] / "viewer_gltf"
+FINE = spheres.LEVELS[0][0]
+
+
+def document(path: Path) -> dict:
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + length])
+
+
+def test_another_library_finds_the_sphere_in_metres_with_colour_and_names(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    line = export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    scene = trimesh.load(tmp_path / "s.glb")
+    assert set(scene.geometry) == {"CD31 r0_c0", "CD31 r0_c1"}
+    low, high = scene.bounds
+    center = spheres.CENTER * 1e-6
+    np.testing.assert_allclose(low, center - spheres.RADIUS * 1e-6, atol=2e-8)
+    np.testing.assert_allclose(high, center + spheres.RADIUS * 1e-6, atol=2e-8)
+    red = scene.geometry["CD31 r0_c0"].visual.material.baseColorFactor
+    assert red.tolist()[:3] == [255, 51, 26]
+    found = document(tmp_path / "s.glb")
+    assert "extensionsRequired" not in found
+    assert "extensionsUsed" not in found
+    assert [node["name"] for node in found["nodes"][:2]] == ["two tiles", "CD31"]
+    triangles = sum(len(mesh.faces) for mesh in scene.geometry.values())
+    assert line == f"2 meshes, {triangles:,} triangles at lod0"
+
+
+def test_tiles_meet_without_a_gap(sphere_stage: Path, tmp_path: Path) -> None:
+    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    joined = trimesh.load(tmp_path / "s.glb", force="mesh")
+    joined.merge_vertices(merge_norm=True, merge_tex=True)
+    joined.update_faces(joined.nondegenerate_faces())
+    assert joined.is_watertight
+
+
+@pytest.mark.parametrize("name", ["s.glb", "s.gltf"])
+def test_the_same_stage_gives_the_same_bytes_and_nothing_else_is_left(
+    sphere_stage: Path, tmp_path: Path, name: str
+) -> None:
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        export_stage(sphere_stage, tmp_path / folder / name, ExportOptions())
+        assert [file.name for file in (tmp_path / folder).iterdir()] == [name]
+    assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+def test_an_edit_over_the_stage_is_in_it(edited: Callable[..., Path], tmp_path: Path) -> None:
+    layer = edited(
+        lambda s: s.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(0.25, 0.5, 0.75))
+    )
+    export_stage(layer, tmp_path / "s.glb", ExportOptions())
+    (material,) = document(tmp_path / "s.glb")["materials"]
+    assert material["pbrMetallicRoughness"]["baseColorFactor"] == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
+    edited: Callable[..., Path], tmp_path: Path
+) -> None:
+    def change(stage: Usd.Stage) -> None:
+        tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
+        lod = tile.GetVariantSet("lod")
+        lod.SetVariantSelection("lod0")
+        with lod.GetVariantEditContext():
+            mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{tile.GetPath()}/CD31/CD31_r0_c0"))
+            points = np.array(mesh.GetPointsAttr().Get())
+            mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points + np.float32([0, 2, 0])))
+        other = stage.GetPrimAtPath("/Specimen/Tiles/r0_c1").GetVariantSet("lod")
+        other.SetVariantSelection("lod2")
+
+    layer = edited(change)
+    for lod in (0, 1):  # coarser levels are made anew from what was edited
+        told: list[str] = []
+        export_stage(layer, tmp_path / "s.glb", ExportOptions(lod=lod), told.append)
+        assert any(line.startswith("r0_c0/CD31: edited by hand: lod0") for line in told)
+        assert told[-1] == "2/2 r0_c1"
+        meshes = trimesh.load(tmp_path / "s.glb").geometry
+        high = meshes["CD31 r0_c0"].bounds[1] * 1e6
+        assert high[1] == pytest.approx(spheres.CENTER[1] + spheres.RADIUS + 2, abs=0.05)
+        assert len(meshes["CD31 r0_c1"].faces) < 2.2 * spheres.LEVELS[2][0] ** 2
+
+
+def test_the_finest_level_within_the_bounds_is_taken(sphere_stage: Path, tmp_path: Path) -> None:
+    path = tmp_path / "s.glb"
+    sizes = []
+    for lod in (0, 1, 2):
+        export_stage(sphere_stage, path, ExportOptions(lod=lod))
+        sizes.append(path.stat().st_size)
+    assert sizes == sorted(sizes, reverse=True)
+    counts = [4 * rings * rings for rings, _ in spheres.LEVELS]
+    for options in (
+        ExportOptions(max_triangles=counts[1]), ExportOptions(max_bytes=sizes[1]),
+    ):  # fmt: skip
+        assert export_stage(sphere_stage, path, options).endswith("at lod1")
+        assert path.stat().st_size == sizes[1]
+    before = path.read_bytes()
+    with pytest.raises(UsageError, match=f"--max-bytes is 100: the smallest file has {sizes[2]}"):
+        export_stage(sphere_stage, path, ExportOptions(max_bytes=100))
+    with pytest.raises(UsageError, match="--max-triangles is 3: the coarsest level has"):
+        export_stage(sphere_stage, path, ExportOptions(max_triangles=3))
+    assert path.read_bytes() == before
+
+
+def test_a_region_cuts_the_surface_and_tiles_leave_some_out(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    box = ExportOptions(region=parse_region("9:,:-5,:"))
+    export_stage(sphere_stage, tmp_path / "s.glb", box)
+    low, high = trimesh.load(tmp_path / "s.glb").bounds * 1e6
+    assert low[0] == pytest.approx(9, abs=1e-4)
+    assert high[1] == pytest.approx(-5, abs=1e-4)
+    assert high[0] == pytest.approx(spheres.CENTER[0] + spheres.RADIUS, abs=0.02)
+    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions(tiles=("r0_c1",)))
+    assert list(trimesh.load(tmp_path / "s.glb").geometry) == ["CD31 r0_c1"]
+
+
+@pytest.mark.parametrize("packing", ["meshopt", "draco"])
+def test_packed_files_have_the_same_surface_and_seam(
+    sphere_stage: Path, tmp_path: Path, packing: str
+) -> None:
+    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    path = tmp_path / "packed.glb"
+    export_stage(sphere_stage, path, ExportOptions(compress=packing))
+    assert path.stat().st_size < 0.35 * (tmp_path / "s.glb").stat().st_size
+    found = document(path)
+    places = []
+    for node in found["nodes"][2:]:
+        (primitive,) = found["meshes"][node["mesh"]]["primitives"]
+        if packing == "draco":
+            import DracoPy
+
+            view = found["bufferViews"][
+                primitive["extensions"]["KHR_draco_mesh_compression"]["bufferView"]
+            ]
+            data = path.read_bytes()
+            start = len(data) - found["buffers"][0]["byteLength"] + view["byteOffset"]
+            mesh = DracoPy.decode(data[start : start + view["byteLength"]])
+            ids = primitive["extensions"]["KHR_draco_mesh_compression"]["attributes"]
+            kinds = {one["unique_id"]: one["attribute_type"] for one in mesh.attributes}
+            assert [kinds[ids[name]] for name in ("POSITION", "NORMAL")] == [0, 1]
+            assert found["accessors"][primitive["indices"]]["count"] == mesh.faces.size
+            places.append(mesh.points.astype(np.float32))
+        else:
+            places.append(meshopt_positions(path, found, node, primitive))
+    cuts = [
+        {tuple(p) for p in np.unique(part, axis=0) if abs(p[0] - 10e-6) < 1e-10} for part in places
+    ]
+    assert cuts[0] == cuts[1]
+    assert len(cuts[0]) == 2 * FINE
+    low = np.concatenate(places).min(axis=0)
+    np.testing.assert_allclose(low, (spheres.CENTER - spheres.RADIUS) * 1e-6, atol=3e-8)
+
+
+def meshopt_positions(path: Path, found: dict, node: dict, primitive: dict) -> np.ndarray:
+    import meshoptimizer
+
+    data = path.read_bytes()
+    accessor = found["accessors"][primitive["attributes"]["POSITION"]]
+    packed = found["bufferViews"][accessor["bufferView"]]["extensions"]["EXT_meshopt_compression"]
+    start = len(data) - -(-found["buffers"][0]["byteLength"] // 4) * 4 + packed["byteOffset"]
+    stream = data[start : start + packed["byteLength"]]
+    rows = meshoptimizer.decode_vertex_buffer(packed["count"], packed["byteStride"], stream)
+    steps = np.frombuffer(np.ascontiguousarray(rows), "<u2").reshape(-1, 4)[:, :3]
+    scaled = steps.astype(np.float32) * np.float32(node["scale"][0])
+    return scaled + np.array(node["translation"], np.float32)
+
+
+NODE = """
+import fs from 'node:fs'
+import validator from 'gltf-validator'
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js'
+import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js'
+import { Box3 } from 'three'
+
+globalThis.ProgressEvent = class {}  // three's own, of the browser
+const loader = new GLTFLoader().setMeshoptDecoder(MeshoptDecoder)
+const found = {}
+for (const file of process.argv.slice(1)) {
+  const bytes = new Uint8Array(fs.readFileSync(file))
+  const { issues } = await validator.validateBytes(bytes)
+  const opened = file.includes('draco') ? null : await loader.parseAsync(bytes.buffer, '')
+  const box = opened && new Box3().setFromObject(opened.scene)
+  found[file] = { issues, box: box && [box.min.toArray(), box.max.toArray()] }
+}
+console.log(JSON.stringify(found))
+"""
+
+
+def test_khronos_validator_finds_no_error_and_three_opens_it(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    node = shutil.which("node")
+    if node is None or not (VIEWER / "node_modules" / "gltf-validator").is_dir():
+        pytest.skip("gltf-validator is not at hand: make setup")
+    for name, options in (
+        ("a.glb", ExportOptions(occlusion=True)), ("a.gltf", ExportOptions()),
+        ("meshopt.glb", ExportOptions(compress="meshopt")),
+        ("draco.glb", ExportOptions(compress="draco")),
+    ):  # fmt: skip
+        export_stage(sphere_stage, tmp_path / name, options)
+    files = sorted(map(str, tmp_path.iterdir()))
+    command = [node, "--input-type=module", "-e", NODE, *files]
+    told = subprocess.run(command, cwd=VIEWER, capture_output=True, text=True, check=True)
+    for file, found in json.loads(told.stdout).items():
+        issues = found["issues"]
+        assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"][:3]
+        if "draco" not in file:  # three decodes it in a worker of a browser
+            ends = (spheres.CENTER - spheres.RADIUS, spheres.CENTER + spheres.RADIUS)
+            np.testing.assert_allclose(found["box"], np.array(ends) * 1e-6, atol=3e-8)

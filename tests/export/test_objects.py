@@ -1,0 +1,101 @@
+"""Objects of a label map: each with its name and colour, in one piece where tiles cut it."""
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from stereocell.export import gltf_scene
+from stereocell.export.options import ExportOptions
+from stereocell.export.write import export_stage
+from stereocell.model.color import to_srgb8
+from support import object_stage
+from support.object_stage import BEAM, COLORS, LABELS, write_objects
+
+NAMES = ("left", "cells 12", "beam")
+BALL_UM3 = 4 / 3 * np.pi * object_stage.RADIUS_UM**3
+BEAM_UM3 = float(np.prod(np.subtract(*BEAM[::-1])))
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_objects(tmp_path_factory.mktemp("objects"))
+
+
+def document(path: Path) -> dict:
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + length])
+
+
+def test_a_gltf_has_a_node_an_object_with_label_name_and_colour(
+    stage: Path, tmp_path: Path
+) -> None:
+    export_stage(stage, tmp_path / "o.glb", ExportOptions())
+    scene = trimesh.load(tmp_path / "o.glb")
+    nodes = document(tmp_path / "o.glb")["nodes"]
+    labels = {node["extras"]["label"]: node["name"] for node in nodes if "mesh" in node}
+    assert labels == dict(zip(LABELS, NAMES, strict=True))
+    assert len(scene.geometry) == 4  # the beam has a mesh in each tile
+    colors = {
+        tuple(mesh.visual.material.baseColorFactor[:3].tolist()) for mesh in scene.geometry.values()
+    }
+    wanted = {tuple(np.rint(255 * np.array(color)).astype(int).tolist()) for color in COLORS}
+    assert colors == wanted
+
+
+def test_of_very_many_objects_a_tile_is_one_mesh_in_their_colours(
+    stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gltf_scene, "MOST_NODES", 1)
+    export_stage(stage, tmp_path / "o.glb", ExportOptions())
+    scene = trimesh.load(tmp_path / "o.glb")
+    assert set(scene.geometry) == {"cells r0_c0", "cells r0_c1"}
+    seen = {
+        tuple(color[:3].tolist())
+        for mesh in scene.geometry.values()
+        for color in mesh.visual.vertex_attributes["color"]
+    }
+    assert seen == {tuple(np.rint(255 * np.array(color)).astype(int).tolist()) for color in COLORS}
+
+
+def test_bodies_of_a_3mf_are_objects_closed_and_whole(stage: Path, tmp_path: Path) -> None:
+    line = export_stage(stage, tmp_path / "o.3mf", ExportOptions(scale=1000, wall_mm=2.5))
+    bodies = trimesh.load(tmp_path / "o.3mf").geometry
+    assert set(bodies) == set(NAMES)
+    assert all(body.is_watertight for body in bodies.values())
+    assert bodies["beam"].volume == pytest.approx(BEAM_UM3, rel=1e-6)
+    assert bodies["left"].volume == pytest.approx(BALL_UM3, rel=0.03)
+    assert "beam: 1 of 1 bodies are thinner than 2.5 mm" in line  # it is 2 high
+    assert "left" not in line.partition("\n")[2]
+
+
+def test_ply_has_their_colours_and_stl_is_one_solid(stage: Path, tmp_path: Path) -> None:
+    export_stage(stage, tmp_path / "o.ply", ExportOptions(scale=1000))
+    mesh = trimesh.load(tmp_path / "o.ply")
+    seen = {tuple(color[:3].tolist()) for color in mesh.visual.vertex_colors}
+    assert seen == {tuple(to_srgb8(np.array(color, np.float32)).tolist()) for color in COLORS}
+    export_stage(stage, tmp_path / "o.stl", ExportOptions(scale=1000))
+    solid = trimesh.load(tmp_path / "o.stl")
+    assert solid.is_watertight
+    assert len(solid.split()) == 3
+    assert solid.volume == pytest.approx(2 * BALL_UM3 + BEAM_UM3, rel=0.03)
+
+
+def test_neuroglancer_has_them_by_label(stage: Path, tmp_path: Path) -> None:
+    export_stage(stage, tmp_path / "o.precomputed", ExportOptions())
+    info = json.loads((tmp_path / "o.precomputed/cells/segment_properties/info").read_text())
+    named = dict(zip(info["inline"]["ids"], info["inline"]["properties"][0]["values"], strict=True))
+    assert named == {str(label): name for label, name in zip(LABELS, NAMES, strict=True)}
+    assert not (tmp_path / "o.precomputed/image").exists()
+    assert all((tmp_path / f"o.precomputed/cells/{label}.index").is_file() for label in LABELS)
+
+
+def test_a_picture_and_usd_show_them(stage: Path, tmp_path: Path) -> None:
+    for name in ("o.png", "o.usdz", "o.usdc"):
+        options = ExportOptions(width=300) if name == "o.png" else ExportOptions()
+        export_stage(stage, tmp_path / name, options)
+        assert (tmp_path / name).stat().st_size > 1000

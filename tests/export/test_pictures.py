@@ -1,0 +1,124 @@
+"""Pictures and turntables: what is seen, once round, the same bytes each time."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+from PIL import Image
+from pxr import Gf, Usd
+
+from stereocell.export import pictures
+from stereocell.export.options import ExportOptions
+from stereocell.export.write import export_stage
+from stereocell.model.errors import UsageError
+from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
+from support import spheres
+from support.bundles import CD31
+
+
+def read(path: Path) -> list[NDArray[np.uint8]]:
+    """Return the frames of a video, (y, x, 3)."""
+    ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", str(path)]
+    folder = path.parent / "frames"
+    folder.mkdir()
+    subprocess.run([*ffmpeg, str(folder / "%03d.png")], check=True)
+    return [np.asarray(Image.open(one).convert("RGB")) for one in sorted(folder.iterdir())]
+
+
+def covered(pixels: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    return pixels.astype(int).max(axis=-1) > 40
+
+
+def test_a_picture_shows_the_sphere_in_its_edited_colour(
+    edited: Callable[..., Path], tmp_path: Path
+) -> None:
+    def paint(stage: Usd.Stage) -> None:
+        stage.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(0.0, 0.8, 0.0))
+
+    layer = edited(paint)
+    line = export_stage(layer, tmp_path / "s.png", ExportOptions(width=300))
+    pixels = np.asarray(Image.open(tmp_path / "s.png").convert("RGB"))
+    assert line == f"300 x {len(pixels)} pixels at lod0"
+    seen = covered(pixels)
+    red, green, blue = pixels[seen].mean(axis=0)
+    assert green > 2 * max(red, blue)
+    # a circle, whose width is to its area as a circle's is
+    width = np.ptp(np.flatnonzero(seen.any(axis=0))) + 1
+    assert seen.sum() == pytest.approx(np.pi / 4 * width**2, rel=0.03)
+    # the boxes of both tiles fill the picture: 20 um of them across, the sphere is 7
+    assert 0.25 < width / 300 < 0.4
+    before = (tmp_path / "s.png").read_bytes()
+    export_stage(layer, tmp_path / "s.png", ExportOptions(width=300))
+    assert (tmp_path / "s.png").read_bytes() == before
+
+
+@pytest.mark.parametrize("ending", ["mp4", "webm"])
+def test_a_turntable_goes_once_round(
+    sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    monkeypatch.setattr(pictures, "_FRAMES", 8)
+    path = tmp_path / f"s.{ending}"
+    half = ExportOptions(width=160, tiles=("r0_c0",))  # a bowl: it looks another way each time
+    export_stage(sphere_stage, path, half)
+    frames = read(path)
+    height, width, _ = frames[0].shape
+    assert (width, len(frames)) == (160, 8)
+    assert height % 2 == 0
+    seen = [covered(frame) for frame in frames]
+    assert all(one.any() for one in seen)
+    # the red comes through, and each frame is another view
+    for frame, one in zip(frames, seen, strict=True):
+        assert frame[one][:, 0].mean() > frame[one][:, 2].mean()
+    assert all((a ^ b).sum() > 30 for a, b in pairwise(seen))
+    before = path.read_bytes()
+    export_stage(sphere_stage, path, half)
+    assert path.read_bytes() == before
+
+
+def test_without_its_package_a_turntable_says_how_to_install_it(
+    sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(UsageError, match=r"pip install 'stereocell\[video\]'"):
+        export_stage(sphere_stage, tmp_path / "s.mp4", ExportOptions())
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_eye_s_way_round_is_to_the_right_of_the_specimen() -> None:
+    mesh = spheres.sphere(8, slice(None))
+    moved = mesh.positions - spheres.CENTER.astype(np.float32)
+    dot = Shape(
+        moved + np.float32([0, 0, 8]), mesh.triangles, mesh.normals, np.array([1.0, 1.0, 1.0])
+    )
+    frame = (-12.0, -12.0, -12.0), (12.0, 12.0, 12.0)
+
+    def middle(turned: float) -> float:
+        seen = covered(np.asarray(draw_image([dot], frame, (200, 200), turned_deg=turned)))
+        return float(np.flatnonzero(seen.any(axis=0)).mean())
+
+    # before the specimen, seen from ever more to the right, it wanders to the left
+    assert middle(0) > middle(30) > middle(60)
+
+
+@pytest.mark.parametrize("turned", [0.0, 40.0, 95.0, 140.0, 337.2])
+def test_a_long_box_fits_however_it_is_turned(turned: float) -> None:
+    low, high = np.array([-30.0, -4.0, -8.0]), np.array([30.0, 4.0, 8.0])
+    box = trimesh.creation.box(bounds=(low, high))
+    shape = Shape(
+        box.vertices.astype(np.float32),
+        box.faces.astype(np.uint32),
+        np.ones((8, 3), np.float32),
+        np.ones(3),
+    )
+    image = draw_image([shape], turning_frame(low, high), (200, 200), turned_deg=turned)
+    seen = covered(np.asarray(image))
+    assert seen.sum() > 1000
+    borders = (seen[0], seen[-1], seen[:, 0], seen[:, -1])
+    assert not any(border.any() for border in borders)

@@ -1,0 +1,91 @@
+"""The command: the ending chooses, options that can't be are refused, errors leave nothing."""
+
+import json
+import shutil
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from stereocell.cli.__main__ import main
+from stereocell.export import volume_files
+from stereocell.export.options import ExportOptions, parse_region
+from stereocell.export.write import FORMATS, export_stage
+from stereocell.model.errors import UsageError
+
+
+def test_an_unknown_ending_and_an_option_of_others_are_refused(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match=r"s\.fbx: expected a name that ends in \.glb, \.gltf"):
+        export_stage(sphere_stage, tmp_path / "s.fbx", ExportOptions())
+    with pytest.raises(UsageError, match=r"--compress can't be for \.stl, expected one of \.glb"):
+        export_stage(sphere_stage, tmp_path / "s.stl", ExportOptions(compress="draco"))
+
+
+def test_unknown_channels_and_tiles_are_refused(sphere_stage: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--channels: no 'CD4', expected of CD31, Hoechst 33342"):
+        export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions(channels=("CD4",)))
+    with pytest.raises(UsageError, match="--tiles: no 'r9_c9' is visible, expected of r0_c0"):
+        export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions(tiles=("r9_c9",)))
+
+
+@pytest.mark.parametrize("text", ["1:2,3:4", "2:1,:,:", "a:b,:,:", "1:2,:,:,:"])
+def test_a_region_is_three_spans(text: str) -> None:
+    with pytest.raises(UsageError, match="--region is"):
+        parse_region(text)
+
+
+def test_what_a_killed_command_left_is_removed(sphere_stage: Path, tmp_path: Path) -> None:
+    (tmp_path / ".s.glb.0123abcd.partial").mkdir()
+    (tmp_path / ".t.glb.0123abcd.partial").mkdir()  # of another file
+    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    assert {one.name for one in tmp_path.iterdir()} == {"s.glb", ".t.glb.0123abcd.partial"}
+
+
+def test_a_failure_half_way_leaves_the_older_file(
+    sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "s.raw").write_text("old")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(volume_files, "nrrd_head", fail)
+    with pytest.raises(OSError, match="No space left"):
+        export_stage(sphere_stage, tmp_path / "s.raw", ExportOptions())
+    assert [one.name for one in tmp_path.iterdir()] == ["s.raw"]
+    assert (tmp_path / "s.raw").read_text() == "old"
+
+
+def test_no_part_of_a_build_and_no_edit_is_written_over(
+    sphere_stage: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(sphere_stage.parent, out / "stage")
+    edit = tmp_path / "edit.usda"
+    edit.write_text("#usda 1.0\n(subLayers = [@./out/stage/stage.usda@])\n")
+    for file in (out / "stage" / "stage.usda", out / "stage" / "new.glb", out / "bundle" / "a.glb"):
+        assert main(["export", str(out), str(file)]) == 2
+        assert "a part of the build lies there" in capsys.readouterr().err
+    assert main(["export", str(out), str(edit), "--stage", str(edit)]) == 2
+    assert edit.read_text().startswith("#usda 1.0\n(subLayers")
+    assert main(["export", str(out), str(out / "s.glb"), "--json"]) == 0
+    told = capsys.readouterr()
+    lines = json.loads(told.out)["lines"]
+    assert len(lines) == 1
+    assert lines[0].startswith("2 meshes, ")
+    assert "export: 2/2 r0_c1" in told.err
+
+
+def test_every_ending_says_its_own_options_in_the_flags_of_the_command() -> None:
+    known = {field.name for field in fields(ExportOptions)}
+    assert set().union(*(way.takes for way in FORMATS.values())) | {"channels"} == known
+
+
+def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(tmp_path), str(tmp_path / "s.glb"), "--json"]) == 1
+    told = capsys.readouterr()
+    assert "stereocell:" in told.err
+    assert json.loads(told.out)["exit_code"] == 1
+    assert not (tmp_path / "s.glb").exists()
