@@ -181,23 +181,67 @@ void main() {
 #else
   const float FULL = OPAQUE;
 #endif
-  for (; i < steps && t < end && sum.a < FULL; i++) {
-    // What remains of the ray over what remains of the budget: it always reaches the end.
-    float dt = max(uMinStep, (end - t) / float(steps - i));
-    // A loop of its own: rays beside each other then sample together, whatever they skipped.
-    while (t >= exit) {
-      vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
-      // By whole steps, so that samples lie where they would without skips.
-      float skip = block.y * floor((block.x - t) / dt) * dt;
-      exit = skip > 0.0 ? t + skip : block.x;
-      if (skip <= 0.0) break;
-      t = exit;
-      if (++i >= steps || t >= end) break;
-      dt = max(uMinStep, (end - t) / float(steps - i));
+  // In legs, to the pane, the edge and the end: so no sample asks what it passes.
+  bool isPast = false;  // the edge
+  for (int leg = 0; leg < 3; leg++) {
+    float stop = min(isPast ? end : edge, pane);
+    for (; i < steps && t < stop && sum.a < FULL; i++) {
+      // What remains of the ray over what remains of the budget: it always reaches the end.
+      float dt = max(uMinStep, (end - t) / float(steps - i));
+      // A loop of its own: rays beside each other then sample together, whatever they skipped.
+      while (t >= exit) {
+        vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
+        // By whole steps, so that samples lie where they would without skips.
+        float skip = block.y * floor((block.x - t) / dt) * dt;
+        exit = skip > 0.0 ? t + skip : block.x;
+        if (skip <= 0.0) break;
+        t = exit;
+        if (++i >= steps || t >= end) break;
+        dt = max(uMinStep, (end - t) / float(steps - i));
+      }
+      if (i >= steps || t >= stop) break;
+      float here = min(dt, stop - t);  // the last step may be shorter
+      float at = t + shift * here;
+      vec3 p = texStart + at * texDir;
+      vec4 v = sampleIntensities(p);
+#ifdef TWO_D
+      if (any(greaterThan(v, uFloor)) && mayShow(v)) {
+#else
+      if (any(greaterThan(v, uFloor))) {
+#endif
+#ifdef DISC
+        vec4 voxels = here / uVoxel * weights(start + at * dir);
+#else
+        vec4 voxels = vec4(here / uVoxel * uPresence);
+#endif
+        vec4 shares;
+#ifdef TWO_D
+        vec4 steepness = steepnessOf(stepsAt(p, uVoxel * abs(texPerUm)));
+        vec4 s = classify2d(v, steepness, voxels, shares);
+#else
+        vec4 s = classify(v, voxels, shares);
+#endif
+#if defined(MAXIMUM)
+        largest = max(largest, mix(vec4(0.0), v, greaterThan(voxels, vec4(0.0))));
+        sum = brightest(largest);
+#elif defined(SUM)
+        sum.rgb += light * s.a * s.rgb;
+#else
+        if (s.a > 0.0) {
+#ifndef UNLIT  // for the benchmark, whose peers are timed without their light
+          vec3 gradient = -face;
+          if (t >= uVoxel || face == vec3(0.0)) gradient = gradientAt(p, texPerUm, shares);
+          s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
+#endif
+          sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
+        }
+#endif
+      }
+      t += here;
     }
-    if (i >= steps || t >= end) break;
+    if (i >= steps || t >= end || sum.a >= FULL) break;
     if (t >= pane) {
-      front = mix(veil, sum, scene.z);
+      front = isPast ? mix(veil, sum, scene.z) : sum;
       sum = veil = vec4(0.0);
 #ifdef MAXIMUM
       largest = vec4(0.0);
@@ -205,52 +249,16 @@ void main() {
       pane = NOWHERE;
       isBehind = true;
     }
-    bool isInFront = t < edge;
-    float here = min(dt, min(isInFront ? edge : end, pane) - t);  // the last step may be shorter
-    float at = t + shift * here;
-    vec3 p = texStart + at * texDir;
-    vec4 v = sampleIntensities(p);
-#ifdef TWO_D
-    if (any(greaterThan(v, uFloor)) && mayShow(v)) {
-#else
-    if (any(greaterThan(v, uFloor))) {
-#endif
-#ifdef DISC
-      vec4 voxels = here / uVoxel * weights(start + at * dir);
-#else
-      vec4 voxels = vec4(here / uVoxel * uPresence);
-#endif
-      vec4 shares;
-#ifdef TWO_D
-      vec4 steepness = steepnessOf(stepsAt(p, uVoxel * abs(texPerUm)));
-      vec4 s = classify2d(v, steepness, voxels, shares);
-#else
-      vec4 s = classify(v, voxels, shares);
-#endif
-#if defined(MAXIMUM)
-      largest = max(largest, mix(vec4(0.0), v, greaterThan(voxels, vec4(0.0))));
-      sum = brightest(largest);
-#elif defined(SUM)
-      sum.rgb += light * s.a * s.rgb;
-#else
-      if (s.a > 0.0) {
-#ifndef UNLIT  // for the benchmark, whose peers are timed without their light
-        vec3 gradient = -face;
-        if (t >= uVoxel || face == vec3(0.0)) gradient = gradientAt(p, texPerUm, shares);
-        s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
-#endif
-        sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
-      }
-#endif
+    if (t >= edge && !isPast) {
+      veil = sum;
+      isPast = true;
     }
-    if (isInFront) veil = sum;
-    t += here;
   }
 #ifdef COUNT_STEPS  // for tests: the number of steps, and the share of the ray that they covered
   oColor = vec4(float(i % 256) / 255.0, float(i / 256) / 255.0, clamp(t / end, 0.0, 1.0), 1.0);
   return;
 #endif
-  sum = mix(veil, sum, scene.z);
+  if (isPast) sum = mix(veil, sum, scene.z);
   vec4 most = max(sum, front);
   if (max(max(most.r, most.g), max(most.b, most.a)) <= 0.0) discard;
   oColor = shown(isBehind ? front : sum);
