@@ -378,7 +378,8 @@ def test_what_can_not_be_built_is_told_in_one_line(
     tifffile.imwrite(tmp_path / "m.tif", np.ones((6, 5, 7), np.uint8), metadata={"axes": "ZYX"})
     told = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
     assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in told
-    negative = np.full((6, 8, 8), -7, np.int16)
+    negative = np.zeros((6, 8, 300), np.int16)
+    negative[..., -1] = -7  # far from its middle
     tifffile.imwrite(tmp_path / "n.tif", negative, metadata={"axes": "ZYX"})
     flags = ("--labels", ".", "--spacing-um", "1,1,1")
     told = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)

@@ -13,7 +13,7 @@ from typing import Any
 
 from stereocell.building import stage_tasks
 from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
-from stereocell.building.intensities import require_intensities
+from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
 from stereocell.building.object_passes import locate_objects, read_notes, told_before
 from stereocell.building.object_tables import appearance_of_labels, make_table, table_of
@@ -104,7 +104,7 @@ def settle(source: str, settings: Settings) -> Plan:
         colors=PALETTE[len(channels) :] + PALETTE[: len(channels)],
         taken=[channel.name for channel in channels],
     )
-    if options.taken_as != INTENSITY and not alone:
+    if options.taken_as != INTENSITY and channels:
         whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
         require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
     origin = dataset.levels[level[0]].origin_um
@@ -125,6 +125,7 @@ def settle(source: str, settings: Settings) -> Plan:
     for one in plan.labels:
         table_of(plan, one)  # what can't be read is told before the build
     gaps, objects = told_of_gaps(dataset, plan), list(told_before(plan))
+    objects += filter(None, map(doubt_of, plan.labels))
     for note in (
         *dataset.notes,
         *gaps,
