@@ -1,6 +1,7 @@
 """Read the objects of a composed stage: which vertex is whose, and the table's columns."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +95,7 @@ def without_hidden(mesh: Mesh, prim: Usd.Prim) -> Mesh | None:
     if not kept.any():
         return None
     number = (np.cumsum(kept) - 1).astype(np.uint32)
-    parts = {
+    parts: dict[str, Any] = {
         field.name: None if part is None else part[kept]
         for field in fields(mesh)
         if field.name not in ("triangles", "objects")
