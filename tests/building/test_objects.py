@@ -3,6 +3,7 @@
 import json
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,11 +16,13 @@ from stereocell.building import object_passes
 from stereocell.building.located_objects import CUT
 from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.tasks import objects as objects_maker
 from stereocell.building.unit_files import load_objects
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
+from stereocell.objects.intensities import Measured
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
@@ -488,6 +491,32 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
     wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
     assert wanted in said(capsys)
+
+
+def test_the_deep_check_measures_the_image_anew(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A unit that counted wrong: the stage has what it said, the voxels have not."""
+    labels = np.zeros((16, 24, 60), np.uint16)
+    labels[3:13, 4:20, 4:20], labels[3:13, 4:20, 24:36], labels[3:13, 4:20, 40:56] = 3, 5, 8
+    image = np.random.default_rng(3).poisson(300, labels.shape).astype(np.uint16)
+    tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
+    write_ome_tiff(tmp_path / "i.ome.tif", image, names=["DNA"])
+    flags = ("--labels", f"cells={tmp_path / 'l.tif'}", "--grid", "2x1")
+    build(tmp_path / "i.ome.tif", tmp_path / "right", *flags)
+    assert run("check", tmp_path / "right", "--deep", "--workers", 0) == 0
+    right = objects_maker.measure_intensities
+
+    def measure(*given: Any) -> Measured:
+        found = right(*given)
+        found.mean[-1] += 1
+        return found
+
+    monkeypatch.setattr(objects_maker, "measure_intensities", measure)
+    build(tmp_path / "i.ome.tif", tmp_path / "wrong", *flags)
+    said(capsys)
+    assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
+    assert "cells: column mean_DNA is not the voxels' mean of 3, 8" in said(capsys)  # last of tiles
 
 
 def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from stereocell.model.unit import ObjectFacts
 from stereocell.objects.intensities import merge_quantiles
 
 Triple = tuple[float, float, float]
+MEAN = "mean_"  # before a channel's identifier: its mean over each object
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ def own_columns(
         mean, p95 = means[:, index], p95s[:, index]
         made.append(
             (
-                f"mean_{to_identifier(name)}",
+                f"{MEAN}{to_identifier(name)}",
                 f"mean {name}",
                 mean,
                 f"Mean of {name} over its voxels",
