@@ -392,6 +392,12 @@ def test_what_can_not_be_built_is_told_in_one_line(
     assert run("plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags) == 0
     assert run("units", tmp_path / "n", "--workers", 0) == 1
     assert "found -7, expected 0 or more in labels" in capsys.readouterr().err
+    for flag in ("--table", "--table-key", "--columns", "--color-by"):
+        assert f"{flag} is 'a': of no objects, expected --labels" in refusal(
+            capsys, *plan, flag, "a"
+        )
+    told = refusal(capsys, *plan, "--labels", "cells", "--columns", "a,b")
+    assert "--columns is 'a,b': of no table, expected --table with it" in told
     told = refusal(capsys, *plan, "--labels", "cells", "--table", tmp_path / "none.csv")
     assert "none.csv: can't be read" in told
     assert not (tmp_path / "out").exists()

@@ -31,7 +31,7 @@ from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
-from stereocell.model.errors import OutputError
+from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
@@ -81,6 +81,7 @@ def settle(source: str, settings: Settings) -> Plan:
     options = settings.plan
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
+    _require_labels(settings)
     dataset = open_source(as_asked(location, options))
     modality = dataset.modality or options.modality
     alone = are_alone(settings.labels)
@@ -134,6 +135,21 @@ def settle(source: str, settings: Settings) -> Plan:
     ):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan
+
+
+def _require_labels(settings: Settings) -> None:
+    """Raise UsageError where something is said of objects that nobody asked for."""
+    options = settings.objects
+    for flag, value in {
+        "--table": options.table,
+        "--table-key": options.table_key,
+        "--columns": ",".join(options.columns),
+        "--color-by": options.color_by,
+    }.items():
+        if value and not settings.labels:
+            raise UsageError(f"{flag} is {value!r:.60}: of no objects, expected --labels with it")
+        if value and not options.table and flag in ("--table-key", "--columns"):
+            raise UsageError(f"{flag} is {value!r:.60}: of no table, expected --table with it")
 
 
 def provenance(plan: Plan) -> dict[str, Any]:
