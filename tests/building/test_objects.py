@@ -412,6 +412,7 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     spacing = [2 * s for s in SPACING_UM]
     group.attrs["ome"] = {
         "version": "0.5",
+        "image-label": {"colors": [{"label-value": 1, "rgba": [0, 0, 255, 255]}]},
         "multiscales": [
             {
                 "axes": [
@@ -439,6 +440,12 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     voxels = np.asarray(zarr.open_group(sample, mode="r")["0"][3])[::2, ::2, ::2]
     for label, mean in zip(found, column_of(out, "mean_CD3"), strict=True):
         assert mean == pytest.approx(voxels[coarse == label].mean(), rel=1e-5)
+    # the file's own colour of one object; the others have hues
+    for tile, rows in objects_of(out)["tiles"].items():
+        mesh = read_glb(out / f"bundle/channels/cells/{tile}/lod1.glb")
+        own = np.array(found[rows["first"] : rows["first"] + rows["count"]])[mesh.objects]
+        assert ((mesh.colors == (0, 0, 1)).all(axis=1) == (own == 1)).all()
+    assert 1 in found
 
 
 @pytest.mark.parametrize("omit_empty", [False, True])

@@ -81,6 +81,7 @@ def make_table(
             else (),
             _default(columns, plan.settings.objects.color_by),
             _walls(facts, rows, names),
+            _colors(notes, names),
         ),
         _told_of_thin(labels, thin) + remarks + renamed,
     )
@@ -144,6 +145,15 @@ def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
             numbers = np.array([np.nan if value is None else float(value) for value in held])
             found.append(number_column(name, numbers, "From the label map's file"))
     return found
+
+
+def _colors(notes: ObjectNotes, labels: NDArray[np.uint64]) -> NDArray[np.float32] | None:
+    """Return the colours that the label map's own file has for its objects; None: for none."""
+    if not notes.colors:
+        return None
+    unknown = (np.nan,) * 3
+    found = [notes.colors.get(label, unknown) for label in labels.tolist()]
+    return np.array(found, np.float32).reshape(-1, 3)
 
 
 def _joined(table: Table, labels: NDArray[np.uint64]) -> tuple[list[Column], list[str]]:
