@@ -403,6 +403,17 @@ def test_what_can_not_be_built_is_told_in_one_line(
     assert not (tmp_path / "out").exists()
 
 
+def test_of_two_label_maps_the_first_one_has_the_table(
+    sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again, table = sample / "labels/cells", tmp_path / "t.csv"
+    table.write_text("label,score\n2,0.5\n")
+    flags = ("--channels", "DNA", "--labels", "cells", "--table", table)
+    for more, is_told in ((), False), (("--labels", f"again={again}"), True):
+        assert run("plan", sample, "-o", tmp_path / "out", *flags, *more) == 0
+        assert ("the table is joined to cells alone, the first" in said(capsys)) is is_told
+
+
 def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: Path) -> None:
     """Labels at half the image's resolution, in a file of their own with a place of their own."""
     tissue = make_tissue(SHAPE, 3)

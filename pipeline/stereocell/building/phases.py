@@ -127,6 +127,8 @@ def settle(source: str, settings: Settings) -> Plan:
         table_of(plan, one)  # what can't be read is told before the build
     gaps, objects = told_of_gaps(dataset, plan), list(told_before(plan))
     objects += filter(None, map(doubt_of, plan.labels))
+    if settings.objects.table and len(plan.labels) > 1:
+        objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
     for note in (
         *dataset.notes,
         *gaps,
