@@ -412,6 +412,15 @@ def test_of_two_label_maps_the_first_one_has_the_table(
     for more, is_told in ((), False), (("--labels", f"again={again}"), True):
         assert run("plan", sample, "-o", tmp_path / "out", *flags, *more) == 0
         assert ("the table is joined to cells alone, the first" in said(capsys)) is is_told
+    out, flags = tmp_path / "small", (*flags, *more, "--color-by", "score", "--grid", "2x1")
+    build(sample, out, *flags)
+    assert objects_of(out)["default"] == "score"
+    again_there = json.loads((out / "bundle/channels/again/objects.json").read_text())
+    assert again_there["default"] != "score"
+    said(capsys)
+    told = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
+    assert "--color-by is 'scores', expected one of volume, area, " in told
+    assert told.endswith(", score")
 
 
 def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: Path) -> None:

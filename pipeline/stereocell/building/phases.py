@@ -16,7 +16,12 @@ from stereocell.building.channels import PALETTE, Channel, choose_color, with_su
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
 from stereocell.building.object_passes import locate_objects, read_notes, told_before
-from stereocell.building.object_tables import appearance_of_labels, make_table, table_of
+from stereocell.building.object_tables import (
+    appearance_of_labels,
+    make_table,
+    require_color_by,
+    table_of,
+)
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
@@ -124,7 +129,8 @@ def settle(source: str, settings: Settings) -> Plan:
         labels=labels,
     )
     for one in plan.labels:
-        table_of(plan, one)  # what can't be read is told before the build
+        # what can't be read, or isn't there, is told before the build
+        require_color_by(plan, one, table_of(plan, one))
     gaps, objects = told_of_gaps(dataset, plan), list(told_before(plan))
     objects += filter(None, map(doubt_of, plan.labels))
     if settings.objects.table and len(plan.labels) > 1:
