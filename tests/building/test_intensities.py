@@ -33,6 +33,30 @@ def test_a_label_map_ends_the_plan_by_a_line_that_names_both_ways(
         assert not out.exists() or not list(out.iterdir())
 
 
+def test_a_label_map_that_is_built_is_no_image_beside_it(
+    labels: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    words = ["plan", str(labels), "-o", str(out), "--labels", "."]
+    assert main([*words, "--channels", "0"]) == 2
+    assert "looks like a label map of 192 objects" in capsys.readouterr().err
+    assert main(words) == 0
+    told = capsys.readouterr().err
+    assert "level 0 (the finest, as label maps are built)" in told
+    assert "looks like" not in told
+
+
+def test_an_image_that_is_taken_for_labels_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "i.ome.tif"
+    voxels = np.random.default_rng(0).poisson(400, (12, 30, 40)).astype(np.uint16)
+    sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
+    tifffile.imwrite(path, voxels, metadata={"axes": "ZYX", **sizes}, ome=True)
+    assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--labels", "cells=."]) == 0
+    assert "cells: looks like intensities: " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("objects", [2, 4])
 @pytest.mark.parametrize("kind", ["uint8", "float32", "float64"])
 def test_few_objects_far_from_each_other_are_seen(

@@ -111,6 +111,35 @@ def test_turned_skewed_and_far_ones_are_refused(scan: tuple[Path, Dataset], tmp_
     assert "lies beside the image" in refusal(scan, path)
 
 
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (("i.ome.tif", "l.nii"), "axes by a patient's sides, and the image has its file's own"),
+        (("i.nii", "l.tif"), "its file's own axes, and the image has axes by a patient's sides"),
+        (("i.ome.tif", "guess.nii"), "axes by guessed sides, and the image has its file's own"),
+        (("i.nii", "guess.nii"), "axes by guessed sides, and the image has axes by a patient's"),
+        (("guess.nii", "guess.nii"), ""),
+    ],
+)
+def test_which_way_round_labels_lie_is_never_guessed(
+    tmp_path: Path, names: tuple[str, str], told: str
+) -> None:
+    """Readers turn what a patient's sides are known of, and nothing else, to the sides."""
+    voxels = numbered(grid("axial", (20, 20, 20)), (20, 20, 20))  # a cube: no shape tells it
+    spacing = {f"PhysicalSize{axis}": 1.0 for axis in "XYZ"}
+    tifffile.imwrite(tmp_path / "i.ome.tif", voxels, metadata={"axes": "ZYX", **spacing})
+    tifffile.imwrite(tmp_path / "l.tif", voxels, photometric="minisblack")
+    for name in ("i.nii", "l.nii"):
+        nifti_files.write(tmp_path / name, np.diag([1.0, 1, 1, 1]), voxels)
+    nifti_files.write(tmp_path / "guess.nii", np.diag([1.0, 1, 1, 1]), voxels, "neither")
+    image, labels = (tmp_path / name for name in names)
+    pair = (image, read.open(image))
+    if told:
+        assert told in refusal(pair, labels)
+    else:
+        assert len(labels_on(pair, labels)) == 3
+
+
 def test_names_that_are_taken(scan: tuple[Path, Dataset], tmp_path: Path) -> None:
     affine = grid("axial", SHAPE, (2.0, 1.8, 1.8))
     path = nifti_files.write(tmp_path / "o.nii.gz", affine, numbered(affine, SHAPE))

@@ -3,6 +3,7 @@
 import json
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,11 +16,13 @@ from stereocell.building import object_passes
 from stereocell.building.located_objects import CUT
 from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.tasks import objects as objects_maker
 from stereocell.building.unit_files import load_objects
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
+from stereocell.objects.intensities import Measured
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
@@ -378,7 +381,8 @@ def test_what_can_not_be_built_is_told_in_one_line(
     tifffile.imwrite(tmp_path / "m.tif", np.ones((6, 5, 7), np.uint8), metadata={"axes": "ZYX"})
     told = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
     assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in told
-    negative = np.full((6, 8, 8), -7, np.int16)
+    negative = np.zeros((6, 8, 300), np.int16)
+    negative[..., -1] = -7  # far from its middle
     tifffile.imwrite(tmp_path / "n.tif", negative, metadata={"axes": "ZYX"})
     flags = ("--labels", ".", "--spacing-um", "1,1,1")
     told = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
@@ -388,9 +392,35 @@ def test_what_can_not_be_built_is_told_in_one_line(
     assert run("plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags) == 0
     assert run("units", tmp_path / "n", "--workers", 0) == 1
     assert "found -7, expected 0 or more in labels" in capsys.readouterr().err
+    for flag in ("--table", "--table-key", "--columns", "--color-by"):
+        assert f"{flag} is 'a': of no objects, expected --labels" in refusal(
+            capsys, *plan, flag, "a"
+        )
+    told = refusal(capsys, *plan, "--labels", "cells", "--columns", "a,b")
+    assert "--columns is 'a,b': of no table, expected --table with it" in told
     told = refusal(capsys, *plan, "--labels", "cells", "--table", tmp_path / "none.csv")
     assert "none.csv: can't be read" in told
     assert not (tmp_path / "out").exists()
+
+
+def test_of_two_label_maps_the_first_one_has_the_table(
+    sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again, table = sample / "labels/cells", tmp_path / "t.csv"
+    table.write_text("label,score\n2,0.5\n")
+    flags = ("--channels", "DNA", "--labels", "cells", "--table", table)
+    for more, is_told in ((), False), (("--labels", f"again={again}"), True):
+        assert run("plan", sample, "-o", tmp_path / "out", *flags, *more) == 0
+        assert ("the table is joined to cells alone, the first" in said(capsys)) is is_told
+    out, flags = tmp_path / "small", (*flags, *more, "--color-by", "score", "--grid", "2x1")
+    build(sample, out, *flags)
+    assert objects_of(out)["default"] == "score"
+    again_there = json.loads((out / "bundle/channels/again/objects.json").read_text())
+    assert again_there["default"] != "score"
+    said(capsys)
+    told = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
+    assert "--color-by is 'scores', expected one of volume, area, " in told
+    assert told.endswith(", score")
 
 
 def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: Path) -> None:
@@ -402,6 +432,7 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     spacing = [2 * s for s in SPACING_UM]
     group.attrs["ome"] = {
         "version": "0.5",
+        "image-label": {"colors": [{"label-value": 1, "rgba": [0, 0, 255, 255]}]},
         "multiscales": [
             {
                 "axes": [
@@ -429,6 +460,12 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     voxels = np.asarray(zarr.open_group(sample, mode="r")["0"][3])[::2, ::2, ::2]
     for label, mean in zip(found, column_of(out, "mean_CD3"), strict=True):
         assert mean == pytest.approx(voxels[coarse == label].mean(), rel=1e-5)
+    # the file's own colour of one object; the others have hues
+    for tile, rows in objects_of(out)["tiles"].items():
+        mesh = read_glb(out / f"bundle/channels/cells/{tile}/lod1.glb")
+        own = np.array(found[rows["first"] : rows["first"] + rows["count"]])[mesh.objects]
+        assert ((mesh.colors == (0, 0, 1)).all(axis=1) == (own == 1)).all()
+    assert 1 in found
 
 
 @pytest.mark.parametrize("omit_empty", [False, True])
@@ -487,6 +524,32 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
     wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
     assert wanted in said(capsys)
+
+
+def test_the_deep_check_measures_the_image_anew(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A unit that counted wrong: the stage has what it said, the voxels have not."""
+    labels = np.zeros((16, 24, 60), np.uint16)
+    labels[3:13, 4:20, 4:20], labels[3:13, 4:20, 24:36], labels[3:13, 4:20, 40:56] = 3, 5, 8
+    image = np.random.default_rng(3).poisson(300, labels.shape).astype(np.uint16)
+    tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
+    write_ome_tiff(tmp_path / "i.ome.tif", image, names=["DNA"])
+    flags = ("--labels", f"cells={tmp_path / 'l.tif'}", "--grid", "2x1")
+    build(tmp_path / "i.ome.tif", tmp_path / "right", *flags)
+    assert run("check", tmp_path / "right", "--deep", "--workers", 0) == 0
+    right = objects_maker.measure_intensities
+
+    def measure(*given: Any) -> Measured:
+        found = right(*given)
+        found.mean[-1] += 1
+        return found
+
+    monkeypatch.setattr(objects_maker, "measure_intensities", measure)
+    build(tmp_path / "i.ome.tif", tmp_path / "wrong", *flags)
+    said(capsys)
+    assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
+    assert "cells: column mean_DNA is not the voxels' mean of 3, 8" in said(capsys)  # last of tiles
 
 
 def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:

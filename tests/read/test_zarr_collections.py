@@ -132,8 +132,8 @@ def test_a_container_of_one_image_is_opened_at_an_address(
 def test_an_image_tells_its_label_images(tmp_path: Path, version: str) -> None:
     path = labelled(tmp_path / "i.zarr", version)
     assert read.open(path).notes == (
-        "label images of it: cells (int32, 3 objects), two words (int32) (--labels NAME builds "
-        "the objects of one)",
+        "label images of it: cells (int32, properties of 3 objects), two words (int32) "
+        "(--labels NAME builds the objects of one)",
     )
     assert "a list of labels, 2 label images (cells, two words)" in refusal(path / "labels")
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.building.label_maps import Labels
 from stereocell.model.errors import UsageError
 from stereocell.model.tiling import Box
 from stereocell.objects.label_rule import Kind, recognise
@@ -23,6 +24,8 @@ _SIDE = 128  # voxels: largest edge of a block that is looked at
 _LEAST_SIDE = 32  # of many channels, whose blocks together are to be as those of _MOST
 _WIDE = 4  # bytes
 _MOST_EXACT = 2.0**53  # whole numbers below are exact as float64
+_FEW_VALUES = 8  # fewer tell nothing
+_IMAGE_S_PIECE = 7.5  # voxels of equal values in images (objects/label_rule.py), at most
 _MOST = 4  # channels that are looked at in blocks of _SIDE; most label maps come with fewer others
 
 
@@ -59,6 +62,24 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
                 "expected intensities: --labels . builds its objects; --as intensity takes it for "
                 "an image"
             )
+
+
+def doubt_of(labels: Labels) -> str:
+    """Return what is said of a label map whose middle looks like an image; empty: it does not.
+
+    Raises SourceError.
+    """
+    box = next(_blocks(Box((0, 0, 0), labels.shape), _SIDE))
+    voxels = labels.open().read(box)
+    found = recognise(voxels)
+    if found.kind != "image" or found.values <= _FEW_VALUES:
+        return ""
+    if found.pieces and np.count_nonzero(voxels) > _IMAGE_S_PIECE * found.pieces:
+        return ""
+    return (
+        f"{labels.name}: looks like intensities: {found.values} values that differ from voxel to "
+        "voxel; each of them is taken for an object's number"
+    )
 
 
 @dataclass(frozen=True, slots=True)

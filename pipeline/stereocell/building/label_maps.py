@@ -9,6 +9,7 @@ from stereocell.building.open_source import SourceRef, as_asked, open_source
 from stereocell.building.settings import PlanOptions
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
+from stereocell.model.rigid_transform import IDENTITY
 from stereocell.read.dataset import Dataset
 from stereocell.read.label_map import LabelMap
 from stereocell.storage.location import Location
@@ -152,8 +153,17 @@ def _as_stored(dataset: Dataset) -> Dataset:
 
 
 def _origin(image: Dataset, labels: Dataset) -> Triple:
-    """Return the centre of the labels' first voxel, from the image's (z, y, x), um."""
-    if image.has_sides and labels.has_sides:
+    """Return the centre of the labels' first voxel, from the image's (z, y, x), um.
+
+    Raises SourceError where they are turned to the image, or which way round they lie is not known.
+    """
+    if _ways_round(image) != _ways_round(labels):
+        raise SourceError(
+            f"{labels.shown}: found {_ways_round(labels)}, and the image has "
+            f"{_ways_round(image)}: which way round the labels lie on it is not known, expected "
+            "both in formats that say it alike, as both NIfTI or both TIFF"
+        )
+    if image.has_sides or image.placement != IDENTITY:
         between = np.linalg.inv(np.array(image.placement)) @ np.array(labels.placement)
         if np.abs(between[:3, :3] - np.eye(3)).max() > _ALIGNED:
             raise SourceError(
@@ -166,6 +176,13 @@ def _origin(image: Dataset, labels: Dataset) -> Triple:
     places = zip(labels.offset_um, image.offset_um, strict=True)
     z, y, x = (own - first for own, first in places)
     return z, y, x
+
+
+def _ways_round(dataset: Dataset) -> str:
+    """Return by what a reader laid a dataset's axes, for messages."""
+    if dataset.has_sides:
+        return "axes by a patient's sides"
+    return "its file's own axes" if dataset.placement == IDENTITY else "axes by guessed sides"
 
 
 def _require_overlap(image: Dataset, labels: Labels, shown: str) -> None:

@@ -148,7 +148,7 @@ def object_tasks(
     out_folder: OutFolder, plan: Plan, located: Mapping[str, Located], survey: Survey
 ) -> Iterator[tuple[str, ObjectsTask, str]]:
     """Yield `<tile>/<labels>`, task and key of the unit of each tile and label map."""
-    images = _images(plan)
+    images = images_of(plan)
     step_um = lattice_step_um(plan, located)
     for labels in plan.labels:
         painted = _painted(plan, labels, survey)
@@ -219,7 +219,7 @@ def lattice_step_um(plan: Plan, located: Mapping[str, Located]) -> float:
     return choose_step(longest) * _UM
 
 
-def _images(plan: Plan) -> tuple[ImageRef, ...]:
+def images_of(plan: Plan) -> tuple[ImageRef, ...]:
     """Return the image's channels, as they are built."""
     seen, found = set(), []
     for channel in plan.channels:

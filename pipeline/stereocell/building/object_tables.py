@@ -1,5 +1,6 @@
 """The table of a label map's objects, put together from the units, the file's notes and a table."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from stereocell.building.plan import Plan
 from stereocell.model.channel import Appearance
 from stereocell.model.counted import counted
 from stereocell.model.errors import UsageError
+from stereocell.model.identifiers import to_identifier
 from stereocell.model.object_notes import ObjectNotes
 from stereocell.model.object_table import Column, ObjectTable
 from stereocell.model.unit import ObjectFacts
@@ -27,6 +29,7 @@ from stereocell.read.tables.table import TableColumn, listed
 from stereocell.usd.write_appearances import DEFAULT_FUNCTION
 from stereocell.usd.write_objects import RESERVED
 
+_ENDS_IN_NUMBER = re.compile(r"_\d+$")  # an ID of which the second column of a name may be
 NAMES = "name"  # the column of the names that a label map's own file gives
 
 
@@ -60,9 +63,10 @@ def make_table(
     high = np.array(labels.origin_um) + (known.high[order] - half) * labels.spacing_um
     centre = np.array(labels.origin_um) + known.centroids[order] * labels.spacing_um
     volume = known.voxels[order] * float(np.prod(labels.spacing_um))
-    channels = list(dict.fromkeys(channel.base or channel.name for channel in plan.channels))
     place = Place(low, high, centre, volume.astype(np.float64))
-    columns = own_columns(place, [(rows[tile], one) for tile, one in facts.items()], channels)
+    columns = own_columns(
+        place, [(rows[tile], one) for tile, one in facts.items()], _measured(plan)
+    )
     remarks: list[str] = []
     columns += _noted(notes, names)
     if table is not None:
@@ -79,8 +83,11 @@ def make_table(
             tuple(notes.names.get(label, str(label)) for label in names.tolist())
             if notes.names
             else (),
-            _default(columns, plan.settings.objects.color_by),
+            _default(
+                columns, plan.settings.objects.color_by, is_first=labels.id == plan.labels[0].id
+            ),
             _walls(facts, rows, names),
+            _colors(notes, names),
         ),
         _told_of_thin(labels, thin) + remarks + renamed,
     )
@@ -146,6 +153,15 @@ def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
     return found
 
 
+def _colors(notes: ObjectNotes, labels: NDArray[np.uint64]) -> NDArray[np.float32] | None:
+    """Return the colours that the label map's own file has for its objects; None: for none."""
+    if not notes.colors:
+        return None
+    unknown = (np.nan,) * 3
+    found = [notes.colors.get(label, unknown) for label in labels.tolist()]
+    return np.array(found, np.float32).reshape(-1, 3)
+
+
 def _joined(table: Table, labels: NDArray[np.uint64]) -> tuple[list[Column], list[str]]:
     """Return a table's columns in the order of the objects, and what did not fit."""
     order = np.argsort(table.labels, kind="stable")
@@ -209,18 +225,42 @@ def _unique(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
     return list(found.values()), remarks
 
 
-def _default(columns: Sequence[Column], wanted: str) -> str:
-    """Return the ID of the column that colours first: the one asked for, or of categories."""
-    if wanted:
-        for column in columns:
-            if wanted in (column.name, column.id):
-                return column.id
-        raise UsageError(
-            f"--color-by is {wanted!r}, expected one of "
-            f"{', '.join(column.name for column in columns)}"
-        )
+def _default(columns: Sequence[Column], wanted: str, *, is_first: bool) -> str:
+    """Return the ID of the column that colours first: the one asked for, or of categories.
+
+    is_first  whether it is the label map that has the table: it needs the column that is asked for
+    """
+    for column in columns:
+        if wanted and wanted in (column.name, column.id):
+            return column.id
+    if wanted and is_first:
+        raise _no_column(wanted, [column.name for column in columns])
     categories = [column.id for column in columns if column.categories]
     return categories[0] if categories else ""
+
+
+def require_color_by(plan: Plan, labels: Labels, table: Table | None) -> None:
+    """Raise UsageError where no column is called as the one that shall colour first."""
+    wanted = plan.settings.objects.color_by
+    if not wanted or labels.id != plan.labels[0].id:
+        return
+    none, notes = np.zeros((0, 3)), labels.open().notes
+    own = own_columns(Place(none, none, none, np.zeros(0)), [], _measured(plan))
+    has_names = bool(notes.names) or plan.settings.objects.segment_labels
+    names = [column.name for column in own] + [NAMES] * has_names + list(notes.columns)
+    names += [column.name for column in table.columns] if table else []
+    ids = {column.id for column in own} | set(map(to_identifier, names))
+    if wanted not in names and wanted not in ids and not _ENDS_IN_NUMBER.search(wanted):
+        raise _no_column(wanted, names)
+
+
+def _no_column(wanted: str, names: Sequence[str]) -> UsageError:
+    return UsageError(f"--color-by is {wanted!r:.60}, expected one of {', '.join(names)}")
+
+
+def _measured(plan: Plan) -> list[str]:
+    """Return the names of the image's channels that are measured over objects."""
+    return list(dict.fromkeys(channel.base or channel.name for channel in plan.channels))
 
 
 def table_of(plan: Plan, labels: Labels) -> Table | None:

@@ -13,10 +13,15 @@ from typing import Any
 
 from stereocell.building import stage_tasks
 from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
-from stereocell.building.intensities import require_intensities
+from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
 from stereocell.building.object_passes import locate_objects, read_notes, told_before
-from stereocell.building.object_tables import appearance_of_labels, make_table, table_of
+from stereocell.building.object_tables import (
+    appearance_of_labels,
+    make_table,
+    require_color_by,
+    table_of,
+)
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
@@ -31,7 +36,7 @@ from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
-from stereocell.model.errors import OutputError
+from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
@@ -81,6 +86,7 @@ def settle(source: str, settings: Settings) -> Plan:
     options = settings.plan
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
+    _require_labels(settings)
     dataset = open_source(as_asked(location, options))
     modality = dataset.modality or options.modality
     alone = are_alone(settings.labels)
@@ -104,7 +110,7 @@ def settle(source: str, settings: Settings) -> Plan:
         colors=PALETTE[len(channels) :] + PALETTE[: len(channels)],
         taken=[channel.name for channel in channels],
     )
-    if options.taken_as != INTENSITY and not alone:
+    if options.taken_as != INTENSITY and channels:
         whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
         require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
     origin = dataset.levels[level[0]].origin_um
@@ -123,8 +129,12 @@ def settle(source: str, settings: Settings) -> Plan:
         labels=labels,
     )
     for one in plan.labels:
-        table_of(plan, one)  # what can't be read is told before the build
+        # what can't be read, or isn't there, is told before the build
+        require_color_by(plan, one, table_of(plan, one))
     gaps, objects = told_of_gaps(dataset, plan), list(told_before(plan))
+    objects += filter(None, map(doubt_of, plan.labels))
+    if settings.objects.table and len(plan.labels) > 1:
+        objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
     for note in (
         *dataset.notes,
         *gaps,
@@ -133,6 +143,21 @@ def settle(source: str, settings: Settings) -> Plan:
     ):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan
+
+
+def _require_labels(settings: Settings) -> None:
+    """Raise UsageError where something is said of objects that nobody asked for."""
+    options = settings.objects
+    for flag, value in {
+        "--table": options.table,
+        "--table-key": options.table_key,
+        "--columns": ",".join(options.columns),
+        "--color-by": options.color_by,
+    }.items():
+        if value and not settings.labels:
+            raise UsageError(f"{flag} is {value!r:.60}: of no objects, expected --labels with it")
+        if value and not options.table and flag in ("--table-key", "--columns"):
+            raise UsageError(f"{flag} is {value!r:.60}: of no table, expected --table with it")
 
 
 def provenance(plan: Plan) -> dict[str, Any]:

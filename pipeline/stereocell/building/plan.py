@@ -171,6 +171,8 @@ def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings)
         voxels = channels * math.prod(box.shape)
         if voxels <= limit:
             what = "the finest" if index == 0 else "the finest within the limit"
+            if not channels:
+                return index, f"{what}, as label maps are built"
             return index, f"{what}: {voxels:,} of at most {limit:,} voxels (plan.max_voxels)"
     what = f"--region {region}" if region else "the coarsest level"
     remedy = "a smaller --region" if region else "a --level"

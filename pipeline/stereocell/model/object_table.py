@@ -44,6 +44,7 @@ class ObjectTable:
     columns  the properties; `volume_um3` is always the first
     default  ID of the column that colours objects first; empty: each has a hue of its own
     walls    int32 (m, 2): rows of two objects that share a wall, each pair once; None: not known
+    colors   float32 (n, 3), linear RGB: the label map's own; NaN: it has none. None: of no object
     """
 
     labels: NDArray[np.uint64]
@@ -53,6 +54,7 @@ class ObjectTable:
     names: tuple[str, ...] = ()
     default: str = ""
     walls: NDArray[np.int32] | None = None
+    colors: NDArray[np.float32] | None = None
 
     def of_tile(self, tile: str) -> "ObjectTable":
         """Return the table of one tile's objects, in the order in which its meshes number them."""
@@ -65,6 +67,7 @@ class ObjectTable:
             columns=tuple(replace(one, values=one.values[rows]) for one in self.columns),
             names=tuple(self.names[row] for row in rows.tolist()) if self.names else (),
             walls=None,
+            colors=None if self.colors is None else self.colors[rows],
         )
 
     def touching(self, tile: str) -> NDArray[np.uint64]:

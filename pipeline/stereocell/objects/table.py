@@ -13,6 +13,7 @@ from stereocell.model.unit import ObjectFacts
 from stereocell.objects.intensities import merge_quantiles
 
 Triple = tuple[float, float, float]
+MEAN = "mean_"  # before a channel's identifier: its mean over each object
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ def own_columns(
         mean, p95 = means[:, index], p95s[:, index]
         made.append(
             (
-                f"mean_{to_identifier(name)}",
+                f"{MEAN}{to_identifier(name)}",
                 f"mean {name}",
                 mean,
                 f"Mean of {name} over its voxels",
@@ -167,10 +168,12 @@ def hashed_colors(labels: NDArray[np.uint64]) -> NDArray[np.float32]:
 def color_objects(table: ObjectTable) -> NDArray[np.float32]:
     """Return the colour of each object as it is first shown, linear RGB (n, 3), float32.
 
-    By the table's default column; without one, each has a hue of its own.
+    By the table's default column; without one, in the label map's own colour, or a hue of its own.
     """
     column = table.column(table.default)
     if column is None or not column.categories:
-        return hashed_colors(table.labels)
+        hashed = hashed_colors(table.labels)
+        own = hashed if table.colors is None else table.colors
+        return np.where(np.isnan(own), hashed, own)
     palette = np.array([*column.colors, NO_CATEGORY], np.float32)  # -1, missing, is the last
     return palette[column.values.astype(np.int64)]

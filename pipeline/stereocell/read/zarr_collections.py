@@ -14,6 +14,7 @@ from typing import Any
 
 import zarr
 
+from stereocell.model.counted import counted
 from stereocell.model.errors import SourceError
 from stereocell.read.zarr_store import GuardedStore, open_store, quiet
 from stereocell.storage.library_errors import one_line
@@ -187,7 +188,7 @@ def _label_image(tree: ZarrTree, name: str) -> str:
     label = ome.get("image-label")
     objects = label.get("properties") if isinstance(label, Mapping) else None
     if isinstance(objects, list) and objects:
-        about.append(f"{len(objects):,} object{'s' * (len(objects) != 1)}")
+        about.append(f"properties of {counted(len(objects), 'object')}")
     known = ", ".join(filter(None, about))
     return _cut(name) + (f" ({known})" if known else "")
 

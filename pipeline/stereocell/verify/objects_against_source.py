@@ -1,8 +1,9 @@
 """Compare the objects of a stage with their label map: voxels are counted anew, surfaces measured.
 
-Of each object its voxels' volume, box and centroid are found again, the table is joined again, and
-both are held against the columns in the stage. The volume inside each level's surface may differ
-from the voxels' by what the units state.
+Of each object its voxels' volume, box and centroid are found again, and the channels' means over it
+(not of those that are cut, of which too thin a piece may be left out). The table is joined again.
+All is held against the columns in the stage. The volume inside each level's surface may differ from
+the voxels' by what the units state.
 """
 
 from dataclasses import dataclass
@@ -12,16 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.building.label_maps import Labels
-from stereocell.building.located_objects import TileGrid, locate, tile_boxes
-from stereocell.building.object_passes import read_notes
+from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
+from stereocell.building.object_passes import images_of, read_notes
 from stereocell.building.object_tables import make_table, table_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.tasks.extents import ExtentsTask, find_in_tile
+from stereocell.building.tasks.objects import ImageRef, read_on_labels
 from stereocell.building.unit_files import load_objects
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import ObjectTable
+from stereocell.model.tiling import Box
+from stereocell.objects.extents import Runs
+from stereocell.objects.table import MEAN
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
 from stereocell.usd.read_stage import loaded, mesh_at, open_stage, read_lods
 from stereocell.verify.formats import raise_on
@@ -35,6 +40,13 @@ class _TileTask:
     stage_file: Path
     tile: str
     labels_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class _SumsTask:
+    labels: Labels
+    box: Box
+    images: tuple[ImageRef, ...]
 
 
 def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> str:
@@ -55,7 +67,7 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
     table, _ = make_table(plan, labels, located, facts, notes, table_of(plan, labels))
     tasks = [(tile.id, _TileTask(out_folder.stage_file, tile.id, labels.id)) for tile in plan.tiles]
     found = engine.run("stage", _read_tile, tasks)
-    problems: list[str] = []
+    problems = _odd_means(plan, labels, located, table, engine)
     worst: list[float] = []
     for tile, (there, volumes) in zip(plan.tiles, found, strict=True):
         problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd(table, tile.id, there)]
@@ -78,6 +90,47 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
         f"{len(table.labels)} objects, {len(table.columns)} columns as counted and joined anew; "
         f"volumes of their surfaces by level within {told or 'nothing'}"
     )
+
+
+def _odd_means(
+    plan: Plan, labels: Labels, located: Located, table: ObjectTable, engine: Engine
+) -> list[str]:
+    """Return which means of a channel over an object are others than those of its voxels."""
+    images = images_of(plan)
+    boxes = tile_boxes(located.grid).items()
+    tasks = [(f"{tile}/{labels.name}", _SumsTask(labels, box, images)) for tile, box in boxes]
+    whole = located.extents.labels[located.owners != CUT]
+    voxels, sums = np.zeros(len(whole)), np.zeros((len(whole), len(images)))
+    for names, counts, totals in engine.run("intensities", _sum_up, tasks) if images else []:
+        _, place, found = np.intersect1d(whole, names, return_indices=True)
+        voxels[place] += counts[found]
+        sums[place] += totals[found]
+    _, place, rows = np.intersect1d(whole, table.labels, return_indices=True)
+    means = sums[place] / np.maximum(voxels[place], 1)[:, np.newaxis]
+    columns = [column for column in table.columns if column.id.startswith(MEAN)][: len(images)]
+    problems = []
+    for column, expected in zip(columns, means.T, strict=True):
+        same = np.isclose(column.values[rows], expected, rtol=1e-4, atol=1e-6, equal_nan=True)
+        if not same.all():
+            shown = ", ".join(map(str, whole[place][~same][:_SHOWN].tolist()))
+            problems.append(f"{labels.id}: column {column.id} is not the voxels' mean of {shown}")
+    return problems
+
+
+def _sum_up(
+    task: _SumsTask,
+) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return the labels of a box (n,), their voxels (n,) and sums of intensities (n, images)."""
+    if 0 in task.box.shape:
+        return np.zeros(0, np.uint64), np.zeros(0, np.int64), np.zeros((0, len(task.images)))
+    runs = Runs.of(task.labels.open().read(task.box))
+    names, place = np.unique(runs.values, return_inverse=True)
+    sums = np.zeros((len(names), len(task.images)))
+    for index, image in enumerate(task.images):
+        voxels = read_on_labels(task.labels, task.box, image).ravel().astype(np.float64)
+        sums[:, index] = np.bincount(place, np.add.reduceat(voxels, runs.starts), len(names))
+    counts = np.bincount(place, runs.lengths, len(names))
+    return names.astype(np.uint64), counts.astype(np.int64), sums
 
 
 def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:

@@ -66,9 +66,12 @@ def test_what_spreadsheets_and_pandas_write(tmp_path: Path) -> None:
     assert b.texts == ("T cell", "B")
 
 
-def test_64_bits(tmp_path: Path) -> None:
-    table = read_table(csv(tmp_path, f"label,a\n{2**63 + 1},1\n"), "", (), "cells")
-    assert table.labels.tolist() == [2**63 + 1]
+@pytest.mark.parametrize("ending", ["", ".0", ".", "e0"])
+def test_64_bits(tmp_path: Path, ending: str) -> None:
+    """Programs write whole numbers as real ones too; a double would round these."""
+    text = f"label,a\n{2**63 + 1}{ending},1\n{2**53 + 1}{ending},2\n"
+    table = read_table(csv(tmp_path, text), "", (), "cells")
+    assert table.labels.tolist() == [2**63 + 1, 2**53 + 1]
 
 
 def test_columns_by_name_and_many_columns(tmp_path: Path) -> None:
@@ -91,6 +94,9 @@ def test_columns_by_name_and_many_columns(tmp_path: Path) -> None:
         ("label,a\n0,2\n", "label, row 1: found 0, expected"),
         ("label,a\n-3,2\n", "label, row 1: found -3, expected"),
         ("label,a\n1e400,2\n", "label, row 1: found 1e400, expected"),
+        ("label,a\n1e999999999,2\n", "label, row 1: found 1e999999999, expected"),
+        ("label,a\n1." + "0" * 40 + "1,2\n", "label, row 1: found 1.000"),
+        ("label,a\ninf,2\n", "label, row 1: found inf, expected"),
         ("label,a\nx\n", "line 2: found 1 cells, expected 2"),
         ("label,a\n1,2,3\n", "line 2: found 3 cells, expected 2"),
         ("label,a,a\n1,2,3\n", "found columns twice (a)"),

@@ -80,6 +80,19 @@ describeInChromium("the objects of a label map", () => {
     for (const id of ["volumes", "light", "slices"]) expect(sections).not.toContain(id);
   });
 
+  it("have columns of any name: a long one makes the panel no wider", async () => {
+    await stand.open();
+    await stand.viewer.settled();
+    const [wide, inside] = await control("color-by").evaluate((found) => {
+      const select = found as HTMLSelectElement;
+      select.options[1].text = "Intensity_MeanIntensityEdge_OrigNuclei_of_a_long_name";
+      select.options[1].selected = true;
+      const items = select.closest(".items") as HTMLElement;
+      return [select.getBoundingClientRect().right, items.getBoundingClientRect().right];
+    });
+    expect(wide).toBeLessThan(inside);
+  });
+
   it("are coloured anew by one upload of a byte an object", async () => {
     await stand.open();
     await stand.viewer.settled();

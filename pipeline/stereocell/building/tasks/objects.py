@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,8 +110,12 @@ def run_objects(task: ObjectsTask) -> None:
     thin = names.labels[built.thin]
     owned = np.setdiff1d(owned, built.thin).astype(np.int32)
     with clock("intensities"):
+        pieces = owned[is_piece[owned]]
         measured = [
-            _measure(task, image, compact, owned, owned[is_piece[owned]]) for image in task.images
+            measure_intensities(
+                compact, read_on_labels(task.labels, task.window, image), owned, pieces
+            )
+            for image in task.images
         ]
     facts = _facts(built, owned, names, measured, compact, thin)
     reason = "" if built.lods else "no object"
@@ -178,20 +183,13 @@ def _numbered(
     )
 
 
-def _measure(
-    task: ObjectsTask,
-    image: ImageRef,
-    compact: NDArray[np.int32],
-    owned: NDArray[np.int32],
-    pieces: NDArray[np.int32],
-) -> Measured:
-    """Return a channel's mean and percentile over objects, by the image's nearest voxels."""
-    assert task.window is not None
+def read_on_labels(labels: Labels, window: Box, image: ImageRef) -> NDArray[Any]:
+    """Return a channel's nearest voxel at each voxel of a window of a label map, (z, y, x)."""
     indices = []
     for axis in range(3):
-        first = task.labels.origin_um[axis] - image.origin_um[axis]
-        at = np.arange(task.window.start[axis], task.window.stop[axis])
-        nearest = np.rint((first + at * task.labels.spacing_um[axis]) / image.spacing_um[axis])
+        first = labels.origin_um[axis] - image.origin_um[axis]
+        at = np.arange(window.start[axis], window.stop[axis])
+        nearest = np.rint((first + at * labels.spacing_um[axis]) / image.spacing_um[axis])
         first_voxel, last_voxel = image.region.start[axis], image.region.stop[axis] - 1
         indices.append(nearest.astype(np.int64).clip(first_voxel, last_voxel))
     z0, y0, x0 = (int(part.min()) for part in indices)
@@ -201,7 +199,7 @@ def _measure(
     for axis, (part, start) in enumerate(zip(indices, (z0, y0, x0), strict=True)):
         if len(part) != voxels.shape[axis] or (np.diff(part) != 1).any():
             voxels = np.take(voxels, part - start, axis)
-    return measure_intensities(compact, voxels, owned, pieces)
+    return voxels
 
 
 def _paint(lods: Sequence[Lod], painted: Painted) -> tuple[Lod, ...]:

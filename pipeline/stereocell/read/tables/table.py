@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ MOST_NAMES = 100_000  # columns of a file
 MOST_ROWS = 1 << 24
 _LONGEST = 200  # characters of a category
 _SHOWN = 8  # names that a message lists
+_MOST_DIGITS = 20  # of a number of 64 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +80,9 @@ def keys_of(
     found: list[int] = []
     for row, value in enumerate(values):
         try:
-            number = int(value) if isinstance(value, str) else _whole(float(value))
+            number = _whole_of(value) if isinstance(value, str) else _whole(float(value))
         except (ValueError, OverflowError):
-            try:
-                number = _whole(float(value))
-            except (ValueError, OverflowError):
-                number = -1
+            number = -1
         if not 0 < number < 1 << 64:
             raise SourceError(
                 f"{where}: {key}, row {row + 1}: found {value!s:.40}, expected a number of an "
@@ -148,6 +147,21 @@ def word_of(text: str) -> str:
 def clean(name: str) -> str:
     """Return a name as it may be shown: no control characters, one space for several."""
     return " ".join("".join(c if c.isprintable() else " " for c in name).split())
+
+
+def _whole_of(text: str) -> int:
+    """Return a text's whole number to the last digit, also of `9223372036854775807.0`."""
+    try:
+        return int(text)
+    except ValueError:
+        pass
+    try:
+        value = Decimal(text)
+    except InvalidOperation:
+        raise ValueError from None
+    if not value.is_finite() or value.adjusted() > _MOST_DIGITS or value != value // 1:
+        raise ValueError
+    return int(value)
 
 
 def _whole(value: float) -> int:
