@@ -161,6 +161,8 @@ serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
 
 lint: $(READY) $(VIEWER_READY) ## ruff, mypy, layers of imports, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
+	@# text without an encoding is read by that of the system, on Windows none of ours
+	$(BIN)/ruff check --quiet --preview --select PLW1514 pipeline
 	$(BIN)/ruff format --check pipeline tests docs
 	$(BIN)/mypy
 	PYTHONPATH=pipeline $(BIN)/lint-imports --no-cache --no-logo
