@@ -310,8 +310,8 @@ bench-fps: setup ## Frames a second of the viewer in headless Chromium, volumes 
 	@if [ -z "$$CHROMIUM" ]; then echo "bench-fps: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else out="$$PWD/out" && cd $(VIEWER) && npm run --silent bench-fps -- "$$out/bench-fps" "$$out/head-512/bundle"; fi
 
-wheel: setup ## A wheel with the built viewer in it: out/wheel
-	$(BIN)/hatchling build -t wheel -d out/wheel
+wheel: setup ## A wheel and an sdist with the built viewer in them: out/wheel
+	$(BIN)/hatchling build -t wheel -t sdist -d out/wheel
 
 docs: $(READY) ## The documentation as a site: out/docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
