@@ -56,7 +56,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -260,6 +260,9 @@ bench: setup ## Ratios of two things in one run, medians
 
 bench-start: setup ## How long `import stereocell` and `stereocell --help` take
 	$(BIN)/python tests/bench/start.py
+
+bench-size: setup ## What each requirement costs on disk
+	$(BIN)/python tests/bench/install_size.py
 
 bench-scale: setup ## Units a second, memory and bytes read by 4 to 32 units; the whole dataset
 	$(BIN)/python tests/bench/scale.py out/bench-scale

@@ -46,6 +46,27 @@ def test_the_recipe_asks_for_what_the_package_does() -> None:
     assert recipe["build"]["python"]["entry_points"] == [" = ".join(script)]
 
 
+def test_what_the_table_of_sizes_says_of_requirements_is_so() -> None:
+    page = (ROOT / "docs" / "install.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| ([a-z0-9-]+) \| \d+ \| \d+ \| (.*) \|$", page, re.MULTILINE))
+    assert rows.keys() <= {Requirement(line).name for line in project()["dependencies"]}
+    assert len(rows) > 15
+    package = ROOT / "pipeline" / "stereocell"
+    for name, module, folder, of in (
+        ("scikit-learn", "sklearn", "tissue", "`tissue` alone"),
+        ("trustme", "trustme", "serve", "`serve --lan`, `view --lan`"),
+    ):
+        users = {
+            file.relative_to(package).parts[0]
+            for file in package.rglob("*.py")
+            if re.search(rf"^\s*(from|import) {module}\b", file.read_text("utf-8"), re.MULTILINE)
+        }
+        assert (users, rows[name]) == ({folder}, of)
+    (listed,) = re.findall(r"is an extra already: (.*?)\n\n", page, re.DOTALL)
+    extras = set(re.findall(r"`([a-z0-9-]+)`", listed))
+    assert extras == project()["optional-dependencies"].keys()
+
+
 def test_the_services_of_compose_are_commands_that_exist() -> None:
     compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text("utf-8"))
     services = compose["services"]
