@@ -56,7 +56,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -161,6 +161,8 @@ serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
 
 lint: $(READY) $(VIEWER_READY) ## ruff, mypy, layers of imports, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
+	@# text without an encoding is read by that of the system, on Windows none of ours
+	$(BIN)/ruff check --quiet --preview --select PLW1514 pipeline
 	$(BIN)/ruff format --check pipeline tests docs
 	$(BIN)/mypy
 	PYTHONPATH=pipeline $(BIN)/lint-imports --no-cache --no-logo
@@ -256,6 +258,12 @@ torture: setup ## 50 builds killed, evenly over their phases; all malformed inpu
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py
 
+bench-start: setup ## How long `import stereocell` and `stereocell --help` take
+	$(BIN)/python tests/bench/start.py
+
+bench-size: setup ## What each requirement costs on disk
+	$(BIN)/python tests/bench/install_size.py
+
 bench-scale: setup ## Units a second, memory and bytes read by 4 to 32 units; the whole dataset
 	$(BIN)/python tests/bench/scale.py out/bench-scale
 
@@ -305,8 +313,8 @@ bench-fps: setup ## Frames a second of the viewer in headless Chromium, volumes 
 	@if [ -z "$$CHROMIUM" ]; then echo "bench-fps: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else out="$$PWD/out" && cd $(VIEWER) && npm run --silent bench-fps -- "$$out/bench-fps" "$$out/head-512/bundle"; fi
 
-wheel: setup ## A wheel with the built viewer in it: out/wheel
-	$(BIN)/hatchling build -t wheel -d out/wheel
+wheel: setup ## A wheel and an sdist with the built viewer in them: out/wheel
+	$(BIN)/hatchling build -t wheel -t sdist -d out/wheel
 
 docs: $(READY) ## The documentation as a site: out/docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

@@ -1,8 +1,9 @@
-"""What hatchling asks when it builds a wheel: the built viewer goes in, or there is no wheel.
+"""What hatchling asks when it builds a wheel or an sdist: the built viewer goes in, or neither is.
 
 A wheel has the viewer, so that viewing takes no Node, and the two scripts of `stereocell check`
-with the packages that they import, so that they take Node alone. An editable install finds both in
-the checkout, built or not.
+with the packages that they import, so that they take Node alone. An sdist has them where a checkout
+has, so that a wheel can be made of it anywhere. An editable install finds both in the checkout,
+built or not.
 """
 
 import json
@@ -16,7 +17,7 @@ TOOL_PACKAGES = ("gltf-validator", "ktx-parse", "meshoptimizer", "zstddec")
 
 
 class WheelHook(BuildHookInterface[Any]):
-    """Adds parts of viewer_gltf/ to the wheel, where `stereocell.storage.assets` looks for them."""
+    """Adds parts of viewer_gltf/: to a wheel where `stereocell.storage.assets` looks for them."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if version == "editable":
@@ -27,8 +28,8 @@ class WheelHook(BuildHookInterface[Any]):
         missing = [part for part in (viewer / "dist/index.html", *parts) if not part.exists()]
         if missing:
             self.app.abort(
-                f"wheel: {missing[0].relative_to(self.root)} is missing, expected the built "
-                "viewer: run `make wheel`, which builds it first (Node 20.19 or newer)"
+                f"{self.target_name}: {missing[0].relative_to(self.root)} is missing, expected the "
+                "built viewer: run `make wheel`, which builds it first (Node 20.19 or newer)"
             )
         # the viewer is made of these, and their licences ask to be passed on
         used = json.loads((viewer / "package.json").read_bytes())["dependencies"]
@@ -36,4 +37,5 @@ class WheelHook(BuildHookInterface[Any]):
             parts += (packages / name).glob("LICENSE*")
         for part in parts:
             inside = part.relative_to(self.root).as_posix()
-            build_data["force_include"][str(part)] = f"stereocell/{inside}"
+            to = inside if self.target_name == "sdist" else f"stereocell/{inside}"
+            build_data["force_include"][str(part)] = to

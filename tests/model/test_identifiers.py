@@ -1,6 +1,7 @@
 """Names become identifiers and come back."""
 
 import re
+from pathlib import PureWindowsPath
 
 import pytest
 from hypothesis import given
@@ -8,6 +9,9 @@ from hypothesis import strategies as st
 from pxr import Sdf
 
 from stereocell.model.identifiers import MAX_LENGTH, from_identifier, to_identifier
+
+PORTS = {f"{port}{n}" for port in ("COM", "LPT") for n in range(10)}
+DEVICES = {"CON", "PRN", "AUX", "NUL"} | PORTS
 
 
 @given(st.text(min_size=1, max_size=20))
@@ -57,11 +61,28 @@ def test_a_name_cut_short_keeps_its_beginning() -> None:
         ("a_x20_", "a_x5f_x20_"),
         ("\u03b5", "_x3b5_"),
         ("//", "_x2f__x2f_"),
+        ("Con", "_x43_on"),
+        ("lpt1", "_x6c_pt1"),
+        ("Conus", "Conus"),
         ("A" * 180, "A" * 180),
     ],
 )
 def test_known_names(name: str, identifier: str) -> None:
     assert to_identifier(name) == identifier
+
+
+@given(
+    st.text(min_size=1, max_size=300)
+    | st.sampled_from(["CON", "nul", "Com1", "LPT9", "aux.", "a:b", "x ", "..", "NUL\n", "prn.txt"])
+)
+def test_windows_takes_them_as_names_of_files(name: str) -> None:
+    identifier = to_identifier(name)
+    for file in (identifier, f"{identifier}.glb"):
+        path = PureWindowsPath(file)
+        assert path.parts == (file,)  # no drive, no folder
+        assert path.stem.upper() not in DEVICES
+        assert not set(file) & set('<>:"/\\|?*')
+        assert file[-1] not in ". "
 
 
 def test_empty_name_is_refused() -> None:

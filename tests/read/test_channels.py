@@ -83,6 +83,12 @@ def test_equal_names_are_told_apart(tmp_path: Path) -> None:
         dataset.find_channels(["DNA"])
 
 
+def test_names_that_differ_by_case_alone_are_told_apart(tmp_path: Path) -> None:
+    # their files would be one on Windows and macOS
+    names = _names(_with_names(tmp_path, ["CD3", "cd3", "CD31"]))
+    assert names == ["CD3 (channel 0)", "cd3 (channel 1)", "CD31"]
+
+
 def test_names_that_look_told_apart_are_told_apart_too(tmp_path: Path) -> None:
     names = _names(_with_names(tmp_path, ["DNA", "DNA (channel 0)", "DNA"]))
     assert len(set(names)) == 3

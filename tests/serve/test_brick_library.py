@@ -3,6 +3,8 @@
 import json
 import os
 import shutil
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from stereocell.formats.ktx2 import decode_finest, encode_2d, encode_3d
 from stereocell.formats.voxel_bvh import build
 from stereocell.model.errors import OutputError, SourceError, StereoCellError
+from stereocell.serve import brick_library
 from stereocell.serve.brick_library import BrickLibrary, UnknownVolumeError, invisible_below
 from support.server.brick_bundles import (
     phantom,
@@ -148,6 +151,34 @@ def test_bricks_are_read_from_the_file(out):
     data = path.read_bytes()[file.table.bytes :]
     assert b"".join(file.read(stored.tolist())) == data
     assert file.read([int(stored[-1])])[0] == data[-int(file.table.nodes["length"][stored[-1]]) :]
+
+
+def test_bricks_are_read_without_pread_too(out, monkeypatch):
+    file = library(out).open("r0_c0", "CD31")
+    nodes = np.flatnonzero(file.table.nodes["length"]).tolist()
+    bricks = file.read(nodes)
+    monkeypatch.setattr(brick_library, "sys", SimpleNamespace(platform="win32"))
+    monkeypatch.delattr(os, "pread")
+    assert file.read(nodes) == bricks
+    assert len(set(bricks)) > 1
+
+
+def test_an_old_tree_that_is_open_is_left_for_the_next_time(out, monkeypatch):
+    library(out).open("r0_c0", "CD31")
+    (old,) = (out / "bricks").iterdir()
+    replace_volume(out / "bundle", 255 - VOLUME)
+
+    unlink = Path.unlink
+
+    def refuse(path, missing_ok=False):
+        if path == old:
+            raise PermissionError(13, "it is open", str(path))
+        unlink(path, missing_ok)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", refuse)
+        library(out).open("r0_c0", "CD31")
+    assert old.exists()
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

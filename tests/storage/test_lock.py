@@ -127,7 +127,7 @@ def test_what_ends_while_a_file_is_written_leaves_the_old_one(tmp_path: Path) ->
 def test_another_machine_of_the_same_name_is_another(monkeypatch: pytest.MonkeyPatch) -> None:
     here = machine()
     assert machine() == here
-    monkeypatch.setattr(Path, "read_text", lambda _: "started at another time")
+    monkeypatch.setattr(Path, "read_text", lambda *_: "started at another time")
     assert (machine() != here) == Path("/proc/sys/kernel/random/boot_id").exists()
 
 

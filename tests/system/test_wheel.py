@@ -9,13 +9,16 @@ import signal
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import venv
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
+from packaging.metadata import Metadata
 
 from stereocell.storage.assets import viewer_dist
 
@@ -138,6 +141,33 @@ def test_a_wheel_alone_builds_and_has_the_viewer(tmp_path: Path) -> None:
             found = json.loads(answer.stdout)
             assert found
             assert all(not file["problems"] for file in found)
+
+
+def test_an_sdist_makes_the_same_wheel_without_node(tmp_path: Path) -> None:
+    if viewer_dist() is None:
+        pytest.skip("the viewer is not built: `make setup`")
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path]
+    made = run(*command, cwd=ROOT)
+    assert made.returncode == 0, made.stderr
+    (sdist,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path, filter="data")
+    unpacked = tmp_path / sdist.name.removesuffix(".tar.gz")
+    contents = []
+    for checkout in (ROOT, unpacked):
+        folder = tmp_path / f"wheel{len(contents)}"
+        made = make_wheel(checkout, folder)
+        assert made.returncode == 0, made.stderr
+        (wheel,) = folder.glob("*.whl")
+        with zipfile.ZipFile(wheel) as files:
+            contents.append({file.filename: file.CRC for file in files.infolist()})
+    assert contents[0] == contents[1]
+    assert "stereocell/viewer_gltf/dist/index.html" in contents[0]
+
+    told = Metadata.from_email((unpacked / "PKG-INFO").read_bytes(), validate=True)
+    assert told.license_expression == "Apache-2.0"
+    assert told.description_content_type == "text/markdown"
+    assert "Operating System :: POSIX :: Linux" in told.classifiers
 
 
 def test_without_the_viewer_there_is_no_wheel(tmp_path: Path) -> None:

@@ -4,10 +4,10 @@ Ctrl-C reaches every process of a terminal's group; only the command itself must
 """
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
 
 
 class Terminated(KeyboardInterrupt):
@@ -57,8 +57,13 @@ def children_ignore_interrupts() -> Iterator[None]:
     """Inside the block, start processes and threads that SIGINT doesn't reach (inherited mask).
 
     Without it each worker prints a traceback of its own. A SIGINT inside the block is not lost: it
-    is delivered at the end.
+    is delivered at the end. Windows has no such mask: there each worker prints its own.
     """
+    if sys.platform == "win32":
+        yield
+        return
+    from multiprocessing import resource_tracker
+
     resource_tracker.ensure_running()  # its start unblocks SIGINT in our thread
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

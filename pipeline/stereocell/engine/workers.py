@@ -10,7 +10,6 @@ long name, or a full one), and where the environment is another one than the ser
 import os
 import sys
 from collections.abc import Callable
-from multiprocessing import forkserver
 from typing import Any
 
 _METHOD = "distributed.worker.multiprocessing-method"
@@ -30,6 +29,8 @@ def choose_start(function: Callable[..., Any]) -> None:
 
 def _has_server(function: Callable[..., Any]) -> bool:
     """Return whether workers can be forked from a server; it is started where there is none."""
+    from multiprocessing import forkserver  # not for Windows
+
     import dask
     from distributed.utils import get_mp_context
 

@@ -36,7 +36,7 @@ def write_raw(chosen: Chosen, path: Path, _: int) -> str:
     if chosen.options.unity:
         lines = [f"dimx:{x}", f"dimy:{y}", f"dimz:{z}", "skip:0", f"format:{layout.dtype.name}"]
         beside = path.with_name(f"{path.name}.ini")
-        beside.write_text("\n".join([*lines, "endianness:LittleEndian", ""]), encoding="ascii")
+        beside.write_bytes("\n".join([*lines, "endianness:LittleEndian", ""]).encode("ascii"))
         across = ", ".join(
             f"{n * s:.6g}" for n, s in zip((x, y, z), layout.grid.spacing, strict=True)
         )

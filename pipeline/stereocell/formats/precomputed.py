@@ -42,7 +42,7 @@ class Level:
 def write_info(folder: Path, content: dict[str, Any]) -> None:
     """Write the `info` of a folder, which is made."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "info").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    (folder / "info").write_text(json.dumps(content, indent=1), encoding="utf-8", newline="\n")
 
 
 def write_volume(

@@ -87,14 +87,14 @@ def _reach(name: str) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting += _IMPORT.findall((_HERE / f"{name}.py").read_text())
+            waiting += _IMPORT.findall((_HERE / f"{name}.py").read_text("utf-8"))
     return found
 
 
 def _processor() -> str:
     """Return what code is compiled for: numba compiles anew for another processor's features."""
     with suppress(OSError):
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
         return next((line for line in lines if line.startswith(("flags", "Features"))), "")
     return platform.machine()
 

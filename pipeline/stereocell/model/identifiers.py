@@ -1,8 +1,9 @@
 """Channel and tile names as identifiers: legal in USD paths, file names and URLs, and reversible.
 
 ASCII letters and digits stay. Each other character becomes `_x<hex>_`; so do a leading digit and
-an underscore before an `x`, so that no name can look like an escape. `Hoechst 33342` becomes
-`Hoechst_x20_33342`, `CD3e` with a Greek epsilon `CD3_x3b5_`, `1st` becomes `_x31_st`.
+an underscore before an `x`, so that no name can look like an escape, and the first letter of a
+device of Windows', whose name no file can have. `Hoechst 33342` becomes `Hoechst_x20_33342`, `CD3e`
+with a Greek epsilon `CD3_x3b5_`, `1st` becomes `_x31_st`, `Con` becomes `_x43_on`.
 
 File names are limited to 255 bytes. An identifier longer than `MAX_LENGTH` is cut, and ends in a
 digest of the whole name, `_xh<hex>_`. No other name can have that identifier.
@@ -16,6 +17,7 @@ from itertools import accumulate
 MAX_LENGTH = 180  # most characters; leaves room for tile id, key and suffix in a file name
 
 _ESCAPE = re.compile(r"_x([0-9a-f]+)_|_xh[0-9a-f]{20}_$")
+_DEVICE = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9])", re.IGNORECASE)
 _KEPT = re.compile(r"[A-Za-z0-9]|_(?!x)")
 
 
@@ -23,8 +25,9 @@ def to_identifier(name: str) -> str:
     """Return the identifier of a non-empty name. Raises ValueError for an empty one."""
     if not name:
         raise ValueError("an empty name has no identifier")
+    is_device = bool(_DEVICE.fullmatch(name))
     kept = [
-        bool(_KEPT.match(name, i)) and not (i == 0 and char.isdigit())
+        bool(_KEPT.match(name, i)) and not (i == 0 and (char.isdigit() or is_device))
         for i, char in enumerate(name)
     ]
     parts = [c if keep else f"_x{ord(c):x}_" for c, keep in zip(name, kept, strict=True)]

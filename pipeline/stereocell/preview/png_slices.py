@@ -79,7 +79,7 @@ def write_slices(plan: Plan, folder: Path, plane: str = ACQUIRED) -> Written:
         for name, picture in zip(names, cut.planes, strict=True):
             Image.fromarray(to_bytes(picture, window)).save(new / name)
         content = _describe(plan, cut, window, names)
-        (new / INDEX).write_text(json.dumps(content, indent=1) + "\n")
+        (new / INDEX).write_bytes((json.dumps(content, indent=1) + "\n").encode())
     return Written(count, cut.view.name, _line(plan, cut))
 
 

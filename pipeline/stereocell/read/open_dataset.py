@@ -308,16 +308,18 @@ def _shown(name: str) -> str:
 
 
 def _unique(names: Sequence[str]) -> list[str]:
-    """Fill in missing names and number equal ones (a marker imaged in every cycle)."""
+    """Fill in missing names and number equal ones (a marker imaged in every cycle).
+
+    Names that differ by case alone count as equal: on Windows and macOS their files would be one.
+    """
     filled = list(names)
     for index in (i for i, name in enumerate(names) if not name):
         filled[index] = f"Channel{index}"
         while filled[index] in names:
             filled[index] += "_"
-    while len(set(filled)) < len(filled):
-        count = Counter(filled)
+    while len(count := Counter(name.lower() for name in filled)) < len(filled):
         filled = [
-            f"{name} (channel {index})" if count[name] > 1 else name
+            f"{name} (channel {index})" if count[name.lower()] > 1 else name
             for index, name in enumerate(filled)
         ]
     return filled

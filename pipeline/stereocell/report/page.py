@@ -87,6 +87,7 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    asked = out_folder.settings_file
     environment.filters |= {"count": _count, "size": _size, "seconds": _seconds, "um": _um}
     return environment.get_template(TEMPLATE.name).render(
         facts=facts,
@@ -124,7 +125,7 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
             part: [file for file in facts.files if file.part == part]
             for part in dict.fromkeys(file.part for file in facts.files)
         },
-        settings=out_folder.settings_file.read_text() if out_folder.settings_file.is_file() else "",
+        settings=asked.read_text("utf-8") if asked.is_file() else "",
     )
 
 

@@ -20,6 +20,6 @@ def run_report(out: Path) -> None:
         out_folder.require_units_of(plan)
         others = {name: entry for name, entry in out_folder.phases().items() if name != "report"}
         content = [out_folder.index(), out_folder.survey(), provenance(plan), others]
-        key = key_of([content, page.TEMPLATE.read_text()], page)
+        key = key_of([content, page.TEMPLATE.read_text("utf-8")], page)
         if not phase.is_done(key, partial(digest_of, [out_folder.report_file])):
             page.write_report(out)

@@ -61,7 +61,7 @@ def write_cycif(
         tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed, brightness_spread)
         truth = json.dumps(_truth(tissue, shape, settings), indent=1) + "\n"
         with replacing(truth_path) as file:
-            file.write_text(truth, encoding="utf-8")
+            file.write_text(truth, encoding="utf-8", newline="\n")
             if not is_there:
                 with replacing_folder(path) as folder:
                     _write_zarr(folder, tissue, shape, tile_size, attributes, seed)

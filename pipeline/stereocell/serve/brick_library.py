@@ -12,8 +12,10 @@ shows more fetches the volume's KTX2 file instead.
 
 import hashlib
 import os
+import sys
 from collections import OrderedDict
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
@@ -94,14 +96,22 @@ class BrickFile:
         self.table_hash = content_hash(self.table_bytes).hex()
         self.placed: PlacedTree = place(self.table, volume.entry)
         self._file = path.open("rb")
+        self._reading = Lock()  # of the file's position
 
     def read(self, nodes: Sequence[int]) -> list[bytes]:
         """Return the zstd frames of these nodes."""
         found = []
         for node in nodes:
             length = int(self.table.nodes["length"][node])
-            found.append(os.pread(self._file.fileno(), length, int(self._ends[node]) - length))
+            found.append(self._read_at(int(self._ends[node]) - length, length))
         return found
+
+    def _read_at(self, start: int, length: int) -> bytes:
+        if sys.platform != "win32":
+            return os.pread(self._file.fileno(), length, start)
+        with self._reading:  # Windows has no pread
+            self._file.seek(start)
+            return self._file.read(length)
 
     def __del__(self) -> None:
         if hasattr(self, "_file"):
@@ -199,7 +209,8 @@ class BrickLibrary:
         wanted = {v.file_name for v in self.volumes().values()}
         for old in self._folder.glob("*.bvh"):
             if old.name not in wanted and not old.name.startswith("."):
-                old.unlink(missing_ok=True)
+                with suppress(PermissionError):  # Windows removes no open file: the next time
+                    old.unlink(missing_ok=True)
         file = BrickFile(path, volume)
         self._keep(file)
         return file

@@ -2,7 +2,8 @@
 
 OUT/.lock is held by the system's own lock (flock), which ends with its process in any case: the
 next command takes over a stale file, and a reused process ID can't mislead. The file's content is
-for people only. On NFS the lock works between machines (Linux 2.6.12 on).
+for people only. On NFS the lock works between machines (Linux 2.6.12 on). Windows has no flock:
+there the file tells people alone, and refuses nobody.
 """
 
 import json
@@ -42,9 +43,12 @@ def alone_in(out: Path, command: str) -> Iterator[None]:
             with holding(Claim((out / LOCK).absolute(), (out / LOCK).read_bytes())):
                 yield
         finally:
+            if sys.platform == "win32":  # it removes no open file
+                os.close(file)
             with suppress(OSError):  # OUT isn't writable any more: the next command takes it over
                 (out / LOCK).unlink(missing_ok=True)  # while held: no command waits for it
-            os.close(file)
+            if sys.platform != "win32":
+                os.close(file)
     finally:
         for folder in made:
             with suppress(OSError):  # it has content
@@ -59,7 +63,7 @@ def _missing_folders(out: Path) -> list[Path]:
 def _hold(path: Path, command: str) -> tuple[int, bool]:
     """Return the open lock, and whether its previous holder was killed."""
     while True:
-        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             if sys.platform != "win32":
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -82,4 +86,5 @@ def _hold(path: Path, command: str) -> tuple[int, bool]:
 
 
 def _owner(file: int) -> str:
-    return in_words(os.pread(file, 4096, 0))
+    os.lseek(file, 0, os.SEEK_SET)
+    return in_words(os.read(file, 4096))

@@ -90,7 +90,7 @@ def machine() -> str:
     since its start. Another machine may have the same host name, a container its host's boot ID."""
     place = socket.gethostname()
     with suppress(OSError):  # Linux has both files
-        place += Path("/proc/sys/kernel/random/boot_id").read_text()
+        place += Path("/proc/sys/kernel/random/boot_id").read_text("utf-8")
         place += os.readlink("/proc/self/ns/pid")
     return hashlib.sha256(place.encode()).hexdigest()[:8]
 
@@ -106,7 +106,8 @@ def start_of(process: int) -> str:
         if not Path("/proc/self/stat").exists():
             return str(psutil.Process(process).create_time())
         # on Linux psutil's value shifts with the clock; ticks since the machine's start don't
-        state, *fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        stat = Path(f"/proc/{process}/stat").read_text("utf-8", "replace")  # with its name
+        state, *fields = stat.rpartition(")")[2].split()
         return "ended" if state in "ZX" else fields[18]
     return ""
 

@@ -54,7 +54,7 @@ def keep_sources() -> None:
     text = json.dumps(known if len(known) <= _MOST else _read)
     with suppress(OSError):
         handle, name = tempfile.mkstemp(dir=place.parent)
-        with open(handle, "w") as file:
+        with open(handle, "w", encoding="utf-8") as file:
             file.write(text)
         os.replace(name, place)
 
@@ -76,7 +76,7 @@ def _kept() -> dict[str, Source]:
     place = _place()
     with suppress(OSError, ValueError, TypeError, AttributeError):
         if place is not None:
-            found = json.loads(place.read_text())
+            found = json.loads(place.read_text("utf-8"))
             return {
                 name: Source(str(code), tuple(assets), tuple(imports))
                 for name, (code, assets, imports) in found.items()

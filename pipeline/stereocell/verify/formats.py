@@ -473,7 +473,7 @@ def _run_node(script_name: str, paths: list[Path]) -> str:
             [node, str(script)],
             input=json.dumps([str(path) for path in paths]),
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             timeout=_NODE_TIMEOUT_S,
             check=False,
         )

@@ -1,0 +1,102 @@
+"""What deploy/ says agrees with the package: nothing of it can be run here."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import yaml
+from packaging.requirements import Requirement
+
+from stereocell.cli.__main__ import COMMANDS
+
+ROOT = Path(__file__).parents[2]
+DEPLOY = ROOT / "deploy"
+# conda-forge calls these otherwise
+CONDA = {
+    "dask": "dask-core",  # distributed brings the rest
+    "libigl": "igl",
+    "matplotlib": "matplotlib-base",
+    "openexr": "openexr-python",
+    "python-gdcm": "gdcm",
+    "usd-core": "openusd",
+    "vtk": "vtk-base",
+}
+
+
+def project() -> dict[str, Any]:
+    found: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    return found
+
+
+def test_the_recipe_asks_for_what_the_package_does() -> None:
+    recipe = yaml.safe_load((DEPLOY / "conda" / "recipe.yaml").read_text("utf-8"))
+    python, *asked = recipe["requirements"]["run"]
+    assert python.startswith("python >=")
+    wanted = [Requirement(line) for line in project()["dependencies"]]
+    assert {(one.name, one.specifier) for one in map(Requirement, asked)} == {
+        (CONDA.get(one.name, one.name), one.specifier) for one in wanted
+    }
+    assert len(asked) == len(wanted)
+    assert recipe["context"]["version"] == project()["version"]
+    assert recipe["about"]["summary"] == project()["description"]
+    (script,) = project()["scripts"].items()
+    assert recipe["build"]["python"]["entry_points"] == [" = ".join(script)]
+
+
+def test_what_the_table_of_sizes_says_of_requirements_is_so() -> None:
+    page = (ROOT / "docs" / "install.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| ([a-z0-9-]+) \| \d+ \| \d+ \| (.*) \|$", page, re.MULTILINE))
+    assert rows.keys() <= {Requirement(line).name for line in project()["dependencies"]}
+    assert len(rows) > 15
+    package = ROOT / "pipeline" / "stereocell"
+    for name, module, folder, of in (
+        ("scikit-learn", "sklearn", "tissue", "`tissue` alone"),
+        ("trustme", "trustme", "serve", "`serve --lan`, `view --lan`"),
+    ):
+        users = {
+            file.relative_to(package).parts[0]
+            for file in package.rglob("*.py")
+            if re.search(rf"^\s*(from|import) {module}\b", file.read_text("utf-8"), re.MULTILINE)
+        }
+        assert (users, rows[name]) == ({folder}, of)
+    (listed,) = re.findall(r"is an extra already: (.*?)\n\n", page, re.DOTALL)
+    extras = set(re.findall(r"`([a-z0-9-]+)`", listed))
+    assert extras == project()["optional-dependencies"].keys()
+
+
+def test_the_services_of_compose_are_commands_that_exist() -> None:
+    compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text("utf-8"))
+    services = compose["services"]
+    assert services["worker"]["deploy"]["replicas"] == 2
+    for name in ("scheduler", "worker"):
+        program, command, *words = services[name]["entrypoint"]
+        told = subprocess.run(
+            [sys.executable, "-m", program, command, "--help"],
+            capture_output=True, text=True, check=True,
+        ).stdout  # fmt: skip
+        for flag in (word for word in words if word.startswith("--")):
+            assert re.search(rf"{flag}\b", told), f"dask {command}: {flag}"
+    # all see the store and the input under the same names
+    ours = [services[name] for name in ("scheduler", "worker", "stereocell")]
+    assert all(one["environment"] == ours[0]["environment"] for one in ours)
+    assert all(one["volumes"] == ours[0]["volumes"] for one in ours)
+    endpoint = ours[0]["environment"]["AWS_ENDPOINT_URL"]
+    port = re.fullmatch(r"http://store:(\d+)", endpoint)
+    assert port is not None
+    assert f"--port :{port[1]} " in str(services["store"])
+    for secret in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        assert ours[0]["environment"][secret] in str(services["store"])
+
+
+def test_commands_in_comments_are_those_of_the_package() -> None:
+    text = (DEPLOY / "compose.yaml").read_text("utf-8").split("x-stereocell")[0]
+    shown = re.findall(r"run --rm stereocell(?: \\\n#)?\s+(\w+)", text)
+    assert shown == ["build", "check"]
+    assert set(shown) <= COMMANDS.keys()
+    image = (DEPLOY / "Containerfile").read_text("utf-8")
+    assert 'ENTRYPOINT ["stereocell"]' in image
+    least = project()["requires-python"].removeprefix(">=")
+    assert f"python:{least}-slim" in image

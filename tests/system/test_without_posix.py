@@ -1,0 +1,69 @@
+"""Sample, build, check, report and serve take nothing that Windows lacks.
+
+A stand-in for that system, which no test of ours runs on: support/without_posix says what it hides.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from urllib.request import urlopen
+
+import numpy as np
+import tifffile
+
+HIDING = Path(__file__).parents[1] / "support" / "without_posix"
+RUN = """
+import json, sys
+from stereocell.cli.__main__ import main
+for words in json.loads(sys.argv[1]):
+    if code := main(words):
+        sys.exit(code)
+"""
+
+
+def start(folder: Path, *commands: list[str]) -> subprocess.Popen[str]:
+    """Start a process that runs commands one after the other, up to the first that fails."""
+    return subprocess.Popen(
+        [sys.executable, "-X", "warn_default_encoding", "-c", RUN, json.dumps(commands)],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(HIDING), "PYTHONIOENCODING": "cp1252"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_all_runs_on_what_windows_has(tmp_path: Path) -> None:
+    z, y, x = np.indices((12, 24, 24))
+    body = np.where((z - 6) ** 2 + ((y - 12) / 2) ** 2 + ((x - 12) / 2) ** 2 < 12, 200, 20)
+    tifffile.imwrite(
+        tmp_path / "two.ome.tif",
+        np.stack([body, body[:, ::-1]]).astype(np.uint8),
+        # a device of Windows', and characters that its file names lack
+        metadata={"axes": "CZYX", "Channel": {"Name": ["NUL", 'a:b? "c".']}},
+    )
+    with start(
+        tmp_path,
+        ["sample", "cycif", "s.ome.zarr", "--grid", "1x1", "--tile-size", "8,16,16"],
+        ["build", "two.ome.tif", "-o", "out", "--spacing-um", "1,1,1", "--workers", "0"],
+        ["report", "out"],
+        ["check", "out"],
+    ) as process:
+        told, complaints = process.communicate(timeout=300)
+    assert process.returncode == 0, (told, complaints)
+
+    with start(tmp_path, ["serve", "out", "--port", "0", "--json"]) as server:
+        try:
+            assert server.stdout is not None
+            line = server.stdout.readline()
+            assert line, server.communicate(timeout=60)[1]
+            with urlopen(json.loads(line)["address"], timeout=30) as answer:
+                assert answer.status == 200
+            server.send_signal(signal.SIGINT)
+            assert server.communicate(timeout=30)[1] == ""
+            assert server.returncode == 0
+        finally:
+            server.kill()
