@@ -14,6 +14,9 @@ from urllib.request import urlopen
 import numpy as np
 import tifffile
 
+from support import ctrl_c
+from support.server.timeouts import PATIENCE_S
+
 HIDING = Path(__file__).parents[1] / "support" / "without_posix"
 RUN = """
 import json, sys
@@ -55,15 +58,18 @@ def test_all_runs_on_what_windows_has(tmp_path: Path) -> None:
         told, complaints = process.communicate(timeout=300)
     assert process.returncode == 0, (told, complaints)
 
-    with start(tmp_path, ["serve", "out", "--port", "0", "--json"]) as server:
+    with (
+        ctrl_c.heeded(),
+        start(tmp_path, ["serve", "out", "--port", "0", "--json"]) as server,
+    ):
         try:
             assert server.stdout is not None
             line = server.stdout.readline()
-            assert line, server.communicate(timeout=60)[1]
-            with urlopen(json.loads(line)["address"], timeout=30) as answer:
+            assert line, server.communicate(timeout=PATIENCE_S)[1]
+            with urlopen(json.loads(line)["address"], timeout=PATIENCE_S) as answer:
                 assert answer.status == 200
             server.send_signal(signal.SIGINT)
-            assert server.communicate(timeout=30)[1] == ""
+            assert server.communicate(timeout=PATIENCE_S)[1] == ""
             assert server.returncode == 0
         finally:
             server.kill()
