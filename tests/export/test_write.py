@@ -2,6 +2,9 @@
 
 import json
 import shutil
+import subprocess
+import sys
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 
@@ -11,7 +14,8 @@ from stereocell.cli.__main__ import main
 from stereocell.export import volume_files
 from stereocell.export.options import ExportOptions, parse_region
 from stereocell.export.write import FORMATS, export_stage
-from stereocell.model.errors import UsageError
+from stereocell.model.errors import OutputError, UsageError
+from support.exhaustive import sweep
 
 
 def test_an_unknown_ending_and_an_option_of_others_are_refused(
@@ -52,7 +56,7 @@ def test_a_failure_half_way_leaves_the_older_file(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(volume_files, "nrrd_head", fail)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OutputError, match=r"s\.raw: can't be written: No space left"):
         export_stage(sphere_stage, tmp_path / "s.raw", ExportOptions())
     assert [one.name for one in tmp_path.iterdir()] == ["s.raw"]
     assert (tmp_path / "s.raw").read_text() == "old"
@@ -89,3 +93,28 @@ def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "stereocell:" in told.err
     assert json.loads(told.out)["exit_code"] == 1
     assert not (tmp_path / "s.glb").exists()
+
+
+@pytest.mark.parametrize("ending", sweep(sorted(FORMATS), kept=[".glb", ".nrrd", ".precomputed"]))
+def test_a_full_disk_is_one_line_and_leaves_nothing(
+    sphere_stage: Path, small_disk: Path, capfd: pytest.CaptureFixture[str], ending: str
+) -> None:
+    """In a process of its own: a mapped file for which there is no room kills it."""
+    out = small_disk.parent / "out"
+    shutil.copytree(sphere_stage.parent, out / "stage")
+    full = small_disk / "full"
+    with suppress(OSError), full.open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+    with full.open("r+b") as file:
+        file.truncate(full.stat().st_size - 8192)  # for folders and heads
+    file = small_disk / f"a{ending}"
+    command = [sys.executable, "-m", "stereocell.cli", "export", str(out), str(file)]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    if answer.returncode == 0:  # the sphere in it is as small as the room that is left
+        assert file.stat().st_size <= 8192
+        return
+    assert answer.returncode == 1, answer.stderr
+    said = answer.stderr.splitlines()[-1]
+    assert said.startswith(f"stereocell: {file}: "), said
+    assert {one.name for one in small_disk.iterdir()} == {"full"}

@@ -217,10 +217,11 @@ def test_every_file_is_fetched_as_browsers_do(
     code, _, said = run(out, site, "--url", url)
     assert code == 1
     assert f"{url}/volumes/r0_c0.ktx2: found other bytes" in said
+    code, mended, _ = run(out, site, "--url", url)
+    assert (code, mended["uploaded"]) == (0, 1)
     code, _, said = run(out, site, "--url", f"{host}/elsewhere")
     assert code == 1
     assert "answered with 404" in said
-    (site / "volumes/r0_c0.ktx2").write_bytes(FILES["volumes/r0_c0.ktx2"])
     monkeypatch.setitem(_Quiet.extensions_map, ".js", "text/plain")
     code, _, said = run(out, site, "--url", url)
     assert code == 1

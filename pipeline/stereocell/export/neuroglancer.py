@@ -20,7 +20,14 @@ from numpy.typing import NDArray
 from stereocell.export.chosen import Chosen
 from stereocell.export.options import UNITS_M
 from stereocell.export.unite import weld
-from stereocell.export.voxels import Layout, fill, find_layout, map_file, places_of_world
+from stereocell.export.voxels import (
+    Layout,
+    fill,
+    find_layout,
+    map_file,
+    map_zeros,
+    places_of_world,
+)
 from stereocell.formats.precomputed import (
     CHUNK,
     Level,
@@ -173,7 +180,8 @@ def _halved(
         len(values),
         *(-(-n // f) for n, f in zip(values.shape[1:], (fz, fy, fx), strict=True)),
     )
-    made = np.memmap(file, values.dtype, "w+", shape=shape)
+    file.touch()
+    made = map_zeros(file, values.dtype, shape)
     for channel, z in product(range(shape[0]), range(shape[1])):
         slab = values[channel, z * fz : (z + 1) * fz].astype(np.float32).mean(axis=0)
         padded = np.pad(slab, [(0, -slab.shape[0] % fy), (0, -slab.shape[1] % fx)], mode="edge")

@@ -5,6 +5,7 @@ scanner stored them. Places are the source's, too: the world's y, which grows up
 over again; a patient's are DICOM's (left, posterior, superior).
 """
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,8 @@ from stereocell.usd.read_stage import ComposedVolume, sides_of
 _OFF = 1e-2  # voxels by which a tile may lie beside the lattice of the first
 _IMAGE_AXES = np.diag([1.0, -1.0, 1.0])  # places in an image, of the world's
 _AS_BYTES = (0.0, 255.0)  # the window of 8-bit sources, of which the stage keeps these bytes alone
+
+_BLOCK = 1 << 20  # bytes of zeros that are written at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +272,23 @@ def _upright(layout: Layout) -> Layout:
 
 def map_file(file: Path, layout: Layout, offset: int) -> NDArray[np.generic]:
     """Return an array of zeros (channel, z, y, x) that lies in a file behind its head."""
+    return map_zeros(file, layout.dtype, layout.shape, offset)
+
+
+def map_zeros(
+    file: Path, dtype: np.dtype[Any], shape: tuple[int, ...], offset: int = 0
+) -> NDArray[Any]:
+    """Return an array of zeros that lies in an existing file from a byte on.
+
+    Its room on the disk is taken at once: a disk that is full when a mapped array is filled kills
+    the process. Raises OSError.
+    """
+    size = offset + int(np.prod(shape)) * np.dtype(dtype).itemsize
     with file.open("r+b") as opened:
-        opened.truncate(offset + int(np.prod(layout.shape)) * layout.dtype.itemsize)
-    return np.memmap(file, layout.dtype, "r+", offset, layout.shape)
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(opened.fileno(), 0, size)
+        else:
+            opened.seek(0, os.SEEK_END)
+            while (missing := size - opened.tell()) > 0:
+                opened.write(bytes(min(missing, _BLOCK)))
+    return np.memmap(file, dtype, "r+", offset, shape)

@@ -145,12 +145,19 @@ def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
 
 @contextmanager
 def _folder_beside(file: Path) -> Iterator[Path]:
-    """Yield an empty folder beside a file; one that a killed command left there is removed."""
+    """Yield an empty folder beside a file; one that a killed command left there is removed.
+
+    Raises OutputError where the system refuses (rights, space).
+    """
     clear_beside(file)
     folder = file.with_name(f".{file.name}.{secrets.token_hex(4)}.partial")
-    folder.mkdir()
     try:
+        folder.mkdir()
         yield folder
+    except OutputError as error:  # it knows the file by its temporary name
+        raise OutputError(str(error).replace(str(folder / file.name), str(file))) from error
+    except OSError as error:
+        raise OutputError(f"{file}: can't be written: {error.strerror or error}") from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

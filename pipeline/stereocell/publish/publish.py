@@ -94,11 +94,15 @@ def publish(
         else {p: "is another" for p in files if digest(target.read(p)) != entries[p]["sha256"]}
     )
     if faults:
+        # what the target itself has otherwise is put there anew by the next run
+        spoilt = [p for p in faults if digest(target.read(p)) != entries[p]["sha256"]]
+        target.write(PUBLISHED, _list({**entries, **dict.fromkeys(spoilt)}))
         path, fault = next(iter(sorted(faults.items())))
         raise OutputError(
             f"{address or target.shown + '/'}{path}: {fault}, expected the bundle's file of "
             f"{entries[path]['bytes']} bytes"
             + (f" ({len(faults)} such)" if len(faults) > 1 else "")
+            + (": the same command puts it there again" if path in spoilt else "")
         )
     size = sum(entry["bytes"] for entry in entries.values())
     sent = sum(entries[path]["bytes"] for path in changed)
