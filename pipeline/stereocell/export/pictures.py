@@ -29,9 +29,12 @@ _SAME_BYTES = ["-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]
 def write_picture(chosen: Chosen, path: Path, level: int) -> str:
     """Write .png; return a line about it."""
     width = chosen.options.width or _PICTURE_WIDTH
-    low, high = chosen.box
+    shapes = list(_shapes(chosen, level))
+    # round what is there: a patient's box is often twice as large
+    low = np.min([shape.positions.min(axis=0) for shape in shapes], axis=0)
+    high = np.max([shape.positions.max(axis=0) for shape in shapes], axis=0)
     frame = tuple(low.tolist()), tuple(high.tolist())
-    image = draw_image(_shapes(chosen, level), frame, (width, width))
+    image = draw_image(shapes, frame, (width, width))
     image.save(path, optimize=True)
     return f"{image.width} x {image.height} pixels at lod{level}"
 
