@@ -107,8 +107,7 @@ export class Help {
       if (!this.dialog.open) onClose(); // the browser may close it in spite of `cancel`
     });
     this.dialog.addEventListener("keydown", (event) => {
-      // For a moment after it was closed the focus is still in it.
-      if (event.key !== "?" || !this.dialog.open || this.find.value !== "") return;
+      if (event.key !== "?" || this.find.value !== "") return;
       event.preventDefault(); // or it would open again by the same key
       onClose();
     });
@@ -132,7 +131,14 @@ export class Help {
       this.show("");
       this.dialog.showModal();
       this.find.focus();
-    } else this.dialog.close();
+      return;
+    }
+    this.dialog.close();
+    // Until the next frame the focus may stay in the hidden field, which would swallow the keys.
+    const { activeElement } = document;
+    if (activeElement instanceof HTMLElement && this.dialog.contains(activeElement)) {
+      activeElement.blur();
+    }
   }
 
   dispose(): void {
