@@ -56,7 +56,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -97,6 +97,15 @@ browser: ## Install Debian's chromium for the browser tests, if it is missing an
 	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
 	elif [ -n "$$CI" ]; then echo "browser: no chromium, and CI needs one: apt-get install chromium" >&2; exit 1; \
 	else echo "browser: no chromium, so the browser tests are skipped; get it by: sudo apt-get install chromium"; fi
+
+# after the browser: dpkg lets one install at a time
+mono: browser ## Install Debian's Mono and shader compilers for the Unity package's tests, if we may
+	@if [ -e /usr/lib/cli/Newtonsoft.Json-5.0 ] && (for each in mcs mono glslangValidator spirv-cross; do command -v $$each >/dev/null || exit 1; done); then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+	    mono-mcs mono-runtime libnewtonsoft-json5.0-cil glslang-tools spirv-cross >/dev/null; } \
+	  || echo "mono: can't be installed here, so tests of the Unity package are skipped" >&2; \
+	else echo "mono: no Mono or shader compilers, so tests of the Unity package are skipped; on Debian get them by: sudo make mono"; fi
 
 demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells, mri or cells)
 	@mkdir -p out/samples
@@ -184,7 +193,7 @@ test-fast: setup ## What takes no while: no whole builds, no malformed inputs, n
 	$(VITEST) --project unit
 
 # Side by side: browsers often wait, and then Python has the cores
-test: setup browser ## All tests, in headless Chromium too
+test: setup browser mono ## All tests, in headless Chromium too
 	$(MAKE) --no-print-directory -j2 test-python test-viewer
 
 # A browser is a session of its own, and Linux shares the cores between sessions before it looks at

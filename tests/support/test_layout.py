@@ -16,7 +16,9 @@ ROOT = TESTS.parent
 PACKAGE = ROOT / "pipeline" / "stereocell"
 VIEWER = ROOT / "viewer_gltf"
 # what mirrors no package: of the whole, of other languages and programs, or what tests share
-OF_THE_WHOLE = {"bench", "blender", "corpus", "docs", "malformed", "support", "system"}
+OF_THE_WHOLE = {
+    "bench", "blender", "corpus", "docs", "malformed", "support", "system", "unity",
+}  # fmt: skip
 OF_THE_PAGE = {"interop", "page", "shaders", "support"}
 
 

@@ -1,0 +1,40 @@
+"""The .meta files of the Unity package: an asset of a package without one is left out by Unity.
+
+    PYTHONPATH=tests python -m support.unity_meta
+
+writes those that are missing. An asset's GUID is that of its path, so that it stays the same.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[2] / "usd_assets" / "unity"
+
+
+def assets() -> Iterator[Path]:
+    """Yield the files and folders that Unity imports: not `.hidden` ones, nor `Documentation~`."""
+    for path in sorted(PACKAGE.rglob("*")):
+        parts = path.relative_to(PACKAGE).parts
+        if path.suffix != ".meta" and not any(p.startswith(".") or p.endswith("~") for p in parts):
+            yield path
+
+
+def meta_of(asset: Path) -> Path:
+    return asset.with_name(asset.name + ".meta")
+
+
+def guid_of(asset: Path) -> str:
+    name = f"org.stereocell.bundle/{asset.relative_to(PACKAGE).as_posix()}"
+    return hashlib.md5(name.encode(), usedforsecurity=False).hexdigest()
+
+
+def main() -> None:
+    for asset in assets():
+        if not meta_of(asset).exists():
+            folder = "folderAsset: yes\n" if asset.is_dir() else ""
+            meta_of(asset).write_text(f"fileFormatVersion: 2\nguid: {guid_of(asset)}\n{folder}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,344 @@
+// Of UnityEngine what the package uses, with the signatures of Unity's published reference source
+// (UnityCsReference, 6000.7): code that compiles with these compiles with the editor's. They do as much as
+// it takes to run the importer: a tree of objects with places, and components that remember what they are given.
+using System;
+using System.Collections.Generic;
+using System.Linq;
+
+namespace UnityEngine
+{
+    public class Object
+    {
+        bool isDestroyed;
+        public virtual string name { get; set; }
+        public static void DestroyImmediate(Object obj) { obj.isDestroyed = true; }
+        public static bool operator ==(Object x, Object y) { return IsNull(x) ? IsNull(y) : ReferenceEquals(x, y); }
+        public static bool operator !=(Object x, Object y) { return !(x == y); }
+        public override bool Equals(object other) { return ReferenceEquals(this, other); }
+        public override int GetHashCode() { return base.GetHashCode(); }
+        static bool IsNull(Object x) { return ReferenceEquals(x, null) || x.isDestroyed; }
+    }
+
+    public class Component : Object
+    {
+        public GameObject gameObject { get; internal set; }
+        public override string name { get { return gameObject.name; } set { gameObject.name = value; } }
+        public Transform transform { get { return gameObject.transform; } }
+        public T GetComponent<T>() { return gameObject.GetComponent<T>(); }
+        public T[] GetComponentsInChildren<T>() { return GetComponentsInChildren<T>(false); }
+        public T[] GetComponentsInChildren<T>(bool includeInactive) { return gameObject.GetComponentsInChildren<T>(includeInactive); }
+        public T GetComponentInParent<T>()
+        {
+            for (var at = transform; at != null; at = at.parent)
+            {
+                var found = at.gameObject.GetComponent<T>();
+                if (found != null) return found;
+            }
+            return default(T);
+        }
+    }
+
+    public class Behaviour : Component
+    {
+        public bool enabled { get; set; }
+    }
+
+    public class MonoBehaviour : Behaviour { }
+
+    public sealed class GameObject : Object
+    {
+        readonly List<Component> components = new List<Component>();
+        public GameObject(string name)
+        {
+            this.name = name;
+            activeSelf = true;
+            transform = AddComponent<Transform>();
+        }
+        public Transform transform { get; private set; }
+        public bool activeSelf { get; private set; }
+        public void SetActive(bool value) { activeSelf = value; }
+        public T AddComponent<T>() where T : Component
+        {
+            var made = (T)Activator.CreateInstance(typeof(T), true);
+            made.gameObject = this;
+            components.Add(made);
+            return made;
+        }
+        public T GetComponent<T>() { return components.OfType<T>().FirstOrDefault(); }
+        public T[] GetComponentsInChildren<T>() { return GetComponentsInChildren<T>(false); }
+        public T[] GetComponentsInChildren<T>(bool includeInactive)
+        {
+            var found = new List<T>();
+            Collect(found, includeInactive);
+            return found.ToArray();
+        }
+        void Collect<T>(List<T> found, bool includeInactive)
+        {
+            if (!includeInactive && !activeSelf) return;
+            found.AddRange(components.OfType<T>());
+            for (var i = 0; i < transform.childCount; i++) transform.GetChild(i).gameObject.Collect(found, includeInactive);
+        }
+    }
+
+    public class Transform : Component
+    {
+        readonly List<Transform> children = new List<Transform>();
+        protected Transform() { localScale = Vector3.one; }
+        public Transform parent { get; private set; }
+        public Vector3 localPosition { get; set; }
+        public Vector3 localScale { get; set; }
+        public Vector3 position { get { return parent == null ? localPosition : parent.TransformPoint(localPosition); } set { localPosition = value; } }
+        public Vector3 forward { get; set; }
+        public int childCount { get { return children.Count; } }
+        public Transform GetChild(int index) { return children[index]; }
+        public void SetParent(Transform p) { SetParent(p, true); }
+        public void SetParent(Transform parent, bool worldPositionStays)
+        {
+            if (worldPositionStays) throw new NotSupportedException();
+            this.parent = parent;
+            parent.children.Add(this);
+        }
+        public Vector3 TransformPoint(Vector3 position)  // no turns here
+        {
+            var at = new Vector3(localPosition.x + localScale.x * position.x, localPosition.y + localScale.y * position.y, localPosition.z + localScale.z * position.z);
+            return parent == null ? at : parent.TransformPoint(at);
+        }
+    }
+
+    public struct Vector3
+    {
+        public float x, y, z;
+        public Vector3(float x, float y, float z) { this.x = x; this.y = y; this.z = z; }
+        public static Vector3 zero { get { return new Vector3(); } }
+        public static Vector3 one { get { return new Vector3(1, 1, 1); } }
+        public static float Dot(Vector3 lhs, Vector3 rhs) { return lhs.x * rhs.x + lhs.y * rhs.y + lhs.z * rhs.z; }
+        public static Vector3 Cross(Vector3 lhs, Vector3 rhs)
+        {
+            return new Vector3(lhs.y * rhs.z - lhs.z * rhs.y, lhs.z * rhs.x - lhs.x * rhs.z, lhs.x * rhs.y - lhs.y * rhs.x);
+        }
+        public static Vector3 operator +(Vector3 a, Vector3 b) { return new Vector3(a.x + b.x, a.y + b.y, a.z + b.z); }
+        public static Vector3 operator -(Vector3 a, Vector3 b) { return new Vector3(a.x - b.x, a.y - b.y, a.z - b.z); }
+        public static Vector3 operator *(Vector3 a, float d) { return new Vector3(a.x * d, a.y * d, a.z * d); }
+    }
+
+    public struct Vector4
+    {
+        public float x, y, z, w;
+        public Vector4(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
+        public static Vector4 zero { get { return new Vector4(); } }
+        public float this[int index]
+        {
+            get { return index == 0 ? x : index == 1 ? y : index == 2 ? z : w; }
+            set
+            {
+                if (index == 0) x = value;
+                else if (index == 1) y = value;
+                else if (index == 2) z = value;
+                else if (index == 3) w = value;
+                else throw new IndexOutOfRangeException();
+            }
+        }
+        public static bool operator ==(Vector4 lhs, Vector4 rhs) { return lhs.x == rhs.x && lhs.y == rhs.y && lhs.z == rhs.z && lhs.w == rhs.w; }
+        public static bool operator !=(Vector4 lhs, Vector4 rhs) { return !(lhs == rhs); }
+        public override bool Equals(object other) { return other is Vector4 && this == (Vector4)other; }
+        public override int GetHashCode() { return x.GetHashCode() ^ y.GetHashCode() ^ z.GetHashCode() ^ w.GetHashCode(); }
+    }
+
+    public struct Color
+    {
+        public float r, g, b, a;
+        public Color(float r, float g, float b, float a) { this.r = r; this.g = g; this.b = b; this.a = a; }
+        public Color linear { get { return new Color(Decode(r), Decode(g), Decode(b), a); } }
+        public Color gamma { get { return new Color(Encode(r), Encode(g), Encode(b), a); } }
+        static float Decode(float c) { return c <= 0.04045f ? c / 12.92f : (float)Math.Pow((c + 0.055) / 1.055, 2.4); }
+        static float Encode(float c) { return c <= 0.0031308f ? c * 12.92f : (float)(1.055 * Math.Pow(c, 1 / 2.4) - 0.055); }
+    }
+
+    public struct Mathf
+    {
+        public static float Max(float a, float b) { return Math.Max(a, b); }
+    }
+
+    public class Texture : Object
+    {
+        public virtual int width { get; set; }
+        public virtual int height { get; set; }
+        public TextureWrapMode wrapMode { get; set; }
+        public FilterMode filterMode { get; set; }
+        public Array Data;  // of the stub: what was set
+        public string Format;
+    }
+
+    public class Texture2D : Texture
+    {
+        public bool IsLinear;
+        public Texture2D(int width, int height, TextureFormat textureFormat, bool mipChain, bool linear)
+        {
+            this.width = width;
+            this.height = height;
+            Format = textureFormat.ToString();
+            IsLinear = linear;
+        }
+        public void SetPixelData<T>(T[] data, int mipLevel, int sourceDataStartIndex = 0) { Data = data; }
+        public void Apply(bool updateMipmaps, bool makeNoLongerReadable) { }
+    }
+
+    public sealed class Texture3D : Texture
+    {
+        public Texture3D(int width, int height, int depth, TextureFormat textureFormat, bool mipChain)
+        {
+            this.width = width;
+            this.height = height;
+            this.depth = depth;
+            Format = textureFormat.ToString();
+        }
+        public int depth { get; private set; }
+        public void SetPixelData<T>(T[] data, int mipLevel, int sourceDataStartIndex = 0) { Data = data; }
+        public void Apply(bool updateMipmaps, bool makeNoLongerReadable) { }
+    }
+
+    public enum TextureFormat { RGBA32 = 4, RG16 = 62, R8 = 63 }
+    public enum TextureWrapMode { Repeat, Clamp, Mirror, MirrorOnce }
+    public enum FilterMode { Point, Bilinear, Trilinear }
+    [Flags] public enum DepthTextureMode { None = 0, Depth = 1, DepthNormals = 2, MotionVectors = 4 }
+    public enum QueryTriggerInteraction { UseGlobal, Ignore, Collide }
+
+    public sealed class Shader : Object
+    {
+        public static Shader Find(string name) { return new Shader { name = name }; }
+    }
+
+    public class Material : Object
+    {
+        public readonly SortedDictionary<string, object> Values = new SortedDictionary<string, object>();
+        public readonly HashSet<string> Keywords = new HashSet<string>();
+        public Material(Shader shader) { }
+        public void SetTexture(string name, Texture value) { Values[name] = value; }
+        public void SetVector(string name, Vector4 value) { Values[name] = value; }
+        public void SetFloat(string name, float value) { Values[name] = value; }
+        public void EnableKeyword(string keyword) { Keywords.Add(keyword); }
+        public void DisableKeyword(string keyword) { Keywords.Remove(keyword); }
+        public bool IsKeywordEnabled(string keyword) { return Keywords.Contains(keyword); }
+    }
+
+    public sealed class MaterialPropertyBlock
+    {
+        public SortedDictionary<string, object> Values = new SortedDictionary<string, object>();
+        public void Clear() { Values = new SortedDictionary<string, object>(); }
+        public void SetFloat(string name, float value) { Values[name] = value; }
+        public void SetVector(string name, Vector4 value) { Values[name] = value; }
+        public void SetColor(string name, Color value) { Values[name] = value; }
+        public void SetVectorArray(string name, Vector4[] values) { Values[name] = values; }
+    }
+
+    public sealed class Mesh : Object
+    {
+        public Vector3[] vertices { get; set; }
+        public int[] triangles { get; set; }
+        public void RecalculateBounds() { }
+    }
+
+    public sealed class MeshFilter : Component
+    {
+        public Mesh sharedMesh { get; set; }
+    }
+
+    public class Renderer : Component
+    {
+        public SortedDictionary<string, object> Block;  // of the stub: a copy, as Unity makes one
+        public Renderer() { enabled = true; }
+        public bool enabled { get; set; }
+        public bool receiveShadows { get; set; }
+        public Rendering.ShadowCastingMode shadowCastingMode { get; set; }
+        public Material sharedMaterial { get; set; }
+        public void SetPropertyBlock(MaterialPropertyBlock properties) { Block = properties == null ? null : properties.Values; }
+    }
+
+    public class MeshRenderer : Renderer { }
+
+    public struct LOD
+    {
+        public LOD(float screenRelativeTransitionHeight, Renderer[] renderers)
+        {
+            this.screenRelativeTransitionHeight = screenRelativeTransitionHeight;
+            fadeTransitionWidth = 0;
+            this.renderers = renderers;
+        }
+        public float screenRelativeTransitionHeight;
+        public float fadeTransitionWidth;
+        public Renderer[] renderers;
+    }
+
+    public class LODGroup : Component
+    {
+        public LOD[] Lods;
+        public Vector3 localReferencePoint { get; set; }
+        public float size { get; set; }
+        public void SetLODs(LOD[] lods)
+        {
+            for (var i = 1; i < lods.Length; i++)
+            {
+                if (lods[i].screenRelativeTransitionHeight >= lods[i - 1].screenRelativeTransitionHeight) throw new ArgumentException("LODs that do not fall");
+            }
+            Lods = lods;
+        }
+    }
+
+    public class Collider : Component
+    {
+        public bool isTrigger { get; set; }
+    }
+
+    public class BoxCollider : Collider
+    {
+        public Vector3 center { get; set; }
+        public Vector3 size { get; set; }
+    }
+
+    public struct RaycastHit
+    {
+        public Collider collider { get; internal set; }
+    }
+
+    public class Physics
+    {
+        public const int DefaultRaycastLayers = ~(1 << 2);
+        public static Collider Ahead;  // of the stub: what any ray hits
+        public static bool Raycast(Vector3 origin, Vector3 direction, out RaycastHit hitInfo, float maxDistance, int layerMask, QueryTriggerInteraction queryTriggerInteraction)
+        {
+            hitInfo = new RaycastHit { collider = Ahead };
+            return Ahead != null && queryTriggerInteraction == QueryTriggerInteraction.Collide;
+        }
+    }
+
+    public sealed class Camera : Behaviour
+    {
+        public static Camera main { get; set; }
+        public DepthTextureMode depthTextureMode { get; set; }
+    }
+
+    public class Time
+    {
+        public static float unscaledDeltaTime { get; set; }
+    }
+
+    public sealed class SystemInfo
+    {
+        public static int maxTexture3DSize { get { return 2048; } }
+    }
+
+    public abstract class PropertyAttribute : Attribute { }
+    [AttributeUsage(AttributeTargets.Field)] public class TooltipAttribute : PropertyAttribute { public TooltipAttribute(string tooltip) { } }
+    [AttributeUsage(AttributeTargets.Field)] public sealed class RangeAttribute : PropertyAttribute { public RangeAttribute(float min, float max) { } }
+    [AttributeUsage(AttributeTargets.Field)] public sealed class MinAttribute : PropertyAttribute { public MinAttribute(float min) { } }
+    public sealed class HideInInspector : Attribute { }
+    public sealed class ExecuteAlways : Attribute { }
+    [AttributeUsage(AttributeTargets.Class)] public sealed class DisallowMultipleComponent : Attribute { }
+    public sealed class AddComponentMenu : Attribute { public AddComponentMenu(string menuName) { } }
+    [AttributeUsage(AttributeTargets.Class, AllowMultiple = true)] public sealed class RequireComponent : Attribute { public RequireComponent(Type requiredComponent) { } }
+}
+
+namespace UnityEngine.Rendering
+{
+    public enum ShadowCastingMode { Off, On, TwoSided, ShadowsOnly }
+}

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.Collections.Generic;
+using System.IO;
+using System.Security.Cryptography;
+using System.Text;
+using Newtonsoft.Json;
+using Newtonsoft.Json.Linq;
+
+namespace StereoCell.Editor
+{
+    /// <summary>What is wrong with a bundle, in a line, for people.</summary>
+    public sealed class BundleException : Exception
+    {
+        public BundleException(string message) : base(message) { }
+    }
+
+    /// <summary>A box along the specimen's axes (x right, y up, z towards the viewer), um.</summary>
+    public struct Box
+    {
+        public double[] Min;
+        public double[] Max;
+    }
+
+    public sealed class TileEntry
+    {
+        public string Id;
+        public string Representation;
+        public Box Bounds;
+    }
+
+    /// <summary>A surface of one tile: its file, and how far it may be from the finest one.</summary>
+    public struct Level
+    {
+        public string Path;
+        public double ErrorMetres;
+    }
+
+    public sealed class VolumeEntry
+    {
+        public string Tile;
+        public string Path;
+        public int[] Size;
+        public int Apron;
+        public Box Bounds;
+
+        /// <summary>4 x 4, column by column: from <see cref="Bounds"/> to the world, um.</summary>
+        public double[] Matrix;
+
+        public int[][] Levels;
+    }
+
+    public sealed class ChannelEntry
+    {
+        public string Id;
+        public string Name;
+        public double[] Color;
+        public string Function;
+        public string[] Functions;
+        public string Table;
+
+        /// <summary>By tile, finest first.</summary>
+        public Dictionary<string, List<Level>> Surfaces = new Dictionary<string, List<Level>>();
+
+        public Dictionary<string, VolumeEntry> Volumes = new Dictionary<string, VolumeEntry>();
+    }
+
+    /// <summary>A bundle on disk. Each file is compared with the size and the SHA-256 that files.json gives.</summary>
+    public sealed class Bundle
+    {
+        const int Version = 1;
+
+        public readonly string Name;
+        public readonly List<TileEntry> Tiles = new List<TileEntry>();
+        public readonly List<ChannelEntry> Channels = new List<ChannelEntry>();
+
+        readonly string folder;
+        readonly JObject files;
+
+        public Bundle(string folder)
+        {
+            this.folder = folder;
+            var manifest = Parse("manifest.json", ReadFile("manifest.json"));
+            if ((string)Member(manifest, "format") != "stereocell-bundle") throw new BundleException("manifest.json is of no StereoCell bundle");
+            if ((int)Member(manifest, "version") != Version)
+            {
+                throw new BundleException("manifest.json: expected version " + Version + ", found " + Member(manifest, "version") + ": take this package of the StereoCell that built it");
+            }
+            var index = (JObject)Member(manifest, "files");
+            files = Parse("files.json", Checked((string)Member(index, "path"), index));
+            Name = (string)Member(Member(manifest, "specimen"), "name");
+            foreach (var tile in Member(manifest, "tiles"))
+            {
+                Tiles.Add(new TileEntry
+                {
+                    Id = (string)Member(tile, "id"),
+                    Representation = (string)Member(tile, "representation"),
+                    Bounds = BoxOf(Member(tile, "bounds_um")),
+                });
+            }
+            foreach (var channel in Member(manifest, "channels")) Channels.Add(ChannelOf(channel));
+        }
+
+        /// <summary>The bytes of a file of the bundle.</summary>
+        public byte[] Read(string path)
+        {
+            var entry = files[path] as JObject;
+            if (entry == null) throw new BundleException(path + " is not in files.json");
+            return Checked(path, entry);
+        }
+
+        byte[] Checked(string path, JObject entry)
+        {
+            var data = ReadFile(path);
+            if (data.Length != (long)entry["bytes"]) throw new BundleException(path + ": expected " + entry["bytes"] + " bytes, found " + data.Length);
+            using (var sha256 = SHA256.Create())
+            {
+                var found = BitConverter.ToString(sha256.ComputeHash(data)).Replace("-", "").ToLowerInvariant();
+                if (found != (string)entry["sha256"]) throw new BundleException(path + " is damaged: its SHA-256 is not that of files.json");
+            }
+            return data;
+        }
+
+        byte[] ReadFile(string path)
+        {
+            var isOutside = Path.IsPathRooted(path) || path.Contains("\\") || Array.IndexOf(path.Split('/'), "..") >= 0;
+            if (isOutside) throw new BundleException(path + " leads out of the bundle");
+            try
+            {
+                return File.ReadAllBytes(Path.Combine(folder, path));
+            }
+            catch (IOException)
+            {
+                throw new BundleException(path + " is missing in " + folder);
+            }
+        }
+
+        static JObject Parse(string path, byte[] data)
+        {
+            try
+            {
+                return JObject.Parse(Encoding.UTF8.GetString(data));
+            }
+            catch (JsonException error)
+            {
+                throw new BundleException(path + ": " + error.Message);
+            }
+        }
+
+        /// <summary>A member that each bundle has.</summary>
+        static JToken Member(JToken from, string name)
+        {
+            var found = from is JObject ? from[name] : null;
+            if (found == null) throw new BundleException("the bundle has no " + (from.Path + "." + name).TrimStart('.'));
+            return found;
+        }
+
+        ChannelEntry ChannelOf(JToken channel)
+        {
+            var entry = new ChannelEntry
+            {
+                Id = (string)Member(channel, "id"),
+                Name = (string)Member(channel, "name"),
+                Color = Member(channel, "color").ToObject<double[]>(),
+                Function = (string)Member(channel, "transfer_function"),
+                Functions = Member(channel, "transfer_functions").ToObject<string[]>(),
+                Table = (string)Member(Member(channel, "lut"), "path"),
+            };
+            if (Member(channel, "tileset") is JObject tileset) AddSurfaces(entry, (string)tileset["path"]);
+            var path = (string)Member(Member(channel, "volumes"), "path");
+            foreach (var volume in Member(Parse(path, Read(path)), "volumes"))
+            {
+                var found = new VolumeEntry
+                {
+                    Tile = (string)Member(volume, "tile"),
+                    Path = (string)Member(Member(volume, "file"), "path"),
+                    Size = Member(volume, "size").ToObject<int[]>(),
+                    Apron = (int)Member(volume, "apron"),
+                    Bounds = BoxOf(Member(volume, "bounds_um")),
+                    Matrix = Member(volume, "matrix").ToObject<double[]>(),
+                    Levels = Array.ConvertAll(((JArray)Member(volume, "levels")).ToObject<JObject[]>(), level => Member(level, "size").ToObject<int[]>()),
+                };
+                entry.Volumes.Add(found.Tile, found);
+            }
+            return entry;
+        }
+
+        /// <summary>The levels of each tile: in the tileset's tree a coarser one holds the finer one.</summary>
+        void AddSurfaces(ChannelEntry entry, string path)
+        {
+            var left = new Stack<KeyValuePair<JToken, string>>();
+            left.Push(new KeyValuePair<JToken, string>(Member(Parse(path, Read(path)), "root"), path));
+            while (left.Count > 0)
+            {
+                var here = left.Pop();
+                var base_ = here.Value.Substring(0, here.Value.LastIndexOf('/') + 1);
+                foreach (var child in here.Key["children"] ?? new JArray())
+                {
+                    left.Push(new KeyValuePair<JToken, string>(child, here.Value));
+                }
+                if (here.Key["content"] == null) continue;
+                var address = base_ + (string)Member(here.Key["content"], "uri");
+                if (address.EndsWith(".json", StringComparison.Ordinal))
+                {
+                    left.Push(new KeyValuePair<JToken, string>(Member(Parse(address, Read(address)), "root"), address));
+                    continue;
+                }
+                var parts = address.Split('/');
+                var tile = parts[parts.Length - 2];
+                if (!entry.Surfaces.ContainsKey(tile)) entry.Surfaces.Add(tile, new List<Level>());
+                entry.Surfaces[tile].Add(new Level { Path = address, ErrorMetres = (double)Member(here.Key, "geometricError") });
+            }
+            foreach (var levels in entry.Surfaces.Values) levels.Sort(FinerFirst);
+        }
+
+        /// <summary>Two levels may be off by the same: then by their names, lod1 before lod2.</summary>
+        static int FinerFirst(Level a, Level b)
+        {
+            var byError = a.ErrorMetres.CompareTo(b.ErrorMetres);
+            return byError != 0 ? byError : string.CompareOrdinal(a.Path, b.Path);
+        }
+
+        static Box BoxOf(JToken bounds)
+        {
+            return new Box { Min = Member(bounds, "min").ToObject<double[]>(), Max = Member(bounds, "max").ToObject<double[]>() };
+        }
+    }
+}

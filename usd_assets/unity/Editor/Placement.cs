@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.Collections.Generic;
+using UnityEngine;
+
+namespace StereoCell.Editor
+{
+    /// <summary>
+    /// Where things of a bundle lie in Unity. The specimen's world is right-handed, Unity's left-handed: x is
+    /// mirrored, as glTFast mirrors what it imports. Lengths: metres for objects, um inside a volume's object.
+    /// </summary>
+    public sealed class Placement
+    {
+        const double MetresPerUm = 1e-6;
+
+        /// <summary>The box's centre, metres.</summary>
+        public Vector3 Centre;
+
+        /// <summary>The box's corners around it, um: bit 0 of the index is x, bit 1 y, bit 2 z.</summary>
+        public Vector3[] Corners;
+
+        /// <summary>From there to the box's own space, um from its low corner: three rows.</summary>
+        public Vector4[] ToBox;
+
+        public Vector4 Size;
+        public Vector4 TexLow;
+        public Vector4 TexHigh;
+        public float Voxel;
+
+        readonly double[] toBox;  // from Unity's world, um: 3 rows of 4
+        readonly double[][] worldCorners;  // um
+
+        public Placement(VolumeEntry volume)
+        {
+            double[] min = volume.Bounds.Min, max = volume.Bounds.Max, m = volume.Matrix;
+            var low = new[] { -max[0], min[1], min[2] };  // of the mirrored box
+            var size = new double[3];
+            var voxel = double.MaxValue;
+            float[] first = new float[3], last = new float[3];
+            for (var i = 0; i < 3; i++)
+            {
+                int n = volume.Size[i], apron = volume.Apron;
+                size[i] = max[i] - min[i];
+                voxel = Math.Min(voxel, size[i] / Math.Max(1, n - 1 - 2 * apron));
+                first[i] = (apron + 0.5f) / n;
+                last[i] = (n - apron - 0.5f) / n;
+            }
+            Size = new Vector4((float)size[0], (float)size[1], (float)size[2], 0);
+            Voxel = (float)voxel;
+            // mirrored, x runs against the texture's; the image's rows run against y in both worlds
+            TexLow = new Vector4(last[0], last[1], first[2], 0);
+            TexHigh = new Vector4(first[0], first[1], last[2], 0);
+
+            // the matrix between mirrored worlds, row by row: x is mirrored before and after it
+            var fromBox = new double[12];
+            for (var row = 0; row < 3; row++)
+            {
+                for (var column = 0; column < 4; column++)
+                {
+                    var isFlipped = row == 0 != (column == 0);
+                    fromBox[4 * row + column] = (isFlipped ? -1 : 1) * m[4 * column + row];
+                }
+            }
+            for (var row = 0; row < 3; row++)
+            {
+                for (var i = 0; i < 3; i++) fromBox[4 * row + 3] += fromBox[4 * row + i] * low[i];
+            }
+            toBox = Inverse(fromBox);
+            worldCorners = new double[8][];
+            for (var k = 0; k < 8; k++)
+            {
+                worldCorners[k] = Apply(fromBox, (k & 1) * size[0], (k >> 1 & 1) * size[1], (k >> 2) * size[2]);
+            }
+            var centre = Apply(fromBox, size[0] / 2, size[1] / 2, size[2] / 2);
+            Centre = ToVector(centre[0] * MetresPerUm, centre[1] * MetresPerUm, centre[2] * MetresPerUm);
+            Corners = Array.ConvertAll(worldCorners, at => ToVector(at[0] - centre[0], at[1] - centre[1], at[2] - centre[2]));
+            ToBox = new Vector4[3];
+            var offset = Apply(toBox, centre[0], centre[1], centre[2]);
+            for (var row = 0; row < 3; row++)
+            {
+                ToBox[row] = new Vector4((float)toBox[4 * row], (float)toBox[4 * row + 1], (float)toBox[4 * row + 2], (float)offset[row]);
+            }
+        }
+
+        /// <summary>The box around all these volumes, in the space of this one's box.</summary>
+        public void Around(IEnumerable<Placement> all, out Vector4 low, out Vector4 high)
+        {
+            double[] min = { double.MaxValue, double.MaxValue, double.MaxValue };
+            double[] max = { double.MinValue, double.MinValue, double.MinValue };
+            foreach (var each in all)
+            {
+                foreach (var corner in each.worldCorners)
+                {
+                    var at = Apply(toBox, corner[0], corner[1], corner[2]);
+                    for (var i = 0; i < 3; i++)
+                    {
+                        min[i] = Math.Min(min[i], at[i]);
+                        max[i] = Math.Max(max[i], at[i]);
+                    }
+                }
+            }
+            low = new Vector4((float)min[0], (float)min[1], (float)min[2], 0);
+            high = new Vector4((float)max[0], (float)max[1], (float)max[2], 0);
+        }
+
+        /// <summary>The centre of a box of the specimen, in Unity, metres.</summary>
+        public static Vector3 CentreOf(Box bounds)
+        {
+            double[] a = bounds.Min, b = bounds.Max;
+            return ToVector(
+                -(a[0] + b[0]) / 2 * MetresPerUm, (a[1] + b[1]) / 2 * MetresPerUm, (a[2] + b[2]) / 2 * MetresPerUm);
+        }
+
+        /// <summary>The edges of a box, metres.</summary>
+        public static Vector3 SizeOf(Box bounds)
+        {
+            double[] a = bounds.Min, b = bounds.Max;
+            return ToVector((b[0] - a[0]) * MetresPerUm, (b[1] - a[1]) * MetresPerUm, (b[2] - a[2]) * MetresPerUm);
+        }
+
+        /// <summary>
+        /// The share of the screen's height, for each level of detail, below which the next one is drawn: where
+        /// that one's error, as large as it may be, spans <paramref name="errorPixels"/>. The last level stays.
+        /// </summary>
+        /// <param name="levels">Finest first.</param>
+        /// <param name="sizeMetres">The LODGroup's size: an object as high as the screen has share 1.</param>
+        public static float[] LodHeights(IList<Level> levels, double sizeMetres, double errorPixels, double screenPixels)
+        {
+            var heights = new float[levels.Count];
+            for (var i = 0; i + 1 < levels.Count; i++)
+            {
+                var error = levels[i + 1].ErrorMetres;
+                var height = error > 0 ? errorPixels * sizeMetres / (error * screenPixels) : 1;
+                var most = i == 0 ? 1 : 0.99f * heights[i - 1];  // Unity wants them to fall
+                heights[i] = Math.Min((float)height, most);
+            }
+            return heights;
+        }
+
+        /// <summary>The finest level whose longest edge is at most so many texels; the coarsest, if none is.</summary>
+        public static int LevelWithin(int[][] levels, int mostTexels)
+        {
+            for (var i = 0; i < levels.Length; i++)
+            {
+                if (Math.Max(levels[i][0], Math.Max(levels[i][1], levels[i][2])) <= mostTexels) return i;
+            }
+            return levels.Length - 1;
+        }
+
+        static Vector3 ToVector(double x, double y, double z)
+        {
+            return new Vector3((float)x, (float)y, (float)z);
+        }
+
+        static double[] Apply(double[] m, double x, double y, double z)
+        {
+            var to = new double[3];
+            for (var row = 0; row < 3; row++) to[row] = m[4 * row] * x + m[4 * row + 1] * y + m[4 * row + 2] * z + m[4 * row + 3];
+            return to;
+        }
+
+        static double[] Inverse(double[] m)
+        {
+            var inverse = new double[12];
+            double determinant = 0;
+            for (var column = 0; column < 3; column++)
+            {
+                int a = (column + 1) % 3, b = (column + 2) % 3;
+                for (var row = 0; row < 3; row++)
+                {
+                    int c = (row + 1) % 3, d = (row + 2) % 3;
+                    inverse[4 * column + row] = m[4 * c + a] * m[4 * d + b] - m[4 * c + b] * m[4 * d + a];
+                }
+                determinant += m[column] * inverse[4 * column];
+            }
+            if (Math.Abs(determinant) < 1e-30) throw new BundleException("a volume's matrix is flat");
+            for (var row = 0; row < 3; row++)
+            {
+                for (var i = 0; i < 3; i++) inverse[4 * row + i] /= determinant;
+                for (var i = 0; i < 3; i++) inverse[4 * row + 3] -= inverse[4 * row + i] * m[4 * i + 3];
+            }
+            return inverse;
+        }
+    }
+}

@@ -1,0 +1,532 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.IO;
+
+namespace StereoCell.Editor
+{
+    /// <summary>
+    /// Unpacks a Zstandard frame (RFC 8878), whose size is known beforehand. Unity brings no decoder, and a
+    /// bundle's volumes are such frames. No dictionaries; the checksum, where there is one, is passed over: the
+    /// importer has checked the file's SHA-256. Anything that is not as the RFC says ends in InvalidDataException.
+    /// </summary>
+    public static class Zstd
+    {
+        const uint Magic = 0xFD2FB528;
+        const int MostOfBlock = 128 << 10;
+
+        /// <param name="data">Holds the frame.</param>
+        /// <param name="offset">First byte of the frame.</param>
+        /// <param name="length">Bytes of the frame.</param>
+        /// <param name="size">Bytes once unpacked.</param>
+        public static byte[] Unpack(byte[] data, int offset, int length, int size)
+        {
+            if (offset < 0 || length < 0 || offset > data.Length - length) throw Broken("beyond the file");
+            try
+            {
+                return new Frame(data, offset, offset + length, size).Unpack();
+            }
+            catch (IndexOutOfRangeException)  // of an array, so of what a damaged frame asked for
+            {
+                throw Broken("ends too early");
+            }
+        }
+
+        static InvalidDataException Broken(string why)
+        {
+            return new InvalidDataException("no whole zstd frame: " + why);
+        }
+
+        static int HighBit(uint value)
+        {
+            var bit = -1;
+            for (; value != 0; value >>= 1) bit++;
+            return bit;
+        }
+
+        /// <summary>Reads bits from the end of a part towards its start, as zstd writes its streams.</summary>
+        sealed class Backwards
+        {
+            readonly byte[] data;
+            readonly int start;
+            int bit;  // that are left, from the part's first
+
+            public Backwards(byte[] data, int start, int end)
+            {
+                this.data = data;
+                this.start = start;
+                if (end <= start || data[end - 1] == 0) throw Broken("a stream without an end");
+                bit = 8 * (end - start - 1) + HighBit(data[end - 1]);  // below the mark, the highest bit
+            }
+
+            public int Left { get { return bit; } }
+
+            /// <summary>Bits before the first are 0, which the last look-ups ask for.</summary>
+            public int Read(int count)
+            {
+                bit -= count;
+                return Look(bit, count);
+            }
+
+            public int Peek(int count)
+            {
+                return Look(bit - count, count);
+            }
+
+            public void Skip(int count)
+            {
+                bit -= count;
+            }
+
+            int Look(int from, int count)
+            {
+                if (count == 0) return 0;
+                if (from < 0)
+                {
+                    var there = count + from;
+                    return there <= 0 ? 0 : Look(0, there) << -from;
+                }
+                var at = start + (from >> 3);
+                ulong bits = 0;
+                for (var i = 0; i < 5 && at + i < data.Length; i++) bits |= (ulong)data[at + i] << 8 * i;
+                return (int)(bits >> (from & 7) & (1ul << count) - 1);
+            }
+        }
+
+        /// <summary>A table of finite-state entropy: symbol, bits to the next state, and that state's base.</summary>
+        sealed class Fse
+        {
+            public readonly int Log;
+            public readonly byte[] Symbol;
+            public readonly byte[] Bits;
+            public readonly ushort[] Base;
+
+            public Fse(short[] counts, int log)
+            {
+                Log = log;
+                var size = 1 << log;
+                Symbol = new byte[size];
+                Bits = new byte[size];
+                Base = new ushort[size];
+                var next = new int[counts.Length];
+                var high = size;
+                for (var s = 0; s < counts.Length; s++)
+                {
+                    if (counts[s] == -1)  // less than one: a cell at the end
+                    {
+                        Symbol[--high] = (byte)s;
+                        next[s] = 1;
+                    }
+                    else next[s] = counts[s];
+                }
+                var step = (size >> 1) + (size >> 3) + 3;
+                var at = 0;
+                for (var s = 0; s < counts.Length; s++)
+                {
+                    for (var i = 0; i < counts[s]; i++)
+                    {
+                        Symbol[at] = (byte)s;
+                        do at = at + step & size - 1;
+                        while (at >= high);
+                    }
+                }
+                if (at != 0) throw Broken("an uneven table");
+                for (var i = 0; i < size; i++)
+                {
+                    var state = next[Symbol[i]]++;
+                    Bits[i] = (byte)(log - HighBit((uint)state));
+                    Base[i] = (ushort)((state << Bits[i]) - size);
+                }
+            }
+
+            /// <summary>A single symbol, which takes no bits.</summary>
+            public Fse(byte symbol)
+            {
+                Symbol = new[] { symbol };
+                Bits = new byte[1];
+                Base = new ushort[1];
+            }
+
+            /// <summary>Reads the table's description at <paramref name="at"/>, which moves behind it.</summary>
+            public static Fse Read(byte[] data, ref int at, int end, int symbols, int mostLog)
+            {
+                var bit = 0;
+                var from = at;
+                Func<int, int> bits = count =>
+                {
+                    var value = 0;
+                    for (var i = 0; i < count; i++, bit++)
+                    {
+                        var index = from + (bit >> 3);
+                        if (index < end) value |= (data[index] >> (bit & 7) & 1) << i;
+                    }
+                    return value;
+                };
+                var log = bits(4) + 5;
+                if (log > mostLog) throw Broken("too fine a table");
+                var counts = new short[symbols];
+                var left = (1 << log) + 1;
+                var symbol = 0;
+                while (left > 1)
+                {
+                    if (symbol >= symbols) throw Broken("too many symbols");
+                    var width = HighBit((uint)left) + 1;  // of the values 0 .. left
+                    var value = bits(width - 1);
+                    var small = (1 << width) - 1 - left;
+                    if (value >= small)
+                    {
+                        value |= bits(1) << width - 1;
+                        if (value >= 1 << width - 1) value -= small;
+                    }
+                    counts[symbol] = (short)(value - 1);
+                    left -= Math.Abs(counts[symbol]);
+                    if (counts[symbol++] != 0) continue;
+                    int more;
+                    do
+                    {
+                        more = bits(2);
+                        symbol += more;
+                    }
+                    while (more == 3 && symbol < symbols);
+                }
+                at = from + (bit + 7 >> 3);
+                if (left < 1 || at > end) throw Broken("a table that adds up to nothing");
+                return new Fse(counts, log);
+            }
+        }
+
+        /// <summary>A table of Huffman's: symbol and bits by the next <see cref="Log"/> bits.</summary>
+        sealed class Huffman
+        {
+            public readonly int Log;
+            public readonly byte[] Symbol;
+            public readonly byte[] Bits;
+
+            Huffman(byte[] weights, int count)
+            {
+                var total = 0;
+                for (var i = 0; i < count; i++)
+                {
+                    if (weights[i] > 12) throw Broken("too long a code");
+                    if (weights[i] > 0) total += 1 << weights[i] - 1;
+                }
+                if (total == 0) throw Broken("no codes");
+                Log = HighBit((uint)total) + 1;
+                var rest = (1 << Log) - total;
+                if (Log > 11 || (rest & rest - 1) != 0) throw Broken("codes that do not add up");
+                weights[count] = (byte)(HighBit((uint)rest) + 1);  // the last symbol's is not stored
+                Symbol = new byte[1 << Log];
+                Bits = new byte[1 << Log];
+                var at = 0;
+                for (var weight = 1; weight <= Log; weight++)
+                {
+                    for (var s = 0; s <= count; s++)
+                    {
+                        if (weights[s] != weight) continue;
+                        for (var i = 0; i < 1 << weight - 1; i++, at++)
+                        {
+                            Symbol[at] = (byte)s;
+                            Bits[at] = (byte)(Log + 1 - weight);
+                        }
+                    }
+                }
+            }
+
+            public static Huffman Read(byte[] data, ref int at, int end)
+            {
+                var weights = new byte[257];
+                var count = 0;
+                var head = data[at++];
+                if (head >= 128)
+                {
+                    count = head - 127;
+                    for (var i = 0; i < count; i++) weights[i] = (byte)(data[at + i / 2] >> (i % 2 == 0 ? 4 : 0) & 15);
+                    at += (count + 1) / 2;
+                    if (at > end) throw Broken("cut weights");
+                    return new Huffman(weights, count);
+                }
+                var stop = at + head;
+                if (stop > end) throw Broken("cut weights");
+                var table = Fse.Read(data, ref at, stop, 13, 6);
+                var stream = new Backwards(data, at, stop);
+                int a = stream.Read(table.Log), b = stream.Read(table.Log);
+                for (;;)  // two states in turn, until the bits are used up
+                {
+                    if (count > 253) throw Broken("too many weights");
+                    weights[count++] = table.Symbol[a];
+                    if (table.Bits[a] > stream.Left)
+                    {
+                        weights[count++] = table.Symbol[b];
+                        break;
+                    }
+                    a = table.Base[a] + stream.Read(table.Bits[a]);
+                    weights[count++] = table.Symbol[b];
+                    if (table.Bits[b] > stream.Left)
+                    {
+                        weights[count++] = table.Symbol[a];
+                        break;
+                    }
+                    b = table.Base[b] + stream.Read(table.Bits[b]);
+                }
+                at = stop;
+                return new Huffman(weights, count);
+            }
+
+            public void Unpack(byte[] data, int start, int end, byte[] to, int at, int stop)
+            {
+                var stream = new Backwards(data, start, end);
+                for (; at < stop; at++)
+                {
+                    var next = stream.Peek(Log);
+                    to[at] = Symbol[next];
+                    stream.Skip(Bits[next]);
+                }
+                if (stream.Left != 0) throw Broken("a stream of another length");
+            }
+        }
+
+        static readonly short[] LiteralCounts =
+        {
+            4, 3, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 2, 3, 2, 1, 1, 1, 1, 1,
+            -1, -1, -1, -1,
+        };
+
+        static readonly short[] MatchCounts =
+        {
+            1, 4, 3, 2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+            1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, -1, -1, -1, -1, -1, -1, -1,
+        };
+
+        static readonly short[] OffsetCounts =
+        {
+            1, 1, 1, 1, 1, 1, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, -1, -1, -1, -1, -1,
+        };
+
+        static readonly byte[] LiteralBits =
+        {
+            0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 4, 6, 7, 8, 9, 10, 11, 12,
+            13, 14, 15, 16,
+        };
+
+        static readonly byte[] MatchBits =
+        {
+            0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+            1, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16,
+        };
+
+        /// <summary>The least length of each code: each begins where the one before ends, up to the last that
+        /// stands for few.</summary>
+        static int[] Bases(byte[] bits, int first)
+        {
+            var bases = new int[bits.Length];
+            for (var i = 0; i < bits.Length; i++)
+            {
+                bases[i] = i == 0 ? first : bases[i - 1] + (1 << bits[i - 1]);
+            }
+            return bases;
+        }
+
+        static readonly int[] LiteralBases = Bases(LiteralBits, 0);
+        static readonly int[] MatchBases = Bases(MatchBits, 3);
+
+        sealed class Frame
+        {
+            readonly byte[] data;
+            readonly int end;
+            readonly byte[] output;
+            int at;
+            int done;  // bytes of the output
+            Huffman huffman;
+            Fse literals;
+            Fse offsets;
+            Fse matches;
+            readonly int[] last = { 1, 4, 8 };  // offsets
+
+            public Frame(byte[] data, int start, int end, int size)
+            {
+                this.data = data;
+                this.end = end;
+                at = start;
+                output = new byte[size];
+            }
+
+            long Number(int bytes)
+            {
+                if (bytes > end - at) throw Broken("ends too early");
+                long value = 0;
+                for (var i = 0; i < bytes; i++) value |= (long)data[at + i] << 8 * i;
+                at += bytes;
+                return value;
+            }
+
+            public byte[] Unpack()
+            {
+                if ((uint)Number(4) != Magic) throw Broken("another format");
+                var descriptor = (int)Number(1);
+                var isSingle = (descriptor & 32) != 0;
+                if ((descriptor & 11) != 0) throw Broken("it asks for a dictionary");
+                if (!isSingle) Number(1);  // the window: all output is at hand
+                var width = descriptor >> 6;
+                var bytes = width == 0 ? (isSingle ? 1 : 0) : 1 << width;
+                var stated = Number(bytes) + (bytes == 2 ? 256 : 0);
+                if (bytes > 0 && stated != output.Length) throw Broken("another size");
+                bool isLast;
+                do
+                {
+                    var head = (int)Number(3);
+                    isLast = (head & 1) != 0;
+                    Block(head >> 1 & 3, head >> 3);
+                }
+                while (!isLast);
+                if (done != output.Length) throw Broken("another size");
+                return output;
+            }
+
+            void Block(int type, int size)
+            {
+                if (size > MostOfBlock) throw Broken("too large a block");
+                if (type == 0)
+                {
+                    if (size > end - at || size > output.Length - done) throw Broken("ends too early");
+                    Buffer.BlockCopy(data, at, output, done, size);
+                    at += size;
+                    done += size;
+                }
+                else if (type == 1)
+                {
+                    var value = (byte)Number(1);
+                    for (var i = 0; i < size; i++) output[done++] = value;
+                }
+                else if (type == 2)
+                {
+                    if (size > end - at) throw Broken("ends too early");
+                    var stop = at + size;
+                    Sequences(Literals(stop), stop);
+                    at = stop;
+                }
+                else throw Broken("a reserved block");
+            }
+
+            byte[] Literals(int stop)
+            {
+                int head = data[at], type = head & 3, format = head >> 2 & 3;
+                if (type < 2)
+                {
+                    var headBytes = format == 1 ? 2 : format == 3 ? 3 : 1;
+                    var plain = (int)Number(headBytes) >> (headBytes == 1 ? 3 : 4);
+                    if (plain > MostOfBlock) throw Broken("too many literals");
+                    var found = new byte[plain];
+                    if (type == 1)
+                    {
+                        var value = (byte)Number(1);
+                        for (var i = 0; i < plain; i++) found[i] = value;
+                        return found;
+                    }
+                    if (plain > stop - at) throw Broken("cut literals");
+                    Buffer.BlockCopy(data, at, found, 0, plain);
+                    at += plain;
+                    return found;
+                }
+                var bits = format < 2 ? 10 : format == 2 ? 14 : 18;
+                var sizes = Number(format < 2 ? 3 : format + 2) >> 4;
+                var count = (int)(sizes & (1 << bits) - 1);
+                var packed = (int)(sizes >> bits);
+                var from = at;
+                if (count > MostOfBlock || packed > stop - at) throw Broken("cut literals");
+                at += packed;
+                if (type == 2) huffman = Huffman.Read(data, ref from, at);
+                if (huffman == null) throw Broken("no table before");
+                var to = new byte[count];
+                if (format == 0)
+                {
+                    huffman.Unpack(data, from, at, to, 0, count);
+                    return to;
+                }
+                if (at - from < 6) throw Broken("cut literals");
+                var each = (count + 3) / 4;
+                var begin = from + 6;
+                for (var i = 0; i < 4; i++)
+                {
+                    var long_ = i < 3 ? data[from + 2 * i] | data[from + 2 * i + 1] << 8 : at - begin;
+                    if (long_ > at - begin || each * i > count) throw Broken("cut literals");
+                    huffman.Unpack(data, begin, begin + long_, to, each * i, i < 3 ? Math.Min(each * (i + 1), count) : count);
+                    begin += long_;
+                }
+                return to;
+            }
+
+            Fse Table(int mode, Fse before, short[] counts, int log, int symbols, int mostLog, int stop)
+            {
+                if (mode == 0) return new Fse(counts, log);
+                if (mode == 1)
+                {
+                    var symbol = (byte)Number(1);
+                    if (symbol >= symbols) throw Broken("an unknown code");
+                    return new Fse(symbol);
+                }
+                if (mode == 2) return Fse.Read(data, ref at, stop, symbols, mostLog);
+                if (before == null) throw Broken("no table before");
+                return before;
+            }
+
+            void Sequences(byte[] from, int stop)
+            {
+                var count = (int)Number(1);
+                if (count >= 128) count = count == 255 ? (int)Number(2) + 0x7F00 : (count - 128 << 8) + (int)Number(1);
+                var used = 0;
+                if (count > 0)
+                {
+                    var modes = (int)Number(1);
+                    literals = Table(modes >> 6, literals, LiteralCounts, 6, 36, 9, stop);
+                    offsets = Table(modes >> 4 & 3, offsets, OffsetCounts, 5, 32, 8, stop);
+                    matches = Table(modes >> 2 & 3, matches, MatchCounts, 6, 53, 9, stop);
+                    var stream = new Backwards(data, at, stop);
+                    int a = stream.Read(literals.Log), b = stream.Read(offsets.Log), c = stream.Read(matches.Log);
+                    for (var i = 0; i < count; i++)
+                    {
+                        var code = offsets.Symbol[b];
+                        if (code > 30) throw Broken("too far an offset");
+                        var far = (1 << code) + stream.Read(code);
+                        var matchCode = matches.Symbol[c];
+                        var match = MatchBases[matchCode] + stream.Read(MatchBits[matchCode]);
+                        var literalCode = literals.Symbol[a];
+                        var plain = LiteralBases[literalCode] + stream.Read(LiteralBits[literalCode]);
+                        Copy(from, used, plain, OffsetOf(far, plain), match);
+                        used += plain;
+                        if (i == count - 1) break;
+                        a = literals.Base[a] + stream.Read(literals.Bits[a]);
+                        c = matches.Base[c] + stream.Read(matches.Bits[c]);
+                        b = offsets.Base[b] + stream.Read(offsets.Bits[b]);
+                    }
+                    if (stream.Left != 0) throw Broken("sequences of another length");
+                }
+                Copy(from, used, from.Length - used, 1, 0);
+            }
+
+            /// <summary>1 to 3 stand for the last offsets; after no literals, for the next ones of them.</summary>
+            int OffsetOf(int value, int plain)
+            {
+                if (value > 3)
+                {
+                    last[2] = last[1];
+                    last[1] = last[0];
+                    return last[0] = value - 3;
+                }
+                var which = value - (plain == 0 ? 0 : 1);
+                var offset = which == 3 ? last[0] - 1 : last[which];
+                if (which > 1) last[2] = last[1];
+                if (which > 0) last[1] = last[0];
+                return last[0] = offset;
+            }
+
+            void Copy(byte[] from, int at, int plain, int offset, int match)
+            {
+                if (plain < 0 || plain > from.Length - at || plain + (long)match > output.Length - done) throw Broken("another size");
+                Buffer.BlockCopy(from, at, output, done, plain);
+                done += plain;
+                if (match == 0) return;
+                if (offset < 1 || offset > done) throw Broken("an offset before the start");
+                for (var i = 0; i < match; i++, done++) output[done] = output[done - offset];
+            }
+        }
+    }
+}

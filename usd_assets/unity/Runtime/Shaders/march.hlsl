@@ -1,0 +1,224 @@
+// March the volume of one tile, up to four channels together, front to back. Functions and numbers alone:
+// the includer says how to sample, float4 sampleIntensities(float3) and float4 lookUp(int, float).
+// Space of the ray: um from the box's low corner, y up, so anisotropic voxels need no care. Unity's space is
+// left-handed: x is mirrored to the specimen's, as glTFast mirrors it, and the texture coordinates with it.
+// After Engel et al., Real-Time Volume Graphics (2006): opacity correction, early termination.
+// Only what HLSL and C++ share is used (no out, no swizzle but xyz and rgb): the tests compile it as C++.
+#ifndef STEREOCELL_MARCH
+#define STEREOCELL_MARCH
+
+#define CHANNELS 4
+#define MAX_STEPS 100  // of a ray, for any size of the volume and any number of tiles
+static const float OPAQUE = 0.99;  // opacity at which a ray ends
+
+float4 _Size;  // um, edges of the box
+float4 _TexLow;  // texture coordinates at the box's low corner ...
+float4 _TexHigh;  // ... and at its high corner
+float4 _AllLow;  // um, the same space: the box around all tiles, which share a ray's steps by length
+float4 _AllHigh;
+float _Voxel;  // um: the opacities of the transfer functions hold for a path this long
+float _MinStep;  // um
+float _Steps;  // for the whole ray, at most MAX_STEPS
+float _Spare;  // of these, one for each other tile
+float _Shading;  // 0..1: by how much the room's light counts
+float4 _Shown;  // 0..1 of each channel
+float4 _Colors[CHANNELS];  // linear RGB of each channel
+
+// The room's light, the same as in StereoCell's viewer: what a white surface sends on that faces the lamp,
+// the weaker lamp, the sky and the ground.
+static const float3 KEY_LIGHT = float3(0.66, 0.62, 0.56);
+static const float3 FILL_LIGHT = float3(0.08, 0.1, 0.14);
+static const float3 SKY_LIGHT = float3(0.33, 0.34, 0.37);
+static const float3 GROUND_LIGHT = float3(0.13, 0.125, 0.12);
+static const float GLOSS = 0.1;
+
+// Where its light comes from: unit vectors in the box's space.
+struct Room
+{
+    float3 key;
+    float3 fill;
+    float3 up;
+};
+
+// Colour (not premultiplied) and opacity of a step, and each channel's share of it.
+struct Seen
+{
+    float4 color;
+    float4 shares;
+};
+
+float awayFromZero(float x)
+{
+    return abs(x) < 1e-6 ? 1e-6 : x;
+}
+
+float3 inverseOf(float3 dir)
+{
+    return float3(1.0 / awayFromZero(dir.x), 1.0 / awayFromZero(dir.y), 1.0 / awayFromZero(dir.z));
+}
+
+// Where a ray enters and leaves the box from `low` to `high` (slab test, Kay & Kajiya 1986).
+float2 intersectBox(float3 eye, float3 invDir, float3 low, float3 high)
+{
+    float3 a = (low - eye) * invDir;
+    float3 b = (high - eye) * invDir;
+    float3 near = min(a, b);
+    float3 far = max(a, b);
+    return float2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
+}
+
+// The opacity of a path that is so many voxels long, of that of one voxel.
+float opacityOf(float ofVoxel, float voxels)
+{
+    return 1.0 - pow(1.0 - min(ofVoxel, 0.999), voxels);
+}
+
+// Channels that overlap absorb together and share the colour by their opacities.
+Seen classify(float4 intensity, float voxels)
+{
+    Seen seen;
+    float3 color = float3(0.0, 0.0, 0.0);
+    float weight = 0.0;
+    float transparency = 1.0;
+    seen.shares = float4(0.0, 0.0, 0.0, 0.0);
+    UNITY_UNROLL
+    for (int c = 0; c < CHANNELS; c++)
+    {
+        float4 look = lookUp(c, intensity[c]);
+        float a = opacityOf(look.a, voxels * _Shown[c]);
+        color += look.rgb * _Colors[c].rgb * a;
+        weight += a;
+        seen.shares[c] = a;
+        transparency *= 1.0 - a;
+    }
+    float whole = max(weight, 1e-6);
+    seen.shares = seen.shares / whole;
+    color = color / whole;
+    seen.color = float4(color.x, color.y, color.z, 1.0 - transparency);
+    return seen;
+}
+
+// Gradient of the intensities, each channel by its share: differences over two voxels of the means of the
+// cube's corners, in the box's directions.
+float3 gradientAt(float3 p, float3 texPerUm, float4 shares)
+{
+    float3 h = _Voxel * abs(texPerUm);
+    float3 gradient = float3(0.0, 0.0, 0.0);
+    UNITY_LOOP
+    for (int corner = 0; corner < 8; corner++)
+    {
+        float3 side = 2.0 * float3(corner & 1, (corner >> 1) & 1, corner >> 2) - float3(1.0, 1.0, 1.0);
+        gradient += side * dot(sampleIntensities(p + side * h), shares);
+    }
+    return 0.25 * gradient * sign(texPerUm);
+}
+
+// Which face of the box round all tiles a place lies on, along an axis: -1, 1, or 0 for neither.
+float faceAt(float place, float low, float high)
+{
+    float near = 0.05 * _Voxel;
+    return (abs(place - high) < near ? 1.0 : 0.0) - (abs(place - low) < near ? 1.0 : 0.0);
+}
+
+// Unit normal of the face by which a ray comes in; 0: it begins within. What is cut through is lit as the face:
+// along it the gradient of the matter has no side that faces the eye.
+float3 cutFace(float3 start)
+{
+    float3 face = float3(
+        faceAt(start.x, _AllLow.x, _AllHigh.x),
+        faceAt(start.y, _AllLow.y, _AllHigh.y),
+        faceAt(start.z, _AllLow.z, _AllHigh.z));
+    return face / max(length(face), 1.0);
+}
+
+float3 lightOn(float3 normal, Room room)
+{
+    float3 around = lerp(GROUND_LIGHT, SKY_LIGHT, 0.5 + 0.5 * dot(normal, room.up));
+    around += FILL_LIGHT * max(dot(normal, room.fill), 0.0);
+    return around + KEY_LIGHT * max(dot(normal, room.key), 0.0);
+}
+
+// Steps of intensity over two voxels: below the first they are noise, above the second a boundary; between,
+// light fades in. What has no boundary is lit through by its surroundings.
+static const float NOISE_STEP = 0.03;
+static const float BOUNDARY_STEP = 0.18;
+static const float FLAT_STEP = 1e-4;
+static const float SCATTERED = 1.2;
+
+// Diffuse light by the gradient (Levoy 1988), and the lamp's own gloss (Blinn 1977, exponent 16).
+float3 shade(float3 color, float3 gradient, float3 dir, Room room)
+{
+    float steepness = length(gradient);
+    float3 normal = -gradient / max(steepness, FLAT_STEP);
+    if (dot(normal, dir) > 0.0) normal = -normal;
+    float3 unlit = SCATTERED * color * lightOn(-dir, room);
+    if (steepness < FLAT_STEP) return unlit;
+    float gloss = max(dot(normal, normalize(room.key - dir)), 0.0);
+    gloss *= gloss;
+    gloss *= gloss;
+    gloss *= gloss;
+    gloss *= gloss;
+    float3 facing = color * lightOn(normal, room) + GLOSS * gloss * KEY_LIGHT;
+    return lerp(unlit, facing, smoothstep(NOISE_STEP, BOUNDARY_STEP, steepness));
+}
+
+// The steps of a ray through this tile, of which all tiles together have _Steps.
+int stepsOf(float span, float whole)
+{
+    float share = min(1.0, span / max(whole, 1e-6));
+    return clamp((int)(share * (_Steps - _Spare) + 1e-3), 1, MAX_STEPS);
+}
+
+// Linear light, premultiplied. `dir` has unit length, so that distances along the ray are um; what is
+// beyond `scene` is hidden; `shift` 0..1 says where in its step a sample lies.
+float4 march(float3 eye, float3 dir, float scene, float shift, Room room)
+{
+    float3 invDir = inverseOf(dir);
+    float2 span = intersectBox(eye, invDir, float3(0.0, 0.0, 0.0), _Size.xyz);
+    span.x = max(span.x, 0.0);
+    float2 whole = intersectBox(eye, invDir, _AllLow.xyz, _AllHigh.xyz);
+    int steps = stepsOf(span.y - span.x, whole.y - max(whole.x, 0.0));
+    // From here on t counts from where the ray comes in: far from the eye, floats would be too coarse.
+    float end = min(span.y, scene) - span.x;
+    float3 texPerUm = (_TexHigh.xyz - _TexLow.xyz) / _Size.xyz;
+    float3 start = eye + span.x * dir;
+    float3 face = span.x > 0.0 ? cutFace(start) : float3(0.0, 0.0, 0.0);
+    bool isCut = dot(face, face) > 0.0;
+    float3 texStart = _TexLow.xyz + start * texPerUm;
+    float3 texDir = dir * texPerUm;
+    float4 sum = float4(0.0, 0.0, 0.0, 0.0);
+    float t = 0.0;
+    UNITY_LOOP
+    for (int i = 0; i < MAX_STEPS; i++)
+    {
+        if (i >= steps || t >= end || sum.a >= OPAQUE) break;
+        // What remains of the ray over what remains of the budget: it always reaches the end.
+        float dt = min(max(_MinStep, (end - t) / (float)(steps - i)), end - t);
+        float3 p = texStart + (t + shift * dt) * texDir;
+        Seen seen = classify(sampleIntensities(p), dt / _Voxel);
+        float a = seen.color.a;
+        if (a > 0.0)
+        {
+            float3 color = seen.color.rgb;
+            if (_Shading > 0.0)
+            {
+                float3 gradient = -face;
+                if (!isCut || t >= _Voxel) gradient = gradientAt(p, texPerUm, seen.shares);
+                color = lerp(color, shade(color, gradient, dir, room), _Shading);
+            }
+            float visible = (1.0 - sum.a) * a;
+            sum += visible * float4(color.x, color.y, color.z, 1.0);
+        }
+        t += dt;
+    }
+    // A ray that ended early is opaque: what was left out behind looks as what is in front.
+    return sum.a >= OPAQUE ? sum / sum.a : sum;
+}
+
+// An offset for each pixel, which turns bands into fine grain (interleaved gradient noise, Jimenez 2014).
+float grain(float2 pixel)
+{
+    return frac(52.9829189 * frac(0.06711056 * pixel.x + 0.00583715 * pixel.y));
+}
+
+#endif
