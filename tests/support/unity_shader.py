@@ -57,7 +57,7 @@ def compile_stage(stage: str, folder: Path, *defines: str) -> Path:
     return out
 
 
-def _cross(spirv: Path, *options: str) -> str:
+def cross(spirv: Path, *options: str) -> str:
     command = ["spirv-cross", str(spirv), *options]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
@@ -88,26 +88,33 @@ def view_of(camera: Camera, middle: NDArray[np.float64], scale: float) -> dict[s
     }
 
 
-def draw(boxes: list[dict[str, Any]], camera: Camera, folder: Path) -> NDArray[np.float64]:
+def draw(
+    boxes: list[dict[str, Any]], camera: Camera, folder: Path, *defines: str
+) -> NDArray[np.float64]:
     """Return a picture (height, width, 4), linear and premultiplied, top row first.
 
     boxes: from the farthest; each has `values` (uniforms by name), `volume`, `table` (as the
         harness prints textures), `vertices` and `triangles`
     """
-    spirv = {stage: compile_stage(stage, folder) for stage in STAGES}
-    glsl = {stage: _cross(path, "--es", "--version", "300") for stage, path in spirv.items()}
+    spirv = {stage: compile_stage(stage, folder, *defines) for stage in STAGES}
+    glsl = {stage: cross(path, "--es", "--version", "300") for stage, path in spirv.items()}
     # stages of WebGL agree by names
     for out, into in re.findall(r"out \w+ (_\w+?_(\w+));", glsl["vert"]):
         glsl["vert"] = re.sub(rf"\b{out}\b", f"v_{into}", glsl["vert"])
         glsl["frag"] = re.sub(rf"\bi_{into}\b", f"v_{into}", glsl["frag"])
-    reflected = json.loads(_cross(spirv["frag"], "--reflect"))
+    reflected = json.loads(cross(spirv["frag"], "--reflect"))
     (ubo,) = reflected["ubos"]
     members = reflected["types"][ubo["type"]]["members"]
     block = re.search(r"uniform (\w+)\s*\{", glsl["frag"])
     assert block is not None
+    names = [
+        "_Volume",
+        "_Table",
+        *(["_CameraDepthTexture"] if "STEREOCELL_SCENE_DEPTH" in defines else []),
+    ]
     samplers = {
         name: re.search(rf"uniform .*sampler[23]D (\w*{name}\w*);", glsl["frag"])[1]  # type: ignore[index]
-        for name in ("_Volume", "_Table")
+        for name in names
     }
     width, height = camera.size_px
     asked = {

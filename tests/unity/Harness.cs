@@ -103,7 +103,7 @@ static class Harness
             new JProperty("assets", new JArray(AssetDatabase.Assets.Keys)),
             new JProperty("bars", EditorUtility.ShownBars),
             new JProperty("depth", ReferenceEquals(Camera.main, null) ? "" : Camera.main.depthTextureMode.ToString()),
-            new JProperty("channels", JToken.FromObject(specimen.channels.Select(c => new { c.id, c.name, c.function, c.functions, c.firstRow, surfaces = c.surfaces.Count }))),
+            new JProperty("channels", JToken.FromObject(specimen.channels.Select(c => new { c.id, c.name, c.isVisible, c.function, c.functions, c.firstRow, surfaces = c.surfaces.Count }))),
             new JProperty("table", Dump(specimen.table)));
     }
 

@@ -32,6 +32,7 @@ const found = await page.evaluate((asked) => {
   gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, block), 0);
   gl.uniform1i(gl.getUniformLocation(program, samplers._Volume), 0);
   gl.uniform1i(gl.getUniformLocation(program, samplers._Table), 1);
+  if (samplers._CameraDepthTexture) gl.uniform1i(gl.getUniformLocation(program, samplers._CameraDepthTexture), 2);
 
   gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
   gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
@@ -59,6 +60,7 @@ const found = await page.evaluate((asked) => {
     for (const name of ["MIN_FILTER", "MAG_FILTER"]) gl.texParameteri(at, gl[`TEXTURE_${name}`], gl.LINEAR);
     for (const name of ["S", "T", "R"]) gl.texParameteri(at, gl[`TEXTURE_WRAP_${name}`], gl.CLAMP_TO_EDGE);
   };
+  upload(2, 2, { size: [1, 1, 1], format: "R8", texels: btoa("\u00ff") }); // a depth of 1 everywhere
   for (const { uniforms, volume, table, vertices, triangles } of boxes) {
     upload(0, 3, volume);
     upload(1, 2, table);

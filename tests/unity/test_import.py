@@ -402,8 +402,15 @@ def test_more_than_four_channels_are_marched_apart(
         assert [box["channels"] for box in made] == [[0, 1, 2, 3], [4]]
         assert [box["material"]["_Volume"]["format"] for box in made] == ["RGBA32", "R8"]
         assert made[0]["name"] == "c0 + c1 + c2 + c3"
+        assert [box["enabled"] for box in made] == [True, False]  # four show at first
     paths = [Path(path).name for path in found["assets"] if "/volumes/" in path]
     assert paths == ["r0_c0.asset", "r0_c0_1.asset", "r0_c1.asset", "r0_c1_1.asset"]
+    assert [c["isVisible"] for c in found["channels"]] == [True] * 4 + [False]
+
+    manifest["channels"][2]["objects"] = {"path": "x", "bytes": 0, "sha256": "0" * 64}
+    (tmp_path / "five" / "manifest.json").write_text(json.dumps(manifest))
+    found = imported(tmp_path / "five")
+    assert [c["isVisible"] for c in found["channels"]] == [False, False, True, False, False]
 
 
 def test_a_bad_bundle_is_told_in_a_line_and_leaves_no_prefab(

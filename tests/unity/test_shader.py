@@ -1,7 +1,10 @@
 """The Unity package's shader whole: it compiles as HLSL, and draws what was imported."""
 
+import re
+import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +15,8 @@ from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from support.bundle_picture import read_blocks
 from support.bundles import load, write_tiles
-from support.reference_raymarch import Camera, psnr, render
-from support.unity_shader import STAGES, chromium, compile_stage, draw, has_compiler, view_of
+from support.reference_raymarch import Block, Camera, Values, psnr, render
+from support.unity_shader import STAGES, chromium, compile_stage, cross, draw, has_compiler, view_of
 
 pytestmark = pytest.mark.skipif(
     not has_compiler(), reason="needs glslangValidator: run `make mono`"
@@ -32,62 +35,135 @@ def test_each_variant_compiles(stage: str, defines: tuple[str, ...], tmp_path: P
     assert compile_stage(stage, tmp_path, *defines).stat().st_size > 1000
 
 
+@pytest.mark.skipif(shutil.which("spirv-cross") is None, reason="needs SPIRV-Cross: `make mono`")
+def test_each_eye_has_a_layer_a_camera_and_a_place(tmp_path: Path) -> None:
+    """Single-pass instanced: an instance is an eye's, and goes to the eye's layer of the target."""
+    vertex = cross(compile_stage("vert", tmp_path, STEREO), "--version", "450")
+    assert re.search(r"gl_Layer = .+;", vertex)
+    assert "gl_InstanceID" in vertex
+    assert "unity_StereoMatrixVP[" in vertex
+    fragment = cross(compile_stage("frag", tmp_path, STEREO, DEPTH), "--version", "450")
+    assert "unity_StereoWorldSpaceCameraPos[" in fragment
+    assert re.search(r"sampler2DArray \w*_CameraDepthTexture", fragment)
+
+
 def test_an_unknown_name_does_not(tmp_path: Path) -> None:
     """What the test above is worth: the compiler sees the whole program."""
     with pytest.raises(subprocess.CalledProcessError):
         compile_stage("frag", tmp_path, "march=gone+")
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(
+@dataclass(frozen=True)
+class Scene:
+    """An import as the shader is given it, and as the reference reads it."""
+
+    boxes: list[dict[str, Any]]  # from the farthest
+    blocks: list[Block]  # likewise
+    camera: Camera
+    um: float  # world units
+
+    def draw(self, folder: Path, *defines: str, **values: Any) -> Values:
+        boxes = [{**box, "values": {**box["values"], **values}} for box in self.boxes]
+        return draw(boxes, self.camera, folder, *defines)
+
+    def expected(self, blocks: list[Block], *, shading: bool) -> Values:
+        width, height = self.camera.size_px
+        picture = np.zeros((height, width, 4))
+        for block in blocks:
+            over = render(block, self.camera, shading=shading)
+            picture = over + (1 - over[..., 3:]) * picture
+        return picture
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("drawn")
+    write_bundle(write_tiles(folder / "stage"), folder / "bundle", None, run=Engine(0).run)
+    return folder / "bundle"
+
+
+@pytest.fixture
+def scene(bundle: Path, imported: Callable[..., Any]) -> Callable[[tuple[float, ...]], Scene]:
+    """See the two tiles from a place, um from their middle."""
+
+    def look(away_um: tuple[float, ...]) -> Scene:
+        found = imported(bundle)
+        root = found["root"]
+        um = root["scale"][0] * UM
+        bounds = load(bundle / "manifest.json")["specimen"]["bounds_um"]
+        middle = np.mean([bounds["min"], bounds["max"]], axis=0)
+        eye = middle + np.array(away_um)
+        camera = Camera(tuple(eye), tuple(middle), (120, 90), fov_deg=35.0)
+        view = view_of(camera, middle, um)
+        boxes = []
+        for tile in root["children"]:
+            (volume,) = (c for c in tile["children"] if c["name"] == "volume")
+            for box in volume["children"]:
+                to_world = np.eye(4)
+                to_world[:3, :3] *= root["scale"][0] * box["scale"][0]
+                to_world[:3, 3] = box["position"]
+                material = box["material"]
+                values = {
+                    **{k: v for k, v in material.items() if not isinstance(v, dict)},
+                    **box["block"],
+                    **view,
+                    "unity_ObjectToWorld": to_world,
+                    "unity_WorldToObject": np.linalg.inv(to_world),
+                }
+                textures = {"volume": material["_Volume"], "table": material["_Table"]}
+                mesh = {"vertices": box["vertices"], "triangles": box["triangles"]}
+                away = np.linalg.norm(np.subtract(box["position"], view["_WorldSpaceCameraPos"]))
+                boxes.append((away, {"values": values, **textures, **mesh}))
+        boxes.sort(key=lambda each: -each[0])
+        blocks = read_blocks(bundle, [c["id"] for c in found["channels"]])
+        blocks.sort(key=lambda b: -np.linalg.norm(np.mean([b.low_um, b.high_um], axis=0) - eye))
+        return Scene([box for _, box in boxes], blocks, camera, um)
+
+    return look
+
+
+def decibels(a: Values, b: Values) -> float:
+    return psnr(np.rint(255 * a[..., :3]), np.rint(255 * b[..., :3]))
+
+
+needs_browser = pytest.mark.skipif(
     chromium() is None, reason="needs SPIRV-Cross, Node and Chromium: run `make mono`"
 )
+
+
+@pytest.mark.slow
+@needs_browser
 @pytest.mark.parametrize("shading", [0.0, 1.0])
 def test_an_imported_specimen_is_drawn_as_the_reference_draws_it(
-    tmp_path: Path, imported: Callable[..., Any], shading: float
+    tmp_path: Path, scene: Callable[..., Scene], shading: float
 ) -> None:
-    """From the bundle to the pixel: importer, placements, textures, shader, culling, blending."""
-    bundle = tmp_path / "bundle"
-    write_bundle(write_tiles(tmp_path / "stage"), bundle, None, run=Engine(0).run)
-    found = imported(bundle)
-    root = found["root"]
-    scale = root["scale"][0] * UM
-    bounds = load(bundle / "manifest.json")["specimen"]["bounds_um"]
-    middle = np.mean([bounds["min"], bounds["max"]], axis=0)
-    camera = Camera(tuple(middle + np.array([9, 7, 30])), tuple(middle), (120, 90), fov_deg=35.0)
-    view = view_of(camera, middle, scale)
-    boxes = []
-    for tile in root["children"]:
-        (volume,) = (c for c in tile["children"] if c["name"] == "volume")
-        for box in volume["children"]:
-            to_world = np.eye(4)
-            to_world[:3, :3] *= root["scale"][0] * box["scale"][0]
-            to_world[:3, 3] = box["position"]
-            material = box["material"]
-            values = {
-                **{k: v for k, v in material.items() if not isinstance(v, dict)},
-                **box["block"],
-                **view,
-                "unity_ObjectToWorld": to_world,
-                "unity_WorldToObject": np.linalg.inv(to_world),
-                "_Shading": shading,
-            }
-            textures = {"volume": material["_Volume"], "table": material["_Table"]}
-            mesh = {"vertices": box["vertices"], "triangles": box["triangles"]}
-            away = np.linalg.norm(np.subtract(box["position"], view["_WorldSpaceCameraPos"]))
-            boxes.append((away, {"values": values, **textures, **mesh}))
-    boxes.sort(key=lambda each: -each[0])
-    picture = draw([box for _, box in boxes], camera, tmp_path)
-
-    blocks = read_blocks(bundle, [c["id"] for c in found["channels"]])
-    eye = np.array(camera.eye_um)
-    blocks.sort(key=lambda b: -np.linalg.norm(np.mean([b.low_um, b.high_um], axis=0) - eye))
-    expected = np.zeros_like(picture)
-    for block in blocks:
-        over = render(block, camera, shading=shading > 0)
-        expected = over + (1 - over[..., 3:]) * expected
+    """From the bundle to the pixel: importer, places, textures, shader, culling, blending."""
+    seen = scene((9, 7, 30))
+    picture = seen.draw(tmp_path, _Shading=shading)
+    expected = seen.expected(seen.blocks, shading=shading > 0)
     assert expected[..., 3].max() > 0.5
     assert np.abs(picture - expected).mean() < 0.002
-    assert psnr(np.rint(255 * picture[..., :3]), np.rint(255 * expected[..., :3])) > 40
+    assert decibels(picture, expected) > 40
     flipped = np.abs(picture[:, ::-1] - expected).mean()
     assert flipped > 5 * np.abs(picture - expected).mean()  # that a mirrored one would be seen
+
+
+@pytest.mark.slow
+@needs_browser
+def test_it_ends_at_the_scene_s_depth(tmp_path: Path, scene: Callable[..., Scene]) -> None:
+    """A wall across the volume, at the centres of a slice: what is behind it is not drawn."""
+    seen = scene((0, 0, 30))
+    slices = 6  # of 8, that are hidden
+    blocks = []
+    for block in seen.blocks:
+        low = np.add(block.low_um, [0, 0, slices * block.spacing_um()[2]])
+        channels = tuple(voxels[slices:] for voxels in block.channels)
+        blocks.append(replace(block, low_um=tuple(low), channels=channels))
+    depth = (seen.camera.eye_um[2] - blocks[0].low_um[2]) * seen.um
+    # the depth buffer is 1 everywhere: the wall is at 1 / (z + w)
+    wall = {"_ZBufferParams": [0, 0, 0.25 / depth, 0.75 / depth], "_ProjectionParams": [1, 0, 0, 0]}
+    picture = seen.draw(tmp_path, DEPTH, _Shading=0.0, **wall)
+    assert decibels(picture, seen.expected(blocks, shading=False)) > 40
+    assert decibels(picture, seen.expected(seen.blocks, shading=False)) < 30
+    near = {"_ZBufferParams": [0, 0, 0, 50 / depth]}
+    assert seen.draw(tmp_path, DEPTH, **near).max() == 0

@@ -322,11 +322,6 @@ namespace UnityEngine
         public static float unscaledDeltaTime { get; set; }
     }
 
-    public sealed class SystemInfo
-    {
-        public static int maxTexture3DSize { get { return 2048; } }
-    }
-
     public abstract class PropertyAttribute : Attribute { }
     [AttributeUsage(AttributeTargets.Field)] public class TooltipAttribute : PropertyAttribute { public TooltipAttribute(string tooltip) { } }
     [AttributeUsage(AttributeTargets.Field)] public sealed class RangeAttribute : PropertyAttribute { public RangeAttribute(float min, float max) { } }

@@ -59,6 +59,9 @@ namespace StereoCell.Editor
         public string[] Functions;
         public string Table;
 
+        /// <summary>Its surfaces are objects, each closed.</summary>
+        public bool IsLabelMap;
+
         /// <summary>By tile, finest first.</summary>
         public Dictionary<string, List<Level>> Surfaces = new Dictionary<string, List<Level>>();
 
@@ -165,6 +168,7 @@ namespace StereoCell.Editor
                 Function = (string)Member(channel, "transfer_function"),
                 Functions = Member(channel, "transfer_functions").ToObject<string[]>(),
                 Table = (string)Member(Member(channel, "lut"), "path"),
+                IsLabelMap = channel["objects"] is JObject,
             };
             if (Member(channel, "tileset") is JObject tileset) AddSurfaces(entry, (string)tileset["path"]);
             var path = (string)Member(Member(channel, "volumes"), "path");

@@ -40,6 +40,7 @@ namespace StereoCell.Editor
     {
         const string ShaderName = "StereoCell/Volume";
         const int Entries = 256;
+        const int MostOfUnity = 2048;  // texels along an edge of a 3D texture
         const int ChannelsOfBox = 4;
         const float MetresPerUm = 1e-6f;
 
@@ -122,6 +123,9 @@ namespace StereoCell.Editor
                 var specimen = root.AddComponent<Specimen>();
                 specimen.table = MakeTable();
                 var row = 0;
+                // as the viewer opens: label maps, if there are any, and no more than four
+                var maps = bundle.Channels.Where(channel => channel.IsLabelMap).ToList();
+                var shown = (maps.Count > 0 ? maps : bundle.Channels).Take(ChannelsOfBox).ToList();
                 foreach (var entry in bundle.Channels)
                 {
                     var color = new Vector4((float)entry.Color[0], (float)entry.Color[1], (float)entry.Color[2], 1);
@@ -131,6 +135,7 @@ namespace StereoCell.Editor
                         name = entry.Name,
                         color = color,
                         importedColor = color,
+                        isVisible = shown.Contains(entry),
                         functions = entry.Functions,
                         function = Math.Max(0, Array.IndexOf(entry.Functions, entry.Function)),
                         firstRow = row,
@@ -281,7 +286,7 @@ namespace StereoCell.Editor
             {
                 var volumes = channels.Select(i => bundle.Channels[i].Volumes[tile]).ToArray();
                 var place = places[volumes[0]];
-                var level = Placement.LevelWithin(volumes[0].Levels, Math.Min(options.mostTexels, SystemInfo.maxTexture3DSize));
+                var level = Placement.LevelWithin(volumes[0].Levels, Math.Min(options.mostTexels, MostOfUnity));
                 var texture = MakeTexture(volumes, level);
                 AssetDatabase.CreateAsset(texture, path);
                 var mesh = BoxMesh(place);

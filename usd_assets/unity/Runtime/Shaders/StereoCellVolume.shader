@@ -39,7 +39,8 @@ Shader "StereoCell/Volume"
             #pragma vertex vert
             #pragma fragment frag
             #pragma multi_compile_instancing
-            #pragma shader_feature_local_fragment STEREOCELL_SCENE_DEPTH
+            // not shader_feature: a player may turn it on that was built without
+            #pragma multi_compile_local_fragment _ STEREOCELL_SCENE_DEPTH
             #include "UnityCG.cginc"
 
             UNITY_DECLARE_TEX3D(_Volume);
