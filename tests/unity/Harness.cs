@@ -21,6 +21,7 @@ static class Harness
             else if (args[0] == "ktx2") Level(args[1], int.Parse(args[2]));
             else if (args[0] == "import") Console.WriteLine(JsonConvert.SerializeObject(Import(args[1], args[2], JObject.Parse(args[3]))));
             else if (args[0] == "heights") Console.WriteLine(Heights(args));
+            else if (args[0] == "drawer") Console.WriteLine(Drawer());
             else if (args[0] == "gaze") Console.WriteLine(Gaze(JArray.Parse(args[1])));
             else return 2;
             return 0;
@@ -69,6 +70,14 @@ static class Harness
         var errors = args[1].Split(',').Select(double.Parse);
         var levels = errors.Select(error => new Level { ErrorMetres = error }).ToList();
         return new JArray(Placement.LodHeights(levels, double.Parse(args[2]), double.Parse(args[3]), double.Parse(args[4])));
+    }
+
+    // what the Inspector draws of a channel, each thing clicked on
+    static JToken Drawer()
+    {
+        var channel = new Channel { name = "CD31", functions = new[] { "default", "sharp" } };
+        new ChannelDrawer().OnGUI(new Rect { width = 100 }, new SerializedProperty(channel), GUIContent.none);
+        return new JObject(new JProperty("drawn", new JArray(EditorGUI.Drawn)), new JProperty("visible", channel.isVisible), new JProperty("function", channel.function));
     }
 
     static JToken Import(string folder, string target, JObject how)

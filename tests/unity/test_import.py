@@ -463,6 +463,12 @@ def test_a_bad_bundle_is_told_in_a_line_and_leaves_no_prefab(
     refuse("no glTFast", lambda f: None, "was not imported", "glTFast", gltf=False)
 
 
+def test_the_inspector_names_channels_and_functions(run: Run) -> None:
+    found = json.loads(run("drawer").stdout)
+    assert found["drawn"] == ["0+40 CD31", "40+20", "60+40 default, sharp 0"]
+    assert (found["visible"], found["function"]) == (False, 1)  # as it was clicked
+
+
 def gaze(run: Run, *frames: tuple[str | None, float, int]) -> list[tuple[float, list[str]]]:
     each = [[target, dt] for target, dt, count in frames for _ in range(count)]
     done = run("gaze", json.dumps(each))

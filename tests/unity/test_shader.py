@@ -15,7 +15,7 @@ from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from support.bundle_picture import read_blocks
 from support.bundles import load, write_tiles
-from support.reference_raymarch import Block, Camera, Values, psnr, render
+from support.reference_raymarch import Block, Camera, Values, encoded, psnr, render
 from support.unity_shader import STAGES, chromium, compile_stage, cross, draw, has_compiler, view_of
 
 pytestmark = pytest.mark.skipif(
@@ -167,3 +167,16 @@ def test_it_ends_at_the_scene_s_depth(tmp_path: Path, scene: Callable[..., Scene
     assert decibels(picture, seen.expected(seen.blocks, shading=False)) < 30
     near = {"_ZBufferParams": [0, 0, 0, 50 / depth]}
     assert seen.draw(tmp_path, DEPTH, **near).max() == 0
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_gamma_project_gets_encoded_colours(tmp_path: Path, scene: Callable[..., Scene]) -> None:
+    seen = scene((9, 7, 30))
+    one = replace(seen, boxes=seen.boxes[:1])  # blending is another in a gamma project
+    linear, coded = one.draw(tmp_path), one.draw(tmp_path, GAMMA)
+    assert np.allclose(coded[..., 3], linear[..., 3], atol=1e-6)
+    drawn = linear[..., 3] > 0.05
+    color = linear[drawn, :3] / linear[drawn, 3:]
+    assert np.allclose(coded[drawn, :3] / coded[drawn, 3:], encoded(color), atol=0.01)
+    assert np.abs(coded - linear).max() > 0.1

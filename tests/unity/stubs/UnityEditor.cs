@@ -15,6 +15,51 @@ namespace UnityEditor
         public MenuItem(string itemName, bool isValidateFunction, int priority) { }
     }
 
+    public sealed class CustomPropertyDrawer : Attribute
+    {
+        public CustomPropertyDrawer(Type type) { }
+    }
+
+    public abstract class PropertyDrawer
+    {
+        public virtual void OnGUI(Rect position, SerializedProperty property, GUIContent label) { }
+    }
+
+    /// <summary>A field of an object, by its name: FieldInfo under Unity's names.</summary>
+    public class SerializedProperty
+    {
+        readonly object owner;
+        readonly System.Reflection.FieldInfo field;
+        readonly object element;
+        public SerializedProperty(object element) { this.element = element; }
+        SerializedProperty(object owner, System.Reflection.FieldInfo field) { this.owner = owner; this.field = field; }
+        object Value { get { return field == null ? element : field.GetValue(owner); } }
+        public SerializedProperty FindPropertyRelative(string relativePropertyPath)
+        {
+            var found = Value.GetType().GetField(relativePropertyPath);
+            return found == null ? null : new SerializedProperty(Value, found);
+        }
+        public int arraySize { get { return ((Array)Value).Length; } set { throw new NotSupportedException(); } }
+        public SerializedProperty GetArrayElementAtIndex(int index) { return new SerializedProperty(((Array)Value).GetValue(index)); }
+        public string stringValue { get { return (string)Value; } set { field.SetValue(owner, value); } }
+        public bool boolValue { get { return (bool)Value; } set { field.SetValue(owner, value); } }
+        public int intValue { get { return (int)Value; } set { field.SetValue(owner, value); } }
+    }
+
+    public sealed class EditorGUI
+    {
+        public static readonly List<string> Drawn = new List<string>();  // of the stub
+        public static GUIContent BeginProperty(Rect totalPosition, GUIContent label, SerializedProperty property) { return label; }
+        public static void EndProperty() { }
+        public static bool ToggleLeft(Rect position, string label, bool value) { Drawn.Add(position.x + "+" + position.width + " " + label); return !value; }
+        public static bool PropertyField(Rect position, SerializedProperty property, GUIContent label) { Drawn.Add(position.x + "+" + position.width); return property == null; }
+        public static int Popup(Rect position, int selectedIndex, string[] displayedOptions)
+        {
+            Drawn.Add(position.x + "+" + position.width + " " + string.Join(", ", displayedOptions) + " " + selectedIndex);
+            return displayedOptions.Length - 1;
+        }
+    }
+
     public sealed class Selection
     {
         public static Object activeObject { get; set; }

@@ -147,11 +147,29 @@ namespace UnityEngine
     public struct Color
     {
         public float r, g, b, a;
+        public static Color white { get { return new Color(1, 1, 1, 1); } }
+        public static bool operator ==(Color lhs, Color rhs) { return lhs.r == rhs.r && lhs.g == rhs.g && lhs.b == rhs.b && lhs.a == rhs.a; }
+        public static bool operator !=(Color lhs, Color rhs) { return !(lhs == rhs); }
+        public override bool Equals(object other) { return other is Color && this == (Color)other; }
+        public override int GetHashCode() { return r.GetHashCode() ^ g.GetHashCode() ^ b.GetHashCode(); }
         public Color(float r, float g, float b, float a) { this.r = r; this.g = g; this.b = b; this.a = a; }
         public Color linear { get { return new Color(Decode(r), Decode(g), Decode(b), a); } }
         public Color gamma { get { return new Color(Encode(r), Encode(g), Encode(b), a); } }
         static float Decode(float c) { return c <= 0.04045f ? c / 12.92f : (float)Math.Pow((c + 0.055) / 1.055, 2.4); }
         static float Encode(float c) { return c <= 0.0031308f ? c * 12.92f : (float)(1.055 * Math.Pow(c, 1 / 2.4) - 0.055); }
+    }
+
+    public struct Rect
+    {
+        public float x { get; set; }
+        public float y { get; set; }
+        public float width { get; set; }
+        public float height { get; set; }
+    }
+
+    public class GUIContent
+    {
+        public static GUIContent none = new GUIContent();
     }
 
     public struct Mathf
@@ -327,6 +345,7 @@ namespace UnityEngine
     [AttributeUsage(AttributeTargets.Field)] public sealed class RangeAttribute : PropertyAttribute { public RangeAttribute(float min, float max) { } }
     [AttributeUsage(AttributeTargets.Field)] public sealed class MinAttribute : PropertyAttribute { public MinAttribute(float min) { } }
     public sealed class HideInInspector : Attribute { }
+    public sealed class ContextMenu : Attribute { public ContextMenu(string itemName) { } }
     public sealed class ExecuteAlways : Attribute { }
     [AttributeUsage(AttributeTargets.Class)] public sealed class DisallowMultipleComponent : Attribute { }
     public sealed class AddComponentMenu : Attribute { public AddComponentMenu(string menuName) { } }

@@ -128,7 +128,7 @@ namespace StereoCell.Editor
                 var shown = (maps.Count > 0 ? maps : bundle.Channels).Take(ChannelsOfBox).ToList();
                 foreach (var entry in bundle.Channels)
                 {
-                    var color = new Vector4((float)entry.Color[0], (float)entry.Color[1], (float)entry.Color[2], 1);
+                    var color = new Color((float)entry.Color[0], (float)entry.Color[1], (float)entry.Color[2], 1).gamma;
                     specimen.channels.Add(new Channel
                     {
                         id = entry.Id,

@@ -12,11 +12,10 @@ namespace StereoCell
         public string id;
         public string name;
 
-        [Tooltip("Linear RGB")]
-        public Vector4 color;
+        public Color color = Color.white;
 
         /// <summary>As it was imported: then its surfaces keep their materials as they are.</summary>
-        [HideInInspector] public Vector4 importedColor;
+        [HideInInspector] public Color importedColor;
 
         public bool isVisible = true;
 
@@ -69,8 +68,7 @@ namespace StereoCell
 
         public void SetColor(string channel, Color color)
         {
-            var linear = color.linear;
-            Known(channel).color = new Vector4(linear.r, linear.g, linear.b, 1);
+            Known(channel).color = color;
             Apply();
         }
 
@@ -100,8 +98,7 @@ namespace StereoCell
             foreach (var channel in channels)
             {
                 block.Clear();
-                var color = new Color(channel.color.x, channel.color.y, channel.color.z, 1).gamma;
-                block.SetColor("baseColorFactor", color);  // of glTFast's materials; Unity makes it linear
+                block.SetColor("baseColorFactor", channel.color);  // of glTFast's materials; Unity makes it linear
                 foreach (var surface in channel.surfaces)
                 {
                     if (surface == null) continue;
@@ -123,7 +120,8 @@ namespace StereoCell
             for (var i = 0; i < box.channels.Length; i++)
             {
                 var channel = channels[box.channels[i]];
-                colors[i] = channel.color;
+                var linear = channel.color.linear;
+                colors[i] = new Vector4(linear.r, linear.g, linear.b, 1);
                 rows[i] = table == null ? 0 : (channel.firstRow + channel.function + 0.5f) / table.height;
                 shown[i] = channel.isVisible ? 1 : 0;
             }

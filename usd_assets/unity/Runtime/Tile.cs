@@ -22,6 +22,7 @@ namespace StereoCell
         }
 
         /// <summary>From surfaces to the volume, and back.</summary>
+        [ContextMenu("Switch between surfaces and volume")]
         public void Switch()
         {
             Show(ShowsVolume, !ShowsVolume);
