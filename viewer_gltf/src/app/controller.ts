@@ -377,17 +377,20 @@ export class Controller {
     const address = new URL(location.href);
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
-    address.hash = writeLink(viewer.state, start, viewer.cameraView);
+    address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
     history.replaceState(history.state, "", address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
     viewer.stereo.hands.panel.take({ link: address.href });
+    const without = viewer.leftOutOfLink;
+    const but =
+      without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;
     if (viewer.stereo.kind !== null) {
-      this.say("The link is in the page's address, for when you leave.");
-    } else if (await copyText(address.href)) this.say("The link is in the clipboard.");
+      this.say(`The link is in the page's address, for when you leave.${but}`);
+    } else if (await copyText(address.href)) this.say(`The link is in the clipboard.${but}`);
     else {
       this.goTo("share", "link"); // which selects it
-      this.say("Here is the link, selected: copy it by Ctrl+C, or by a long press.");
+      this.say(`Here is the link, selected: copy it by Ctrl+C, or by a long press.${but}`);
     }
   }
 

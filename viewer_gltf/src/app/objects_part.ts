@@ -8,6 +8,7 @@ import type { Objects } from "../objects/objects";
 import type { MetObject } from "../objects/pick";
 import type { Control, Group } from "../panel/controls";
 import type { Action } from "../state/actions";
+import type { ObjectView } from "../state/objects";
 import type { ViewerState } from "../state/viewer_state";
 import type { SurfaceSet } from "../surfaces/surface_set";
 
@@ -126,6 +127,11 @@ export class ObjectsPart {
       if (objects !== undefined) return objects.csv();
     }
     return null;
+  }
+
+  /** What a link says of a channel's objects; null: their table has not come. */
+  linked(channel: string, view: ObjectView): ReturnType<Objects["linked"]> | null {
+    return this.objects.get(channel)?.linked(view) ?? null;
   }
 
   retryFailed(): void {

@@ -79,16 +79,3 @@ export function withObjects(views: ObjectViews, { channel, change }: ObjectChang
   );
   return isSame ? views : { ...views, [channel]: { ...before, ...change } };
 }
-
-/** Not in a link: what is of the moment. */
-const OF_THE_MOMENT: ReadonlySet<string> = new Set(["aim", "search", "lasso", "linked"]);
-
-/** What differs from the start, as text; "": nothing. */
-export function linkedObjects(view: ObjectView): string {
-  const parts = Object.entries(view).filter(
-    ([key, value]) =>
-      !OF_THE_MOMENT.has(key) &&
-      JSON.stringify(value) !== JSON.stringify(START_OBJECTS[key as keyof ObjectView]),
-  );
-  return parts.length === 0 ? "" : JSON.stringify(Object.fromEntries(parts));
-}
