@@ -467,13 +467,16 @@ export class Controller {
   }
 
   private saveObjects(): void {
-    if (this.viewer.objectItems.length === 0) {
+    const { objects } = this.viewer;
+    if (objects.length === 0) {
       this.say("No objects of a label map are shown.");
       return;
     }
-    const text = this.viewer.objectsCsv();
-    if (text === null) this.say("Their values are on their way: once more, please.");
-    else this.save("objects", "csv", new Blob([text], { type: "text/csv" }));
+    for (const { id, text } of this.viewer.objectsCsv()) {
+      const name = objects.length === 1 ? "objects" : `objects-${id}`;
+      if (text === null) this.say("Their values are on their way: once more, please.");
+      else this.save(name, "csv", new Blob([text], { type: "text/csv" }));
+    }
   }
 
   private get shown(): Box {
@@ -520,7 +523,7 @@ export class Controller {
       isLoading,
       values: viewer.snapshot().measuredValues,
       sliceValues: viewer.sliceValues,
-      objectItems: viewer.objectItems,
+      objects: viewer.objects,
       isFilming: this.filming !== null,
       undo: viewer.undoes,
       redo: viewer.redoes,

@@ -519,13 +519,13 @@ export class Viewer {
     return this.contents.transferFunctions2d.histogram(channel);
   }
 
-  /** The panel's section of the objects of label maps. */
-  get objectItems() {
-    return this.contents.objects.items;
+  /** The panel's sections of the label maps that are shown. */
+  get objects() {
+    return this.contents.objects.facts;
   }
 
-  /** The objects that are meant, as a table; null: it is on its way, or there is none. */
-  objectsCsv(): string | null {
+  /** The objects that are meant, as a table for each label map; null: it is on its way. */
+  objectsCsv() {
     return this.contents.objects.csv();
   }
 

@@ -32,6 +32,8 @@ export type ObjectView = Readonly<{
   /** Space that each leaves along its walls, um. */
   gap_um: number;
   search: string;
+  /** Page of the categories' legend. */
+  legend: number;
   /** Columns of the scatter plot; "": the first that suit. */
   scatter: readonly [string, string];
   /** In the scatter plot, shares of its width and height. */
@@ -57,6 +59,7 @@ export const START_OBJECTS: ObjectView = {
   isStained: true,
   gap_um: 0,
   search: "",
+  legend: 0,
   scatter: ["", ""],
   lasso: [],
   linked: "",
