@@ -1,6 +1,7 @@
 """Builds of label maps from end to end: which tile has which object, the table, edits, resuming."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
+from stereocell.objects.build_objects import BuiltObjects
 from stereocell.objects.intensities import Measured
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
 from support.dicom_segmentations import SPACING, write_segmentation
@@ -552,6 +554,25 @@ def test_the_deep_check_measures_the_image_anew(
     said(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
     assert "cells: column mean_DNA is not the voxels' mean of 3, 8" in said(capsys)  # last of tiles
+
+
+def test_the_deep_check_measures_the_surfaces_anew(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    labels = np.zeros((16, 24, 24), np.uint16)
+    labels[3:13, 4:20, 4:20] = 3
+    write_ome_tiff(tmp_path / "l.ome.tif", labels)
+    right = objects_maker.build_objects
+
+    def build_objects(*given: Any, **named: Any) -> BuiltObjects:
+        built = right(*given, **named)
+        return replace(built, areas_um2=1.1 * built.areas_um2)
+
+    monkeypatch.setattr(objects_maker, "build_objects", build_objects)
+    build(tmp_path / "l.ome.tif", tmp_path / "wrong", "--labels", ".")
+    said(capsys)
+    assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
+    assert "column area_um2 is not that of the surface of 3" in said(capsys)
 
 
 def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
