@@ -530,6 +530,30 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     assert wanted in said(capsys)
 
 
+@pytest.mark.parametrize("grid", ["1x1", "2x1"])
+def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: str) -> None:
+    """Of three boxes in a row, the last in two tiles: 10 x 16 voxels of .5 x .2 um, 10 x 8."""
+    labels = np.zeros((16, 24, 80), np.uint16)
+    labels[3:13, 4:20, 4:20], labels[3:13, 4:20, 20:28], labels[3:13, 8:16, 28:76] = 3, 5, 8
+    write_ome_tiff(tmp_path / "cells.ome.tif", labels)
+    out = tmp_path / "out"
+    build(tmp_path / "cells.ome.tif", out, "--labels", ".", "--grid", grid)
+    known = objects_of(out)["neighbours"]
+    first, rows = (np.fromfile(out / "bundle" / known[k]["path"], "<u4") for k in ("first", "rows"))
+    areas = np.fromfile(out / "bundle" / known["area_um2"]["path"], "<f4")
+    names = labels_of(out)
+    found = {
+        (int(names[row]), int(names[other])): float(area)
+        for row in range(3)
+        for other, area in zip(
+            rows[first[row] : first[row + 1]], areas[first[row] : first[row + 1]], strict=True
+        )
+    }
+    assert set(found) == {(3, 5), (5, 3), (5, 8), (8, 5)}
+    for one, other, area in ((3, 5, 160), (5, 8, 80)):
+        assert found[one, other] == found[other, one] == pytest.approx(0.1 * area, rel=0.05)
+
+
 def test_the_deep_check_measures_the_image_anew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -152,6 +152,7 @@ def make_table(is_wide: bool = False, has_organs: bool = False) -> ObjectTable:
         columns,
         default="cell_type",
         walls=np.array(walls, np.int32),
+        wall_um2=np.arange(1, len(walls) + 1, dtype=np.float32),
     )
 
 

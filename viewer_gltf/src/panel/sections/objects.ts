@@ -21,6 +21,7 @@ import {
   ROWS_OF_LEGEND,
   unitText,
 } from "../../objects/pictures";
+import type { ObjectTable } from "../../objects/table";
 import {
   ALL_BYTES,
   type ObjectView,
@@ -356,12 +357,14 @@ class Layout {
     const title = table.title(row);
     const label = table.label(row);
     const others = [...table.neighbours(row)];
+    const wall = largestWall(table, row);
     return [
       this.text("card", "Object", title === label ? title : `${title} (${label})`),
       ...table.columns.map((column) =>
         this.text(`card-${column.id}`, column.name, this.valueText(column, row)),
       ),
       ...(table.hasNeighbours ? [this.text("card-next", "Neighbours", String(others.length))] : []),
+      ...(wall === "" ? [] : [this.text("card-wall", "Largest wall, to", wall)]),
       this.button("fly", "Go there", { aim: { row } }),
       this.button("only", "Only this one", { only: [row] }),
       ...(table.hasNeighbours
@@ -486,6 +489,18 @@ class Layout {
       },
     ];
   }
+}
+
+/** The neighbour that a row shares the most with, `liver, 120 µm²`; "": none, or not known. */
+export function largestWall(
+  table: Pick<ObjectTable, "neighbours" | "walls_um2" | "title">,
+  row: number,
+): string {
+  const areas = [...(table.walls_um2(row) ?? [])];
+  const largest = Math.max(...areas);
+  if (!Number.isFinite(largest)) return "";
+  const other = table.neighbours(row)[areas.indexOf(largest)];
+  return `${table.title(other)}, ${numberText(largest)} ${unitText("um2")}`;
 }
 
 /** Of a column that does not colour. */
