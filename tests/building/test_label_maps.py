@@ -140,14 +140,15 @@ def test_which_way_round_labels_lie_is_never_guessed(
         assert len(labels_on(pair, labels)) == 3
 
 
-def test_names_that_are_taken(scan: tuple[Path, Dataset], tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["CT", "ct"])  # Windows' files would be one
+def test_names_that_are_taken(scan: tuple[Path, Dataset], tmp_path: Path, name: str) -> None:
     affine = grid("axial", SHAPE, (2.0, 1.8, 1.8))
     path = nifti_files.write(tmp_path / "o.nii.gz", affine, numbered(affine, SHAPE))
     with pytest.raises(UsageError, match="a channel has that name"):
         find_labels(
             scan[1],
             str(scan[0]),
-            {"CT": str(path)},
+            {name: str(path)},
             options=PlanOptions(),
             colors=[(1, 1, 1)],
             taken=["CT"],

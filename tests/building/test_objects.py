@@ -1,6 +1,7 @@
 """Builds of label maps from end to end: which tile has which object, the table, edits, resuming."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
+from stereocell.objects.build_objects import BuiltObjects
 from stereocell.objects.intensities import Measured
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
 from support.dicom_segmentations import SPACING, write_segmentation
@@ -378,7 +380,8 @@ def test_what_can_not_be_built_is_told_in_one_line(
     assert "--labels nuclei" in told
     assert "--labels nuclei=PATH" in told
     told = refusal(capsys, *plan, "--labels", "DNA=" + str(sample / "labels/cells"))
-    assert "a channel has that name, expected another one, as DNA_objects=PATH" in told
+    assert "a channel has that name" in told
+    assert "expected another one, as DNA_objects=PATH" in told
     tifffile.imwrite(tmp_path / "m.tif", np.ones((6, 5, 7), np.uint8), metadata={"axes": "ZYX"})
     told = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
     assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in told
@@ -527,6 +530,30 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     assert wanted in said(capsys)
 
 
+@pytest.mark.parametrize("grid", ["1x1", "2x1"])
+def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: str) -> None:
+    """Of three boxes in a row, the last in two tiles: 10 x 16 voxels of .5 x .2 um, 10 x 8."""
+    labels = np.zeros((16, 24, 80), np.uint16)
+    labels[3:13, 4:20, 4:20], labels[3:13, 4:20, 20:28], labels[3:13, 8:16, 28:76] = 3, 5, 8
+    write_ome_tiff(tmp_path / "cells.ome.tif", labels)
+    out = tmp_path / "out"
+    build(tmp_path / "cells.ome.tif", out, "--labels", ".", "--grid", grid)
+    known = objects_of(out)["neighbours"]
+    first, rows = (np.fromfile(out / "bundle" / known[k]["path"], "<u4") for k in ("first", "rows"))
+    areas = np.fromfile(out / "bundle" / known["area_um2"]["path"], "<f4")
+    names = labels_of(out)
+    found = {
+        (int(names[row]), int(names[other])): float(area)
+        for row in range(3)
+        for other, area in zip(
+            rows[first[row] : first[row + 1]], areas[first[row] : first[row + 1]], strict=True
+        )
+    }
+    assert set(found) == {(3, 5), (5, 3), (5, 8), (8, 5)}
+    for one, other, area in ((3, 5, 160), (5, 8, 80)):
+        assert found[one, other] == found[other, one] == pytest.approx(0.1 * area, rel=0.05)
+
+
 def test_the_deep_check_measures_the_image_anew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -551,6 +578,25 @@ def test_the_deep_check_measures_the_image_anew(
     said(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
     assert "cells: column mean_DNA is not the voxels' mean of 3, 8" in said(capsys)  # last of tiles
+
+
+def test_the_deep_check_measures_the_surfaces_anew(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    labels = np.zeros((16, 24, 24), np.uint16)
+    labels[3:13, 4:20, 4:20] = 3
+    write_ome_tiff(tmp_path / "l.ome.tif", labels)
+    right = objects_maker.build_objects
+
+    def build_objects(*given: Any, **named: Any) -> BuiltObjects:
+        built = right(*given, **named)
+        return replace(built, areas_um2=1.1 * built.areas_um2)
+
+    monkeypatch.setattr(objects_maker, "build_objects", build_objects)
+    build(tmp_path / "l.ome.tif", tmp_path / "wrong", "--labels", ".")
+    said(capsys)
+    assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
+    assert "column area_um2 is not that of the surface of 3" in said(capsys)
 
 
 def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:

@@ -50,6 +50,7 @@ PARSED = {
     "publish out/mine ../pages": "another host: the same",
     "build s3://": "object storage: storage/test_object_store.py",
     "build stack.tif": "masks of another program: building/test_objects.py",
+    "build store.zarr": "the same: read/tables/test_tables.py",
     "build ct.nii.gz": "the same: building/test_label_maps.py",
     "build CT_FOLDER": "the same: read/dicom/test_segmentation.py",
     "build seg.dcm": "the same",

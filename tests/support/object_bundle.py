@@ -7,7 +7,7 @@ ball is stained.
 """
 
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -105,8 +105,11 @@ def tile_mesh(tile: int, rings: int, is_painted: bool = False) -> Mesh:
     )
 
 
-def make_table(is_wide: bool = False) -> ObjectTable:
-    """Return the table: `x_um` grows with x, `CD8` spreads over decades, one value is missing."""
+def make_table(is_wide: bool = False, has_organs: bool = False) -> ObjectTable:
+    """Return the table: `x_um` grows with x, `CD8` spreads over decades, one value is missing.
+
+    `has_organs`: there are 117 categories, as a whole body has, in colours of nobody's choice.
+    """
     rows = np.arange(COUNT)
     beam = COUNT - 1
     centers = np.array([center(row) for row in range(beam)])
@@ -138,6 +141,9 @@ def make_table(is_wide: bool = False) -> ObjectTable:
             colors=COLORS,
         ),
     )
+    if has_organs:
+        named = tuple(f"organ {i + 1}" for i in range(117))
+        columns = (*columns[:-1], replace(columns[-1], categories=named, colors=()))
     walls = [(row, row + 1) for row in range(beam) if row % GRID[0] < GRID[0] - 1]
     return ObjectTable(
         labels,
@@ -146,12 +152,15 @@ def make_table(is_wide: bool = False) -> ObjectTable:
         columns,
         default="cell_type",
         walls=np.array(walls, np.int32),
+        wall_um2=np.arange(1, len(walls) + 1, dtype=np.float32),
     )
 
 
-def write(root: Path, is_wide: bool = False, is_painted: bool = False) -> None:
+def write(
+    root: Path, is_wide: bool = False, is_painted: bool = False, has_organs: bool = False
+) -> None:
     """Write the bundle into a folder."""
-    table, files = make_table(is_wide), []
+    table, files = make_table(is_wide, has_organs), []
 
     def put(path, content):
         files.append(write_file(root, path, content))
@@ -207,4 +216,4 @@ def write(root: Path, is_wide: bool = False, is_painted: bool = False) -> None:
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]), "--wide" in sys.argv, "--painted" in sys.argv)
+    write(Path(sys.argv[1]), *(flag in sys.argv for flag in ("--wide", "--painted", "--organs")))

@@ -82,7 +82,8 @@ def find_labels(
     Raises UsageError, SourceError.
     """
     found: list[Labels] = []
-    ids = [to_identifier(name) for name in taken]
+    # but for their case: on Windows and macOS their files would be one
+    ids = [to_identifier(name).lower() for name in taken]
     for name, place in wanted.items():
         if not name.isprintable():
             raise UsageError(f"--labels {name!r:.60}: expected a name without control characters")
@@ -101,13 +102,13 @@ def find_labels(
                 dataset.levels[0].shape,
                 colors[len(found) % len(colors)],
             )
-            if one.id in ids:
+            if one.id.lower() in ids:
                 raise UsageError(
-                    f"--labels {one.name}: a channel has that name, expected another one, as "
-                    f"{one.name}_objects=PATH"
+                    f"--labels {one.name}: a channel has that name (small letters or capitals), "
+                    f"expected another one, as {one.name}_objects=PATH"
                 )
             _require_overlap(image, one, dataset.shown)
-            ids.append(one.id)
+            ids.append(one.id.lower())
             found.append(one)
     return tuple(found)
 

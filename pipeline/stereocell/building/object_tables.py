@@ -86,7 +86,7 @@ def make_table(
             _default(
                 columns, plan.settings.objects.color_by, is_first=labels.id == plan.labels[0].id
             ),
-            _walls(facts, rows, names),
+            *_walls(facts, rows, names),
             _colors(notes, names),
         ),
         _told_of_thin(labels, thin) + remarks + renamed,
@@ -97,17 +97,25 @@ def _walls(
     facts: Mapping[str, ObjectFacts],
     rows: Mapping[str, NDArray[np.int32]],
     labels: NDArray[np.uint64],
-) -> NDArray[np.int32]:
-    """Return the rows of the objects that share a wall, int32 (m, 2), each pair once."""
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the rows of the objects that share a wall, int32 (m, 2), and its area, um^2 (m,).
+
+    Each pair once. Both objects' tiles know the wall; of an object that is cut each knows a part.
+    """
     order = np.argsort(labels)
-    found = [np.zeros((0, 2), np.int64)]
+    found, areas = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
     for tile, one in facts.items():
         at = np.searchsorted(labels[order], one.beside).clip(0, max(len(labels) - 1, 0))
         other = order[at] if len(order) else at
         known = labels[other] == one.beside if len(order) else np.zeros(0, bool)
         found.append(np.stack([rows[tile][one.walls][known], other[known]], axis=1))
-    pairs = np.sort(np.concatenate(found), axis=1)
-    return np.unique(pairs, axis=0).astype(np.int32)
+        areas.append(one.wall_um2[known])
+    pairs, place = np.unique(np.concatenate(found), axis=0, return_inverse=True)
+    sums = np.bincount(place.ravel(), np.concatenate(areas), len(pairs))
+    walls, place = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+    largest = np.zeros(len(walls))
+    np.maximum.at(largest, place.ravel(), sums)
+    return walls.astype(np.int32), largest.astype(np.float32)
 
 
 def _order(located: Located, facts: Mapping[str, ObjectFacts]) -> NDArray[np.int64]:

@@ -9,9 +9,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.unit_files import (
@@ -24,7 +21,7 @@ from stereocell.building.unit_files import (
 from stereocell.formats.vdb import MEASURED_NAME
 from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.model.channel import PaintColors
-from stereocell.model.object_table import ObjectTable
+from stereocell.model.object_table import ObjectTable, SharedWalls
 from stereocell.model.tile_content import ChannelContent, TileContent
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
@@ -55,7 +52,7 @@ class TileTask:
     record: Path
     key: str
     shared: frozenset[str] = frozenset()
-    tables: tuple[tuple[str, ObjectTable, NDArray[np.uint64]], ...] = ()
+    tables: tuple[tuple[str, ObjectTable, SharedWalls], ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -123,11 +120,15 @@ def tile_task(
         asdict(content),
         [(*one, paint and asdict(paint)) for *one, paint in made_of],
         sorted(shared),
-        [(id_, digest_of_table(table), touching.tolist()) for id_, table, touching in own],
+        [(id_, digest_of_table(table), _digest(touching)) for id_, table, touching in own],
     ]
     key = key_of(depends, sys.modules[__name__])
     record = out_folder.tile_file(tile.id)
     return TileTask(out_folder.stage_dir, content, units, record, key, shared, own)
+
+
+def _digest(walls: SharedWalls) -> str:
+    return hashlib.sha256(walls.labels.tobytes() + walls.area_um2.tobytes()).hexdigest()
 
 
 def digest_of_table(table: ObjectTable) -> str:

@@ -40,7 +40,7 @@ def gather_table(
         tuple(replace(column, values=_values(own, column.id)[kept]) for column in columns),
         _names(own, kept),
         default,
-        _walls(own, found, row),
+        *_walls(own, found, row),
     )
 
 
@@ -68,9 +68,14 @@ def _names(own: dict[str, PackedObjects], kept: NDArray[np.int64]) -> tuple[str,
 
 def _walls(
     own: dict[str, PackedObjects], found: NDArray[np.uint64], row: NDArray[np.int32]
-) -> NDArray[np.int32]:
-    """Return the rows of objects that share a wall, each pair once; hidden tiles' are left out."""
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the rows of objects that share a wall, each pair once, and the walls' areas, um^2.
+
+    Hidden tiles' are left out.
+    """
     pairs = np.concatenate([np.frombuffer(o.touching, "<u8") for o in own.values()]).reshape(-1, 2)
     at = np.searchsorted(found, pairs).clip(0, len(found) - 1)
     known = (found[at] == pairs).all(axis=1)
-    return np.unique(np.sort(row[at[known]], axis=1), axis=0).astype(np.int32)
+    areas = np.concatenate([np.frombuffer(o.wall_um2, "<f4") for o in own.values()])
+    walls, first = np.unique(np.sort(row[at[known]], axis=1), axis=0, return_index=True)
+    return walls.astype(np.int32), areas[known][first]

@@ -64,11 +64,14 @@ def write_objects(
         entry["exact"] = write(f"{i}_{column.id}.f32", column.values.astype("<f4"))
         content["columns"].append(entry)
     if table.walls is not None:
-        first, rows = _neighbours(table.walls, count)
+        first, rows, order = _neighbours(table.walls, count)
         content["neighbours"] = {
             "first": write("neighbours_first.bin", first),
             "rows": write("neighbours.bin", rows),
         }
+        if table.wall_um2 is not None and not np.isnan(table.wall_um2).any():
+            areas = np.tile(table.wall_um2, 2)[order].astype("<f4")
+            content["neighbours"]["area_um2"] = write("neighbours_um2.f32", areas)
     index = write_file(root, f"{folder}/{OBJECTS}", compact_json(content))
     return index, [index, *files]
 
@@ -128,10 +131,14 @@ def _quantize(values: NDArray[np.float32]) -> tuple[NDArray[np.uint8], dict[str,
 
 def _neighbours(
     walls: NDArray[np.int32], count: int
-) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Return where each row's neighbours begin (count + 1,), and all neighbours, ascending."""
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.int64]]:
+    """Return where each row's neighbours begin (count + 1,), all neighbours, ascending, an order.
+
+    It brings the walls, and behind them the same from the other side, into the neighbours' order.
+    """
     both = np.concatenate([walls, walls[:, ::-1]])
-    both = both[np.lexsort((both[:, 1], both[:, 0]))]
+    order = np.lexsort((both[:, 1], both[:, 0]))
+    both = both[order]
     first = np.zeros(count + 1, dtype="<u4")
     first[1:] = np.cumsum(np.bincount(both[:, 0], minlength=count))
-    return first, both[:, 1].astype("<u4")
+    return first, both[:, 1].astype("<u4"), order

@@ -74,6 +74,7 @@ class PackedObjects:
     values    float32 (n,) by column ID
     boxes     float32 (n, 6): least and largest (x, y, z), world um
     touching  uint64 (m, 2), labels of objects that share a wall
+    wall_um2  float32 (m,), its area; NaN: not known
     """
 
     __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
@@ -83,6 +84,7 @@ class PackedObjects:
     values: dict[str, bytes]
     boxes: bytes
     touching: bytes
+    wall_um2: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,7 +309,8 @@ def _objects(
         found.names,
         {name: values.astype("<f4").tobytes() for name, values in found.values.items()},
         boxes.astype("<f4").tobytes(),
-        found.touching.astype("<u8").tobytes(),
+        found.touching.labels.astype("<u8").tobytes(),
+        found.touching.area_um2.astype("<f4").tobytes(),
     )
     shown = [column for column in columns if column.id in (FIRST_COLUMN, default)]
     filled = tuple(replace(column, values=found.values[column.id]) for column in shown)

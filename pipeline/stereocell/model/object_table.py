@@ -32,6 +32,18 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True)
+class SharedWalls:
+    """Walls that objects share.
+
+    labels    uint64 (m, 2), of the two objects
+    area_um2  float32 (m,), at the finest level; NaN: not known
+    """
+
+    labels: NDArray[np.uint64]
+    area_um2: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
 class ObjectTable:
     """All objects of a label map, n rows, in the order of the tiles that hold them.
 
@@ -44,6 +56,7 @@ class ObjectTable:
     columns  the properties; `volume_um3` is always the first
     default  ID of the column that colours objects first; empty: each has a hue of its own
     walls    int32 (m, 2): rows of two objects that share a wall, each pair once; None: not known
+    wall_um2 float32 (m,), the area of that wall at the finest level; NaN: not known
     colors   float32 (n, 3), linear RGB: the label map's own; NaN: it has none. None: of no object
     """
 
@@ -54,6 +67,7 @@ class ObjectTable:
     names: tuple[str, ...] = ()
     default: str = ""
     walls: NDArray[np.int32] | None = None
+    wall_um2: NDArray[np.float32] | None = None
     colors: NDArray[np.float32] | None = None
 
     def of_tile(self, tile: str) -> "ObjectTable":
@@ -67,15 +81,17 @@ class ObjectTable:
             columns=tuple(replace(one, values=one.values[rows]) for one in self.columns),
             names=tuple(self.names[row] for row in rows.tolist()) if self.names else (),
             walls=None,
+            wall_um2=None,
             colors=None if self.colors is None else self.colors[rows],
         )
 
-    def touching(self, tile: str) -> NDArray[np.uint64]:
-        """Return the labels of objects that share a wall, uint64 (m, 2), the tile's first."""
-        if self.walls is None:
-            return np.zeros((0, 2), np.uint64)
+    def touching(self, tile: str) -> SharedWalls:
+        """Return the walls of a tile's objects, theirs the first label."""
+        if self.walls is None or self.wall_um2 is None:
+            return SharedWalls(np.zeros((0, 2), np.uint64), np.zeros(0, np.float32))
         both = np.concatenate([self.walls, self.walls[:, ::-1]])
-        return self.labels[both[np.isin(both[:, 0], self.rows[tile])]]
+        kept = np.isin(both[:, 0], self.rows[tile])
+        return SharedWalls(self.labels[both[kept]], np.tile(self.wall_um2, 2)[kept])
 
     def column(self, column_id: str) -> Column | None:
         """Return a column by its ID; None: there is none."""

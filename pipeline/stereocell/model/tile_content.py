@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.channel import PaintColors
 from stereocell.model.mesh import Lod
-from stereocell.model.object_table import ObjectTable
+from stereocell.model.object_table import ObjectTable, SharedWalls
 
 APRON = 1  # voxels added around a volume on every side; trilinear filtering reads them
 Provenance = dict[str, Any]
@@ -26,7 +26,7 @@ class ChannelContent:
     closed  STL file of a closed copy of the surface; None: no file
     measured  the volume's voxels as they were read; None: they are not kept
     objects   the table of the objects in `lods`, which count in it; None: it is no label map
-    touching  uint64 (m, 2): labels of these objects, and of those that they share a wall with
+    touching  walls of these objects to others; None: not known
     """
 
     channel_id: str
@@ -36,7 +36,7 @@ class ChannelContent:
     closed: Path | None = None
     measured: NDArray[Any] | None = None
     objects: ObjectTable | None = None
-    touching: NDArray[np.uint64] | None = None
+    touching: SharedWalls | None = None
 
 
 @dataclass(frozen=True, slots=True)

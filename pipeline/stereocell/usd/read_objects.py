@@ -9,7 +9,7 @@ from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
-from stereocell.model.object_table import Column
+from stereocell.model.object_table import Column, SharedWalls
 from stereocell.usd.layer import CHANNELS, PAINTED_BY
 from stereocell.usd.write_objects import (
     COLUMN,
@@ -20,6 +20,7 @@ from stereocell.usd.write_objects import (
     NAMES,
     OBJECT_ID,
     TOUCHING,
+    WALL_UM2,
 )
 
 
@@ -30,13 +31,13 @@ class TileObjects:
     labels   uint64 (n,)
     names    by object; empty: there are none
     values   float32 (n,) by column ID
-    touching  uint64 (m, 2), labels of objects that share a wall, the tile's first
+    touching  the walls of these objects, theirs the first label
     """
 
     labels: NDArray[np.uint64]
     names: tuple[str, ...]
     values: dict[str, NDArray[np.float32]]
-    touching: NDArray[np.uint64]
+    touching: SharedWalls
 
 
 def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] | None:
@@ -138,13 +139,20 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
     pairs = np.array(list(mesh.GetAttribute(TOUCHING).Get() or ()), np.uint64)
     if len(pairs) % 2:
         raise StageError(f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected pairs")
+    given = mesh.GetAttribute(WALL_UM2).Get()  # stages of earlier versions have none
+    areas = np.full(len(pairs) // 2, np.nan) if given is None else given
+    if len(areas) != len(pairs) // 2:
+        raise StageError(
+            f"{mesh.GetPath()}.{WALL_UM2}: found {len(areas)}, expected {len(pairs) // 2}, one a "
+            "wall"
+        )
     shown = shown_objects(mesh)
     assert shown is not None
     return TileObjects(
         np.array(list(labels), np.uint64)[shown],
         tuple(name for name, is_shown in zip(names, shown, strict=False) if is_shown),
         {name: column[shown] for name, column in values.items()},
-        pairs.reshape(-1, 2),
+        SharedWalls(pairs.reshape(-1, 2), np.array(areas, np.float32)),
     )
 
 

@@ -15,7 +15,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.mesh import Mesh
-from stereocell.model.object_table import Column, ObjectTable
+from stereocell.model.object_table import Column, ObjectTable, SharedWalls
 from stereocell.objects.table import color_objects
 from stereocell.usd.layer import CLASSES, set_attribute
 
@@ -24,6 +24,7 @@ PAINT = "paint"  # primvar: intensity of the sampled channel at each vertex, 0..
 LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
 NAMES = "stereocell:objectNames"  # on a tile's mesh, too
 TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
+WALL_UM2 = "stereocell:objectWallAreas"  # and the area of each of these walls, um^2
 HIDDEN = "stereocell:hiddenObjects"  # on a channel's prim, by an edit: labels that are left out
 COLUMNS, DEFAULT = "stereocell:columns", "stereocell:defaultColumn"
 COLUMN = "stereocell:column:"
@@ -97,11 +98,11 @@ def define_objects(
     look: Sdf.Path,
     channel_id: str,
     table: ObjectTable,
-    touching: NDArray[np.uint64] | None,
+    touching: SharedWalls | None,
 ) -> None:
     """Write what all levels of a tile's objects share: their numbers, names and classes' looks.
 
-    touching  uint64 (m, 2), labels of objects that share a wall, the tile's first; None: not known
+    touching  the walls of these objects; None: not known
     """
     prim = mesh.GetPrim()
     set_attribute(prim, LABELS, _Types.UInt64Array, _uint64(table.labels), custom=True)
@@ -109,8 +110,10 @@ def define_objects(
         names = Vt.StringArray(list(table.names))
         set_attribute(prim, NAMES, _Types.StringArray, names, custom=True)
     if touching is not None:
-        pairs = _uint64(touching.ravel())
+        pairs = _uint64(touching.labels.ravel())
         set_attribute(prim, TOUCHING, _Types.UInt64Array, pairs, custom=True)
+        areas = Vt.FloatArray.FromNumpy(touching.area_um2)
+        set_attribute(prim, WALL_UM2, _Types.FloatArray, areas, custom=True)
     classes = classes_of(table)
     for code in range(len(classes.categories) if classes else 0):
         assert classes is not None

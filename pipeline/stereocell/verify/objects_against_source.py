@@ -3,7 +3,8 @@
 Of each object its voxels' volume, box and centroid are found again, and the channels' means over it
 (not of those that are cut, of which too thin a piece may be left out). The table is joined again.
 All is held against the columns in the stage. The volume inside each level's surface may differ from
-the voxels' by what the units state.
+the voxels' by what the units state. The area of whole objects' finest surfaces is measured again in
+the stage, and what is made of area and volume is made anew.
 """
 
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ from stereocell.verify.formats import raise_on
 
 _CLOSE = 1e-4  # share by which a level's volume may exceed what is stated: float32
 _SHOWN = 5  # problems of a column
+_ROUGH = 0.02  # share of an area that simplifying a voxel's steps may change beside the distance
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +71,13 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
     found = engine.run("stage", _read_tile, tasks)
     problems = _odd_means(plan, labels, located, table, engine)
     worst: list[float] = []
-    for tile, (there, volumes) in zip(plan.tiles, found, strict=True):
+    for tile, (there, volumes, area) in zip(plan.tiles, found, strict=True):
         problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd(table, tile.id, there)]
         if there is None or problems:
             continue
         own = facts[tile.id]
+        whole = ~np.isin(own.labels, located.extents.labels[located.owners == CUT])
+        problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd_areas(there, area, whole)]
         voxels = own.voxels * float(np.prod(labels.spacing_um))
         for level, held in enumerate(volumes):
             bias = float(np.abs(held / voxels - 1).max(initial=0.0))
@@ -155,17 +159,53 @@ def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
     return found
 
 
-def _read_tile(task: _TileTask) -> tuple[TileObjects | None, list[NDArray[np.float64]]]:
-    """Return a tile's objects in the stage, and the volume of each by level, um^3."""
+def _odd_areas(
+    there: TileObjects, area: tuple[NDArray[np.float64], float], whole: NDArray[np.bool_]
+) -> list[str]:
+    """Return which areas of whole objects are others than those of their surfaces.
+
+    area  of each object's finest surface in the stage, um^2, and how far it lies, um, from the one
+          that was measured: a ball whose skin moves by d has 2 d / r more
+    """
+    measured, distance_um = area
+    stated = there.values["area_um2"].astype(np.float64)
+    volume = there.values["volume_um3"].astype(np.float64)
+    radius = np.cbrt(3 * volume / (4 * np.pi))
+    off = np.abs(measured - stated) > (2 * distance_um / radius + _ROUGH) * stated
+    round_area = 4 * np.pi * radius**2
+    uneven = ~np.isclose(there.values["sphericity"] * stated, round_area, rtol=1e-4)
+    found = []
+    for column, odd in (("area_um2", off & whole), ("sphericity", uneven & (stated > 0))):
+        if odd.any():
+            shown = ", ".join(map(str, there.labels[odd][:_SHOWN].tolist()))
+            found.append(f"column {column} is not that of the surface of {shown}")
+    return found
+
+
+def _read_tile(
+    task: _TileTask,
+) -> tuple[TileObjects | None, list[NDArray[np.float64]], tuple[NDArray[np.float64], float]]:
+    """Return a tile's objects in the stage, their volumes by level, um^3, and `_odd_areas`'."""
     stage = open_stage(task.stage_file)
     described = read_columns(stage, task.labels_id)
     with loaded(stage, task.tile) as (tile, _):
         prim = mesh_at(tile, task.labels_id, 0)
         there = None if prim is None or described is None else read_tile_objects(prim, described[0])
         if there is None:
-            return None, []
+            return None, [], (np.zeros(0), 0.0)
         count = len(there.labels)
-        return there, [_volumes(lod.mesh, count) for lod in read_lods(tile, task.labels_id)]
+        lods = list(read_lods(tile, task.labels_id))
+        area = _areas(lods[0].mesh, count), lods[0].largest_um
+        return there, [_volumes(lod.mesh, count) for lod in lods], area
+
+
+def _areas(mesh: Mesh, count: int) -> NDArray[np.float64]:
+    """Return the area of each object's surface, um^2, float64 (n,)."""
+    if mesh.objects is None:
+        return np.zeros(count)
+    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    parts = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.bincount(mesh.objects[mesh.triangles[:, 0]], parts, count).astype(np.float64)
 
 
 def _volumes(mesh: Mesh, count: int) -> NDArray[np.float64]:

@@ -377,17 +377,20 @@ export class Controller {
     const address = new URL(location.href);
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
-    address.hash = writeLink(viewer.state, start, viewer.cameraView);
+    address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
     history.replaceState(history.state, "", address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
     viewer.stereo.hands.panel.take({ link: address.href });
+    const without = viewer.leftOutOfLink;
+    const but =
+      without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;
     if (viewer.stereo.kind !== null) {
-      this.say("The link is in the page's address, for when you leave.");
-    } else if (await copyText(address.href)) this.say("The link is in the clipboard.");
+      this.say(`The link is in the page's address, for when you leave.${but}`);
+    } else if (await copyText(address.href)) this.say(`The link is in the clipboard.${but}`);
     else {
       this.goTo("share", "link"); // which selects it
-      this.say("Here is the link, selected: copy it by Ctrl+C, or by a long press.");
+      this.say(`Here is the link, selected: copy it by Ctrl+C, or by a long press.${but}`);
     }
   }
 
@@ -464,13 +467,16 @@ export class Controller {
   }
 
   private saveObjects(): void {
-    if (this.viewer.objectItems.length === 0) {
+    const { objects } = this.viewer;
+    if (objects.length === 0) {
       this.say("No objects of a label map are shown.");
       return;
     }
-    const text = this.viewer.objectsCsv();
-    if (text === null) this.say("Their values are on their way: once more, please.");
-    else this.save("objects", "csv", new Blob([text], { type: "text/csv" }));
+    for (const { id, text } of this.viewer.objectsCsv()) {
+      const name = objects.length === 1 ? "objects" : `objects-${id}`;
+      if (text === null) this.say("Their values are on their way: once more, please.");
+      else this.save(name, "csv", new Blob([text], { type: "text/csv" }));
+    }
   }
 
   private get shown(): Box {
@@ -517,7 +523,7 @@ export class Controller {
       isLoading,
       values: viewer.snapshot().measuredValues,
       sliceValues: viewer.sliceValues,
-      objectItems: viewer.objectItems,
+      objects: viewer.objects,
       isFilming: this.filming !== null,
       undo: viewer.undoes,
       redo: viewer.redoes,

@@ -6,8 +6,9 @@ import type { Box } from "../math/box";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { Objects } from "../objects/objects";
 import type { MetObject } from "../objects/pick";
-import type { Control, Group } from "../panel/controls";
+import type { ObjectsFacts } from "../panel/layout";
 import type { Action } from "../state/actions";
+import type { ObjectView } from "../state/objects";
 import type { ViewerState } from "../state/viewer_state";
 import type { SurfaceSet } from "../surfaces/surface_set";
 
@@ -30,7 +31,8 @@ type Items = (
   objects: Objects,
   state: ViewerState,
   channel: string,
-) => readonly (Control | Group)[];
+  isLast: boolean,
+) => ObjectsFacts["items"];
 
 /** An object that a ray meets; `distance`: in lengths of its direction. */
 export type Met = MetObject & Readonly<{ channel: string }>;
@@ -86,14 +88,21 @@ export class ObjectsPart {
     return this.coming.size > 0 || [...this.objects.values()].some(({ isLoading }) => isLoading);
   }
 
-  /** The panel's section; empty: no label map is shown. */
-  get items(): readonly (Control | Group)[] {
-    const { state } = this;
-    if (state === null) return [];
-    return state.channels.flatMap(({ id, shown }) => {
+  private get shown(): readonly Readonly<{ id: string; name: string; objects: Objects }>[] {
+    return (this.state?.channels ?? []).flatMap(({ id, name, shown }) => {
       const objects = shown ? this.objects.get(id) : undefined;
-      return objects === undefined ? [] : this.layOut(objects, state, id);
+      return objects === undefined ? [] : [{ id, name, objects }];
     });
+  }
+
+  /** The panel's sections, one of each label map that is shown. */
+  get facts(): readonly ObjectsFacts[] {
+    const { state, shown } = this;
+    if (state === null) return [];
+    return shown.map(({ id, name, objects }, i) => ({
+      ...{ id, name },
+      items: this.layOut(objects, state, id, i === shown.length - 1),
+    }));
   }
 
   /** The nearest object along a ray, um; null: none. */
@@ -119,13 +128,14 @@ export class ObjectsPart {
     return true;
   }
 
-  /** The objects that are meant, as a table; null: it is on its way, or there is none. */
-  csv(): string | null {
-    for (const { id, shown } of this.state?.channels ?? []) {
-      const objects = shown ? this.objects.get(id) : undefined;
-      if (objects !== undefined) return objects.csv();
-    }
-    return null;
+  /** The objects that are meant, as a table for each label map that is shown; null: it is on its way. */
+  csv(): readonly Readonly<{ id: string; text: string | null }>[] {
+    return this.shown.map(({ id, objects }) => ({ id, text: objects.csv() }));
+  }
+
+  /** What a link says of a channel's objects; null: their table has not come. */
+  linked(channel: string, view: ObjectView): ReturnType<Objects["linked"]> | null {
+    return this.objects.get(channel)?.linked(view) ?? null;
   }
 
   retryFailed(): void {

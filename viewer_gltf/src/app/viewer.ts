@@ -32,6 +32,7 @@ import { CANT, type Command, STAYS } from "../state/commands";
 import { discLimit } from "../state/focus_tiles";
 import { isSameView, keyOfChange, nameOfChange } from "../state/history";
 import { initialState } from "../state/initial_state";
+import type { ObjectView } from "../state/objects";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
 import { START_TOOLS } from "../state/parameters/tools";
@@ -518,14 +519,27 @@ export class Viewer {
     return this.contents.transferFunctions2d.histogram(channel);
   }
 
-  /** The panel's section of the objects of label maps. */
-  get objectItems() {
-    return this.contents.objects.items;
+  /** The panel's sections of the label maps that are shown. */
+  get objects() {
+    return this.contents.objects.facts;
   }
 
-  /** The objects that are meant, as a table; null: it is on its way, or there is none. */
-  objectsCsv(): string | null {
+  /** The objects that are meant, as a table for each label map; null: it is on its way. */
+  objectsCsv() {
     return this.contents.objects.csv();
+  }
+
+  /** What a link says of a channel's objects; "": nothing. */
+  readonly linkedObjects = (channel: string, view: ObjectView): string =>
+    this.contents.objects.linked(channel, view)?.text ?? view.linked;
+
+  /** Objects of lists that are too long for a link. */
+  get leftOutOfLink(): number {
+    const { objects } = this.contents;
+    return Object.entries(this.state.objects).reduce(
+      (sum, [id, view]) => sum + (objects.linked(id, view)?.leftOut ?? 0),
+      0,
+    );
   }
 
   /** The channels' values where the slices meet, in the source's units; none: no slices show. */

@@ -1,9 +1,12 @@
 import { describe, expect, it } from "vitest";
-import { linkedObjects, type ObjectView, START_OBJECTS } from "../state/objects";
-import { readLinked } from "./linked";
+import type { ColumnRange, ObjectColumn } from "../bundle/generated/objects";
+import { type ObjectView, START_OBJECTS } from "../state/objects";
+import { readLinked, writeLinked } from "./linked";
+import { byteValue } from "./palettes";
 import { sampleTable } from "./sample_table";
 
 const TABLE = sampleTable();
+const write = (view: ObjectView, table = TABLE) => writeLinked(view, table).text;
 const read = (text: string): ObjectView => ({ ...START_OBJECTS, ...readLinked(text, TABLE) });
 
 describe("objects in a link", () => {
@@ -14,7 +17,7 @@ describe("objects in a link", () => {
       palette: "magma",
       span: [10, 200],
       isLog: false,
-      ranges: { size: [5, 250] },
+      ranges: { size: [5, 255] },
       without: { type: [0, -1] },
       hidden: [1],
       only: [1, 2, 3],
@@ -24,11 +27,54 @@ describe("objects in a link", () => {
       gap_um: 0.5,
       scatter: ["size", "size"],
     };
-    expect(read(linkedObjects(view))).toEqual(view);
+    expect(read(write(view))).toEqual(view);
+  });
+
+  it("go by what is in the table, not by where: another build has other rows and bytes", () => {
+    const view: ObjectView = {
+      ...START_OBJECTS,
+      ranges: { size: [64, 255] },
+      without: { type: [1] },
+      selected: [0, 1, 2, 5],
+      picked: 4,
+    };
+    const [column, types] = TABLE.columns;
+    const others = [{ ...column, range: { ...column.range, low: 0.5, high: 900 } }, types].map(
+      (each) => ({ ...each, categories: each.categories && ["new", ...each.categories] }),
+    ) as ObjectColumn[];
+    const found = readLinked(write(view), {
+      ...{ count: 7, first: "type" },
+      column: (id) => others.find((each) => each.id === id) ?? null,
+      label: (row) => String(106 - row),
+    });
+    expect(found.selected).toEqual([1, 4, 5, 6]); // 105, 102, 101, 100
+    expect(found.picked).toBe(2);
+    expect(found.without).toEqual({ type: [2] });
+    const [low, high] = found.ranges?.size ?? [];
+    expect(high).toBe(255); // without an end then as now
+    const value = (range: ColumnRange | undefined, byte = 0) => range && byteValue(range, byte);
+    expect(Math.log(value(others[0].range, low) ?? 0)).toBeCloseTo(
+      Math.log(value(column.range, 64) ?? 0),
+      1,
+    );
+  });
+
+  it("are short where many follow one another, and left out where they are too many", () => {
+    const count = 100_000;
+    const table = {
+      ...{ count, first: "", column: () => null },
+      label: (row: number) => String(2n ** 53n + BigInt(row)),
+    };
+    const many = { ...START_OBJECTS, selected: Array.from({ length: count }, (_, row) => row) };
+    const { text, leftOut } = writeLinked(many, table);
+    expect([text.length < 60, leftOut]).toEqual([true, 0]);
+    expect(readLinked(text, table).selected).toEqual(many.selected);
+    const odd = { ...many, selected: many.selected.filter((row) => row % 2 === 1) };
+    expect(writeLinked(odd, table)).toEqual({ text: "", leftOut: count / 2 });
   });
 
   it("are nothing as they open, whatever is looked for", () => {
-    expect(linkedObjects({ ...START_OBJECTS, search: "liver", lasso: [[0, 0]] })).toBe("");
+    expect(write({ ...START_OBJECTS, search: "liver", lasso: [[0, 0]] })).toBe("");
   });
 
   it("are never more than this table has, whatever the link says", () => {
@@ -42,10 +88,10 @@ describe("objects in a link", () => {
         ranges: { a: [1, 2], size: [1] },
       }),
       JSON.stringify({
-        without: { type: [300], size: 1 },
-        hidden: [6, -1, 0.5, "1"],
+        without: { type: ["no such"], size: 1 },
+        hidden: "0-99.106-340282366920938463463.-1.1-.x",
         only: 5,
-        picked: 99,
+        picked: "99",
       }),
       JSON.stringify({
         gap_um: 1e9,
@@ -53,7 +99,8 @@ describe("objects in a link", () => {
         selected: { length: 3 },
         ranges: null,
       }),
-      JSON.stringify({ gap_um: -1, isStained: 1, span: [0, 999], scatter: 1, without: [1] }),
+      JSON.stringify({ gap_um: -1, isStained: 1, span: [9, 1], scatter: 1, without: [1] }),
+      JSON.stringify({ hidden: [100], selected: [0], picked: 100, ranges: { size: ["1", 2] } }),
     ];
     for (const text of texts) {
       const view = read(text);

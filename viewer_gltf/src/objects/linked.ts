@@ -1,16 +1,89 @@
-/** What a link says of a label map's objects, as far as this table has it: a link is somebody else's text. Pure. */
-import { type ObjectView, PALETTES, START_OBJECTS } from "../state/objects";
+/**
+ * What a link says of a label map's objects, and what of it this table has: a link is somebody else's text. Objects
+ * go by their numbers in the label map, values by the column's own unit, categories by their names: what was built
+ * anew has other rows and bytes. Pure.
+ */
+import type { ObjectColumn } from "../bundle/generated/objects";
+import { ALL_BYTES, type ObjectView, PALETTES, START_OBJECTS } from "../state/objects";
+import { byteOf, byteValue } from "./palettes";
 import type { ObjectTable } from "./table";
 
 /** Widest gap, um, that a link may ask for; the panel's slider is shorter. */
 const WIDEST_UM = 1000;
+/** Longest text of a list of objects, characters: all of a link has 8000. */
+const LONGEST = 2000;
+const LISTS = ["hidden", "only", "selected"] as const;
 
-type Known = Pick<ObjectTable, "count" | "column">;
+type Known = Pick<ObjectTable, "count" | "column" | "first" | "label">;
+type Span = readonly [number, number];
+/** First and last of numbers that follow one another. */
+type Run = readonly [bigint, bigint];
 
-const isByte = (value: unknown) =>
-  Number.isInteger(value) && 0 <= Number(value) && Number(value) <= 255;
+const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
 
-/** The change that brings the view to a link's; what can't be read is left out. */
+/** What differs from the start, as text; "": nothing. `leftOut`: objects whose lists are too long for a link. */
+export function writeLinked(
+  view: ObjectView,
+  table: Known,
+): Readonly<{ text: string; leftOut: number }> {
+  const { colorBy, span, ranges, without, picked } = view;
+  const parts: Record<string, unknown> = {};
+  for (const key of ["colorBy", "palette", "isLog", "isStained", "gap_um", "scatter"] as const) {
+    if (!same(view[key], START_OBJECTS[key])) parts[key] = view[key];
+  }
+  const colored = table.column(colorBy ?? table.first);
+  if (!same(span, ALL_BYTES) && colored?.range) parts.span = valuesOf(colored, span);
+  const narrow = Object.entries(ranges).flatMap(([id, range]) => {
+    const column = table.column(id);
+    return column?.range && !same(range, ALL_BYTES) ? [[id, valuesOf(column, range)]] : [];
+  });
+  if (narrow.length > 0) parts.ranges = Object.fromEntries(narrow);
+  const gone = Object.entries(without).flatMap(([id, list]) => {
+    const names = table.column(id)?.categories;
+    return names && list.length > 0 ? [[id, list.map((i) => names[i] ?? null)]] : [];
+  });
+  if (gone.length > 0) parts.without = Object.fromEntries(gone);
+  let leftOut = 0;
+  for (const key of LISTS) {
+    const rows = view[key];
+    if (rows === null || (rows.length === 0 && key !== "only")) continue;
+    const text = runs(rows.map((row) => BigInt(table.label(row))));
+    if (text.length <= LONGEST) parts[key] = text;
+    else leftOut += rows.length;
+  }
+  if (picked !== null) parts.picked = table.label(picked);
+  return { text: Object.keys(parts).length === 0 ? "" : JSON.stringify(parts), leftOut };
+}
+
+/** Null: without an end there, as the first and last bytes are. */
+function valuesOf({ range }: ObjectColumn, bytes: Span): readonly (number | null)[] {
+  return bytes.map((byte, i) =>
+    byte === ALL_BYTES[i] || range === undefined
+      ? null
+      : Number(byteValue(range, byte).toPrecision(7)),
+  );
+}
+
+/** As `3-17.20`. */
+function runs(numbers: bigint[]): string {
+  const found: [bigint, bigint][] = [];
+  for (const each of numbers.sort((one, other) => (one < other ? -1 : Number(one > other)))) {
+    const newest = found.at(-1);
+    if (newest !== undefined && each <= newest[1] + 1n) newest[1] = each;
+    else found.push([each, each]);
+  }
+  return found.map(([low, high]) => (low === high ? low : `${low}-${high}`)).join(".");
+}
+
+function readRuns(text: unknown): readonly Run[] {
+  if (typeof text !== "string") return [];
+  return text.split(".").flatMap((part): Run[] => {
+    const [, low, high = low] = /^(\d{1,20})(?:-(\d{1,20}))?$/.exec(part) ?? [];
+    return low === undefined ? [] : [[BigInt(low), BigInt(high)]];
+  });
+}
+
+/** The change that brings the view to a link's; what can't be read, or is not here, is left out. */
 export function readLinked(text: string, table: Known): Partial<ObjectView> {
   const change: { -readonly [K in keyof ObjectView]?: ObjectView[K] } = { linked: "" };
   let given: Record<string, unknown>;
@@ -19,38 +92,53 @@ export function readLinked(text: string, table: Known): Partial<ObjectView> {
   } catch {
     return change;
   }
-  const rowsOf = (value: unknown) =>
-    Array.isArray(value)
-      ? value.filter((row) => Number.isInteger(row) && row >= 0 && row < table.count)
-      : [];
-  const isColumn = (id: unknown) => typeof id === "string" && table.column(id) !== null;
-  const spanOf = (value: unknown): readonly [number, number] | null =>
-    Array.isArray(value) && value.length === 2 && value.every(isByte) && value[0] <= value[1]
-      ? [value[0], value[1]]
-      : null;
+  const rowsOf = (value: unknown) => {
+    const wanted = readRuns(value);
+    const rows: number[] = [];
+    for (let row = 0; wanted.length > 0 && row < table.count; row++) {
+      const label = BigInt(table.label(row));
+      if (wanted.some(([low, high]) => low <= label && label <= high)) rows.push(row);
+    }
+    return rows;
+  };
+  const columnOf = (id: unknown) => (typeof id === "string" ? table.column(id) : null);
+  const bytesOf = (column: ObjectColumn | null, value: unknown): Span | null => {
+    const range = column?.range;
+    if (range === undefined || !Array.isArray(value) || value.length !== 2) return null;
+    const isEnd = (each: unknown) => each === null || Number.isFinite(each);
+    if (!value.every(isEnd)) return null;
+    const [low, high] = value.map((each, i) =>
+      each === null ? ALL_BYTES[i] : byteOf(range, each),
+    );
+    return low <= high ? [low, high] : null;
+  };
   const { colorBy, palette, span, isLog, ranges, without, only, picked, gap_um, scatter } = given;
   if (typeof given.isStained === "boolean") change.isStained = given.isStained;
-  if (colorBy === "" || isColumn(colorBy)) change.colorBy = colorBy as string;
+  if (colorBy === "" || columnOf(colorBy) !== null) change.colorBy = colorBy as string;
   change.palette = PALETTES.find((each) => each === palette) ?? START_OBJECTS.palette;
-  change.span = spanOf(span) ?? START_OBJECTS.span;
+  change.span = bytesOf(table.column(change.colorBy ?? table.first), span) ?? START_OBJECTS.span;
   if (typeof isLog === "boolean") change.isLog = isLog;
   change.ranges = Object.fromEntries(
     Object.entries(Object(ranges)).flatMap(([id, value]) => {
-      const read = isColumn(id) ? spanOf(value) : null;
+      const read = bytesOf(columnOf(id), value);
       return read === null ? [] : [[id, read]];
     }),
   );
   change.without = Object.fromEntries(
-    Object.entries(Object(without)).filter(
-      ([id, list]) => isColumn(id) && Array.isArray(list) && list.every((i) => isByte(i + 1)),
-    ) as [string, number[]][],
+    Object.entries(Object(without)).flatMap(([id, list]) => {
+      const names = columnOf(id)?.categories;
+      if (names === undefined || !Array.isArray(list)) return [];
+      const found = list.map((name) => (name === null ? -1 : names.indexOf(name)));
+      const known = found.filter((index, i) => index >= 0 || list[i] === null);
+      return known.length > 0 ? [[id, known]] : [];
+    }),
   );
   change.hidden = rowsOf(given.hidden);
-  change.only = only == null ? null : rowsOf(only);
+  change.only = typeof only !== "string" ? null : rowsOf(only);
   change.selected = rowsOf(given.selected);
-  change.picked = rowsOf([picked])[0] ?? null;
+  change.picked = rowsOf(picked)[0] ?? null;
   if (typeof gap_um === "number" && gap_um >= 0 && gap_um <= WIDEST_UM) change.gap_um = gap_um;
-  if (Array.isArray(scatter) && scatter.length === 2 && scatter.every(isColumn)) {
+  if (Array.isArray(scatter) && scatter.length === 2 && scatter.every((id) => columnOf(id))) {
     change.scatter = [scatter[0], scatter[1]];
   }
   return change;

@@ -10,7 +10,7 @@ import type { ChannelState, ViewerState } from "../state/viewer_state";
 import type { SurfaceSet } from "../surfaces/surface_set";
 import { objectsCsv } from "./csv";
 import { filtered, flag, GONE } from "./flags";
-import { readLinked } from "./linked";
+import { readLinked, writeLinked } from "./linked";
 import { ObjectMaterial } from "./object_material";
 import { tableOf } from "./palettes";
 import { type MetObject, pickObject } from "./pick";
@@ -235,6 +235,10 @@ export class Objects {
   csv(): string | null {
     const { selected } = this.view;
     return objectsCsv(this.table, selected.length > 0 ? selected : this.shown);
+  }
+
+  linked(view: ObjectView): ReturnType<typeof writeLinked> {
+    return writeLinked(view, this.table);
   }
 
   retryFailed(): void {

@@ -1,5 +1,15 @@
 import { expect, it } from "vitest";
-import { byteAt, categoryAt, countBytes, inLasso, numberText, placeOf, unitText } from "./pictures";
+import {
+  byteAt,
+  categoryAt,
+  countBytes,
+  inLasso,
+  legendOf,
+  numberText,
+  placeOf,
+  ROWS_OF_LEGEND,
+  unitText,
+} from "./pictures";
 import { sampleContent } from "./sample_table";
 
 it("bytes are counted, all and those that show", () => {
@@ -15,8 +25,18 @@ it("a byte has a place, and a place a byte", () => {
 
 it("rows of a picture are categories, the last one those without", () => {
   const column = sampleContent().columns[1];
-  expect([0, 0.4, 0.7, 1].map((down) => categoryAt(column, 3, down))).toEqual([0, 1, -1, -1]);
-  expect([0.4, 1].map((down) => categoryAt(column, 0, down))).toEqual([0, 1]);
+  const { indices } = legendOf(column, true, 0);
+  expect([0, 0.4, 0.7, 1].map((down) => categoryAt(indices, down))).toEqual([0, 1, -1, -1]);
+  expect(legendOf(column, false, 0).indices).toEqual([0, 1]);
+});
+
+it("a legend of many has pages, which hold each once", () => {
+  const organs = { categories: Array.from({ length: 117 }, (_, i) => `organ ${i}`) };
+  const pages = Array.from({ length: 12 }, (_, page) => legendOf(organs, true, page));
+  expect(pages.flatMap(({ indices }) => indices)).toEqual([...Array(117).keys(), -1]);
+  expect(Math.max(...pages.map(({ indices }) => indices.length))).toBe(ROWS_OF_LEGEND);
+  expect(legendOf(organs, true, 99)).toEqual(pages[11]);
+  expect(legendOf({}, false, 3)).toEqual({ indices: [], page: 0, pages: 1, count: 0 });
 });
 
 it("a lasso holds the points inside it that show and have both values", () => {

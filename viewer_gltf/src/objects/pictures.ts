@@ -102,25 +102,41 @@ export function drawHistogram(
   }
 }
 
-/** A row a category: its colour, name and number; what is left out is dim. The last is what has none. */
+/** Rows of a legend that can be read at a time, on a plane before the eyes, too. */
+export const ROWS_OF_LEGEND = 10;
+/** Of what has none. */
+export const NO_CATEGORY = "(none)";
+
+/** A page of a legend: indices of categories, the last of all -1 where objects have none. */
+export function legendOf(
+  { categories }: Readonly<{ categories?: readonly string[] }>,
+  hasMissing: boolean,
+  wanted: number,
+): Readonly<{ indices: readonly number[]; page: number; pages: number; count: number }> {
+  const all = [...(categories ?? []).keys(), ...(hasMissing ? [-1] : [])];
+  const pages = Math.max(1, Math.ceil(all.length / ROWS_OF_LEGEND));
+  const page = Math.min(wanted, pages - 1); // of another column there may be fewer
+  const first = page * ROWS_OF_LEGEND;
+  return { indices: all.slice(first, first + ROWS_OF_LEGEND), page, pages, count: all.length };
+}
+
+/** A row a category: its colour, name and number; what is left out is dim. */
 export function drawCategories(
   context: Context,
   width: number,
   height: number,
-  { categories }: ObjectColumn,
+  categories: readonly Readonly<{ index: number; name: string }>[],
   [all, left]: readonly [Uint32Array, Uint32Array],
   colors: Uint8Array,
   without: readonly number[],
 ): void {
-  const names = [...(categories ?? []), ...(all[0] > 0 ? ["(none)"] : [])];
-  const count = categories?.length ?? 0;
-  const row = height / names.length;
+  const row = height / categories.length;
   const size = Math.round(0.55 * row);
   context.font = `500 ${size}px ${FONT}`;
   context.textBaseline = "middle";
-  names.forEach((name, i) => {
-    const byte = i < count ? i + 1 : 0;
-    const isOut = without.includes(byte - 1);
+  categories.forEach(({ index, name }, i) => {
+    const byte = index + 1;
+    const isOut = without.includes(index);
     const y = i * row;
     context.globalAlpha = isOut ? 0.35 : 1;
     context.fillStyle = css(colors, byte);
@@ -135,12 +151,10 @@ export function drawCategories(
   });
 }
 
-/** Which category a picture's row is: an index, or -1 for what has none. */
-export function categoryAt({ categories }: ObjectColumn, missing: number, down: number): number {
-  const known = categories?.length ?? 0;
-  const count = known + (missing > 0 ? 1 : 0);
-  const i = Math.min(count - 1, Math.max(0, Math.floor(down * count)));
-  return i < known ? i : -1;
+/** Which of a picture's rows is so far down. */
+export function categoryAt(indices: readonly number[], down: number): number {
+  const i = Math.floor(down * indices.length);
+  return indices[Math.min(indices.length - 1, Math.max(0, i))];
 }
 
 /** Objects as points, those that show; the selected ones light, with the lasso round them. */

@@ -67,7 +67,11 @@ export function sampleTable(changed = () => {}, failed = (_: unknown) => {}): Ob
     (_, i) => 10 * Math.floor(i / 6) + (i % 6 > 2 ? 5 : 0),
   );
   const labels = Uint32Array.from({ length: COUNT }, (_, i) => 100 + i);
-  const next = [Uint32Array.of(0, 1, 3, 4, 4, 4, 4), Uint32Array.of(1, 0, 2, 1)] as const;
+  const next = {
+    first: Uint32Array.of(0, 1, 3, 4, 4, 4, 4),
+    rows: Uint32Array.of(1, 0, 2, 1),
+    area_um2: Float32Array.of(2, 2, 30.5, 30.5),
+  };
   return new ObjectTable(sampleContent(), labels, boxes, next, fetchOne, changed, failed);
 }
 

@@ -57,6 +57,7 @@ describe("the table of objects", () => {
     const table = sampleTable();
     expect([...table.neighbours(1)]).toEqual([0, 2]);
     expect([...table.neighbours(5)]).toEqual([]);
+    expect([...(table.walls_um2(1) ?? [])]).toEqual([2, 30.5]);
   });
 });
 

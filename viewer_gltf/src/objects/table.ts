@@ -34,22 +34,38 @@ export async function loadObjects(
   const text = new TextDecoder().decode(await fetchFile(base, file));
   const content = checkObjects(parseJson(text, file.path), file.path);
   const { labels, boxes, neighbours } = content;
-  const refs = [labels, boxes, ...(neighbours ? [neighbours.first, neighbours.rows] : [])];
-  const [ofLabels, ofBoxes, first, rows] = await Promise.all(
-    refs.map(async (ref) => (await fetchFile(base, ref)).buffer),
+  const { first, rows, area_um2 } = neighbours ?? {};
+  const [ofLabels, ofBoxes, ofFirst, ofRows, ofAreas] = await Promise.all(
+    [labels, boxes, first, rows, area_um2].map(
+      async (ref) => ref && (await fetchFile(base, ref)).buffer,
+    ),
   );
-  const next = first && rows ? [new Uint32Array(first), new Uint32Array(rows)] : null;
+  if (ofLabels === undefined || ofBoxes === undefined) throw new TypeError("needs labels, boxes");
+  const next = ofFirst &&
+    ofRows && {
+      first: new Uint32Array(ofFirst),
+      rows: new Uint32Array(ofRows),
+      area_um2: ofAreas === undefined ? null : new Float32Array(ofAreas),
+    };
   const fetchOne = async (ref: FileRef) => (await fetchFile(base, ref)).buffer;
   return new ObjectTable(
     content,
     content.label_bytes === 8 ? new BigUint64Array(ofLabels) : new Uint32Array(ofLabels),
     new Float32Array(ofBoxes),
-    next as [Uint32Array, Uint32Array] | null,
+    next ?? null,
     fetchOne,
     onChange,
     onError,
   );
 }
+
+/** Whom each row shares a wall with: those of row i are rows[first[i]] to rows[first[i + 1] - 1]. */
+type Walls = Readonly<{
+  first: Uint32Array;
+  rows: Uint32Array;
+  /** um^2; null: not known. */
+  area_um2: Float32Array | null;
+}>;
 
 export class ObjectTable {
   private readonly byId: ReadonlyMap<string, ObjectColumn>;
@@ -62,7 +78,7 @@ export class ObjectTable {
     private readonly labels: Uint32Array | BigUint64Array,
     /** Six a row: least x, y, z and largest, um. */
     readonly boxes: Float32Array,
-    private readonly next: readonly [first: Uint32Array, rows: Uint32Array] | null,
+    private readonly next: Walls | null,
     private readonly fetchOne: (file: FileRef) => Promise<ArrayBuffer>,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
@@ -116,8 +132,15 @@ export class ObjectTable {
 
   neighbours(row: number): Uint32Array {
     if (this.next === null) return new Uint32Array();
-    const [first, rows] = this.next;
+    const { first, rows } = this.next;
     return rows.subarray(first[row], first[row + 1]);
+  }
+
+  /** The areas of the walls to its neighbours, um^2; null: not known. */
+  walls_um2(row: number): Float32Array | null {
+    if (!this.next?.area_um2) return null;
+    const { first, area_um2 } = this.next;
+    return area_um2.subarray(first[row], first[row + 1]);
   }
 
   /** The row of each feature ID of a tile. */

@@ -218,6 +218,20 @@ describe("the panel's layout", () => {
     expect(state.clip.plane).not.toBeNull();
   });
 
+  it("gives each of several label maps a section of its own", () => {
+    const map = (id: string) => ({ id, name: id.toUpperCase(), items: [] });
+    const named = (ids: readonly string[]) =>
+      laid(start(), START_VIEW, { ...FACTS, objects: ids.map(map) })
+        .sections.filter(({ id }) => id.startsWith("objects"))
+        .map(({ id, label }) => [id, label]);
+    expect(named([])).toEqual([]);
+    expect(named(["cells"])).toEqual([["objects", "Objects"]]);
+    expect(named(["cells", "nuclei"])).toEqual([
+      ["objects/cells", "Objects: CELLS"],
+      ["objects/nuclei", "Objects: NUCLEI"],
+    ]);
+  });
+
   it("offers another try in stereo while a notice shows a fault that it may mend", () => {
     const facts = { ...FACTS, isStereo: true };
     const withNotice = (isMendable: boolean) =>

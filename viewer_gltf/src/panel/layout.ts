@@ -51,14 +51,17 @@ export type Facts = StereoSupport &
     values: readonly (readonly string[])[];
     /** The channels' values where the slices meet. */
     sliceValues: readonly string[];
-    /** Of label maps; absent or empty: none is shown. */
-    objectItems?: Section["items"];
+    /** Of the label maps that are shown. */
+    objects?: readonly ObjectsFacts[];
     /** Whether a video is being made. */
     isFilming: boolean;
     /** What undoing and redoing would change, in words; null: there is nothing. */
     undo: string | null;
     redo: string | null;
   }>;
+
+/** What the panel has of one label map: its channel, and the controls that its table asks for. */
+export type ObjectsFacts = Readonly<{ id: string; name: string; items: Section["items"] }>;
 
 /** Most notices on the panel: the newest few are enough. */
 const MOST_NOTICES = 3;
@@ -95,7 +98,11 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
         ? [section("notices", "Notices", noticeItems(state))]
         : []),
       section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
-      ...(facts.objectItems?.length ? [section("objects", "Objects", facts.objectItems)] : []),
+      ...(facts.objects ?? []).map(({ id, name, items }, _, { length }) =>
+        length === 1
+          ? section("objects", "Objects", items)
+          : section(`objects/${id}`, `Objects: ${name}`, items),
+      ),
       ...ofVolumes(
         section("volumes", "Volumes", [...controlsOf(VOLUMES, state), discNow(state, facts)]),
         section("light", "Light", lightItems(state, view, facts.isStereo)),

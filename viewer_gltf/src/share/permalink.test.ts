@@ -89,6 +89,18 @@ describe("a link to a view", () => {
     expect(writeLink(after(start(), CHANGES), start(), CAMERA).length).toBeLessThan(400);
   });
 
+  it("says of objects what the code that knows their table does, or what another link said", () => {
+    const linked = '{"picked":"7"}';
+    const before = after(start(), [
+      { type: "objects", channel: start().channels[0].id, change: { linked } },
+    ]);
+    const { id } = start().channels[0];
+    const hash = writeLink(before, start(), null);
+    expect(opened(hash).objects[id].linked).toBe(linked);
+    expect(writeLink(before, start(), null, () => "")).toBe("#v=1");
+    expect(opened(writeLink(before, start(), null, (of) => of)).objects[id].linked).toBe(id);
+  });
+
   it("needs no escaping: a URL keeps it as it is", () => {
     const hash = writeLink(after(start(), CHANGES), start(), CAMERA);
     const url = new URL("https://example.org/view/?bundle=x");

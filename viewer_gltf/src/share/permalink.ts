@@ -8,7 +8,7 @@
  * name_shapes: see shapes_link.ts) t(ransfer function) n(o volume).
  * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
  * corner), cut (a plane's normal and offset), points (um), measures (see measurements_link.ts), views
- * (kept ones, as eye), objects (of label maps: see state/objects.ts), tool, dwell, quality, light (see
+ * (kept ones, as eye), objects (of label maps: see objects/linked.ts), tool, dwell, quality, light (see
  * path_trace_link.ts), lamps (shown or not), eye and pose.
  * An address is somebody else's text: whatever it holds, the actions are ones that a user could
  * have taken; an unreadable part is reported and left out.
@@ -19,7 +19,7 @@ import { type Clip, withinSpecimen } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
 import { AXES } from "../math/vec3";
 import type { Action } from "../state/actions";
-import { linkedObjects } from "../state/objects";
+import type { ObjectView } from "../state/objects";
 import { CHANNEL, START_CHANNEL } from "../state/parameters/channel";
 import type { Parameter } from "../state/parameters/kinds";
 import { LIGHT } from "../state/parameters/light";
@@ -46,6 +46,9 @@ const OTHERS = PARAMETERS.filter((row) => !NAMED_APART.has(row));
 
 export type Shared = Readonly<{ actions: readonly Action[]; camera: CameraView | null }>;
 
+/** What a link says of a channel's objects; "": nothing. */
+type WriteObjects = (channel: string, view: ObjectView) => string;
+
 /**
  * @param start the state in which the bundle opens
  * @param look null: as the bundle opens
@@ -54,8 +57,11 @@ export function writeLink(
   state: ViewerState,
   start: ViewerState,
   camera: CameraView | null,
+  objectsOf: WriteObjects = (_, { linked }) => linked,
 ): string {
-  const links = [isAnything, isChosen, isShown].map((has) => linkOf(state, start, camera, has));
+  const links = [isAnything, isChosen, isShown].map((has) =>
+    linkOf(state, start, camera, objectsOf, has),
+  );
   return links.find(({ length }) => length <= LONGEST) ?? links[links.length - 1];
 }
 
@@ -69,6 +75,7 @@ function linkOf(
   state: ViewerState,
   start: ViewerState,
   camera: CameraView | null,
+  objectsOf: WriteObjects,
   has: HasShapes,
 ): string {
   const parts: Record<string, string> = { v: VERSION };
@@ -84,7 +91,7 @@ function linkOf(
   if (cameras.length > 0) parts.l = cameras.join(",");
   Object.assign(parts, Object.fromEntries(writeWords(VOLUMES, state, start, WORDS)));
   const objects = Object.entries(state.objects).flatMap(([id, view]) => {
-    const text = linkedObjects(view);
+    const text = objectsOf(id, view);
     return text === "" ? [] : [[id, text].map(encodeURIComponent).join(":")];
   });
   if (objects.length > 0) parts.objects = objects.join(",");

@@ -32,6 +32,8 @@ export type ObjectView = Readonly<{
   /** Space that each leaves along its walls, um. */
   gap_um: number;
   search: string;
+  /** Page of the categories' legend. */
+  legend: number;
   /** Columns of the scatter plot; "": the first that suit. */
   scatter: readonly [string, string];
   /** In the scatter plot, shares of its width and height. */
@@ -57,6 +59,7 @@ export const START_OBJECTS: ObjectView = {
   isStained: true,
   gap_um: 0,
   search: "",
+  legend: 0,
   scatter: ["", ""],
   lasso: [],
   linked: "",
@@ -78,17 +81,4 @@ export function withObjects(views: ObjectViews, { channel, change }: ObjectChang
     ([key, value]) => before[key as keyof ObjectView] === value,
   );
   return isSame ? views : { ...views, [channel]: { ...before, ...change } };
-}
-
-/** Not in a link: what is of the moment. */
-const OF_THE_MOMENT: ReadonlySet<string> = new Set(["aim", "search", "lasso", "linked"]);
-
-/** What differs from the start, as text; "": nothing. */
-export function linkedObjects(view: ObjectView): string {
-  const parts = Object.entries(view).filter(
-    ([key, value]) =>
-      !OF_THE_MOMENT.has(key) &&
-      JSON.stringify(value) !== JSON.stringify(START_OBJECTS[key as keyof ObjectView]),
-  );
-  return parts.length === 0 ? "" : JSON.stringify(Object.fromEntries(parts));
 }

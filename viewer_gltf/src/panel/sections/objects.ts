@@ -14,10 +14,14 @@ import {
   drawHistogram,
   drawScatter,
   inLasso,
+  legendOf,
+  NO_CATEGORY,
   numberText,
   placeOf,
+  ROWS_OF_LEGEND,
   unitText,
 } from "../../objects/pictures";
+import type { ObjectTable } from "../../objects/table";
 import {
   ALL_BYTES,
   type ObjectView,
@@ -48,9 +52,19 @@ export function objectItems(
   objects: Objects,
   state: ViewerState,
   channel: string,
+  isLast: boolean,
 ): readonly Control[] {
-  return new Layout(objects, state.objects[channel] ?? START_OBJECTS, channel).items();
+  const items = new Layout(objects, state.objects[channel] ?? START_OBJECTS, channel).items();
+  return isLast ? [...items, SAVE] : items;
 }
+
+/** Once for all label maps. */
+const SAVE: Control = {
+  kind: "button",
+  id: "save-objects",
+  label: "Save as CSV: the selected, or all that show",
+  to: () => "save-objects",
+};
 
 class Layout {
   private readonly table;
@@ -159,7 +173,7 @@ class Layout {
       colors,
     ];
     return column.kind === "category"
-      ? [this.categories(column, [all, left], table, state.join())]
+      ? this.categories(column, [all, left], table, state.join())
       : this.numbers(column, [all, left], table, state.join(), colors);
   }
 
@@ -168,30 +182,50 @@ class Layout {
     counts: readonly [Uint32Array, Uint32Array],
     table: Uint8Array,
     version: string,
-  ): Control {
+  ): readonly Control[] {
     const { view } = this;
     const without = view.without[column.id] ?? [];
-    const rows = (column.categories?.length ?? 0) + (counts[0][0] > 0 ? 1 : 0);
-    return {
+    const { indices, page, pages, count } = legendOf(column, counts[0][0] > 0, view.legend);
+    const nameOf = (index: number) => column.categories?.[index] ?? NO_CATEGORY;
+    const first = page * ROWS_OF_LEGEND;
+    const picture: Picture = {
       kind: "picture",
       id: this.id(`column-${column.id}`),
       label: `${column.name}: a tap leaves out`,
       about: column.about,
-      height: 0.12 * rows,
-      version: `${version} ${without}`,
-      text: (column.categories ?? [])
-        .map((name, i) => `${name} ${counts[1][i + 1]}${without.includes(i) ? ", left out" : ""}`)
+      height: 0.12 * indices.length,
+      version: `${version} ${without} ${page}`,
+      text: indices
+        .map((index) => {
+          const out = without.includes(index) ? ", left out" : "";
+          return `${nameOf(index)} ${counts[1][index + 1]}${out}`;
+        })
         .join("; "),
-      draw: (context, width, height) =>
-        drawCategories(context, width, height, column, counts, table, without),
+      draw: (context, width, height) => {
+        const rows = indices.map((index) => ({ index, name: nameOf(index) }));
+        drawCategories(context, width, height, rows, counts, table, without);
+      },
       press: (_, down) => {
-        const index = categoryAt(column, counts[0][0], down);
+        const index = categoryAt(indices, down);
         const next = without.includes(index)
           ? without.filter((each) => each !== index)
           : [...without, index];
         return this.change({ without: { ...view.without, [column.id]: next } });
       },
     };
+    if (pages === 1) return [picture];
+    const turn = (part: string, label: string, to: number) =>
+      this.button(`${part}-${column.id}`, label, { legend: (to + pages) % pages });
+    return [
+      picture,
+      this.text(
+        `legend-${column.id}`,
+        "Of these",
+        `${first + 1} to ${first + indices.length} of ${count}`,
+      ),
+      turn("legend-next", "Next of these", page + 1),
+      turn("legend-back", "Earlier ones", page - 1),
+    ];
   }
 
   private numbers(
@@ -323,14 +357,15 @@ class Layout {
     const title = table.title(row);
     const label = table.label(row);
     const others = [...table.neighbours(row)];
+    const wall = largestWall(table, row);
     return [
       this.text("card", "Object", title === label ? title : `${title} (${label})`),
       ...table.columns.map((column) =>
         this.text(`card-${column.id}`, column.name, this.valueText(column, row)),
       ),
       ...(table.hasNeighbours ? [this.text("card-next", "Neighbours", String(others.length))] : []),
+      ...(wall === "" ? [] : [this.text("card-wall", "Largest wall, to", wall)]),
       this.button("fly", "Go there", { aim: { row } }),
-      this.button("hide", "Hide it", { hidden: [...view.hidden, row], picked: null }),
       this.button("only", "Only this one", { only: [row] }),
       ...(table.hasNeighbours
         ? [this.button("only-next", "Only it and its neighbours", { only: [row, ...others] })]
@@ -344,6 +379,7 @@ class Layout {
             : [...view.selected, row],
         },
       ),
+      this.button("hide", "Hide it", { hidden: [...view.hidden, row], picked: null }),
       this.button("close", "Close the card", { picked: null }),
     ];
   }
@@ -383,12 +419,6 @@ class Layout {
         { hidden: [], only: null, ranges: {}, without: {} },
         isWhole ? "All are shown." : "",
       ),
-      {
-        kind: "button",
-        id: "save-objects",
-        label: selected.length === 0 ? "Save what shows as CSV" : "Save the selected as CSV",
-        to: () => "save-objects",
-      },
     ];
   }
 
@@ -459,6 +489,18 @@ class Layout {
       },
     ];
   }
+}
+
+/** The neighbour that a row shares the most with, `liver, 120 µm²`; "": none, or not known. */
+export function largestWall(
+  table: Pick<ObjectTable, "neighbours" | "walls_um2" | "title">,
+  row: number,
+): string {
+  const areas = [...(table.walls_um2(row) ?? [])];
+  const largest = Math.max(...areas);
+  if (!Number.isFinite(largest)) return "";
+  const other = table.neighbours(row)[areas.indexOf(largest)];
+  return `${table.title(other)}, ${numberText(largest)} ${unitText("um2")}`;
 }
 
 /** Of a column that does not colour. */
