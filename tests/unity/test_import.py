@@ -434,6 +434,14 @@ def test_a_bad_bundle_is_told_in_a_line_and_leaves_no_prefab(
 
         return write
 
+    def rename(what: str) -> Callable[[Path], None]:
+        def write(folder: Path) -> None:
+            manifest = load(folder / "manifest.json")
+            manifest[what][0]["id"] = "../../x"
+            (folder / "manifest.json").write_text(json.dumps(manifest))
+
+        return write
+
     def lead_out(folder: Path) -> None:
         manifest = load(folder / "manifest.json")
         manifest["files"]["path"] = "../files.json"
@@ -459,6 +467,8 @@ def test_a_bad_bundle_is_told_in_a_line_and_leaves_no_prefab(
     refuse("json", lambda f: (f / "manifest.json").write_text("{"), "manifest.json")
     refuse("bare", change("manifest.json", tiles=None, specimen={}), "specimen.name")
     refuse("outside", lead_out, "../files.json", "leads out")
+    refuse("tile", rename("tiles"), "../../x", "identifier")
+    refuse("channel", rename("channels"), "../../x", "identifier")
     refuse("empty", lambda f: (f / "manifest.json").unlink(), "manifest.json", "missing")
     refuse("no glTFast", lambda f: None, "was not imported", "glTFast", gltf=False)
 

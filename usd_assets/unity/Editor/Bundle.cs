@@ -4,6 +4,7 @@ using System.Collections.Generic;
 using System.IO;
 using System.Security.Cryptography;
 using System.Text;
+using System.Text.RegularExpressions;
 using Newtonsoft.Json;
 using Newtonsoft.Json.Linq;
 
@@ -96,7 +97,7 @@ namespace StereoCell.Editor
             {
                 Tiles.Add(new TileEntry
                 {
-                    Id = (string)Member(tile, "id"),
+                    Id = Identifier((string)Member(tile, "id")),
                     Representation = (string)Member(tile, "representation"),
                     Bounds = BoxOf(Member(tile, "bounds_um")),
                 });
@@ -158,11 +159,18 @@ namespace StereoCell.Editor
             return found;
         }
 
+        /// <summary>What becomes part of a file's name here, as the bundle's schema has it.</summary>
+        static string Identifier(string id)
+        {
+            if (!Regex.IsMatch(id, "^[A-Za-z_][A-Za-z0-9_]*$")) throw new BundleException(id + " is no identifier of a tile or channel");
+            return id;
+        }
+
         ChannelEntry ChannelOf(JToken channel)
         {
             var entry = new ChannelEntry
             {
-                Id = (string)Member(channel, "id"),
+                Id = Identifier((string)Member(channel, "id")),
                 Name = (string)Member(channel, "name"),
                 Color = Member(channel, "color").ToObject<double[]>(),
                 Function = (string)Member(channel, "transfer_function"),
@@ -210,7 +218,7 @@ namespace StereoCell.Editor
                     continue;
                 }
                 var parts = address.Split('/');
-                var tile = parts[parts.Length - 2];
+                var tile = Identifier(parts[parts.Length - 2]);
                 if (!entry.Surfaces.ContainsKey(tile)) entry.Surfaces.Add(tile, new List<Level>());
                 entry.Surfaces[tile].Add(new Level { Path = address, ErrorMetres = (double)Member(here.Key, "geometricError") });
             }

@@ -5,7 +5,7 @@ using System.IO;
 namespace StereoCell.Editor
 {
     /// <summary>One level of an 8-bit KTX 2.0 texture as a bundle has them: R8 or RGBA8, zstd. KTX for Unity
-    /// reads no 3D textures.</summary>
+    /// makes 2D textures alone.</summary>
     public sealed class Ktx2
     {
         static readonly byte[] Identifier = { 0xAB, 0x4B, 0x54, 0x58, 0x20, 0x32, 0x30, 0xBB, 0x0D, 0x0A, 0x1A, 0x0A };
