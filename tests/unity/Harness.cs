@@ -21,6 +21,7 @@ static class Harness
             else if (args[0] == "ktx2") Level(args[1], int.Parse(args[2]));
             else if (args[0] == "import") Console.WriteLine(JsonConvert.SerializeObject(Import(args[1], args[2], JObject.Parse(args[3]))));
             else if (args[0] == "heights") Console.WriteLine(Heights(args));
+            else if (args[0] == "sort") Console.WriteLine(Sort(JArray.Parse(args[1]), JArray.Parse(args[2])));
             else if (args[0] == "drawer") Console.WriteLine(Drawer());
             else if (args[0] == "gaze") Console.WriteLine(Gaze(JArray.Parse(args[1])));
             else return 2;
@@ -72,6 +73,36 @@ static class Harness
         return new JArray(Placement.LodHeights(levels, double.Parse(args[2]), double.Parse(args[3]), double.Parse(args[4])));
     }
 
+    // boxes [[min, max], ...] and eyes: each box's place in the order of blending, for each eye
+    static JToken Sort(JArray corners, JArray eyes)
+    {
+        var root = new GameObject("specimen");
+        var specimen = root.AddComponent<Specimen>();
+        var renderers = new List<Renderer>();
+        foreach (var corner in corners)
+        {
+            float[] min = corner[0].ToObject<float[]>(), max = corner[1].ToObject<float[]>();
+            var box = new GameObject("box");
+            box.transform.SetParent(root.transform, false);
+            box.transform.localPosition = new Vector3(min[0], min[1], min[2]);
+            var renderer = box.AddComponent<MeshRenderer>();
+            renderer.sharedMaterial = new Material(null);
+            renderer.sharedMaterial.SetVector("_Size", new Vector4(max[0] - min[0], max[1] - min[1], max[2] - min[2], 0));
+            renderer.sharedMaterial.SetVector("_ToBox0", new Vector4(1, 0, 0, 0));
+            renderer.sharedMaterial.SetVector("_ToBox1", new Vector4(0, 1, 0, 0));
+            renderer.sharedMaterial.SetVector("_ToBox2", new Vector4(0, 0, 1, 0));
+            box.AddComponent<VolumeBox>();
+            renderers.Add(renderer);
+        }
+        var found = new JArray();
+        foreach (var eye in eyes)
+        {
+            specimen.SortFrom(new Vector3((float)eye[0], (float)eye[1], (float)eye[2]));
+            found.Add(new JArray(renderers.Select(renderer => renderer.sortingOrder)));
+        }
+        return found;
+    }
+
     // what the Inspector draws of a channel, each thing clicked on
     static JToken Drawer()
     {
@@ -89,8 +120,12 @@ static class Harness
         var specimen = root.GetComponent<Specimen>();
         foreach (var call in how["calls"] ?? new JArray())
         {
-            var args = call["args"].Select(Argument).ToArray();
             var method = (string)call["name"];
+            if (method == "SortFrom")
+            {
+                specimen.SortFrom(new Vector3((float)call["args"][0], (float)call["args"][1], (float)call["args"][2]));
+                continue;
+            }
             if (method == "endsAtSurfaces")
             {
                 specimen.endsAtSurfaces = true;
@@ -99,6 +134,7 @@ static class Harness
             }
             try
             {
+                var args = call["args"].Select(Argument).ToArray();
                 typeof(Specimen).GetMethod(method).Invoke(specimen, args);
             }
             catch (TargetInvocationException error) when (error.InnerException is ArgumentException)
@@ -151,6 +187,7 @@ static class Harness
         if (!ReferenceEquals(renderer, null))
         {
             dump["enabled"] = renderer.enabled;
+            dump["order"] = renderer.sortingOrder;
             if (renderer.Block != null) dump["block"] = Dump(renderer.Block);
             if (!ReferenceEquals(renderer.sharedMaterial, null))
             {

@@ -9,6 +9,7 @@ import json
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +130,7 @@ def check_volumes(found: Any, bundle: Path) -> None:
             in_box = inside @ to_box[:, :3].T + to_box[:, 3]
             texture = low + in_box / size * (high - low)
             assert np.allclose(texture, (index + 0.5) / n, atol=2e-5)
+            assert box["scale"] == [1, 1, 1]
             assert material["_Voxel"] == pytest.approx(spacing.min())
         corners = np.array(box["vertices"]) @ to_box[:, :3].T + to_box[:, 3]
         k = np.arange(8)
@@ -208,7 +210,7 @@ def test_surface_and_volume_of_a_sphere_are_one(bundle: Path, imported: Import) 
     in_box = (texture - low) / (high - low) * size
     to_box = np.array([material[f"_ToBox{row}"] for row in range(3)])
     inside = (in_box - to_box[:, 3]) @ np.linalg.inv(to_box[:, :3]).T
-    world = np.array(box["position"]) + inside * root["scale"][0] * UM
+    world = np.array(box["position"]) + inside * root["scale"][0]
     voxel = material["_Voxel"] * root["scale"][0] * UM
     assert np.allclose(world.min(axis=0), surface[0], atol=2.1 * voxel)
     assert np.allclose(world.max(axis=0), surface[1], atol=2.1 * voxel)
@@ -471,6 +473,37 @@ def test_a_bad_bundle_is_told_in_a_line_and_leaves_no_prefab(
     refuse("channel", rename("channels"), "../../x", "identifier")
     refuse("empty", lambda f: (f / "manifest.json").unlink(), "manifest.json", "missing")
     refuse("no glTFast", lambda f: None, "was not imported", "glTFast", gltf=False)
+
+
+def test_volumes_are_blended_from_the_farthest_along_every_ray(run: Run) -> None:
+    """A grid of boxes of different sizes, seen from outside and from inside."""
+    edges = ([0, 4, 10, 13], [-7, -2, 0], [0, 3, 5])
+    x, y, z = ([*pairwise(along)] for along in edges)
+    grid = [[[a[0], b[0], c[0]], [a[1], b[1], c[1]]] for a in x for b in y for c in z]
+    rng = np.random.default_rng(2)
+    eyes = rng.uniform([-12, -18, -10], [28, 12, 20], (150, 3))
+    orders = json.loads(run("sort", json.dumps(grid), json.dumps(eyes.tolist())).stdout)
+    low, high = np.array(grid).transpose(1, 0, 2)
+    crossed = 0
+    for eye, order in zip(eyes, orders, strict=True):
+        assert sorted(order) == list(range(1 - len(grid), 1))
+        for target in rng.uniform([0, -7, 0], [13, 0, 5], (10, 3)):
+            a, b = (low - eye) / (target - eye), (high - eye) / (target - eye)
+            near, far = np.minimum(a, b).max(axis=1), np.maximum(a, b).min(axis=1)
+            hit = np.flatnonzero(far > np.maximum(near, 0) + 1e-6)
+            along = hit[np.argsort(near[hit])]
+            crossed += len(along)
+            assert (np.diff(np.array(order)[along]) < 0).all()  # the nearer, the later
+    assert crossed > 3000
+
+
+@pytest.mark.parametrize("x", [-1.0, 1.0])
+def test_the_farther_tile_is_blended_first(bundle: Path, imported: Import, x: float) -> None:
+    found = imported(bundle, calls=[{"name": "SortFrom", "args": [x, 0, 0.1]}])
+    order = {tile: box["order"] for tile, box in boxes(found["root"])}
+    # the first tile is at greater x: the world is mirrored
+    near, far = ("r0_c0", "r0_c1") if x > 0 else ("r0_c1", "r0_c0")
+    assert (order[near], order[far]) == (0, -1)
 
 
 def test_the_inspector_names_channels_and_functions(run: Run) -> None:

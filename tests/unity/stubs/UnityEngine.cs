@@ -98,6 +98,11 @@ namespace UnityEngine
             this.parent = parent;
             parent.children.Add(this);
         }
+        public Vector3 InverseTransformPoint(Vector3 position)
+        {
+            var at = parent == null ? position : parent.InverseTransformPoint(position);
+            return new Vector3((at.x - localPosition.x) / localScale.x, (at.y - localPosition.y) / localScale.y, (at.z - localPosition.z) / localScale.z);
+        }
         public Vector3 TransformPoint(Vector3 position)  // no turns here
         {
             var at = new Vector3(localPosition.x + localScale.x * position.x, localPosition.y + localScale.y * position.y, localPosition.z + localScale.z * position.z);
@@ -125,6 +130,7 @@ namespace UnityEngine
     {
         public float x, y, z, w;
         public Vector4(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
+        public static float Dot(Vector4 a, Vector4 b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
         public static Vector4 zero { get { return new Vector4(); } }
         public float this[int index]
         {
@@ -223,7 +229,13 @@ namespace UnityEngine
 
     public sealed class Shader : Object
     {
+        public static readonly List<string> Names = new List<string>();
         public static Shader Find(string name) { return new Shader { name = name }; }
+        public static int PropertyToID(string name)
+        {
+            if (!Names.Contains(name)) Names.Add(name);
+            return Names.IndexOf(name);
+        }
     }
 
     public class Material : Object
@@ -233,6 +245,7 @@ namespace UnityEngine
         public Material(Shader shader) { }
         public void SetTexture(string name, Texture value) { Values[name] = value; }
         public void SetVector(string name, Vector4 value) { Values[name] = value; }
+        public Vector4 GetVector(int nameID) { return (Vector4)Values[Shader.Names[nameID]]; }
         public void SetFloat(string name, float value) { Values[name] = value; }
         public void EnableKeyword(string keyword) { Keywords.Add(keyword); }
         public void DisableKeyword(string keyword) { Keywords.Remove(keyword); }
@@ -267,6 +280,7 @@ namespace UnityEngine
         public Renderer() { enabled = true; }
         public bool enabled { get; set; }
         public bool receiveShadows { get; set; }
+        public int sortingOrder { get; set; }
         public Rendering.ShadowCastingMode shadowCastingMode { get; set; }
         public Material sharedMaterial { get; set; }
         public void SetPropertyBlock(MaterialPropertyBlock properties) { Block = properties == null ? null : properties.Values; }

@@ -42,7 +42,6 @@ namespace StereoCell.Editor
         const int Entries = 256;
         const int MostOfUnity = 2048;  // texels along an edge of a 3D texture
         const int ChannelsOfBox = 4;
-        const float MetresPerUm = 1e-6f;
 
         [MenuItem("Assets/Import StereoCell Bundle...", false, 30)]
         static void Choose()
@@ -296,7 +295,6 @@ namespace StereoCell.Editor
 
                 var name = string.Join(" + ", channels.Select(i => bundle.Channels[i].Id).ToArray());
                 var box = Child(parent, name, place.Centre - pivot);
-                box.transform.localScale = Vector3.one * MetresPerUm;  // inside, lengths are um
                 box.AddComponent<MeshFilter>().sharedMesh = mesh;
                 var renderer = box.AddComponent<MeshRenderer>();
                 renderer.sharedMaterial = material;

@@ -7,7 +7,7 @@ namespace StereoCell.Editor
 {
     /// <summary>
     /// Where things of a bundle lie in Unity. The specimen's world is right-handed, Unity's left-handed: x is
-    /// mirrored, as glTFast mirrors what it imports. Lengths: metres for objects, um inside a volume's object.
+    /// mirrored, as glTFast mirrors what it imports. Lengths: metres for objects, um within a volume's box.
     /// </summary>
     public sealed class Placement
     {
@@ -16,7 +16,7 @@ namespace StereoCell.Editor
         /// <summary>The box's centre, metres.</summary>
         public Vector3 Centre;
 
-        /// <summary>The box's corners around it, um: bit 0 of the index is x, bit 1 y, bit 2 z.</summary>
+        /// <summary>The box's corners around it, metres: bit 0 of the index is x, bit 1 y, bit 2 z.</summary>
         public Vector3[] Corners;
 
         /// <summary>From there to the box's own space, um from its low corner: three rows.</summary>
@@ -73,12 +73,14 @@ namespace StereoCell.Editor
             }
             var centre = Apply(fromBox, size[0] / 2, size[1] / 2, size[2] / 2);
             Centre = ToVector(centre[0] * MetresPerUm, centre[1] * MetresPerUm, centre[2] * MetresPerUm);
-            Corners = Array.ConvertAll(worldCorners, at => ToVector(at[0] - centre[0], at[1] - centre[1], at[2] - centre[2]));
+            Corners = Array.ConvertAll(worldCorners, at => ToVector(
+                (at[0] - centre[0]) * MetresPerUm, (at[1] - centre[1]) * MetresPerUm, (at[2] - centre[2]) * MetresPerUm));
             ToBox = new Vector4[3];
             var offset = Apply(toBox, centre[0], centre[1], centre[2]);
             for (var row = 0; row < 3; row++)
             {
-                ToBox[row] = new Vector4((float)toBox[4 * row], (float)toBox[4 * row + 1], (float)toBox[4 * row + 2], (float)offset[row]);
+                var turn = Array.ConvertAll(new[] { 0, 1, 2 }, i => (float)(toBox[4 * row + i] / MetresPerUm));
+                ToBox[row] = new Vector4(turn[0], turn[1], turn[2], (float)offset[row]);
             }
         }
 

@@ -53,6 +53,8 @@ namespace StereoCell
         public bool endsAtSurfaces;
 
         MaterialPropertyBlock block;
+        VolumeBox[] boxes;  // kept, so that a frame allocates nothing
+        float[] nearness;
 
         /// <summary>The channel of this id or name; null if there is none.</summary>
         public Channel Find(string idOrName)
@@ -109,8 +111,25 @@ namespace StereoCell
                     }
                 }
             }
-            foreach (var box in GetComponentsInChildren<VolumeBox>(true)) Apply(box);
+            boxes = GetComponentsInChildren<VolumeBox>(true);
+            nearness = new float[boxes.Length];
+            foreach (var box in boxes) Apply(box);
             if (endsAtSurfaces && Camera.main != null) Camera.main.depthTextureMode |= DepthTextureMode.Depth;
+        }
+
+        void LateUpdate()
+        {
+            if (Camera.main != null) SortFrom(Camera.main.transform.position);
+        }
+
+        /// <summary>Blend volumes from the farthest, for an eye in the world: done for the main camera by itself.</summary>
+        public void SortFrom(Vector3 eye)
+        {
+            if (boxes == null || Array.Exists(boxes, box => box == null)) Apply();  // some were removed
+            for (var i = 0; i < boxes.Length; i++) nearness[i] = -boxes[i].DistanceFrom(eye);
+            Array.Sort(nearness, boxes);
+            // up to 0, so that what else is transparent is blended after them
+            for (var i = 0; i < boxes.Length; i++) boxes[i].GetComponent<Renderer>().sortingOrder = i + 1 - boxes.Length;
         }
 
         void Apply(VolumeBox box)
