@@ -9,6 +9,9 @@ from typing import Any
 
 import pytest
 
+from stereocell.bundle.write import write_bundle
+from stereocell.engine.run import Engine
+from support.bundles import write_tiles
 from support.unity_meta import PACKAGE
 
 HERE = Path(__file__).parent
@@ -53,6 +56,19 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         return subprocess.run(command, input=data, capture_output=True, timeout=120)
 
     return run_harness
+
+
+@pytest.fixture(scope="session")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_tiles(tmp_path_factory.mktemp("stage"))
+
+
+@pytest.fixture(scope="session")
+def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of two tiles and two channels, one without surfaces; to be read only."""
+    out = tmp_path_factory.mktemp("bundle") / "bundle"
+    write_bundle(stage, out, None, run=Engine(0).run)
+    return out
 
 
 @pytest.fixture

@@ -11,17 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stereocell.bundle.write import write_bundle
-from stereocell.engine.run import Engine
 from support.bundle_picture import read_blocks
-from support.bundles import load, write_tiles
+from support.bundles import load
 from support.reference_raymarch import Block, Camera, Values, encoded, psnr, render
+from support.unity_import import UM
 from support.unity_shader import STAGES, chromium, compile_stage, cross, draw, has_compiler, view_of
 
 pytestmark = pytest.mark.skipif(
     not has_compiler(), reason="needs glslangValidator: run `make mono`"
 )
-UM = 1e-6
 DEPTH, GAMMA, STEREO = (
     "STEREOCELL_SCENE_DEPTH",
     "UNITY_COLORSPACE_GAMMA",
@@ -73,13 +71,6 @@ class Scene:
             over = render(block, self.camera, shading=shading)
             picture = over + (1 - over[..., 3:]) * picture
         return picture
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("drawn")
-    write_bundle(write_tiles(folder / "stage"), folder / "bundle", None, run=Engine(0).run)
-    return folder / "bundle"
 
 
 @pytest.fixture

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+
+namespace StereoCell.Editor
+{
+    /// <summary>What a frame's blocks are coded by: bits that are read backwards, finite-state entropy, Huffman.</summary>
+    public static partial class Zstd
+    {
+        /// <summary>Reads bits from the end of a part towards its start, as zstd writes its streams.</summary>
+        sealed class Backwards
+        {
+            readonly byte[] data;
+            readonly int start;
+            int bit;  // that are left, from the part's first
+
+            public Backwards(byte[] data, int start, int end)
+            {
+                this.data = data;
+                this.start = start;
+                if (end <= start || data[end - 1] == 0) throw Broken("a stream without an end");
+                bit = 8 * (end - start - 1) + HighBit(data[end - 1]);  // below the mark, the highest bit
+            }
+
+            public int Left { get { return bit; } }
+
+            /// <summary>Bits before the first are 0, which the last look-ups ask for.</summary>
+            public int Read(int count)
+            {
+                bit -= count;
+                return Look(bit, count);
+            }
+
+            public int Peek(int count)
+            {
+                return Look(bit - count, count);
+            }
+
+            public void Skip(int count)
+            {
+                bit -= count;
+            }
+
+            int Look(int from, int count)
+            {
+                if (count == 0) return 0;
+                if (from < 0)
+                {
+                    var there = count + from;
+                    return there <= 0 ? 0 : Look(0, there) << -from;
+                }
+                var at = start + (from >> 3);
+                ulong bits = 0;
+                for (var i = 0; i < 5 && at + i < data.Length; i++) bits |= (ulong)data[at + i] << 8 * i;
+                return (int)(bits >> (from & 7) & (1ul << count) - 1);
+            }
+        }
+
+        /// <summary>A table of finite-state entropy: symbol, bits to the next state, and that state's base.</summary>
+        sealed class Fse
+        {
+            public readonly int Log;
+            public readonly byte[] Symbol;
+            public readonly byte[] Bits;
+            public readonly ushort[] Base;
+
+            public Fse(short[] counts, int log)
+            {
+                Log = log;
+                var size = 1 << log;
+                Symbol = new byte[size];
+                Bits = new byte[size];
+                Base = new ushort[size];
+                var next = new int[counts.Length];
+                var high = size;
+                for (var s = 0; s < counts.Length; s++)
+                {
+                    if (counts[s] == -1)  // less than one: a cell at the end
+                    {
+                        Symbol[--high] = (byte)s;
+                        next[s] = 1;
+                    }
+                    else next[s] = counts[s];
+                }
+                var step = (size >> 1) + (size >> 3) + 3;
+                var at = 0;
+                for (var s = 0; s < counts.Length; s++)
+                {
+                    for (var i = 0; i < counts[s]; i++)
+                    {
+                        Symbol[at] = (byte)s;
+                        do at = at + step & size - 1;
+                        while (at >= high);
+                    }
+                }
+                if (at != 0) throw Broken("an uneven table");
+                for (var i = 0; i < size; i++)
+                {
+                    var state = next[Symbol[i]]++;
+                    Bits[i] = (byte)(log - HighBit((uint)state));
+                    Base[i] = (ushort)((state << Bits[i]) - size);
+                }
+            }
+
+            /// <summary>A single symbol, which takes no bits.</summary>
+            public Fse(byte symbol)
+            {
+                Symbol = new[] { symbol };
+                Bits = new byte[1];
+                Base = new ushort[1];
+            }
+
+            /// <summary>Reads the table's description at <paramref name="at"/>, which moves behind it.</summary>
+            public static Fse Read(byte[] data, ref int at, int end, int symbols, int mostLog)
+            {
+                var bit = 0;
+                var from = at;
+                Func<int, int> bits = count =>
+                {
+                    var value = 0;
+                    for (var i = 0; i < count; i++, bit++)
+                    {
+                        var index = from + (bit >> 3);
+                        if (index < end) value |= (data[index] >> (bit & 7) & 1) << i;
+                    }
+                    return value;
+                };
+                var log = bits(4) + 5;
+                if (log > mostLog) throw Broken("too fine a table");
+                var counts = new short[symbols];
+                var left = (1 << log) + 1;
+                var symbol = 0;
+                while (left > 1)
+                {
+                    if (symbol >= symbols) throw Broken("too many symbols");
+                    var width = HighBit((uint)left) + 1;  // of the values 0 .. left
+                    var value = bits(width - 1);
+                    var small = (1 << width) - 1 - left;
+                    if (value >= small)
+                    {
+                        value |= bits(1) << width - 1;
+                        if (value >= 1 << width - 1) value -= small;
+                    }
+                    counts[symbol] = (short)(value - 1);
+                    left -= Math.Abs(counts[symbol]);
+                    if (counts[symbol++] != 0) continue;
+                    int more;
+                    do
+                    {
+                        more = bits(2);
+                        symbol += more;
+                    }
+                    while (more == 3 && symbol < symbols);
+                }
+                at = from + (bit + 7 >> 3);
+                if (left < 1 || at > end) throw Broken("a table that adds up to nothing");
+                return new Fse(counts, log);
+            }
+        }
+
+        /// <summary>A table of Huffman's: symbol and bits by the next <see cref="Log"/> bits.</summary>
+        sealed class Huffman
+        {
+            public readonly int Log;
+            public readonly byte[] Symbol;
+            public readonly byte[] Bits;
+
+            Huffman(byte[] weights, int count)
+            {
+                var total = 0;
+                for (var i = 0; i < count; i++)
+                {
+                    if (weights[i] > 12) throw Broken("too long a code");
+                    if (weights[i] > 0) total += 1 << weights[i] - 1;
+                }
+                if (total == 0) throw Broken("no codes");
+                Log = HighBit((uint)total) + 1;
+                var rest = (1 << Log) - total;
+                if (Log > 11 || (rest & rest - 1) != 0) throw Broken("codes that do not add up");
+                weights[count] = (byte)(HighBit((uint)rest) + 1);  // the last symbol's is not stored
+                Symbol = new byte[1 << Log];
+                Bits = new byte[1 << Log];
+                var at = 0;
+                for (var weight = 1; weight <= Log; weight++)
+                {
+                    for (var s = 0; s <= count; s++)
+                    {
+                        if (weights[s] != weight) continue;
+                        for (var i = 0; i < 1 << weight - 1; i++, at++)
+                        {
+                            Symbol[at] = (byte)s;
+                            Bits[at] = (byte)(Log + 1 - weight);
+                        }
+                    }
+                }
+            }
+
+            public static Huffman Read(byte[] data, ref int at, int end)
+            {
+                var weights = new byte[257];
+                var count = 0;
+                var head = data[at++];
+                if (head >= 128)
+                {
+                    count = head - 127;
+                    for (var i = 0; i < count; i++) weights[i] = (byte)(data[at + i / 2] >> (i % 2 == 0 ? 4 : 0) & 15);
+                    at += (count + 1) / 2;
+                    if (at > end) throw Broken("cut weights");
+                    return new Huffman(weights, count);
+                }
+                var stop = at + head;
+                if (stop > end) throw Broken("cut weights");
+                var table = Fse.Read(data, ref at, stop, 13, 6);
+                var stream = new Backwards(data, at, stop);
+                int a = stream.Read(table.Log), b = stream.Read(table.Log);
+                for (;;)  // two states in turn, until the bits are used up
+                {
+                    if (count > 253) throw Broken("too many weights");
+                    weights[count++] = table.Symbol[a];
+                    if (table.Bits[a] > stream.Left)
+                    {
+                        weights[count++] = table.Symbol[b];
+                        break;
+                    }
+                    a = table.Base[a] + stream.Read(table.Bits[a]);
+                    weights[count++] = table.Symbol[b];
+                    if (table.Bits[b] > stream.Left)
+                    {
+                        weights[count++] = table.Symbol[a];
+                        break;
+                    }
+                    b = table.Base[b] + stream.Read(table.Bits[b]);
+                }
+                at = stop;
+                return new Huffman(weights, count);
+            }
+
+            public void Unpack(byte[] data, int start, int end, byte[] to, int at, int stop)
+            {
+                var stream = new Backwards(data, start, end);
+                for (; at < stop; at++)
+                {
+                    var next = stream.Peek(Log);
+                    to[at] = Symbol[next];
+                    stream.Skip(Bits[next]);
+                }
+                if (stream.Left != 0) throw Broken("a stream of another length");
+            }
+        }
+    }
+}
