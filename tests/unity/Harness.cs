@@ -22,6 +22,7 @@ static class Harness
             else if (args[0] == "import") Console.WriteLine(JsonConvert.SerializeObject(Import(args[1], args[2], JObject.Parse(args[3]))));
             else if (args[0] == "heights") Console.WriteLine(Heights(args));
             else if (args[0] == "sort") Console.WriteLine(Sort(JArray.Parse(args[1]), JArray.Parse(args[2])));
+            else if (args[0] == "tests") Console.WriteLine(Tests(float.Parse(args[1])));
             else if (args[0] == "drawer") Console.WriteLine(Drawer());
             else if (args[0] == "gaze") Console.WriteLine(Gaze(JArray.Parse(args[1])));
             else return 2;
@@ -99,6 +100,26 @@ static class Harness
         {
             specimen.SortFrom(new Vector3((float)eye[0], (float)eye[1], (float)eye[2]));
             found.Add(new JArray(renderers.Select(renderer => renderer.sortingOrder)));
+        }
+        return found;
+    }
+
+    // the package's own tests, as Unity's test runner would run them
+    static JToken Tests(float mirrorX)
+    {
+        AssetDatabase.MirrorX = mirrorX;
+        var found = new JObject();
+        foreach (var method in typeof(StereoCell.Tests.InEditorTests).GetMethods().Where(m => m.IsDefined(typeof(NUnit.Framework.TestAttribute), false)))
+        {
+            try
+            {
+                method.Invoke(new StereoCell.Tests.InEditorTests(), null);
+                found[method.Name] = "passed";
+            }
+            catch (TargetInvocationException error) when (error.InnerException is NUnit.Framework.AssertionException || error.InnerException is NUnit.Framework.IgnoreException)
+            {
+                found[method.Name] = error.InnerException.Message;
+            }
         }
         return found;
     }

@@ -30,8 +30,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     parts: list[tuple[str, Path, str]] = [
         ("UnityEngine.dll", stubs, "UnityEngine.cs"),
         ("UnityEditor.dll", stubs, "UnityEditor.cs"),
+        ("nunit.framework.dll", stubs, "NUnit.cs"),
         ("StereoCell.dll", PACKAGE / "Runtime", "*.cs"),
         ("StereoCell.Editor.dll", PACKAGE / "Editor", "*.cs"),
+        ("StereoCell.Tests.dll", PACKAGE / "Tests", "*.cs"),
         ("harness.exe", HERE, "Harness.cs"),
     ]
     before = [f"-r:{folder / NEWTONSOFT.name}"]
@@ -53,7 +55,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
     def run_harness(*args: object, data: bytes = b"") -> subprocess.CompletedProcess[bytes]:
         command = ["mono", "--debug", str(folder / "harness.exe"), *map(str, args)]
-        return subprocess.run(command, input=data, capture_output=True, timeout=120)
+        return subprocess.run(command, input=data, capture_output=True, timeout=120, cwd=folder)
 
     return run_harness
 

@@ -52,6 +52,10 @@ def test_assemblies_refer_to_what_is_there() -> None:
     editor = names["StereoCell.Editor"]
     assert editor["references"] == ["StereoCell"]
     assert editor["includePlatforms"] == ["Editor"]  # so that no game carries it
+    tests = names["StereoCell.Tests"]
+    assert {"StereoCell", "StereoCell.Editor"} < set(tests["references"])
+    assert tests["includePlatforms"] == ["Editor"]
+    assert tests["defineConstraints"] == ["UNITY_INCLUDE_TESTS"]
     for script in (PACKAGE / "Runtime").rglob("*.cs"):
         assert "UnityEditor" not in script.read_text()
 

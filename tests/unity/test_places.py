@@ -163,6 +163,17 @@ def test_surface_and_volume_of_a_sphere_are_one(bundle: Path, imported: Import) 
     assert np.allclose(world.max(axis=0), surface[1], atol=2.1 * voxel)
 
 
+def test_the_package_s_own_test_in_the_editor_tells_a_mirrored_surface(
+    run: Run, bundle: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lies = "SurfacesLieInTheirVolumes"
+    assert json.loads(run("tests", -1).stdout)[lies] == "STEREOCELL_BUNDLE names no bundle"
+    monkeypatch.setenv("STEREOCELL_BUNDLE", str(bundle))
+    found = json.loads(run("tests", -1).stdout)
+    assert found == {"TheShaderCompiles": "passed", lies: "passed"}
+    assert "lies outside its volume" in json.loads(run("tests", 1).stdout)[lies]
+
+
 def turned() -> Gf.Matrix4d:
     turn = Gf.Matrix4d().SetRotate(Gf.Rotation((0.3, 1, 0.2), 40))
     return turn * Gf.Matrix4d().SetTranslate((3, -4, 5))

@@ -69,9 +69,11 @@ namespace UnityEditor
     {
         public static readonly SortedDictionary<string, List<Object>> Assets = new SortedDictionary<string, List<Object>>();
         public static bool HasGltf = true;  // whether glTFast is in the project
+        public static float MirrorX = -1;  // 1: what another importer might do
 
         public static void Refresh() { }
         public static void SaveAssets() { }
+        public static bool DeleteAsset(string path) { return true; }
         public static void CreateAsset(Object asset, string path)
         {
             if (!Directory.Exists(Path.GetDirectoryName(path))) throw new ArgumentException("no folder for " + path);
@@ -99,14 +101,19 @@ namespace UnityEditor
             var made = new GameObject((string)node["name"]);
             var at = node["translation"] == null ? new float[3] : node["translation"].ToObject<float[]>();
             var scale = node["scale"] == null ? new float[] { 1, 1, 1 } : node["scale"].ToObject<float[]>();
-            made.transform.localPosition = new Vector3(-at[0], at[1], at[2]);
+            made.transform.localPosition = new Vector3(MirrorX * at[0], at[1], at[2]);
             made.transform.localScale = new Vector3(scale[0], scale[1], scale[2]);
             float[] min = json["accessors"][0]["min"].ToObject<float[]>(), max = json["accessors"][0]["max"].ToObject<float[]>();
-            var mesh = new Mesh { vertices = new[] { new Vector3(-max[0], min[1], min[2]), new Vector3(-min[0], max[1], max[2]) } };
+            var mesh = new Mesh { vertices = new[] { new Vector3(MirrorX * max[0], min[1], min[2]), new Vector3(MirrorX * min[0], max[1], max[2]) } };
             made.AddComponent<MeshFilter>().sharedMesh = mesh;
             made.AddComponent<MeshRenderer>();
             return made;
         }
+    }
+
+    public sealed class ShaderUtil
+    {
+        public static bool ShaderHasError(Shader s) { return false; }
     }
 
     public sealed class PrefabUtility
@@ -118,6 +125,7 @@ namespace UnityEditor
             made.transform.SetParent(parent, false);
             return made;
         }
+        public static Object InstantiatePrefab(Object assetComponentOrGameObject) { return assetComponentOrGameObject; }
         public static GameObject SaveAsPrefabAsset(GameObject instanceRoot, string assetPath)
         {
             Saved.Add(assetPath);

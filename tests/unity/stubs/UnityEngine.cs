@@ -121,6 +121,9 @@ namespace UnityEngine
         {
             return new Vector3(lhs.y * rhs.z - lhs.z * rhs.y, lhs.z * rhs.x - lhs.x * rhs.z, lhs.x * rhs.y - lhs.y * rhs.x);
         }
+        public float magnitude { get { return (float)Math.Sqrt(Dot(this, this)); } }
+        public static Vector3 Min(Vector3 lhs, Vector3 rhs) { return new Vector3(Math.Min(lhs.x, rhs.x), Math.Min(lhs.y, rhs.y), Math.Min(lhs.z, rhs.z)); }
+        public static Vector3 Max(Vector3 lhs, Vector3 rhs) { return new Vector3(Math.Max(lhs.x, rhs.x), Math.Max(lhs.y, rhs.y), Math.Max(lhs.z, rhs.z)); }
         public static Vector3 operator +(Vector3 a, Vector3 b) { return new Vector3(a.x + b.x, a.y + b.y, a.z + b.z); }
         public static Vector3 operator -(Vector3 a, Vector3 b) { return new Vector3(a.x - b.x, a.y - b.y, a.z - b.z); }
         public static Vector3 operator *(Vector3 a, float d) { return new Vector3(a.x * d, a.y * d, a.z * d); }
@@ -148,6 +151,23 @@ namespace UnityEngine
         public static bool operator !=(Vector4 lhs, Vector4 rhs) { return !(lhs == rhs); }
         public override bool Equals(object other) { return other is Vector4 && this == (Vector4)other; }
         public override int GetHashCode() { return x.GetHashCode() ^ y.GetHashCode() ^ z.GetHashCode() ^ w.GetHashCode(); }
+    }
+
+    public struct Bounds
+    {
+        public Vector3 min { get; set; }
+        public Vector3 max { get; set; }
+        public Vector3 size { get { return max - min; } }
+        public void Encapsulate(Bounds bounds) { min = Vector3.Min(min, bounds.min); max = Vector3.Max(max, bounds.max); }
+        public void Expand(float amount)
+        {
+            min -= Vector3.one * (amount / 2);
+            max += Vector3.one * (amount / 2);
+        }
+        public bool Contains(Vector3 point)
+        {
+            return point.x >= min.x && point.y >= min.y && point.z >= min.z && point.x <= max.x && point.y <= max.y && point.z <= max.z;
+        }
     }
 
     public struct Color
@@ -229,6 +249,7 @@ namespace UnityEngine
 
     public sealed class Shader : Object
     {
+        public bool isSupported { get { return true; } }
         public static readonly List<string> Names = new List<string>();
         public static Shader Find(string name) { return new Shader { name = name }; }
         public static int PropertyToID(string name)
@@ -279,6 +300,14 @@ namespace UnityEngine
         public SortedDictionary<string, object> Block;  // of the stub: a copy, as Unity makes one
         public Renderer() { enabled = true; }
         public bool enabled { get; set; }
+        public Bounds bounds
+        {
+            get
+            {
+                var places = GetComponent<MeshFilter>().sharedMesh.vertices.Select(v => transform.TransformPoint(v)).ToArray();
+                return new Bounds { min = places.Aggregate(Vector3.Min), max = places.Aggregate(Vector3.Max) };
+            }
+        }
         public bool receiveShadows { get; set; }
         public int sortingOrder { get; set; }
         public Rendering.ShadowCastingMode shadowCastingMode { get; set; }

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.Linq;
+using NUnit.Framework;
+using StereoCell.Editor;
+using UnityEditor;
+using UnityEngine;
+using Object = UnityEngine.Object;
+
+namespace StereoCell.Tests
+{
+    /// <summary>
+    /// What only the editor can tell: that its compilers take the shader, and that what glTFast imports lies where
+    /// the volumes are. For the second, the environment's STEREOCELL_BUNDLE names a bundle's folder.
+    /// </summary>
+    public sealed class InEditorTests
+    {
+        const string Target = "Assets/StereoCell test";
+
+        [Test]
+        public void TheShaderCompiles()
+        {
+            var shader = Shader.Find("StereoCell/Volume");
+            Assert.IsTrue(shader != null, "the shader is not in the project");
+            Assert.IsFalse(ShaderUtil.ShaderHasError(shader), "the shader has errors: see its Inspector");
+            Assert.IsTrue(shader.isSupported, "this GPU does not take the shader");
+        }
+
+        [Test]
+        public void SurfacesLieInTheirVolumes()
+        {
+            var bundle = Environment.GetEnvironmentVariable("STEREOCELL_BUNDLE");
+            if (string.IsNullOrEmpty(bundle)) Assert.Ignore("STEREOCELL_BUNDLE names no bundle");
+            GameObject made = null;
+            try
+            {
+                made = (GameObject)PrefabUtility.InstantiatePrefab(BundleImporter.Import(bundle, Target));
+                var tiles = made.GetComponentsInChildren<Tile>(true);
+                Assert.IsTrue(tiles.Length > 0, "there are no tiles");
+                foreach (var tile in tiles)
+                {
+                    tile.Show(true, true);
+                    var boxes = tile.volume.GetComponentsInChildren<Renderer>().Select(renderer => renderer.bounds).ToArray();
+                    if (boxes.Length == 0) continue;
+                    var whole = boxes[0];
+                    foreach (var box in boxes) whole.Encapsulate(box);
+                    whole.Expand(0.02f * whole.size.magnitude);
+                    foreach (var surface in tile.surfaces.GetComponentsInChildren<Renderer>(true))
+                    {
+                        var inside = whole.Contains(surface.bounds.min) && whole.Contains(surface.bounds.max);
+                        Assert.IsTrue(inside, tile.name + ": " + surface.name + " lies outside its volume");
+                    }
+                }
+            }
+            finally
+            {
+                if (made != null) Object.DestroyImmediate(made);
+                AssetDatabase.DeleteAsset(Target);
+            }
+        }
+    }
+}
