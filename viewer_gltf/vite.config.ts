@@ -139,8 +139,8 @@ export default defineConfig({
           fileParallelism: false,
           isolate: false,
           sequence: { groupOrder: 1 }, // not beside the other project's
-          // where others have the cores a browser may miss a moment; what is wrong is wrong twice
-          retry: process.env.CI === undefined ? 0 : 1,
+          // where others have the cores a browser may miss a moment; what is wrong is wrong each time
+          retry: process.env.CI === undefined ? 0 : 2,
         },
       },
     ],

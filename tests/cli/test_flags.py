@@ -8,6 +8,7 @@ import pytest
 
 from stereocell.building.settings import Settings, apply
 from stereocell.cli import flags
+from stereocell.cli.__main__ import _parser
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import Flag, setting
 
@@ -109,3 +110,21 @@ def test_what_is_no_setting_is_told_by_its_flag(words: list[str], message: str) 
     with pytest.raises(UsageError) as raised:
         parser().parse_args(["in.tif", *words])
     assert message in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["plan", "", "-o", "out"],
+        ["build", "in", "--out", ""],
+        ["check", ""],
+        ["export", "out", ""],
+        ["publish", "out", ""],
+        ["bundle", "out", "--stage", ""],
+    ],
+    ids=" ".join,
+)
+def test_an_empty_name_is_not_the_folder_in_which_one_is(words: list[str]) -> None:
+    """It is a variable that a script has not set."""
+    with pytest.raises(UsageError, match="is empty, as a variable that is not set"):
+        _parser().parse_args(words)

@@ -86,7 +86,10 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for name, holder in held.items():
         if holder is not None:
             pieces = ", ".join(holder.pieces)
-            console.print(f"units: {name}: a table or holder is left out: {pieces}", markup=False)
+            console.print(
+                f"units: {name}: a table or holder is left out of the surface: {pieces}",
+                markup=False,
+            )
     evidence = _evidence(out_folder, plan, engine, windows)
     survey, inside = {}, {}
     found = {

@@ -35,6 +35,7 @@ def declare_slices(parser: argparse.ArgumentParser) -> None:
 def declare_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input",
+        type=_named,
         help="a path: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of planes (TIFF, "
         "PNG, JPEG), Imaris, HDF5 (FILE.h5:/KEY), NRRD, MRC, CZI, ...; or an http(s):// or s3:// "
         "address of OME-Zarr, TIFF or N5",
@@ -107,10 +108,23 @@ def declare_out(parser: argparse.ArgumentParser) -> None:
 
 def _place(text: str) -> Path | str:
     """Return a local path, or an address as it is."""
-    scheme, mark, path = text.partition("://")
+    scheme, mark, path = _named(text).partition("://")
     if not mark:
         return Path(text)
     return Path(unquote(path)) if scheme == "file" else text
+
+
+def _named(text: str) -> str:
+    """Return a name as it is; an empty one would mean the folder in which the command runs."""
+    if not text:
+        raise argparse.ArgumentTypeError(
+            "is empty, as a variable that is not set: expected a name (. is this folder)"
+        )
+    return text
+
+
+def _file(text: str) -> Path:
+    return Path(_named(text))
 
 
 def _worker_count(text: str) -> int:
@@ -216,7 +230,7 @@ def declare_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--preset", help=f"{presets}, none, or a TOML file of your own (default: by the input)"
     )
-    parser.add_argument("--config", type=Path, help="settings (see `stereocell settings`)")
+    parser.add_argument("--config", type=_file, help="settings (see `stereocell settings`)")
 
 
 def declare_build(parser: argparse.ArgumentParser) -> None:
@@ -247,7 +261,7 @@ def declare_stage(parser: argparse.ArgumentParser) -> None:
 def declare_bundle(parser: argparse.ArgumentParser) -> None:
     declare_out(parser)
     declare_workers(parser)
-    parser.add_argument("--stage", type=Path, help="an edited stage, instead of OUT/stage")
+    parser.add_argument("--stage", type=_file, help="an edited stage, instead of OUT/stage")
 
 
 def declare_check(parser: argparse.ArgumentParser) -> None:
@@ -259,7 +273,7 @@ def declare_check(parser: argparse.ArgumentParser) -> None:
         help="also hold the stage against its source, and the bundle against the stage",
     )
     parser.add_argument(
-        "--stage", type=Path, help="what the bundle was exported from, instead of OUT/stage"
+        "--stage", type=_file, help="what the bundle was exported from, instead of OUT/stage"
     )
 
 
@@ -273,7 +287,7 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
         "--channel", default="", metavar="X", help="learn from this one, by name or index"
     )
     parser.add_argument(
-        "--model", type=Path, metavar="FILE.onnx", help="a network of your own (docs/tissue.md)"
+        "--model", type=_file, metavar="FILE.onnx", help="a network of your own (docs/tissue.md)"
     )
     parser.add_argument(
         "--everywhere",
@@ -315,13 +329,13 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
 
 def declare_export(parser: argparse.ArgumentParser) -> None:
     declare_out(parser)
-    parser.add_argument("file", type=Path, metavar="FILE", help="what to write, by its ending")
+    parser.add_argument("file", type=_file, metavar="FILE", help="what to write, by its ending")
     parser.add_argument("--channels", type=_names, default=(), metavar="A,B", help="these alone")
     parser.add_argument(
         "--tiles", type=_names, default=(), metavar="r0_c0,r0_c1", help="these alone"
     )
     parser.add_argument("--region", metavar="x0:x1,y0:y1,z0:z1", help="in um, as the stage has it")
-    parser.add_argument("--stage", type=Path, help="an edited stage, instead of OUT/stage")
+    parser.add_argument("--stage", type=_file, help="an edited stage, instead of OUT/stage")
     surfaces = parser.add_argument_group("surfaces")
     surfaces.add_argument("--lod", type=_count, help="level of detail (default 0: the finest)")
     surfaces.add_argument(
@@ -380,7 +394,10 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
 def declare_publish(parser: argparse.ArgumentParser) -> None:
     declare_out(parser)
     parser.add_argument(
-        "target", metavar="TARGET", help="a folder, or an address, as s3://bucket/specimen"
+        "target",
+        type=_named,
+        metavar="TARGET",
+        help="a folder, or an address, as s3://bucket/specimen",
     )
     parser.add_argument(
         "--url",
