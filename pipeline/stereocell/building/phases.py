@@ -43,6 +43,7 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
+from stereocell.read.cast import CAST
 from stereocell.read.open_dataset import READERS
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.atomic_write import write_bytes
@@ -139,7 +140,8 @@ def settle(source: str, settings: Settings) -> Plan:
     if settings.objects.table and len(plan.labels) > 1:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
     for note in (
-        *dataset.notes,
+        # numbers of objects are read as they are
+        *(note for note in dataset.notes if not (alone and note.startswith(CAST))),
         *gaps,
         *objects,
         *told_in_vain(settings, channels),
