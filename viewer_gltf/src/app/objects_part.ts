@@ -119,6 +119,13 @@ export class ObjectsPart {
     return true;
   }
 
+  /** The number of the object along a ray in its label map; null: there is none. */
+  labelAlong(ray: Ray): Readonly<{ channel: string; label: string }> | null {
+    const met = this.meet(ray);
+    const label = met && this.objects.get(met.channel)?.table.label(met.row);
+    return met && label ? { channel: met.channel, label } : null;
+  }
+
   /** The objects that are meant, as a table; null: it is on its way, or there is none. */
   csv(): string | null {
     for (const { id, shown } of this.state?.channels ?? []) {

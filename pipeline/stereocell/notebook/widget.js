@@ -1,0 +1,174 @@
+// The widget's view: the viewer's page in a frame of its own, and the messages between it and the kernel.
+// The frame is of no origin (a sandbox), so that a bundle can reach neither the notebook nor its server.
+
+/** What the kernel sent for good: the page, for all widgets, and small files, for a view that comes again. */
+const kept = new Map();
+const MOST_KEPT = 64 * 2 ** 20;
+let keptBytes = 0;
+/** Of the state, what goes both ways. */
+const SHARED = ["link", "channels", "view", "picked"];
+
+/** Asks of the kernel; each answer is of one question. */
+function kernelOf(model) {
+  const waiting = new Map();
+  const mine = crypto.randomUUID();
+  let last = 0;
+  const hear = (content, buffers) => {
+    const answer = waiting.get(content.id);
+    if (answer === undefined) return; // of another view of the same widget
+    waiting.delete(content.id);
+    answer({ ...content, buffers: buffers.map(bytesOf) });
+  };
+  model.on("msg:custom", hear);
+  return {
+    ask: (question) =>
+      new Promise((resolve) => {
+        const id = `${mine}/${++last}`;
+        waiting.set(id, resolve);
+        model.send({ ...question, id });
+      }),
+    leave: () => model.off("msg:custom", hear),
+  };
+}
+
+/** Buffers come as views of whatever the notebook's program has: a copy of one's own may be handed on. */
+function bytesOf(buffer) {
+  const isView = ArrayBuffer.isView(buffer);
+  return isView
+    ? new Uint8Array(buffer.buffer, buffer.byteOffset, buffer.byteLength).slice()
+    : new Uint8Array(buffer).slice();
+}
+
+async function pageOf(kernel, model) {
+  const key = `page ${model.get("_page")}`;
+  if (!kept.has(key)) {
+    kept.set(key, await kernel.ask({ ask: "page" }));
+  }
+  const { html, names, buffers } = kept.get(key);
+  return { html, files: new Map(names.map((name, i) => [name, buffers[i]])) };
+}
+
+async function fileOf(kernel, model, { path, range }) {
+  const key = `${model.get("_bundle")} ${range} ${path}`;
+  const found = kept.get(key);
+  if (found !== undefined) return found;
+  const { status, buffers } = await kernel.ask({ ask: "file", path, range });
+  const answer = { status, bytes: buffers[0] ?? new Uint8Array() };
+  if (keptBytes + answer.bytes.length <= MOST_KEPT) {
+    keptBytes += answer.bytes.length;
+    kept.set(key, answer);
+  }
+  return answer;
+}
+
+function same(a, b) {
+  return JSON.stringify(a) === JSON.stringify(b);
+}
+
+function render({ model, el }) {
+  const root = document.createElement("div");
+  root.className = "stereocell";
+  const picture = document.createElement("img");
+  picture.alt = `StereoCell: ${model.get("name")}`;
+  const words = document.createElement("p");
+  root.append(picture, words);
+  const bar = document.createElement("div");
+  bar.className = "stereocell-bar";
+  const keep = document.createElement("button");
+  keep.textContent = "Keep this picture";
+  keep.title = "The saved notebook shows it where no kernel runs. The view is drawn anew by this.";
+  keep.disabled = true;
+  keep.onclick = () => port?.postMessage({ type: "keep" });
+  const quality = document.createElement("span");
+  quality.textContent = model.get("quality");
+  bar.append(keep, quality);
+  el.append(root, bar);
+  const frame = document.createElement("iframe");
+  const kernel = kernelOf(model);
+  let port = null;
+  /** What both sides know of: what comes back is no news. */
+  let known = {};
+
+  const showHeight = () => root.style.setProperty("height", `${model.get("height")}px`);
+  const showPicture = () => {
+    const bytes = model.get("_picture");
+    picture.hidden = !(bytes?.byteLength > 0);
+    if (picture.hidden) return;
+    let text = "";
+    for (const byte of bytesOf(bytes)) text += String.fromCharCode(byte);
+    picture.src = `data:image/png;base64,${btoa(text)}`;
+  };
+  const tell = () => {
+    const state = Object.fromEntries(SHARED.map((name) => [name, model.get(name)]));
+    const news = SHARED.filter((name) => !same(state[name], known[name]));
+    if (port === null || news.length === 0) return;
+    known = state;
+    port.postMessage({ type: "state", state: Object.fromEntries(news.map((n) => [n, state[n]])) });
+  };
+  /** What the link, which the page has opened with, does not say. */
+  const tellAll = () => {
+    const { channels, view, picked } = Object.fromEntries(SHARED.map((n) => [n, model.get(n)]));
+    const isNamed = picked !== null && picked.tile === undefined; // else the link has it, or nobody
+    const state = { channels, view, ...(isNamed ? { picked } : {}) };
+    port?.postMessage({ type: "state", state });
+  };
+  const take = (state) => {
+    known = { ...known, ...state };
+    for (const [name, value] of Object.entries(state)) model.set(name, value);
+    model.save_changes();
+  };
+
+  const hear = async ({ data }) => {
+    if (data.type === "file") {
+      const { status, bytes } = await fileOf(kernel, model, data);
+      port?.postMessage({ type: "file", id: data.id, status, bytes });
+    } else if (data.type === "state") take(data.state);
+    else if (data.type === "open") tellAll();
+    else if (data.type === "shown") {
+      root.dataset.state = "live";
+      keep.disabled = false;
+    } else if (data.type === "picture") {
+      model.send({ ask: "picture", keep: data.keep }, undefined, [data.png]);
+    }
+    if (data.type === "failed") words.textContent = `The viewer can't run here: ${data.text}`;
+  };
+  const begin = async () => {
+    const { files } = await pageOf(kernel, model);
+    const { port1, port2 } = new MessageChannel();
+    port?.close();
+    port = port1;
+    port.onmessage = (event) => void hear(event);
+    known = Object.fromEntries(SHARED.map((name) => [name, model.get(name)]));
+    const message = { stereocell: "begin", files, view: model.get("link") };
+    frame.contentWindow?.postMessage(message, "*", [port2]);
+  };
+  const open = async () => {
+    words.textContent = "A picture, until the kernel answers: it does between two cells.";
+    const { html } = await pageOf(kernel, model);
+    words.textContent = "";
+    frame.title = picture.alt;
+    frame.setAttribute("sandbox", "allow-scripts allow-downloads");
+    frame.allow = "fullscreen; xr-spatial-tracking; clipboard-write";
+    frame.srcdoc = html;
+    frame.addEventListener("load", () => void begin()); // anew where the notebook moves it about
+    root.append(frame);
+  };
+  const watched = [
+    ["change:height", showHeight],
+    ["change:_picture", showPicture],
+    ...SHARED.map((name) => [`change:${name}`, tell]),
+  ];
+  for (const [event, then] of watched) model.on(event, then);
+  showHeight();
+  showPicture();
+  void open();
+  return () => {
+    for (const [event, then] of watched) model.off(event, then);
+    kernel.leave();
+    port?.close();
+    root.remove();
+    bar.remove();
+  };
+}
+
+export default { render };
