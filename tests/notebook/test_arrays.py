@@ -38,7 +38,7 @@ def of_xarray(data, z=(0.0, 2.0, 4.0, 6.0), units="um", **others):
 
 def written(array, tmp_path, *, channels=None, spacing_um=SPACING, blocks=(1, 1, 1)):
     file = tmp_path / "array.ome.tif"
-    write_source(as_source(array, spacing_um, channels), file, blocks, "array")
+    write_source(as_source(array, spacing_um, channels), file, blocks)
     return open_volume(file)
 
 

@@ -18,7 +18,7 @@ BALLS = """
 import numpy as np, stereocell
 z, y, x = np.ogrid[:24, :48, :48]
 r = np.sqrt((2 * (z - 12)) ** 2 + (y - 24) ** 2 + (x - 24) ** 2)
-ball = (900 / (1 + np.exp(r - 15)) + 100).astype(np.uint16)
+ball, small = ((900 / (1 + np.exp(r - radius)) + 100).astype(np.uint16) for radius in (17, 9))
 """
 
 
@@ -27,18 +27,37 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
     exec(BALLS, made)
     monkeypatch.setattr(arrays, "MOST_VOXELS", 20_000)
     monkeypatch.setattr(arrays.find_blocks, "__defaults__", (20_000,))
-    stack = np.stack([made["ball"], made["ball"][::-1]])
+    stack = np.stack([made["small"], made["ball"]])
     out = tmp_path / "out"
     viewer = stereocell.show(
-        stack, spacing_um=(0.5, 0.25, 0.25), channels=["DNA", "CD3"], name="ball", out=out
+        stack, spacing_um=(0.5, 0.25, 0.25), channels=["DNA", "CD3"], name="a ball/1", out=out
     )
     assert viewer._files.channels == ["DNA", "CD3"]
     assert viewer.quality.startswith("means of 1 x 3 x 3 voxels (z, y, x): the array has 110,592")
+    assert viewer.name == "a ball_1"
     assert "24 x 16 x 16 voxels" in viewer.told
     assert capsys.readouterr() == ("", "")  # a notebook is no log
-    picture = np.asarray(Image.open(io.BytesIO(viewer._draw())).convert("RGB"))
-    assert picture.shape[1] == 800
-    assert picture.max() > 100
+
+    def drawn(**looks):
+        found = viewer._draw(looks)
+        return (
+            np.asarray(Image.open(io.BytesIO(found)).convert("RGB")).astype(int) if found else None
+        )
+
+    both = drawn()
+    assert both.shape[1] == 640
+    assert both.max() > 100
+    # as the channels look: another colour, hidden, seen through
+    only = drawn(DNA={"color": "#ff0000"}, CD3={"visible": False})
+    assert only[..., 0].max() > 2 * only[..., 2].max()
+    blue = {"color": "#0000ff"}
+    over = drawn(DNA={"color": "#ff0000"}, CD3=blue)
+    through = drawn(DNA={"color": "#ff0000"}, CD3={"opacity": 0.25, **blue})
+    middle = over.shape[0] // 2, over.shape[1] // 2
+    assert over[middle][2] > 2 * over[middle][0]
+    assert through[middle][0] == pytest.approx(0.75 * only[..., 0].max(), rel=0.2)
+    assert through[middle][2] > 0.25 * over[middle][2] - 2
+    assert drawn(DNA={"visible": False}, CD3={"opacity": 0.0}) is None
     # shown again from its folder, which stays, with nothing built
     assert stereocell.show(out).name == viewer.name
 

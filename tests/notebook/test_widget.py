@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("built_page")
 
 @pytest.fixture
 def viewer(bundle, monkeypatch):
-    made = Viewer(NotebookBundle(bundle), draw=png)
+    made = Viewer(NotebookBundle(bundle), draw=lambda looks: png())
     made.sent = []
     monkeypatch.setattr(
         made, "send", lambda content, buffers=(): made.sent.append((content, list(buffers)))

@@ -170,7 +170,7 @@ def say_quality(source: ArraySource, blocks: tuple[int, int, int]) -> str:
     )
 
 
-def write_source(source: ArraySource, path: Path, blocks: tuple[int, int, int], name: str) -> None:
+def write_source(source: ArraySource, path: Path, blocks: tuple[int, int, int]) -> None:
     """Write an array as OME-TIFF. Raises UsageError for values that no file holds."""
     count, depth, *_ = source.shape
     coarse = [
@@ -181,7 +181,6 @@ def write_source(source: ArraySource, path: Path, blocks: tuple[int, int, int], 
     spacing = [s * b for s, b in zip(source.spacing_um, blocks, strict=True)]
     metadata = {
         "axes": "CZYX",
-        "Name": name,
         "Channel": {"Name": list(source.channels)},
         **{f"PhysicalSize{axis}": edge for axis, edge in zip("ZYX", spacing, strict=True)},
         **{f"PhysicalSize{axis}Unit": "um" for axis in "ZYX"},

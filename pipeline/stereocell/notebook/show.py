@@ -4,9 +4,13 @@ Imports are lazy: `import stereocell` takes none of them.
 """
 
 import atexit
+import io
+import re
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stderr
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -114,14 +118,14 @@ def _viewer(
     told: str = "",
 ) -> "Viewer":
     from stereocell.notebook.bundle_files import NotebookBundle
-    from stereocell.notebook.picture import draw
+    from stereocell.notebook.picture import draw, no_picture
     from stereocell.notebook.widget import Viewer
 
     viewer = Viewer(
         NotebookBundle(bundle),
         quality=quality,
         told=told,
-        draw=bytes if out is None else lambda: draw(out),
+        draw=no_picture if out is None else partial(draw, out),
         height=height,
     )
     for trait, value in state.items():
@@ -141,7 +145,6 @@ def _build(
     settings: Mapping[str, Any],
 ) -> tuple[str, str]:
     """Build a source or an array in a folder; return words about its quality, and what was said."""
-    from stereocell.engine.run import console
     from stereocell.notebook import arrays
 
     chosen = ""
@@ -154,14 +157,30 @@ def _build(
         blocks = (1, 1, 1) if is_full else arrays.find_blocks(given)
         chosen = arrays.say_quality(given, blocks)
         folder.mkdir(parents=True, exist_ok=True)
-        source = folder / "array.ome.tif"
-        arrays.write_source(given, source, blocks, name or "array")
+        # the build is called as its file is
+        called = re.sub(r"[^\w .-]", "_", name)[:60].strip(" .") or "array"
+        source = folder / f"{called}.ome.tif"
+        arrays.write_source(given, source, blocks)
     else:
         plan = wanted.setdefault("plan", {})
         if spacing_um is not None:
             plan["spacing_um"] = tuple(spacing_um)
         if channels is not None:
             plan["channels"] = tuple(channels)
-    with console.capture() as said:
+    with _heard() as said:
         build(source, folder, preset=preset, settings=wanted)
-    return chosen, said.get()
+    return chosen, said.getvalue()
+
+
+@contextmanager
+def _heard() -> Iterator[io.StringIO]:
+    """Take what a build says, which a notebook would keep among its outputs."""
+    from stereocell.engine.run import console
+
+    said = io.StringIO()
+    before, console.is_jupyter = console.is_jupyter, False
+    try:
+        with redirect_stderr(said):
+            yield said
+    finally:
+        console.is_jupyter = before

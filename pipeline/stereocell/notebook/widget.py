@@ -16,6 +16,7 @@ from IPython.display import display, update_display
 
 from stereocell.notebook import page
 from stereocell.notebook.bundle_files import NotebookBundle
+from stereocell.notebook.picture import Looks, no_picture
 from stereocell.notebook.shared_state import (
     check_channels,
     check_link,
@@ -63,12 +64,12 @@ class Viewer(anywidget.AnyWidget):
         *,
         quality: str = "",
         told: str = "",
-        draw: Callable[[], bytes] = bytes,
+        draw: Callable[[Looks], bytes] = no_picture,
         height: int = 520,
     ) -> None:
         """
-        draw  returns a PNG of the specimen, for a notebook that no browser has opened; empty: none
-              can be drawn
+        draw  returns a PNG of the specimen by the channels' looks, for a notebook that no browser
+              has opened; empty: none can be drawn
         """
         self._files = bundle
         self._draw = draw
@@ -91,24 +92,27 @@ class Viewer(anywidget.AnyWidget):
         A page that is open draws it a second after each change; its view begins anew by this.
         """
         if self._display_id and self._picture:
-            update_display(self._mime(), raw=True, display_id=self._display_id)
+            data, about = self._output()
+            update_display(data, metadata=about, raw=True, display_id=self._display_id)
 
     # --- the notebook's side
 
     def _ipython_display_(self, **_: Any) -> None:
         if not self._picture:
-            self._picture = self._draw()
+            self._picture = self._draw(self.channels)
         self._display_id = self._display_id or secrets.token_hex(8)
-        display(self._mime(), raw=True, display_id=self._display_id)
+        data, about = self._output()
+        display(data, metadata=about, raw=True, display_id=self._display_id)
 
-    def _mime(self) -> dict[str, Any]:
+    def _output(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the output by media type, and what is said about it."""
         data: dict[str, Any] = {
             "text/plain": f"StereoCell: {self.name}",
             _VIEW: {"version_major": 2, "version_minor": 0, "model_id": self.model_id},
         }
         if self._picture:
             data["image/png"] = base64.b64encode(self._picture).decode()
-        return data
+        return data, {"image/png": {"alt": data["text/plain"]}} if self._picture else {}
 
     # --- the page's side
 
