@@ -14,8 +14,9 @@ from stereocell.storage.assets import viewer_dist
 
 _FRAME = Path(__file__).with_name("frame.js")
 _TAKEN = {".js", ".css", ".wasm"}
+# a worker from blob: has the frame's policy, and that of textures makes functions of text
 _POLICY = (
-    "default-src 'none'; script-src blob: 'wasm-unsafe-eval' 'sha256-{boot}'; style-src blob:; "
+    "default-src 'none'; script-src blob: 'unsafe-eval' 'sha256-{boot}'; style-src blob:; "
     "img-src data: blob:; connect-src data: blob:; worker-src blob:; base-uri 'none'; "
     "form-action 'none'"
 )

@@ -1,7 +1,8 @@
 // The widget's view: the viewer's page in a frame of its own, and the messages between it and the kernel.
 // The frame is of no origin (a sandbox), so that a bundle can reach neither the notebook nor its server.
 
-/** What the kernel sent for good: the page, for all widgets, and small files, for a view that comes again. */
+/** The page's files, for all widgets; and files of bundles, for a view that comes again. */
+const pages = new Map();
 const kept = new Map();
 const MOST_KEPT = 64 * 2 ** 20;
 let keptBytes = 0;
@@ -40,11 +41,9 @@ function bytesOf(buffer) {
 }
 
 async function pageOf(kernel, model) {
-  const key = `page ${model.get("_page")}`;
-  if (!kept.has(key)) {
-    kept.set(key, await kernel.ask({ ask: "page" }));
-  }
-  const { html, names, buffers } = kept.get(key);
+  const key = model.get("_page");
+  if (!pages.has(key)) pages.set(key, await kernel.ask({ ask: "page" }));
+  const { html, names, buffers } = pages.get(key);
   return { html, files: new Map(names.map((name, i) => [name, buffers[i]])) };
 }
 
@@ -54,11 +53,19 @@ async function fileOf(kernel, model, { path, range }) {
   if (found !== undefined) return found;
   const { status, buffers } = await kernel.ask({ ask: "file", path, range });
   const answer = { status, bytes: buffers[0] ?? new Uint8Array() };
-  if (keptBytes + answer.bytes.length <= MOST_KEPT) {
-    keptBytes += answer.bytes.length;
-    kept.set(key, answer);
-  }
+  keep(key, answer);
   return answer;
+}
+
+/** The newest files stay. */
+function keep(key, answer) {
+  keptBytes += answer.bytes.length;
+  kept.set(key, answer);
+  for (const [oldest, { bytes }] of kept) {
+    if (keptBytes <= MOST_KEPT) return;
+    keptBytes -= bytes.length;
+    kept.delete(oldest);
+  }
 }
 
 function same(a, b) {
@@ -74,14 +81,14 @@ function render({ model, el }) {
   root.append(picture, words);
   const bar = document.createElement("div");
   bar.className = "stereocell-bar";
-  const keep = document.createElement("button");
-  keep.textContent = "Keep this picture";
-  keep.title = "The saved notebook shows it where no kernel runs. The view is drawn anew by this.";
-  keep.disabled = true;
-  keep.onclick = () => port?.postMessage({ type: "keep" });
+  const keeper = document.createElement("button");
+  keeper.textContent = "Keep this picture";
+  keeper.title = "The saved notebook shows it where no kernel runs. The view is drawn anew by this.";
+  keeper.disabled = true;
+  keeper.onclick = () => port?.postMessage({ type: "keep" });
   const quality = document.createElement("span");
   quality.textContent = model.get("quality");
-  bar.append(keep, quality);
+  bar.append(keeper, quality);
   el.append(root, bar);
   const frame = document.createElement("iframe");
   const kernel = kernelOf(model);
@@ -113,8 +120,9 @@ function render({ model, el }) {
     port?.postMessage({ type: "state", state });
   };
   const take = (state) => {
-    known = { ...known, ...state };
-    for (const [name, value] of Object.entries(state)) model.set(name, value);
+    const told = Object.fromEntries(Object.entries(state).filter(([name]) => SHARED.includes(name)));
+    known = { ...known, ...told };
+    for (const [name, value] of Object.entries(told)) model.set(name, value);
     model.save_changes();
   };
 
@@ -126,7 +134,7 @@ function render({ model, el }) {
     else if (data.type === "open") tellAll();
     else if (data.type === "shown") {
       root.dataset.state = "live";
-      keep.disabled = false;
+      keeper.disabled = false;
     } else if (data.type === "picture") {
       model.send({ ask: "picture", keep: data.keep }, undefined, [data.png]);
     }

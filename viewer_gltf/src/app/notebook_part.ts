@@ -11,6 +11,7 @@ import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
 import { COLOR, OPACITY } from "../state/parameters/channel";
 import { setTo } from "../state/parameters/kinds";
+import { isTraced } from "../state/parameters/volumes";
 import type { ChannelState } from "../state/viewer_state";
 import type { Viewer } from "./viewer";
 
@@ -49,6 +50,8 @@ const BETWEEN_MS = 200;
 /** Without a change until a picture is made, ms. */
 const REST_MS = 1200;
 const POSTER_PX = 960;
+/** Of light, a pixel: a picture of fewer is noise. */
+const LEAST_SAMPLES = 64;
 /** Digits of what is told: more are noise of the camera. */
 const DIGITS = 6;
 
@@ -166,10 +169,24 @@ export class NotebookPart {
 
   /** Show what Python asks for, and tell what it has come to. */
   private follow(asked: Asked): void {
-    const { viewer, ranges } = this;
+    const { viewer } = this;
     this.known = { ...this.known, ...(asked as Partial<Shared>) };
     viewer.stopTurning();
-    if (asked.link !== undefined) this.openLink(asked.link);
+    this.followLooks(asked);
+    if (asked.link !== undefined && asked.link !== this.shared.link) {
+      this.openLink(asked.link);
+      this.followLooks(asked);
+    }
+    if (asked.picked !== undefined && !isSame(asked.picked, this.picked)) {
+      this.picked = asked.picked;
+      const points = asked.picked === null ? [] : [asked.picked.point_um];
+      viewer.dispatch({ type: "measure", points });
+    }
+    this.note();
+  }
+
+  private followLooks(asked: Asked): void {
+    const { viewer, ranges } = this;
     for (const channel of viewer.state.channels) {
       const look = asked.channels?.[channel.id];
       const range = ranges.get(channel.id) ?? [0, 1];
@@ -184,12 +201,6 @@ export class NotebookPart {
       const specimen = viewer.cameraView?.specimen ?? null;
       viewer.lookFrom({ position: inRoom(eye_um), target: inRoom(target_um), specimen });
     }
-    if (asked.picked !== undefined && !isSame(asked.picked, this.picked)) {
-      this.picked = asked.picked;
-      const points = asked.picked === null ? [] : [asked.picked.point_um];
-      viewer.dispatch({ type: "measure", points });
-    }
-    this.note();
   }
 
   private openLink(link: string): void {
@@ -222,8 +233,17 @@ export class NotebookPart {
     // what is news will be told in a moment, and rest again
     const isDue = link !== this.pictured && link === this.known.link;
     if (viewer.stereo.kind !== null || !(isDue || keep)) return;
+    const hasLight = !isTraced(viewer.state) || viewer.snapshot().traced.samples >= LEAST_SAMPLES;
+    if (!hasLight && !keep) {
+      this.rest = window.setTimeout(() => void this.picture(), REST_MS);
+      return;
+    }
     this.pictured = link;
-    const blob = await viewer.poster(POSTER_PX);
+    const { signal } = new AbortController();
+    const blob = hasLight
+      ? await viewer.poster(POSTER_PX)
+      : await viewer.picture(1, (words) => viewer.onAnnounce(`Picture: ${words}`), signal);
+    if (blob === null) return;
     const png = await blob.arrayBuffer();
     this.port.postMessage({ type: "picture", keep, png }, [png]);
   }

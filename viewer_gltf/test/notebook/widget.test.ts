@@ -136,6 +136,29 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     await front.stop();
   });
 
+  const REAL = process.env.STEREOCELL_REAL_BUNDLE;
+  test.skipIf(REAL === undefined)(
+    "textures, and light from files of the page, come too",
+    async () => {
+      kernel.stop();
+      kernel = new Kernel(REAL ?? "");
+      const front = await open();
+      const faults: string[] = [];
+      front.page.on("pageerror", ({ message }) => faults.push(message));
+      const frame = await front.viewer();
+      kernel.run("viewer.link = '#v=1&mode=traced'");
+      const state = () => frame.evaluate(() => window.stereocell?.snapshot().state);
+      await expect.poll(async () => (await state())?.mode).toBe("traced");
+      await expect
+        .poll(() => kernel.told.some((text) => text.includes("environments/")))
+        .toBe(true);
+      await frame.evaluate(() => window.stereocell?.settled());
+      expect((await state())?.notices).toEqual([]);
+      expect(faults).toEqual([]);
+      await front.stop();
+    },
+  );
+
   test("where the page may not run its picture stands, with the reason", async () => {
     const front = await open({ headers: { "Content-Security-Policy": STRICT } });
     await front.cell.waitForFunction(() =>

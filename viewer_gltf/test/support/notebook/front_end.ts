@@ -86,7 +86,7 @@ export type Surroundings = Readonly<{
 export class FrontEnd {
   private constructor(
     private readonly hosts: readonly Host[],
-    private readonly page: Page,
+    readonly page: Page,
     /** The output. */
     readonly cell: Frame,
   ) {}
