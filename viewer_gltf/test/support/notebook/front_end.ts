@@ -114,7 +114,7 @@ export class FrontEnd {
     for (const [path, body] of Object.entries(pages))
       host.overrides.set(path, { status: 200, body });
     const cellAddress = `${host.address}/cell.html`;
-    const around = `<iframe src="${cellAddress}" width="600" height="540"></iframe>`;
+    const around = `<iframe src="${cellAddress}" width="600" height="280"></iframe>`;
     outer.overrides.set("/outer.html", { status: 200, body: around });
     await page.exposeFunction("toKernel", (message: string) => kernel.tell(JSON.parse(message)));
     await page.goto(isForeign ? `${outer.address}/outer.html` : cellAddress);
