@@ -104,43 +104,41 @@ def published():
     InteractiveShell.clear_instance()
 
 
-def test_its_output_has_the_picture_beside_the_widget(viewer, published):
+def test_its_output_is_the_widget_and_the_picture_below(viewer, published):
     viewer._ipython_display_()
-    (output,) = published
-    data = output["data"]
-    assert data["application/vnd.jupyter.widget-view+json"]["model_id"] == viewer.model_id
-    assert data["image/png"].startswith("iVBORw0KGgo")
-    assert "two tiles" in data["text/plain"]
-    assert output["transient"]["display_id"]
+    widget, picture = (output["data"] for output in published)
+    assert widget["application/vnd.jupyter.widget-view+json"]["model_id"] == viewer.model_id
+    assert "two tiles" in widget["text/plain"]
+    assert "image/png" not in widget
+    assert picture["image/png"].startswith("iVBORw0KGgo")
+    assert published[1]["metadata"] == {"image/png": {"alt": "StereoCell: two tiles"}}
+    assert published[1]["transient"]["display_id"]
 
 
-def test_a_page_s_picture_takes_its_place_when_it_is_to_be_kept(viewer, published):
+def test_a_page_s_picture_takes_its_place_and_the_widget_stays(viewer, published):
     viewer._ipython_display_()
     first = viewer._picture
-    hear(viewer, {"ask": "picture", "keep": False}, [memoryview(png("blue"))])
+    hear(viewer, {"ask": "picture"}, [memoryview(png("blue"))])
     assert viewer._picture == png("blue") != first
-    assert len(published) == 1
-    hear(viewer, {"ask": "picture", "keep": True}, [memoryview(png("green"))])
-    shown, again = published
+    _, shown, again = published
     assert again["update"]
     assert again["transient"] == shown["transient"]
     assert again["data"]["image/png"] != shown["data"]["image/png"]
-    viewer.keep()
-    assert len(published) == 3
+    assert again["metadata"] == shown["metadata"]
 
 
 def test_what_is_no_picture_is_not_kept(viewer):
     for sent in ([], [memoryview(b"<svg>")], [memoryview(png() + bytes(5 * 2**20))]):
-        hear(viewer, {"ask": "picture", "keep": True}, sent)
+        hear(viewer, {"ask": "picture"}, sent)
         assert viewer._picture == b""
 
 
 def test_where_none_can_be_drawn_the_page_s_first_picture_is_kept(bundle, published):
     viewer = Viewer(NotebookBundle(bundle))
     viewer._ipython_display_()
-    assert "image/png" not in published[0]["data"]
-    viewer._handle_custom_msg({"ask": "picture", "keep": False}, [memoryview(png())])
-    assert "image/png" in published[1]["data"]
+    assert "image/png" not in published[1]["data"]
+    viewer._handle_custom_msg({"ask": "picture"}, [memoryview(png())])
+    assert "image/png" in published[2]["data"]
 
 
 def test_a_bundle_by_itself_is_shown_as_the_view_asks_for(bundle):

@@ -68,6 +68,17 @@ function keep(key, answer) {
   }
 }
 
+/** The output with the picture, which comes after the widget's; null: this program has it elsewhere. */
+function pictureBelow(el) {
+  for (let node = el; node !== null; node = node.parentElement ?? node.getRootNode().host ?? null) {
+    const next = node.nextElementSibling;
+    if (next === null) continue;
+    const isPicture = next.querySelectorAll("img").length === 1 && next.innerText.trim() === "";
+    return isPicture ? next : null;
+  }
+  return null;
+}
+
 function same(a, b) {
   return JSON.stringify(a) === JSON.stringify(b);
 }
@@ -81,20 +92,15 @@ function render({ model, el }) {
   root.append(picture, words);
   const bar = document.createElement("div");
   bar.className = "stereocell-bar";
-  const keeper = document.createElement("button");
-  keeper.textContent = "Keep this picture";
-  keeper.title = "The saved notebook shows it where no kernel runs. The view is drawn anew by this.";
-  keeper.disabled = true;
-  keeper.onclick = () => port?.postMessage({ type: "keep" });
-  const quality = document.createElement("span");
-  quality.textContent = model.get("quality");
-  bar.append(keeper, quality);
+  bar.textContent = model.get("quality");
   el.append(root, bar);
   const frame = document.createElement("iframe");
   const kernel = kernelOf(model);
   let port = null;
   /** What both sides know of: what comes back is no news. */
   let known = {};
+  /** The output below, while this lives. */
+  let hidden = null;
 
   const showHeight = () => root.style.setProperty("height", `${model.get("height")}px`);
   const showPicture = () => {
@@ -134,9 +140,10 @@ function render({ model, el }) {
     else if (data.type === "open") tellAll();
     else if (data.type === "shown") {
       root.dataset.state = "live";
-      keeper.disabled = false;
+      hidden = pictureBelow(el);
+      if (hidden !== null) hidden.style.display = "none";
     } else if (data.type === "picture") {
-      model.send({ ask: "picture", keep: data.keep }, undefined, [data.png]);
+      model.send({ ask: "picture" }, undefined, [data.png]);
     }
     if (data.type === "failed") words.textContent = `The viewer can't run here: ${data.text}`;
   };
@@ -174,6 +181,7 @@ function render({ model, el }) {
     for (const [event, then] of watched) model.off(event, then);
     kernel.leave();
     port?.close();
+    hidden?.style.removeProperty("display");
     root.remove();
     bar.remove();
   };

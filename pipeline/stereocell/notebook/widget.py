@@ -86,33 +86,29 @@ class Viewer(anywidget.AnyWidget):
         id_ = self._files.ids.get(channel, channel)
         self.channels = {**self.channels, id_: {**self.channels.get(id_, {}), **look}}
 
-    def keep(self) -> None:
-        """Keep the picture as it is now in the notebook's output, for whoever opens it later.
-
-        A page that is open draws it a second after each change; its view begins anew by this.
-        """
-        if self._display_id and self._picture:
-            data, about = self._output()
-            update_display(data, metadata=about, raw=True, display_id=self._display_id)
-
     # --- the notebook's side
 
     def _ipython_display_(self, **_: Any) -> None:
+        """Show the viewer, and below it its picture, by itself: the viewer hides it while it lives.
+
+        JupyterLab shows no picture of an output that was a widget's, and begins an output anew that
+        is given another picture.
+        """
         if not self._picture:
             self._picture = self._draw(self.channels)
-        self._display_id = self._display_id or secrets.token_hex(8)
-        data, about = self._output()
-        display(data, metadata=about, raw=True, display_id=self._display_id)
+        view = {"version_major": 2, "version_minor": 0, "model_id": self.model_id}
+        display({"text/plain": f"StereoCell: {self.name}", _VIEW: view}, raw=True)
+        self._display_id = secrets.token_hex(8)
+        shown = self._shown()
+        display(shown["obj"], metadata=shown["metadata"], raw=True, display_id=self._display_id)
 
-    def _output(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the output by media type, and what is said about it."""
-        data: dict[str, Any] = {
-            "text/plain": f"StereoCell: {self.name}",
-            _VIEW: {"version_major": 2, "version_minor": 0, "model_id": self.model_id},
-        }
+    def _shown(self) -> dict[str, Any]:
+        """Return the picture as an output."""
+        data = {"text/plain": ""}
         if self._picture:
             data["image/png"] = base64.b64encode(self._picture).decode()
-        return data, {"image/png": {"alt": data["text/plain"]}} if self._picture else {}
+        about = {"image/png": {"alt": f"StereoCell: {self.name}"}} if self._picture else {}
+        return {"obj": data, "metadata": about}
 
     # --- the page's side
 
@@ -140,10 +136,9 @@ class Viewer(anywidget.AnyWidget):
             case "picture":
                 png = bytes(buffers[0]) if buffers else b""
                 if png.startswith(_PNG) and len(png) <= _MOST_PICTURE:
-                    is_first = not self._picture
                     self._picture = png
-                    if is_first or content.get("keep") is True:
-                        self.keep()
+                    if self._display_id:
+                        update_display(**self._shown(), raw=True, display_id=self._display_id)
 
     # --- what may be set
 

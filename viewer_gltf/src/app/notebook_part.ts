@@ -114,7 +114,6 @@ export class NotebookPart {
     viewer.onTap = (ray) => void this.pick(ray);
     port.addEventListener("message", ({ data }: MessageEvent) => {
       if (data.type === "state") this.follow(data.state);
-      else if (data.type === "keep") void this.picture(true);
     });
     port.postMessage({ type: "open" });
     void viewer.settled().then(() => port.postMessage({ type: "shown" }));
@@ -225,26 +224,20 @@ export class NotebookPart {
     this.note();
   }
 
-  /** Of the view at rest. @param keep for the saved notebook: asked for by hand */
-  private async picture(keep = false): Promise<void> {
+  /** Of the view at rest, for the saved notebook. */
+  private async picture(): Promise<void> {
     const { viewer } = this;
     await viewer.settled();
     const { link } = this.shared;
     // what is news will be told in a moment, and rest again
-    const isDue = link !== this.pictured && link === this.known.link;
-    if (viewer.stereo.kind !== null || !(isDue || keep)) return;
-    const hasLight = !isTraced(viewer.state) || viewer.snapshot().traced.samples >= LEAST_SAMPLES;
-    if (!hasLight && !keep) {
+    if (link === this.pictured || link !== this.known.link || viewer.stereo.kind !== null) return;
+    if (isTraced(viewer.state) && viewer.snapshot().traced.samples < LEAST_SAMPLES) {
       this.rest = window.setTimeout(() => void this.picture(), REST_MS);
       return;
     }
     this.pictured = link;
-    const { signal } = new AbortController();
-    const blob = hasLight
-      ? await viewer.poster(POSTER_PX)
-      : await viewer.picture(1, (words) => viewer.onAnnounce(`Picture: ${words}`), signal);
-    if (blob === null) return;
+    const blob = await viewer.poster(POSTER_PX);
     const png = await blob.arrayBuffer();
-    this.port.postMessage({ type: "picture", keep, png }, [png]);
+    this.port.postMessage({ type: "picture", png }, [png]);
   }
 }

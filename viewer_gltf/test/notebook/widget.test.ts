@@ -121,6 +121,11 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     const asked = () => kernel.told.filter((text) => text.includes('"ask":"')).length;
     await inPython("len(viewer._picture) > 100").toBe(true);
     const before = asked();
+    // the output with the picture shows where the viewer does not
+    const below = front.cell.locator("#below");
+    expect(await below.isVisible()).toBe(false);
+    await front.leave();
+    expect(await below.isVisible()).toBe(true);
     await front.show();
     const frame = await front.viewer();
     const view = await kernel.ask<View>("viewer.view");

@@ -106,7 +106,7 @@ export class FrontEnd {
     host.headers = headers;
     const style = await readFile(new URL("widget.css", NOTEBOOK), "utf8");
     const pages = {
-      "/cell.html": `<!doctype html><link rel="stylesheet" href="cell.css"><div id="cell"></div>
+      "/cell.html": `<!doctype html><link rel="stylesheet" href="cell.css"><div id="cell"></div><div id="below"><img alt="" src="data:,"></div>
         <script type="module" src="listen.js"></script>`,
       "/cell.css": style,
       "/listen.js": `import widget from "./widget.js"; window.widget = widget; (${listen})();`,
@@ -134,11 +134,14 @@ export class FrontEnd {
     return front;
   }
 
-  /** Show the widget, anew where it was shown. */
+  /** The output is gone. */
+  async leave(): Promise<void> {
+    await this.cell.evaluate(() => (window as unknown as Given).leave());
+  }
+
   async show(): Promise<void> {
     await this.cell.evaluate(() => {
       const given = window as unknown as Given;
-      given.leave?.();
       const el = document.getElementById("cell");
       given.leave = given.widget.render({ model: given.model, el });
     });
