@@ -24,6 +24,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
   beforeEach(() => {
     kernel?.stop();
     kernel = new Kernel(inject("fixture"));
+    kernel.run("viewer.link = '#v=1&quality=low'"); // software draws it
   });
   afterAll(async () => {
     kernel?.stop();
@@ -63,7 +64,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     const link = await kernel.ask<string>("viewer.link");
 
     // a link is the whole view
-    kernel.run("viewer.link = '#v=1'");
+    kernel.run("viewer.link = '#v=1&quality=low'");
     const told = (name: string) => `viewer.channels.get("${first}", {}).get("${name}")`;
     await inPython(told("opacity")).toBe(1);
     await inPython("viewer.view.get('eye_um', [30, 40, 50]) == [30, 40, 50]").toBe(false);
@@ -155,7 +156,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
       const faults: string[] = [];
       front.page.on("pageerror", ({ message }) => faults.push(message));
       const frame = await front.viewer();
-      kernel.run("viewer.link = '#v=1&mode=traced'");
+      kernel.run("viewer.link = '#v=1&quality=low&mode=traced'");
       const state = () => frame.evaluate(() => window.stereocell?.snapshot().state);
       await expect.poll(async () => (await state())?.mode).toBe("traced");
       await expect
