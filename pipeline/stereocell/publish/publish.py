@@ -18,12 +18,13 @@ from typing import Any
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.publish.over_http import fetch_faults
 from stereocell.publish.targets import Target, digest, target_of
-from stereocell.storage.file_list import find_faults, read_list, to_json
+from stereocell.storage.file_list import DAMAGED, find_faults, read_list, to_json
+from stereocell.storage.json_files import read_json
 from stereocell.storage.workspace import cached
 
 PUBLISHED = "stereocell-published.json"
-FILES = "files.json"
-_LAST = ("sw.js", "manifest.json", FILES, "index.html")
+FILES, MANIFEST = "files.json", "manifest.json"
+_LAST = ("sw.js", FILES, MANIFEST, "index.html")
 _REMEDY = "run `stereocell bundle OUT` first"
 _SMALL_BYTES = 1000  # JSON below is as short as it is
 
@@ -116,8 +117,12 @@ def _files_of(bundle: Path) -> dict[str, _File]:
         path, fault = next(iter(faults.items()))
         raise OutputError(f"{bundle / path}: {fault}: {_REMEDY}")
     files = {path: _File(entry, partial(_content, bundle / path)) for path, entry in listed.items()}
-    index = _content(bundle / FILES)
-    files[FILES] = _made(index)
+    # the list names all files but itself and the manifest, which names the list
+    index = _made(_content(bundle / FILES))
+    manifest = read_json(bundle / MANIFEST, None, _REMEDY)
+    if not isinstance(manifest, dict) or manifest.get("files") != {"path": FILES, **index.entry}:
+        raise OutputError(f"{bundle / MANIFEST}: {DAMAGED}, names another {FILES}: {_REMEDY}")
+    files |= {FILES: index, MANIFEST: _made(_content(bundle / MANIFEST))}
     for path, file in list(files.items()):
         is_long = file.entry["bytes"] >= _SMALL_BYTES
         if path.endswith(".json") and is_long and f"{path}.gz" not in files:
