@@ -110,6 +110,22 @@ class Chosen:
         return [one for one in found if not wanted or one.name in wanted or one.id in wanted]
 
     @property
+    def label_maps(self) -> list[ComposedAppearance]:
+        """Return those of the chosen channels whose surfaces are objects."""
+        return [one for one in self.channels if read_columns(self.stage, one.id) is not None]
+
+    def show_as_viewer(self) -> None:
+        """Choose label maps alone where there are any, as the viewer opens, if none are named.
+
+        Surfaces of their image's channels would show through them in patches.
+        """
+        if not self.options.channels and (maps := self.label_maps):
+            if len(maps) < len(self.channels):
+                names = ", ".join(one.name for one in maps)
+                self.report(f"{names} alone, as the viewer opens: --channels takes others")
+            self.channels = maps
+
+    @property
     def region(self) -> Region | None:
         return self.options.region
 

@@ -22,7 +22,6 @@ from stereocell.formats.voxel_grid import VoxelGrid
 from stereocell.model.errors import StageError, UsageError
 from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_appearances import ComposedAppearance
-from stereocell.usd.read_objects import read_columns
 from stereocell.usd.read_stage import ComposedVolume, sides_of
 
 _OFF = 1e-2  # voxels by which a tile may lie beside the lattice of the first
@@ -104,7 +103,7 @@ def find_layout(chosen: Chosen) -> Layout:
             span.add(channel, volume, chosen, is_needed=bits == 16)
     if start is None:
         names = ", ".join(channel.name for channel in chosen.channels)
-        are_maps = all(read_columns(chosen.stage, channel.id) for channel in chosen.channels)
+        are_maps = len(chosen.label_maps) == len(chosen.channels)
         why = ": of a label map the stage has surfaces alone" if are_maps else ""
         raise StageError(f"{chosen.path}: no volume of {names}{why}")
     channels = tuple(channel for channel in chosen.channels if channel.id in found)
