@@ -56,7 +56,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs lock clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -327,6 +327,9 @@ wheel: setup ## A wheel and an sdist with the built viewer in them: out/wheel
 
 docs: $(READY) ## The documentation as a site: out/docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+notebook: setup ## Run docs/jupyter.ipynb and store it with its pictures
+	$(BIN)/python docs/run_jupyter.py
 
 lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

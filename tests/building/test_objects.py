@@ -599,6 +599,17 @@ def test_the_deep_check_measures_the_surfaces_anew(
     assert "column area_um2 is not that of the surface of 3" in said(capsys)
 
 
+def test_numbers_of_objects_are_read_as_they_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    labels = np.zeros((12, 16, 16), np.uint32)
+    labels[3:9, 4:12, 4:12] = 2**31 + 1
+    write_ome_tiff(tmp_path / "cells.ome.tif", labels)
+    build(tmp_path / "cells.ome.tif", tmp_path / "out", "--labels", ".")
+    assert "rounded" not in said(capsys)
+    assert labels_of(tmp_path / "out").tolist() == [2**31 + 1]
+
+
 def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
     """Of two boxes the first lies in the dark, the second in what is stained."""
     labels = np.zeros((20, 24, 48), np.uint16)

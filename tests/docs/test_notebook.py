@@ -1,16 +1,25 @@
 """The documentation as a site: built strictly, with the notebook run and its pictures in it."""
 
+import base64
+import io
 import json
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from stereocell.storage.assets import viewer_dist
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOK = ROOT / "docs" / "notebook.ipynb"
+SHOWN = ROOT / "docs" / "jupyter.ipynb"
 
 
 def test_the_notebook_is_stored_without_outputs() -> None:
@@ -19,6 +28,51 @@ def test_the_notebook_is_stored_without_outputs() -> None:
     code = [cell for cell in cells if cell["cell_type"] == "code"]
     assert len(code) > 6
     assert all(not cell["outputs"] and cell["execution_count"] is None for cell in code)
+
+
+def outputs(notebook: Any) -> list[dict[str, Any]]:
+    """Return all that was shown, by media type; what was printed as text/plain."""
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    shown = [output for cell in cells for output in cell["outputs"]]
+    return [one.get("data") or {"text/plain": one.get("text")} for one in shown]
+
+
+def pictures(notebook: Any) -> list[NDArray[np.uint8]]:
+    found = [data["image/png"] for data in outputs(notebook) if "image/png" in data]
+    return [
+        np.asarray(Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB")) for png in found
+    ]
+
+
+def test_the_viewer_s_notebook_is_stored_with_its_pictures_and_no_more() -> None:
+    text = SHOWN.read_text()
+    notebook = json.loads(text)
+    assert [picture.std() > 10 for picture in pictures(notebook)] == [True, True]
+    assert all(cell["execution_count"] for cell in notebook["cells"] if cell["cell_type"] == "code")
+    assert "widgets" not in notebook["metadata"]
+    assert not any("stderr" in str(data) or "text/html" in data for data in outputs(notebook))
+    assert str(ROOT) not in text
+    assert len(text) < 400_000
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(viewer_dist() is None, reason="the viewer is not built")
+def test_the_viewer_s_notebook_gives_what_it_is_stored_with(tmp_path: Path) -> None:
+    """It is stored by `make notebook`."""
+    again = tmp_path / "jupyter.ipynb"
+    quiet = {**os.environ, "IPYTHONDIR": str(tmp_path / "ipython"), "TMPDIR": str(tmp_path)}
+    command = [sys.executable, str(ROOT / "docs" / "run_jupyter.py"), str(again)]
+    answer = subprocess.run(command, env=quiet, capture_output=True, text=True)
+    assert answer.returncode == 0, answer.stderr
+    stored, run = json.loads(SHOWN.read_text()), json.loads(again.read_text())
+    for before, after in zip(pictures(stored), pictures(run), strict=True):
+        assert before.shape == after.shape
+        assert np.abs(before.astype(int) - after).mean() < 2  # of 255: processors round differently
+    # nor is anything else another, but for the pictures' bytes
+    for notebook in (stored, run):
+        for data in outputs(notebook):
+            data.pop("image/png", None)
+    assert stored["cells"] == run["cells"]
 
 
 @pytest.mark.slow

@@ -3,10 +3,7 @@
 Every phase skips finished work: a result is named by everything that it depends on.
 """
 
-import hashlib
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +22,12 @@ from stereocell.building.object_tables import (
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
+from stereocell.building.phase import (
+    digest_of_bundle,
+    digest_of_stage,
+    phase_of,
+    states_of,
+)
 from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
 from stereocell.building.plan_notes import told_in_vain, told_of_gaps
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
@@ -40,14 +43,15 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
+from stereocell.read.cast import CAST
 from stereocell.read.open_dataset import READERS
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of, libraries_of
-from stereocell.storage.file_list import FileList, find_faults, measure, read_list
+from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import write_json
 from stereocell.storage.location import Location, require_apart
-from stereocell.storage.workspace import cached, is_file, objects_below, remove, sizes_below
+from stereocell.storage.workspace import is_file, objects_below, remove
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import write_usdz as usdz_writer
 from stereocell.usd import written_files
@@ -136,7 +140,8 @@ def settle(source: str, settings: Settings) -> Plan:
     if settings.objects.table and len(plan.labels) > 1:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
     for note in (
-        *dataset.notes,
+        # numbers of objects are read as they are
+        *(note for note in dataset.notes if not (alone and note.startswith(CAST))),
         *gaps,
         *objects,
         *told_in_vain(settings, channels),
@@ -242,7 +247,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             {id_: digest_of_table(table) for id_, table in tables.items()},
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
-        if phase.is_done(key, partial(_digest_of_stage, out_folder)):
+        if phase.is_done(key, partial(digest_of_stage, out_folder)):
             return
         remove(out_folder.stage_list)  # the list of the earlier stage
         engine.run("stage", run_tile, [(id_, tile) for id_, tile in tiles if not tile.is_done()])
@@ -321,13 +326,13 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
         viewer = viewer_dist()
         kept = objects_below(path.parent)
         files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
-        made_of = [str(path.absolute()), _states(files)] if kept is None else kept
-        page = [] if viewer is None else _states(sorted(viewer.rglob("*")))
+        made_of = [str(path.absolute()), states_of(files)] if kept is None else kept
+        page = [] if viewer is None else states_of(sorted(viewer.rglob("*")))
         key = key_of([made_of, page], bundle_writer)
         if kept is not None and out_folder.is_begun("bundle"):
             bundle_writer.remove_half(out_folder.bundle_dir)
         bundle_writer.require_bundle(out_folder.bundle_dir)  # before the phase is recorded as begun
-        if not phase.is_done(key, partial(_digest_of_bundle, out_folder)):
+        if not phase.is_done(key, partial(digest_of_bundle, out_folder)):
             out_folder.remove_other_folders(out_folder.parts_dir, {key})
             parts = out_folder.parts_dir / key
             bundle_writer.write_bundle(
@@ -347,85 +352,3 @@ def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
 
 def _print_line(line: str) -> None:
     console.print(f"bundle: {line}", markup=False, soft_wrap=True)
-
-
-def _states(files: Iterable[Path]) -> list[tuple[str, int, int]]:
-    """Return each file's path, size and modification time: an edit changes them."""
-    found = [(file, file.stat()) for file in files]
-    return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
-
-
-def digest_of(results: Iterable[Path]) -> str:
-    """Return a digest of all files' names and sizes: damage changes it."""
-    digest = hashlib.sha256()
-    for result in results:
-        for file, size in (sizes_below(result) or {result: -1}).items():
-            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
-    return digest.hexdigest()[:20]
-
-
-def _digest_of_bundle(out_folder: OutFolder) -> str:
-    """Return a digest of the bundle; empty where one of its files is missing or damaged."""
-    path = out_folder.bundle_dir / bundle_writer.FILES
-    try:
-        listed = read_list(path, "")
-    except OutputError:
-        return ""
-    faults = find_faults(out_folder.bundle_dir, listed, since=path)
-    return "" if faults else digest_of([out_folder.bundle_dir]) + digest_of_manifest(out_folder)
-
-
-def digest_of_manifest(out_folder: OutFolder) -> str:
-    """Return a digest of the bundle's manifest, which is in no list; empty: there is none."""
-    manifest = out_folder.bundle_dir / bundle_writer.MANIFEST
-    with cached(manifest):
-        return str(measure(manifest)["sha256"])[:20] if manifest.is_file() else ""
-
-
-def _digest_of_stage(out_folder: OutFolder) -> str:
-    """Return a digest of the stage's list; empty where one of its files is missing or damaged."""
-    try:
-        listed = written_files.read_stage_list(out_folder.stage_dir)
-    except OutputError:
-        return ""
-    if not written_files.is_kept(out_folder.stage_dir, listed, since=out_folder.stage_list):
-        return ""
-    return written_files.digest_of(listed)
-
-
-class Phase:
-    """A running phase: whether it has work to do, and its duration."""
-
-    def __init__(self, out_folder: OutFolder, name: str) -> None:
-        self.out_folder, self.name = out_folder, name
-        self.key, self.about = "done", ""
-        self.results: Callable[[], str] = str
-        self.is_up_to_date = False
-
-    def is_done(self, key: str, results: Callable[[], str]) -> bool:
-        """Return whether the phase's results are whole and made from the same inputs.
-
-        key      digest of the inputs
-        results  returns a digest of the results
-        """
-        self.key, self.results = key, results
-        entry = self.out_folder.phases().get(self.name, {})
-        self.is_up_to_date = entry.get("key") == key and entry["results"] == results()
-        if not self.is_up_to_date:
-            # an empty key: a killed phase is not done
-            self.out_folder.save_phase(self.name, "", "", 0.0, "")
-        return self.is_up_to_date
-
-
-@contextmanager
-def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
-    """Print and save a phase's duration; print "up to date" for a phase without work."""
-    start = time.perf_counter()
-    phase = Phase(out_folder, name)
-    yield phase
-    seconds = time.perf_counter() - start
-    if phase.is_up_to_date:
-        console.print(f"{name}: up to date")
-    else:
-        out_folder.save_phase(name, phase.key, phase.results(), seconds, phase.about)
-        console.print(f"{name}: {seconds:.1f} s")

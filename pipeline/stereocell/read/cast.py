@@ -30,6 +30,9 @@ def built_dtype(stored: Any) -> np.dtype[Any] | None:
     return None if name is None else np.dtype(name)
 
 
+CAST = "voxels are"  # how the note on a cast begins
+
+
 def cast(voxels: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return voxels of any shape in `dtype`; numbers beyond float32 become infinite."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -41,7 +44,7 @@ def cast_note(stored: Any) -> str:
     dtype, built = np.dtype(stored), built_dtype(stored)
     if built is None or dtype.name == built.name:
         return ""
-    told = f"voxels are {dtype.name}: read as {built.name}"
+    told = f"{CAST} {dtype.name}: read as {built.name}"
     if dtype.kind in "iu" and built.kind == "f":
         return (
             f"{told}, which keeps 24 of {8 * dtype.itemsize} bits: whole numbers beyond "

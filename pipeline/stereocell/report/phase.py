@@ -4,7 +4,8 @@ from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.phases import digest_of, phase_of, provenance
+from stereocell.building.phase import digest_of, phase_of
+from stereocell.building.phases import provenance
 from stereocell.report import page
 from stereocell.storage.cache_key import key_of
 

@@ -18,7 +18,7 @@ from typing import Any
 from stereocell.building import unit_files
 from stereocell.building.input_unchanged import require_added
 from stereocell.building.out_folder import SURVEY, OutFolder
-from stereocell.building.phases import digest_of_manifest
+from stereocell.building.phase import digest_of_manifest
 from stereocell.building.survey_file import EVIDENCE, SOLIDS, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.bundle.write import FILES, MANIFEST

@@ -24,7 +24,7 @@ import { LampMark } from "./lamp_gizmo";
 import { dragLamp, isLampHandle, lampHandles } from "./lamp_handles";
 import { MeasureMark } from "./measurement";
 import { Axes, OrientationMark } from "./orientation_axes";
-import type { Cone } from "./probe";
+import type { Cone, Probed } from "./probe";
 import { Reading, type ReadingOptions } from "./probe_reader";
 import { Ruler } from "./ruler";
 import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
@@ -203,6 +203,11 @@ export class Marks {
     if (this.isDisposed) return;
     if (found === null) this.options.announce(NOTHING_MET);
     else this.options.dispatch({ type: "add-point", point: found.point });
+  }
+
+  /** What a ray (um) means; null: it meets nothing that shows. */
+  probe(ray: Ray): Promise<Probed | null> {
+    return this.reading.probe(ray);
   }
 
   /** Box of what is shown: the specimen, or the isolated tile. */

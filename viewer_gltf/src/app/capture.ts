@@ -141,6 +141,21 @@ export function savePicture(
   });
 }
 
+/** The view as the screen has it, smaller, drawn as well as can be in a moment. */
+export function posterOf(scene: Scene, longest_px: number): Promise<Blob> {
+  const { renderer, studio } = scene;
+  const { width, height } = renderer.domElement;
+  const shrink = Math.min(1, longest_px / Math.max(width, height));
+  return studio.apart(async () => {
+    const { canvas, context } = canvasOf(Math.round(shrink * width), Math.round(shrink * height));
+    studio.drawStill(FRAME_MS);
+    context.imageSmoothingQuality = "high";
+    context.drawImage(renderer.domElement, 0, 0, canvas.width, canvas.height);
+    drawCaption(context, canvas, shrink * renderer.getPixelRatio(), clearCaptionOf(scene));
+    return pngOf(canvas);
+  });
+}
+
 /** Draw what the camera sees until it is clear, or its time is over; false: it was left. */
 async function drawPart(
   studio: Studio,

@@ -5,6 +5,7 @@
  */
 
 import { unitOf } from "../annotations/measure";
+import { pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
@@ -374,11 +375,12 @@ export class Controller {
   /** The address of this view, in the clipboard, in the address bar and in the panel. */
   private async share(): Promise<void> {
     const { viewer } = this;
-    const address = new URL(location.href);
+    const address = new URL(pageAddress());
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
-    history.replaceState(history.state, "", address);
+    // a notebook's frame has no address
+    if (globalThis.stereocellHost === undefined) history.replaceState(history.state, "", address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
     viewer.stereo.hands.panel.take({ link: address.href });

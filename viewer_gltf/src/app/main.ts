@@ -6,7 +6,7 @@ import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../annotations/annotations.css";
 import { sizeText } from "../annotations/measure";
-import { bundleAddress } from "../bundle/address";
+import { bundleAddress, pageAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import { fileAddress } from "../bundle/fetch";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -23,6 +23,7 @@ import type { ImmersiveMode } from "../xr/session";
 import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
+import type { NotebookPart } from "./notebook_part";
 import { Viewer } from "./viewer";
 
 function checkWebGl2(): void {
@@ -73,7 +74,8 @@ function alsoKept({ bundle }: Viewer): readonly string[] {
 async function open(parent: HTMLElement): Promise<Viewer> {
   checkWebGl2();
   sayAtStart("Reading the bundle");
-  const bundle = await loadBundle(bundleAddress(location.href));
+  const page = pageAddress();
+  const bundle = await loadBundle(bundleAddress(page));
   const { manifest } = bundle;
   document.title = `${manifest.specimen.name} · StereoCell`;
 
@@ -91,6 +93,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const over = [hint.root, progress.root, said.root, notices.root, waysIn.root];
   parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
+  let notebook: NotebookPart | null = null;
   const viewer: Viewer = new Viewer(
     bundle,
     stage,
@@ -98,10 +101,12 @@ async function open(parent: HTMLElement): Promise<Viewer> {
       controller?.refresh();
       notices.update(state);
       hint.update(state);
+      notebook?.note();
     },
     () => {
       progress.update(viewer.snapshot().overview);
       controller?.refreshSoon();
+      notebook?.note();
     },
   );
   controller = new Controller(viewer, parent, said, {
@@ -113,7 +118,8 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const { layOut } = controller;
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
-  controller.followAddress(location.search, location.hash);
+  const { search, hash } = new URL(page);
+  controller.followAddress(search, hash);
   hint.update(viewer.state);
   whenTouched(() => {
     viewer.stopTurning();
@@ -127,7 +133,11 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   if (hasRoom) waysIn.offerRoom(() => controller.perform("room"));
   const usdz = usdzFor(bundle);
   if (usdz !== null) waysIn.offerLink(usdz);
-  const flight_s = flightAsked(location.search);
+  if (globalThis.stereocellHost !== undefined) {
+    const part = await import("./notebook_part");
+    notebook = new part.NotebookPart(viewer, globalThis.stereocellHost.port);
+  }
+  const flight_s = flightAsked(search);
   if (flight_s !== null) await offerBench(viewer, parent, flight_s, support.isAvailable);
   return viewer;
 }

@@ -138,6 +138,13 @@ export class ObjectsPart {
     return this.objects.get(channel)?.linked(view) ?? null;
   }
 
+  /** The number of the object along a ray in its label map; null: there is none. */
+  labelAlong(ray: Ray): Readonly<{ channel: string; label: string }> | null {
+    const met = this.meet(ray);
+    const label = met && this.objects.get(met.channel)?.table.label(met.row);
+    return met && label ? { channel: met.channel, label } : null;
+  }
+
   retryFailed(): void {
     this.failed.clear();
     for (const each of this.objects.values()) each.retryFailed();

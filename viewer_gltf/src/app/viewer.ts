@@ -89,6 +89,8 @@ export class Viewer {
   private perInch: number | null = null;
   /** Announces what a change has brought besides what it shows; the page sets it. */
   onAnnounce: (text: string) => void = () => undefined;
+  /** Where someone has tapped, um; for what stands round the page. */
+  onTap: (ray: Ray) => void = () => undefined;
   readonly contents: Contents;
   private readonly room: Room;
   private readonly hybrid: Hybrid;
@@ -311,6 +313,17 @@ export class Viewer {
     }
   }
 
+  /** What the screen shows, no larger than so many pixels, as soon as can be. Rejects with a DOMException. */
+  async poster(longest_px: number): Promise<Blob> {
+    const { posterOf } = await this.loadCapture();
+    return posterOf(this.filmed, longest_px);
+  }
+
+  /** From um to the room. */
+  get specimen(): Matrix4 {
+    return this.room.specimen.group.matrixWorld;
+  }
+
   private loadCapture() {
     return import("./capture").catch((cause) => {
       throw new DOMException(`the code for it has not come (${cause})`, "NetworkError");
@@ -324,7 +337,7 @@ export class Viewer {
       navigation,
       studio,
       height_px: stage.clientHeight,
-      specimen: this.room.specimen.group.matrixWorld,
+      specimen: this.specimen,
       labelled: this.room.specimen.group,
       state: this.state,
       manifest: this.bundle.manifest,
@@ -654,6 +667,7 @@ export class Viewer {
 
   /** Whether there was anything to measure or to choose. */
   private tap(ray: Ray): boolean {
+    this.onTap(ray);
     const tiles = shownTiles(this.bundle.manifest.tiles, this.state.isolated);
     return this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
   }

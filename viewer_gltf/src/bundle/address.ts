@@ -1,5 +1,22 @@
 import { BundleError } from "./errors";
 
+/** What a notebook gives to the page that it holds in a frame, which has no address of its own. */
+export type NotebookHost = Readonly<{
+  /** Stands for the page's address: the bundle lies beside it, and the view is behind its `#`. */
+  page: string;
+  /** To the widget. */
+  port: MessagePort;
+}>;
+
+declare global {
+  var stereocellHost: NotebookHost | undefined;
+}
+
+/** The page's own address, or the one that a notebook gives it. */
+export function pageAddress(): string {
+  return globalThis.stereocellHost?.page ?? location.href;
+}
+
 /**
  * The folder that holds the bundle, with a closing slash. `?bundle=` names the folder or its
  * manifest.json, relative to the page or absolute; without it the bundle lies beside the page.

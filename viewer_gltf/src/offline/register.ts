@@ -21,9 +21,10 @@ export function canKeep(page: string, isSecure: boolean): boolean {
  * @param also addresses of files of the bundle that the page has not asked for
  */
 export async function keepOffline(onReady: () => void, also: readonly string[]): Promise<void> {
-  const { serviceWorker } = navigator as { serviceWorker?: ServiceWorkerContainer };
   const isAble = !import.meta.env.DEV && canKeep(location.href, isSecureContext);
-  if (!isAble || serviceWorker === undefined) {
+  // a frame without an origin may not even ask for it
+  const { serviceWorker } = (isAble ? navigator : {}) as { serviceWorker?: ServiceWorkerContainer };
+  if (serviceWorker === undefined) {
     takeAsked(); // nobody will want the log
     return;
   }

@@ -1,5 +1,6 @@
 /** The path-traced picture's subject: follows the state, loads what is missing, and is drawn. */
 import { Group, type Texture, type WebGLRenderer } from "three";
+import { pageAddress } from "../bundle/address";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import { LAST, Overlay } from "../gpu/composite_pass";
 import type { Eyes } from "../gpu/eyes";
@@ -345,7 +346,7 @@ export class TracedVolume {
     this.hasLightFailed = false;
     this.isLightComing = true;
     try {
-      const tables = await loadEnvironment(document.baseURI, name);
+      const tables = await loadEnvironment(pageAddress(), name);
       if (this.environment === name) this.tracer?.lightBy(tables);
     } catch (error) {
       if (!(error instanceof BundleError)) throw error;

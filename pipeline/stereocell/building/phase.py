@@ -1,0 +1,97 @@
+"""A phase of a build: whether what it made is whole, and made of the same as it would be now."""
+
+import hashlib
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.bundle import write as bundle_writer
+from stereocell.engine.run import console
+from stereocell.model.errors import OutputError
+from stereocell.storage.file_list import find_faults, measure, read_list
+from stereocell.storage.workspace import cached, sizes_below
+from stereocell.usd import written_files
+
+
+class Phase:
+    """A running phase: whether it has work to do, and its duration."""
+
+    def __init__(self, out_folder: OutFolder, name: str) -> None:
+        self.out_folder, self.name = out_folder, name
+        self.key, self.about = "done", ""
+        self.results: Callable[[], str] = str
+        self.is_up_to_date = False
+
+    def is_done(self, key: str, results: Callable[[], str]) -> bool:
+        """Return whether the phase's results are whole and made from the same inputs.
+
+        key      digest of the inputs
+        results  returns a digest of the results
+        """
+        self.key, self.results = key, results
+        entry = self.out_folder.phases().get(self.name, {})
+        self.is_up_to_date = entry.get("key") == key and entry["results"] == results()
+        if not self.is_up_to_date:
+            # an empty key: a killed phase is not done
+            self.out_folder.save_phase(self.name, "", "", 0.0, "")
+        return self.is_up_to_date
+
+
+@contextmanager
+def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
+    """Print and save a phase's duration; print "up to date" for a phase without work."""
+    start = time.perf_counter()
+    phase = Phase(out_folder, name)
+    yield phase
+    seconds = time.perf_counter() - start
+    if phase.is_up_to_date:
+        console.print(f"{name}: up to date")
+    else:
+        out_folder.save_phase(name, phase.key, phase.results(), seconds, phase.about)
+        console.print(f"{name}: {seconds:.1f} s")
+
+
+def states_of(files: Iterable[Path]) -> list[tuple[str, int, int]]:
+    """Return each file's path, size and modification time: an edit changes them."""
+    found = [(file, file.stat()) for file in files]
+    return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
+
+
+def digest_of(results: Iterable[Path]) -> str:
+    """Return a digest of all files' names and sizes: damage changes it."""
+    digest = hashlib.sha256()
+    for result in results:
+        for file, size in (sizes_below(result) or {result: -1}).items():
+            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
+    return digest.hexdigest()[:20]
+
+
+def digest_of_bundle(out_folder: OutFolder) -> str:
+    """Return a digest of the bundle; empty where one of its files is missing or damaged."""
+    path = out_folder.bundle_dir / bundle_writer.FILES
+    try:
+        listed = read_list(path, "")
+    except OutputError:
+        return ""
+    faults = find_faults(out_folder.bundle_dir, listed, since=path)
+    return "" if faults else digest_of([out_folder.bundle_dir]) + digest_of_manifest(out_folder)
+
+
+def digest_of_manifest(out_folder: OutFolder) -> str:
+    """Return a digest of the bundle's manifest, which is in no list; empty: there is none."""
+    manifest = out_folder.bundle_dir / bundle_writer.MANIFEST
+    with cached(manifest):
+        return str(measure(manifest)["sha256"])[:20] if manifest.is_file() else ""
+
+
+def digest_of_stage(out_folder: OutFolder) -> str:
+    """Return a digest of the stage's list; empty where one of its files is missing or damaged."""
+    try:
+        listed = written_files.read_stage_list(out_folder.stage_dir)
+    except OutputError:
+        return ""
+    if not written_files.is_kept(out_folder.stage_dir, listed, since=out_folder.stage_list):
+        return ""
+    return written_files.digest_of(listed)

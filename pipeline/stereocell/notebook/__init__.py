@@ -1,0 +1,1 @@
+"""The viewer in a notebook: the page in a frame, fed by the kernel, without a server."""

@@ -1,0 +1,224 @@
+"""An array becomes a source that a build reads: one file, as fine as a notebook has patience for.
+
+numpy, dask, zarr and xarray are told by what they have, so that none of them has to be installed.
+A larger array is made coarser by means over blocks of voxels, whose edges are as equal in um as can
+be; it is read a block of planes at a time, so that no more of it is in memory.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, isfinite, prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tifffile
+from numpy.typing import NDArray
+
+from stereocell.model.errors import UsageError
+from stereocell.read.spacing import um_per
+
+Triple = tuple[float, float, float]
+
+MOST_VOXELS = 4_000_000  # of all channels: a build of as many takes half a minute on two cores
+_MOST_READ = 2**30  # voxels: more take minutes to read
+_LEAST_EDGE = 4  # voxels: a thinner array has no surface
+_AXES = {3: "zyx", 4: "czyx"}
+_READ_AT_ONCE = 2**24  # voxels
+
+
+@dataclass(frozen=True, slots=True)
+class ArraySource:
+    """An array as a notebook was given it.
+
+    data        whatever slices into numpy arrays, (z, y, x) or (c, z, y, x)
+    spacing_um  (z, y, x)
+    channels    names
+    """
+
+    data: Any
+    spacing_um: Triple
+    channels: tuple[str, ...]
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """(c, z, y, x)."""
+        shape = tuple(int(n) for n in self.data.shape)
+        return (1, *shape) if len(shape) == 3 else shape  # type: ignore[return-value]
+
+    def planes(self, channel: int, start: int, stop: int) -> NDArray[Any]:
+        """Return planes of a channel."""
+        whole = self.data if len(self.data.shape) == 3 else self.data[channel]
+        return np.asarray(whole[start:stop])
+
+
+def is_array(source: Any) -> bool:
+    """Return whether a source is an array rather than a path."""
+    return hasattr(source, "shape") and hasattr(source, "dtype")
+
+
+def as_source(
+    array: Any, spacing_um: Sequence[float] | None, channels: Sequence[str] | None
+) -> ArraySource:
+    """Return an array with its spacing and channels; those that are given go before its own.
+
+    Raises UsageError where it can't be a volume.
+    """
+    shape = tuple(array.shape)
+    size = " x ".join(str(n) for n in shape)
+    if len(shape) not in _AXES:
+        raise UsageError(
+            f"the array has {len(shape)} axes ({size}), expected (z, y, x) or (c, z, y, x)"
+        )
+    axes = _AXES[len(shape)]
+    dims = tuple(str(dim).lower() for dim in getattr(array, "dims", ()))
+    if dims and dims != tuple(axes):
+        raise UsageError(
+            f"the array's axes are {', '.join(dims)}, expected {', '.join(axes)}: transpose it"
+        )
+    if min(shape[-3:]) < _LEAST_EDGE:
+        raise UsageError(
+            f"the array is {size}, expected {_LEAST_EDGE} voxels or more along z, y and x"
+        )
+    if array.dtype.kind not in "buif":
+        raise UsageError(f"the array's type is {array.dtype}, expected whole numbers or fractions")
+    if prod(shape) > _MOST_READ:
+        raise UsageError(
+            f"the array is {size}, {prod(shape):,} voxels, more than the {_MOST_READ:,} that a "
+            "notebook reads: save it as OME-Zarr, run `stereocell build scan.ome.zarr -o out`, and "
+            "show out; or show a part of it"
+        )
+    found = spacing_um if spacing_um is not None else _spacing_of(array)
+    if found is None:
+        raise UsageError(
+            "an array states no voxel spacing: name it, as spacing_um=(0.5, 0.25, 0.25) (z, y, x)"
+        )
+    spacing = tuple(float(v) for v in found)
+    if len(spacing) != 3 or not all(isfinite(v) and v > 0 for v in spacing):
+        raise UsageError(f"spacing_um is {found!r:.60}, expected z, y, x in um, each above 0")
+    count = shape[0] if len(shape) == 4 else 1
+    names = list(channels) if channels is not None else _names_of(array, count)
+    if len(names) != count or len(set(names)) != count or not all(names):
+        raise UsageError(f"channels are {names!r:.80}, expected {count} different names")
+    data = getattr(array, "variable", array)  # of xarray, whose own slices carry coordinates
+    return ArraySource(getattr(data, "data", data) if dims else data, spacing, tuple(names))
+
+
+def _spacing_of(array: Any) -> tuple[float, ...] | None:
+    """Return the spacing that an xarray's coordinates have; None: it has none, or not for all axes.
+
+    Raises UsageError for places that are not even, or a unit that is no length.
+    """
+    spacing = []
+    for axis in "zyx":
+        coordinate = getattr(array, "coords", {}).get(axis)
+        if coordinate is None:
+            return None
+        places = np.asarray(coordinate.data, float)
+        step = float((places[-1] - places[0]) / (len(places) - 1))
+        if not np.allclose(np.diff(places), step, rtol=1e-3):
+            raise UsageError(f"the array's places along {axis} are not even: name spacing_um")
+        unit = coordinate.attrs.get("units", "um")
+        um = um_per(unit)
+        if um is None:
+            raise UsageError(
+                f"the array's unit along {axis} is {unit!r:.40}, no length: name spacing_um"
+            )
+        spacing.append(abs(step) * um)
+    return tuple(spacing)
+
+
+def _names_of(array: Any, count: int) -> list[str]:
+    coordinate = getattr(array, "coords", {}).get("c")
+    if coordinate is not None:
+        return [str(name) for name in coordinate.data]
+    name = getattr(array, "name", None)
+    if count == 1:
+        return [str(name) if isinstance(name, str) and name and "/" not in name else "volume"]
+    return [f"channel {i + 1}" for i in range(count)]
+
+
+def find_blocks(source: ArraySource, most: int = MOST_VOXELS) -> tuple[int, int, int]:
+    """Return the voxels (z, y, x) that become one, so that at most so many are left.
+
+    The edges of the new voxels grow step by step until few enough are left: where those of the
+    array are long, they stay. No axis is left with less than a surface needs.
+    """
+    count, *shape = source.shape
+    finest = min(source.spacing_um)
+    widest = [max(1, n // _LEAST_EDGE) for n in shape]
+    for step in range(1, max(widest) * ceil(max(source.spacing_um) / finest) + 1):
+        edge = step * finest * (1 + 1e-9)
+        z, y, x = (
+            min(max(1, int(edge / own)), most_wide)
+            for own, most_wide in zip(source.spacing_um, widest, strict=True)
+        )
+        left = count * prod(ceil(n / b) for n, b in zip(shape, (z, y, x), strict=True))
+        if left <= most or [z, y, x] == widest:
+            break
+    return z, y, x
+
+
+def say_quality(source: ArraySource, blocks: tuple[int, int, int]) -> str:
+    """Return in words what of the array is shown, and why; empty: all of it."""
+    if blocks == (1, 1, 1):
+        return ""
+    voxels = prod(source.shape)
+    return (
+        f"means of {' x '.join(str(b) for b in blocks)} voxels (z, y, x): the array has "
+        f"{voxels:,}, and of at most {MOST_VOXELS:,} a build is quick; quality='full' takes all"
+    )
+
+
+def write_source(source: ArraySource, path: Path, blocks: tuple[int, int, int]) -> None:
+    """Write an array as OME-TIFF. Raises UsageError for values that no file holds."""
+    count, depth, *_ = source.shape
+    coarse = [
+        np.concatenate([_mean(part, blocks) for part in _parts(source, channel, depth, blocks[0])])
+        for channel in range(count)
+    ]
+    voxels = _as_stored(np.stack(coarse))
+    spacing = [s * b for s, b in zip(source.spacing_um, blocks, strict=True)]
+    metadata = {
+        "axes": "CZYX",
+        "Channel": {"Name": list(source.channels)},
+        **{f"PhysicalSize{axis}": edge for axis, edge in zip("ZYX", spacing, strict=True)},
+        **{f"PhysicalSize{axis}Unit": "um" for axis in "ZYX"},
+    }
+    tifffile.imwrite(path, voxels, ome=True, metadata=metadata, photometric="minisblack")
+
+
+def _parts(source: ArraySource, channel: int, depth: int, block: int) -> list[NDArray[Any]]:
+    height, width = source.shape[2:]
+    planes = max(1, _READ_AT_ONCE // (height * width) // block) * block
+    return [source.planes(channel, z, min(z + planes, depth)) for z in range(0, depth, planes)]
+
+
+def _mean(part: NDArray[Any], blocks: tuple[int, int, int]) -> NDArray[Any]:
+    """Return means over blocks; those at the far sides may have fewer voxels."""
+    if blocks == (1, 1, 1):
+        return part
+    sums, counts = part.astype(np.float64), np.ones((1, 1, 1))
+    for axis, (size, block) in enumerate(zip(part.shape, blocks, strict=True)):
+        starts = np.arange(0, size, block)
+        sums = np.add.reduceat(sums, starts, axis=axis)
+        each = np.diff([*starts, size])
+        counts = counts * each.reshape([-1 if i == axis else 1 for i in range(3)])
+    mean = sums / counts
+    return np.rint(mean).astype(part.dtype) if part.dtype.kind in "ui" else mean
+
+
+def _as_stored(voxels: NDArray[Any]) -> NDArray[Any]:
+    """Return voxels in a type that OME-TIFF has and a build reads. Raises UsageError."""
+    if voxels.dtype.kind == "b":
+        return voxels.astype(np.uint8)
+    if voxels.dtype.kind == "f":
+        if not np.isfinite(voxels).any():
+            raise UsageError("the array has no finite value")
+        return voxels.astype(np.float32)
+    low, high = int(voxels.min()), int(voxels.max())
+    for kind in (voxels.dtype, np.uint16, np.int16):
+        limits = np.iinfo(kind)
+        if limits.bits <= 16 and limits.min <= low and high <= limits.max:
+            return voxels.astype(np.dtype(kind).newbyteorder("="))
+    return voxels.astype(np.float32)

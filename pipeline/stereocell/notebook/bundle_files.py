@@ -1,0 +1,66 @@
+"""The files of a bundle, as the page in a notebook asks for them: these, and no others.
+
+The bundle's own list says which there are. A path that it does not have, as one that leads out by
+`..`, is not found; nor is a file of the list that is a link out.
+"""
+
+from pathlib import Path
+
+from stereocell.notebook.page import find_page
+from stereocell.serve.static_files import parse_range
+from stereocell.storage.file_list import read_list
+from stereocell.storage.json_files import read_json
+
+MANIFEST, _FILES = "manifest.json", "files.json"
+_REMEDY = "run `stereocell bundle OUT`"
+_LIGHTS = ("environments/sky.hdr", "environments/studio.hdr")  # of the viewer
+_WHOLE, _PART, _MISSING, _UNSATISFIABLE = 200, 206, 404, 416
+
+
+class NotebookBundle:
+    """A bundle that a notebook shows.
+
+    name      of the specimen
+    channels  their IDs
+    ids       of each channel, by its ID and by its name
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Raises OutputError where there is no bundle, or its list is damaged."""
+        self._root = folder.resolve()
+        manifest = read_json(self._root / MANIFEST, "bundle.schema.json", _REMEDY)
+        listed = read_list(self._root / _FILES, _REMEDY)
+        self._names = {MANIFEST, *listed}
+        self.name = str(manifest["specimen"]["name"])
+        about = [(str(one["id"]), str(one["name"])) for one in manifest["channels"]]
+        self.channels = [id_ for id_, _ in about]
+        self.ids = {**{name: id_ for id_, name in about}, **{id_: id_ for id_, _ in about}}
+
+    def answer(self, path: object, header: object = None) -> tuple[int, bytes]:
+        """Return the status of HTTP and the bytes of a file, or of the part that a Range asks for.
+
+        What a page sends is anybody's: whatever it is, there is an answer.
+        """
+        place = self._find(path) if isinstance(path, str) else None
+        try:
+            content = b"" if place is None else place.read_bytes()
+        except OSError:  # it has gone since
+            place = None
+        if place is None:
+            return _MISSING, b""
+        asked = parse_range(header, len(content)) if isinstance(header, str) else None
+        if asked is None:
+            return _WHOLE, content
+        if not asked:
+            return _UNSATISFIABLE, b""
+        return _PART, content[asked.start : asked.stop]
+
+    def _find(self, path: str) -> Path | None:
+        if path in self._names:
+            root = self._root
+        elif path in _LIGHTS:
+            root = find_page()
+        else:
+            return None
+        place = (root / path).resolve()
+        return place if place.is_relative_to(root) and place.is_file() else None

@@ -1,0 +1,186 @@
+"""`stereocell.show`: a build, a source or an array becomes a viewer in the notebook.
+
+Imports are lazy: `import stereocell` takes none of them.
+"""
+
+import atexit
+import io
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stderr
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stereocell.api import build
+from stereocell.model.errors import UsageError
+
+if TYPE_CHECKING:
+    from stereocell.notebook.widget import Viewer
+
+_MANIFEST = "manifest.json"
+_QUALITIES = ("auto", "full")
+
+
+def show(
+    source: Any,
+    *,
+    spacing_um: Sequence[float] | None = None,
+    channels: Sequence[str] | None = None,
+    name: str = "",
+    quality: str = "auto",
+    out: str | Path | None = None,
+    preset: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    height: int = 520,
+    **state: Any,
+) -> "Viewer":
+    """Show a build, a source or an array in Jupyter, JupyterLab, Colab, VS Code or marimo.
+
+    source      OUT of a build, its bundle, a path that `build` reads, or an array (z, y, x) or
+                (c, z, y, x) of numpy, dask, zarr or xarray
+    spacing_um  of an array, z, y, x; xarray's coordinates will do
+    channels    names of an array's channels
+    name        of an array
+    quality     auto: means of voxels where an array, or a level where a source, is large; full
+    out         where the build of a source or an array stays; else it goes when Python ends
+    preset, settings  of the build, as `stereocell.build` takes them
+    height      CSS pixels
+    state       `link`, `channels`, `view`, `picked`: what the viewer opens with
+
+    Returns a widget: the last line of a cell shows it. Its `channels`, `view`, `picked` and `link`
+    follow what is done in the viewer, and may be set; see `stereocell.notebook.widget.Viewer`.
+    Raises StereoCellError, whose text is one line.
+
+        viewer = stereocell.show(stack, spacing_um=(0.5, 0.25, 0.25))
+    """
+    try:
+        import anywidget  # noqa: F401
+    except ModuleNotFoundError:
+        raise UsageError(
+            "a notebook's viewer takes the package anywidget: pip install 'stereocell[notebook]'"
+        ) from None
+    from stereocell.notebook.arrays import is_array
+    from stereocell.notebook.page import find_page
+
+    if quality not in _QUALITIES:
+        raise UsageError(f"quality is {quality!r:.40}, expected one of {', '.join(_QUALITIES)}")
+    if unknown := sorted(state.keys() - {"link", "channels", "view", "picked"}):
+        raise UsageError(f"show takes no {unknown[0]!r:.40}")
+    find_page()  # before a build that nobody could look at
+    if not is_array(source):
+        if not isinstance(source, str | Path):
+            raise UsageError(f"{source!r:.60} is no array, expected one, or a path")
+        if spacing_um is None and channels is None and (found := _find_bundle(Path(source))):
+            return _viewer(*found, height=height, state=state)
+    kept = None if out is None else Path(out)
+    folder = kept or Path(tempfile.mkdtemp(prefix="stereocell-"))
+    try:
+        chosen, told = _build(
+            source,
+            folder,
+            spacing_um=spacing_um,
+            channels=channels,
+            name=name,
+            is_full=quality == "full",
+            preset=preset,
+            settings=settings or {},
+        )
+        bundle = folder / "bundle"
+        viewer = _viewer(bundle, folder, quality=chosen, told=told, height=height, state=state)
+    except BaseException:
+        if kept is None:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    if kept is None:
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return viewer
+
+
+def _find_bundle(path: Path) -> tuple[Path, Path | None] | None:
+    """Return the folders of a bundle and of its OUT, if a path is one of them."""
+    if (path / "bundle" / _MANIFEST).is_file():
+        return path / "bundle", path
+    if (path / _MANIFEST).is_file() and (path / "files.json").is_file():
+        return path, None
+    return None
+
+
+def _viewer(
+    bundle: Path,
+    out: Path | None,
+    *,
+    height: int,
+    state: Mapping[str, Any],
+    quality: str = "",
+    told: str = "",
+) -> "Viewer":
+    from stereocell.notebook.bundle_files import NotebookBundle
+    from stereocell.notebook.picture import draw, no_picture
+    from stereocell.notebook.widget import Viewer
+
+    viewer = Viewer(
+        NotebookBundle(bundle),
+        quality=quality,
+        told=told,
+        draw=no_picture if out is None else partial(draw, out),
+        height=height,
+    )
+    for trait, value in state.items():
+        setattr(viewer, trait, value)
+    return viewer
+
+
+def _build(
+    source: Any,
+    folder: Path,
+    *,
+    spacing_um: Sequence[float] | None,
+    channels: Sequence[str] | None,
+    name: str,
+    is_full: bool,
+    preset: str | None,
+    settings: Mapping[str, Any],
+) -> tuple[str, str]:
+    """Build a source or an array in a folder; return words about its quality, and what was said."""
+    from stereocell.notebook import arrays
+
+    chosen = ""
+    wanted = {
+        section: dict(keys) if isinstance(keys, Mapping) else keys
+        for section, keys in settings.items()
+    }
+    if arrays.is_array(source):
+        given = arrays.as_source(source, spacing_um, channels)
+        blocks = (1, 1, 1) if is_full else arrays.find_blocks(given)
+        chosen = arrays.say_quality(given, blocks)
+        folder.mkdir(parents=True, exist_ok=True)
+        # the build is called as its file is
+        called = re.sub(r"[^\w .-]", "_", name)[:60].strip(" .") or "array"
+        source = folder / f"{called}.ome.tif"
+        arrays.write_source(given, source, blocks)
+    else:
+        plan = wanted.setdefault("plan", {})
+        if spacing_um is not None:
+            plan["spacing_um"] = tuple(spacing_um)
+        if channels is not None:
+            plan["channels"] = tuple(channels)
+    with _heard() as said:
+        build(source, folder, preset=preset, settings=wanted)
+    return chosen, said.getvalue()
+
+
+@contextmanager
+def _heard() -> Iterator[io.StringIO]:
+    """Take what a build says, which a notebook would keep among its outputs."""
+    from stereocell.engine.run import console
+
+    said = io.StringIO()
+    before, console.is_jupyter = console.is_jupyter, False
+    try:
+        with redirect_stderr(said):
+            yield said
+    finally:
+        console.is_jupyter = before

@@ -1,0 +1,41 @@
+"""A bundle of two tiles, and the widget that shows it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from stereocell.bundle.write import write_bundle
+from stereocell.engine.run import Engine
+from stereocell.notebook import page
+from support.bundles import write_tiles
+
+
+@pytest.fixture(scope="session")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bundle by itself, to be read only."""
+    folder = tmp_path_factory.mktemp("notebook")
+    stage = write_tiles(folder / "stage")
+    write_bundle(stage, folder / "bundle", None, run=Engine(0).run)
+    return folder / "bundle"
+
+
+@pytest.fixture
+def built_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The folder of a page of two files, for a checkout whose viewer is not built."""
+    folder = tmp_path / "dist"
+    (folder / "assets").mkdir(parents=True)
+    for name, content in {
+        "index.html": "",
+        "assets/index-1.css": "style",
+        "assets/viewer-1.js": "plain",
+        "assets/viewer-1.js.gz": "packed",
+        "assets/viewer-1.js.br": "other",
+    }.items():
+        (folder / name).write_text(content)
+    monkeypatch.setattr(page, "viewer_dist", lambda: folder)
+    page.files.cache_clear()
+    page.key.cache_clear()
+    yield folder
+    page.files.cache_clear()
+    page.key.cache_clear()

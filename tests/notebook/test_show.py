@@ -1,0 +1,82 @@
+"""From an array to a viewer: a whole build."""
+
+import io
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import stereocell
+from stereocell.notebook import arrays
+
+pytestmark = pytest.mark.slow
+
+BALLS = """
+import numpy as np, stereocell
+z, y, x = np.ogrid[:24, :48, :48]
+r = np.sqrt((2 * (z - 12)) ** 2 + (y - 24) ** 2 + (x - 24) ** 2)
+ball, small = ((900 / (1 + np.exp(r - radius)) + 100).astype(np.uint16) for radius in (17, 9))
+"""
+
+
+def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, capsys):
+    made: dict = {}
+    exec(BALLS, made)
+    monkeypatch.setattr(arrays, "MOST_VOXELS", 20_000)
+    monkeypatch.setattr(arrays.find_blocks, "__defaults__", (20_000,))
+    stack = np.stack([made["small"], made["ball"]])
+    out = tmp_path / "out"
+    viewer = stereocell.show(
+        stack, spacing_um=(0.5, 0.25, 0.25), channels=["DNA", "CD3"], name="a ball/1", out=out
+    )
+    assert viewer._files.channels == ["DNA", "CD3"]
+    assert viewer.quality.startswith("means of 1 x 3 x 3 voxels (z, y, x): the array has 110,592")
+    assert viewer.name == "a ball_1"
+    assert "24 x 16 x 16 voxels" in viewer.told
+    assert capsys.readouterr() == ("", "")  # a notebook is no log
+
+    def drawn(**looks):
+        found = viewer._draw(looks)
+        return (
+            np.asarray(Image.open(io.BytesIO(found)).convert("RGB")).astype(int) if found else None
+        )
+
+    both = drawn()
+    assert both.shape[1] == 640
+    assert both.max() > 100
+    # as the channels look: another colour, hidden, seen through
+    only = drawn(DNA={"color": "#ff0000"}, CD3={"visible": False})
+    assert only[..., 0].max() > 2 * only[..., 2].max()
+    blue = {"color": "#0000ff"}
+    over = drawn(DNA={"color": "#ff0000"}, CD3=blue)
+    through = drawn(DNA={"color": "#ff0000"}, CD3={"opacity": 0.25, **blue})
+    middle = over.shape[0] // 2, over.shape[1] // 2
+    assert over[middle][2] > 2 * over[middle][0]
+    assert through[middle][0] == pytest.approx(0.75 * only[..., 0].max(), rel=0.2)
+    assert through[middle][2] > 0.25 * over[middle][2] - 2
+    assert drawn(DNA={"visible": False}, CD3={"opacity": 0.0}) is None
+    # shown again from its folder, which stays, with nothing built
+    assert stereocell.show(out).name == viewer.name
+
+
+def test_a_build_that_nobody_keeps_goes_when_python_ends(built_page, tmp_path):
+    code = BALLS + (
+        "from stereocell.notebook import page\n"
+        f"from pathlib import Path; page.viewer_dist = lambda: Path({str(built_page)!r})\n"
+        "import tempfile; viewer = stereocell.show(ball, spacing_um=(.5, .25, .25))\n"
+        "print(viewer._files.answer('manifest.json')[0])\n"
+        "print(len(list(Path(tempfile.gettempdir()).iterdir())))"
+    )
+    place = tmp_path / "temporary"
+    place.mkdir()
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "TMPDIR": str(place)},
+    )
+    assert done.stdout == "200\n1\n", done.stderr
+    assert not list(place.iterdir())

@@ -1,0 +1,80 @@
+/** The widget in Python, without a notebook: tests/support/widget_host.py. */
+import { type ChildProcess, spawn } from "node:child_process";
+import { join } from "node:path";
+import { createInterface } from "node:readline";
+
+const REPOSITORY = new URL("../../../../", import.meta.url).pathname;
+const PYTHON = process.env.STEREOCELL_PYTHON ?? join(REPOSITORY, ".venv/bin/python");
+
+/** As it goes over the wire; buffers in base64. */
+export type Message = Readonly<{ type: string; data: unknown; buffers: readonly string[] }>;
+
+type Answer = Readonly<{ answer?: unknown; fault?: string }>;
+
+export class Kernel {
+  /** The widget's first message: its state. */
+  readonly opened: Promise<Message>;
+  /** What changed in its state since, for a page that opens later. */
+  readonly sent: Message[] = [];
+  /** All that a page has told. */
+  readonly told: string[] = [];
+  /** How many messages have passed, both ways. */
+  heard = 0;
+  onMessage: (message: Message) => void = () => undefined;
+  private readonly answers: ((told: Answer) => void)[] = [];
+  private readonly child: ChildProcess;
+
+  constructor(bundle: string) {
+    const env = { ...process.env, PYTHONPATH: join(REPOSITORY, "tests") };
+    this.child = spawn(PYTHON, ["-m", "support.widget_host", bundle], {
+      env,
+      stdio: ["pipe", "pipe", "inherit"],
+    });
+    const { stdout } = this.child;
+    if (stdout === null) throw new Error("no pipe");
+    const lines = createInterface({ input: stdout });
+    this.opened = new Promise((resolve) => {
+      lines.on("line", (line) => {
+        const told = JSON.parse(line);
+        if ("answer" in told || "fault" in told) this.answers.shift()?.(told);
+        else if (told.type === "comm_open") resolve(told);
+        else {
+          if (told.data.method === "update") this.sent.push(told);
+          this.heard++;
+          this.onMessage(told);
+        }
+      });
+    });
+  }
+
+  /** What a page tells. */
+  tell(message: unknown): void {
+    this.heard++;
+    this.told.push(JSON.stringify(message));
+    this.write(message);
+  }
+
+  private write(message: unknown): void {
+    this.child.stdin?.write(`${JSON.stringify(message)}\n`);
+  }
+
+  /** A statement in Python, with the widget as `viewer`. */
+  run(statement: string): void {
+    this.write({ run: statement });
+  }
+
+  /** An expression's value. */
+  ask<T>(expression: string): Promise<T> {
+    return new Promise((resolve, reject) => {
+      this.answers.push(({ answer, fault }) => {
+        if (fault === undefined) resolve(answer as T);
+        else reject(new Error(fault));
+      });
+      this.write({ ask: expression });
+    });
+  }
+
+  stop(): void {
+    this.child.kill();
+  }
+}
