@@ -4,6 +4,7 @@ import hashlib
 import http.server
 import json
 import threading
+import urllib.request
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -285,7 +286,10 @@ def test_an_object_store_gets_types_and_a_second_run_nothing(
     files.pipe_file("bucket/mine/notes.txt", b"mine")
     code, done, said = run(out, "s3://bucket/mine")
     assert code == 0, said
-    assert done["address"] == f"{store.endpoint}/bucket/mine/"
+    # a folder of S3 has no page
+    assert done["address"] == f"{store.endpoint}/bucket/mine/index.html"
+    with urllib.request.urlopen(done["address"]) as page:
+        assert page.read() == FILES["index.html"]
     for path, content in FILES.items():
         assert files.cat_file(f"bucket/mine/{path}") == content
     about = {

@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from stereocell.model.errors import OutputError, UsageError
-from stereocell.publish.over_http import fetch_faults
+from stereocell.publish.over_http import INDEX, fetch_faults, find_page
 from stereocell.publish.targets import Target, digest, target_of
 from stereocell.storage.file_list import DAMAGED, find_faults, read_list, to_json
 from stereocell.storage.json_files import read_json
@@ -24,14 +24,14 @@ from stereocell.storage.workspace import cached
 
 PUBLISHED = "stereocell-published.json"
 FILES, MANIFEST = "files.json", "manifest.json"
-_LAST = ("sw.js", FILES, MANIFEST, "index.html")
+_LAST = ("sw.js", FILES, MANIFEST, INDEX)
 _REMEDY = "run `stereocell bundle OUT` first"
 _SMALL_BYTES = 1000  # JSON below is as short as it is
 
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """What a run has done. address: where browsers find it, or None."""
+    """What a run has done. address: of the page, for browsers, or None."""
 
     address: str | None
     files: int
@@ -107,7 +107,8 @@ def publish(
         )
     size = sum(entry["bytes"] for entry in entries.values())
     sent = sum(entries[path]["bytes"] for path in changed)
-    return Published(address, len(files), size, len(changed), sent, len(gone))
+    page = address and find_page(address, entries)
+    return Published(page, len(files), size, len(changed), sent, len(gone))
 
 
 def _files_of(bundle: Path) -> dict[str, _File]:
