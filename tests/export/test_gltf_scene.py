@@ -123,6 +123,35 @@ def test_the_finest_level_within_the_bounds_is_taken(sphere_stage: Path, tmp_pat
     assert path.read_bytes() == before
 
 
+def test_a_level_that_is_given_is_the_finest_within_the_bounds(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "s.glb"
+    rings = [n for n, _ in spheres.LEVELS]
+    assert export_stage(
+        sphere_stage, path, ExportOptions(lod=0, max_triangles=4 * rings[1] ** 2)
+    ).endswith("at lod1")
+    size = path.stat().st_size
+    assert export_stage(sphere_stage, path, ExportOptions(lod=0, max_bytes=size)).endswith("lod1")
+    assert export_stage(
+        sphere_stage, path, ExportOptions(lod=2, max_triangles=4 * rings[0] ** 2)
+    ).endswith("at lod2")
+    with pytest.raises(UsageError, match="--max-triangles is 3: the coarsest level has"):
+        export_stage(sphere_stage, path, ExportOptions(lod=0, max_triangles=3))
+
+
+def test_what_a_region_leaves_out_is_not_counted(sphere_stage: Path, tmp_path: Path) -> None:
+    path, box = tmp_path / "s.glb", parse_region("9:,:-5,:")
+    export_stage(sphere_stage, path, ExportOptions(region=box))
+    meshes = trimesh.load(path).geometry.values()
+    within = sum(len(mesh.faces) for mesh in meshes)
+    assert within < 4 * spheres.LEVELS[1][0] ** 2  # of the whole at the next level
+    options = ExportOptions(region=box, max_triangles=within)
+    assert export_stage(sphere_stage, path, options).endswith("at lod0")
+    options = ExportOptions(region=box, max_triangles=within - 1)
+    assert export_stage(sphere_stage, path, options).endswith("at lod1")
+
+
 def test_a_region_cuts_the_surface_and_tiles_leave_some_out(
     sphere_stage: Path, tmp_path: Path
 ) -> None:

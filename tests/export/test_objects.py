@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from stereocell.export import gltf_scene
+from stereocell.export import gltf_scene, print_solids
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.color import to_srgb8
+from stereocell.model.errors import StageError
 from support import object_stage
 from support.object_stage import BEAM, COLORS, LABELS, write_objects
 
@@ -71,6 +72,20 @@ def test_bodies_of_a_3mf_are_objects_closed_and_whole(stage: Path, tmp_path: Pat
     assert bodies["left"].volume == pytest.approx(BALL_UM3, rel=0.03)
     assert "beam: 1 of 1 bodies are thinner than 2.5 mm" in line  # it is 2 high
     assert "left" not in line.partition("\n")[2]
+
+
+def test_of_many_thin_bodies_some_are_named_and_all_are_counted(
+    stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(print_solids, "_MOST_TOLD", 1)
+    told = export_stage(stage, tmp_path / "o.3mf", ExportOptions(scale=1, wall_mm=5)).split("\n")
+    assert len(told) == 3
+    assert told[2] == f"... and of {len(NAMES) - 1} more parts"
+
+
+def test_a_label_map_has_no_volume_and_that_is_told(stage: Path, tmp_path: Path) -> None:
+    with pytest.raises(StageError, match="no volume of cells: of a label map the stage has surf"):
+        export_stage(stage, tmp_path / "o.nrrd", ExportOptions(channels=("cells",)))
 
 
 def test_ply_has_their_colours_and_stl_is_one_solid(stage: Path, tmp_path: Path) -> None:

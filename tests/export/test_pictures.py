@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,13 +13,15 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 from PIL import Image
-from pxr import Gf, Usd
+from pxr import Gf, Sdf, Usd
 
 from stereocell.export import pictures
+from stereocell.export.chosen import Chosen
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import UsageError
 from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
+from stereocell.usd.write_objects import COLUMNS
 from support import spheres
 from support.bundles import CD31
 
@@ -34,6 +37,30 @@ def read(path: Path) -> list[NDArray[np.uint8]]:
 
 def covered(pixels: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return pixels.astype(int).max(axis=-1) > 40
+
+
+def test_a_picture_opens_with_label_maps_alone_as_the_viewer(
+    edited: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Surfaces of the image's channels would show through them in patches."""
+
+    def make_label_map(stage: Usd.Stage) -> None:
+        prim = stage.GetPrimAtPath(CD31)
+        prim.CreateAttribute(COLUMNS, Sdf.ValueTypeNames.TokenArray).Set([])
+
+    layer, small = edited(make_label_map), ExportOptions(width=64)
+    said = "CD31 alone, as the viewer opens: --channels takes others"
+    for file, options, is_said in (
+        ("s.png", small, True),
+        ("t.png", replace(small, channels=("CD31", "Hoechst 33342")), False),
+        ("s.glb", ExportOptions(), False),
+    ):
+        told: list[str] = []
+        export_stage(layer, tmp_path / file, options, told.append)
+        assert (said in told) == is_said
+    chosen = Chosen(layer, small)
+    chosen.show_as_viewer()
+    assert [channel.name for channel in chosen.channels] == ["CD31"]
 
 
 def test_a_picture_shows_the_sphere_in_its_edited_colour(

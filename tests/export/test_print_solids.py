@@ -109,6 +109,13 @@ def test_what_is_thinner_than_a_wall_is_named(sphere_stage: Path, tmp_path: Path
     assert "6.9 mm at (10, -5, 4)" in line or "7 mm at (10, -5, 4)" in line
 
 
+def test_places_of_thin_bodies_are_in_the_file_s_unit(sphere_stage: Path, tmp_path: Path) -> None:
+    thin = ExportOptions(scale=1000, wall_mm=7.1, units="m", channels=("CD31",))
+    line = export_stage(sphere_stage, tmp_path / "s.obj", thin).split("\n")[1]
+    assert line.endswith(" mm at (0.01, -0.005, 0.004)")
+    assert read(tmp_path / "s.obj").centroid == pytest.approx((0.01, -0.005, 0.004), rel=0.02)
+
+
 def test_a_solid_that_touches_itself_is_closed_to_programs_that_join_places() -> None:
     cube = trimesh.creation.box()
     faces = cube.faces.astype(np.uint32)

@@ -1,5 +1,6 @@
 """USD in one file: valid, with edits, of the tiles and channels asked for, the same each time."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,3 +57,18 @@ def test_a_flattened_stage_names_its_files_from_where_it_lies(
     assert (len(layers), lost) == (1, [])
     assert assets
     assert str(sphere_stage.parent) not in (tmp_path / "s.usda").read_text()
+
+
+def test_files_on_another_drive_are_named_from_its_root(
+    sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of Windows: from one drive to another no relative path leads."""
+
+    def refuse(*_: object) -> str:
+        raise ValueError("path is on mount 'C:', start on mount 'D:'")
+
+    monkeypatch.setattr(os.path, "relpath", refuse)
+    export_stage(sphere_stage, tmp_path / "s.usda", ExportOptions())
+    layers, assets, lost = UsdUtils.ComputeAllDependencies(str(tmp_path / "s.usda"))
+    assert (len(layers), lost) == (1, [])
+    assert all(Path(asset).is_relative_to(sphere_stage.parent) for asset in assets)

@@ -104,6 +104,50 @@ def test_a_specimen_that_was_turned_lies_obliquely(
     assert np.abs(np.array(image.GetDirection())).max() < 0.98
 
 
+def test_of_a_turned_specimen_a_region_is_the_least_box_of_voxels_round_it(
+    sphere_stage: Path, edited: Callable[..., Path], tmp_path: Path
+) -> None:
+    """A scanner has its patients turned by some degrees."""
+
+    def move(stage: Usd.Stage) -> None:
+        tiles = UsdGeom.XformCommonAPI(stage.GetPrimAtPath("/Specimen/Tiles"))
+        tiles.SetRotate(Gf.Vec3f(5, 10, 20))
+
+    layer, options = edited(move), {"units": "um", "channels": ("CD31",)}
+    export_stage(layer, tmp_path / "s.nrrd", ExportOptions(**options))
+    whole, image = read(tmp_path / "s.nrrd")
+    k, j, i = np.indices(whole.shape).reshape(3, -1)
+    index = np.stack([i, j, k], axis=-1)
+    turned = np.array(image.GetDirection()).reshape(3, 3) * image.GetSpacing()
+    places = (index @ turned.T + image.GetOrigin()) * (1, -1, 1)
+    box = parse_region("9:12,-2:1,:5")
+    export_stage(layer, tmp_path / "t.nrrd", ExportOptions(**options, region=box))
+    values, part = read(tmp_path / "t.nrrd")
+    first = image.TransformPhysicalPointToContinuousIndex(part.GetOrigin())
+    x, y, z = np.rint(first).astype(int).tolist()
+    assert first == pytest.approx((x, y, z), abs=1e-3)
+    size_z, size_y, size_x = values.shape
+    np.testing.assert_array_equal(values, whole[z : z + size_z, y : y + size_y, x : x + size_x])
+    is_within = ((places >= box.low) & (places <= box.high)).all(axis=1)
+    assert is_within.any()
+    found = index[is_within] - (x, y, z)
+    assert (found >= 0).all()
+    assert (found < (size_x, size_y, size_z)).all()
+    assert values.size < whole.size / 2
+
+
+def test_what_is_in_no_region_is_told_with_where_there_is_something(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    for name, kind in (("s.glb", "surface"), ("s.png", "surface"), ("s.nrrd", "voxel")):
+        options = ExportOptions(
+            region=parse_region(":,:,7.2:7.4" if kind == "voxel" else ":,:,7.9:")
+        )
+        told = rf"--region: no {kind} is in it, expected a part of -0.25:19.75,-9.75:0.25,"
+        with pytest.raises(UsageError, match=told):
+            export_stage(sphere_stage, tmp_path / name, options)
+
+
 @pytest.mark.slow
 def test_an_oblique_patient_s_voxels_are_in_the_patient_s_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

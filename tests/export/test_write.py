@@ -40,6 +40,17 @@ def test_a_region_is_three_spans(text: str) -> None:
         parse_region(text)
 
 
+@pytest.mark.parametrize("words", [["--region", "-9:12,-5.5:,:"], ["--region=-9:12,-5.5:,:"]])
+def test_a_region_may_begin_left_of_zero(
+    sphere_stage: Path, tmp_path: Path, words: list[str]
+) -> None:
+    """Where a patient's specimen lies: argparse takes the minus for that of another flag."""
+    shutil.copytree(sphere_stage.parent, tmp_path / "out" / "stage")
+    file = tmp_path / "s.glb"
+    assert main(["export", str(tmp_path / "out"), *words, str(file)]) == 0
+    assert file.is_file()
+
+
 def test_what_a_killed_command_left_is_removed(sphere_stage: Path, tmp_path: Path) -> None:
     (tmp_path / ".s.glb.0123abcd.partial").mkdir()
     (tmp_path / ".t.glb.0123abcd.partial").mkdir()  # of another file

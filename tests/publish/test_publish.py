@@ -4,6 +4,7 @@ import hashlib
 import http.server
 import json
 import threading
+import urllib.request
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -11,15 +12,17 @@ from typing import Any, ClassVar
 
 import pytest
 
+from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
+from stereocell.engine.run import Engine
 from stereocell.publish.targets import AGAIN, FOREVER, FolderTarget
-from stereocell.storage.file_list import encode, list_files
+from stereocell.storage.file_list import encode, list_files, measure
+from support.bundles import write_tiles
 from support.object_store import ObjectStore, serving
 
 FILES = {
     "index.html": b"<!doctype html>",
     "sw.js": b"self;",
-    "manifest.json": b'{"a": "' + b"b" * 2000 + b'"}',
     "assets/page-abc123.js": b"1;",
     **{f"assets/part-{i}.js": b"%d;" % i for i in range(40)},
     "channels/CD31/it's 1.glb": b"glTF" + bytes(3000),
@@ -37,14 +40,17 @@ def out(tmp_path: Path) -> Path:
 
 
 def write(out: Path, files: dict[str, bytes]) -> None:
-    """A bundle of these files."""
+    """A bundle of these files: the manifest names the list, which names all but these two."""
     for path, content in files.items():
         file = out / "bundle" / path
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(content)
     bundle = out / "bundle"
-    (bundle / "files.json").unlink(missing_ok=True)
+    for name in ("files.json", "manifest.json"):
+        (bundle / name).unlink(missing_ok=True)
     (bundle / "files.json").write_bytes(encode(list_files(bundle, root=bundle)))
+    index = {"path": "files.json", **measure(bundle / "files.json")}
+    (bundle / "manifest.json").write_text(json.dumps({"a": "b" * 2000, "files": index}))
 
 
 @pytest.fixture
@@ -72,7 +78,7 @@ def test_a_folder_gets_the_bundle_and_then_what_has_changed(
     assert code == 0
     there = below(site)
     assert {path: there[path] for path in FILES} == FILES
-    assert {"files.json", "manifest.json.gz", LIST, "CNAME"} < there.keys()
+    assert {"files.json", "manifest.json", "manifest.json.gz", LIST, "CNAME"} < there.keys()
     assert (first["uploaded"], first["removed"]) == (len(there) - 2, 0)
 
     _, again, _ = run(out, site)
@@ -86,10 +92,46 @@ def test_a_folder_gets_the_bundle_and_then_what_has_changed(
     assert third["removed"] == 1
     assert not (site / "channels").exists()
     assert {path for path in after if after[path] != there[path]} == {
-        *("volumes/r0_c0.ktx2", "files.json", "files.json.gz", LIST)
+        *("volumes/r0_c0.ktx2", "files.json", "files.json.gz", LIST),
+        *("manifest.json", "manifest.json.gz"),
     }
-    assert third["uploaded"] == 3
+    assert third["uploaded"] == 5
     assert after["CNAME"] == b"me.example"
+
+
+def test_of_a_bundle_as_it_is_written_every_file_is_there(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The manifest is in no list of files, and nothing opens without."""
+    viewer = tmp_path / "dist"
+    viewer.mkdir()
+    (viewer / "index.html").write_text("<!doctype html>")
+    out, site = tmp_path / "out", tmp_path / "site"
+    out.mkdir()
+    write_bundle(write_tiles(tmp_path / "stage"), out / "bundle", viewer, run=Engine(0).run)
+    order: list[str] = []
+    put = FolderTarget.write
+
+    def writes(self: FolderTarget, path: str, content: bytes) -> None:
+        order.append(path)
+        put(self, path, content)
+
+    monkeypatch.setattr(FolderTarget, "write", writes)
+    assert run(out, site)[0] == 0
+    made, there = below(out / "bundle"), below(site)
+    assert {path: there.get(path) for path in made} == made
+    assert order[-4:] == ["files.json", "manifest.json", "index.html", LIST]
+
+
+def test_a_manifest_of_another_build_is_not_published(out: Path, run: Run, tmp_path: Path) -> None:
+    manifest = out / "bundle/manifest.json"
+    manifest.write_text(manifest.read_text().replace('"sha256": "', '"sha256": "0'))
+    code, _, said = run(out, tmp_path / "site")
+    assert code == 1
+    assert "manifest.json: damaged, names another files.json: run `stereocell bundle OUT`" in said
+    manifest.unlink()
+    assert "manifest.json is missing" in run(out, tmp_path / "site")[2]
+    assert not (tmp_path / "site").exists()
 
 
 def test_what_others_put_there_stays_and_ends_the_run_before_it_writes(
@@ -244,7 +286,10 @@ def test_an_object_store_gets_types_and_a_second_run_nothing(
     files.pipe_file("bucket/mine/notes.txt", b"mine")
     code, done, said = run(out, "s3://bucket/mine")
     assert code == 0, said
-    assert done["address"] == f"{store.endpoint}/bucket/mine/"
+    # a folder of S3 has no page
+    assert done["address"] == f"{store.endpoint}/bucket/mine/index.html"
+    with urllib.request.urlopen(done["address"]) as page:
+        assert page.read() == FILES["index.html"]
     for path, content in FILES.items():
         assert files.cat_file(f"bucket/mine/{path}") == content
     about = {
@@ -261,7 +306,8 @@ def test_an_object_store_gets_types_and_a_second_run_nothing(
     (out / "bundle/channels/CD31/it's 1.glb").unlink()
     write(out, {"index.html": b"<!doctype html>other"})
     _, third, _ = run(out, "s3://bucket/mine")
-    assert (third["uploaded"], third["removed"]) == (3, 1)  # and the list, with its packed copy
+    # and the list and the manifest, with their packed copies
+    assert (third["uploaded"], third["removed"]) == (5, 1)
     assert not files.exists("bucket/mine/channels/CD31/it's 1.glb")
     assert files.cat_file("bucket/mine/notes.txt") == b"mine"
     listed = json.loads(files.cat_file(f"bucket/mine/{LIST}"))["files"]

@@ -1,4 +1,4 @@
-"""Sample, build, check, report and serve take nothing that Windows lacks.
+"""Sample, build, check, report, export, publish and serve take nothing that Windows lacks.
 
 A stand-in for that system, which no test of ours runs on: support/without_posix says what it hides.
 """
@@ -54,9 +54,16 @@ def test_all_runs_on_what_windows_has(tmp_path: Path) -> None:
         ["build", "two.ome.tif", "-o", "out", "--spacing-um", "1,1,1", "--workers", "0"],
         ["report", "out"],
         ["check", "out"],
+        *(["export", "out", f"a.{ending}"] for ending in ("glb", "3mf", "usdc", "nii.gz", "png")),
+        ["export", "out", "a.precomputed"],
+        ["export", "out", "a.precomputed", "--bits", "8"],  # in place of the first
+        ["publish", "out", "site"],
+        ["publish", "out", "site"],
     ) as process:
         told, complaints = process.communicate(timeout=300)
     assert process.returncode == 0, (told, complaints)
+    assert (tmp_path / "site" / "manifest.json").is_file()
+    assert told.endswith("0 uploaded (0 bytes), 0 removed\n")
 
     with (
         ctrl_c.heeded(),

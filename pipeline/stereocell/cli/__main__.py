@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -14,6 +15,7 @@ from stereocell.engine.interrupts import Terminated, answering_sigterm
 from stereocell.model.errors import StereoCellError, UsageError
 from stereocell.storage.processes import require_address_space, shortage
 
+_BELOW_ZERO = re.compile(r"-\.?\d")  # no flag of ours has a digit there
 EXIT_CODES = """exit codes:
   0    done; `view`, `serve`: stopped
   1    an error, told in one line; `check`: something is wrong; `doctor`: what is needed is missing
@@ -43,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _main(words: Sequence[str]) -> int:
     options = argparse.Namespace(json="--json" in words)  # until the arguments are parsed
     try:
-        options = _parser().parse_args(words)
+        options = _parser().parse_args(_with_their_flags(words))
         with answering_sigterm():
             return _run(options)
     except StereoCellError as error:
@@ -53,6 +55,21 @@ def _main(words: Sequence[str]) -> int:
     except KeyboardInterrupt as stop:
         code = 143 if isinstance(stop, Terminated) else 130
         return _fail(options, "stopped; the same command goes on from here", code)
+
+
+def _with_their_flags(words: Sequence[str]) -> list[str]:
+    """Return the words, values that begin with a minus and a digit joined to their flags.
+
+    argparse takes such a value, `-20:20,:,:`, for another flag.
+    """
+    joined: list[str] = []
+    for word in words:
+        is_value = _BELOW_ZERO.match(word) is not None
+        if is_value and joined and re.fullmatch(r"--[a-z][a-z-]*", joined[-1]):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 def _reason(error: Exception) -> str:

@@ -110,6 +110,22 @@ class Chosen:
         return [one for one in found if not wanted or one.name in wanted or one.id in wanted]
 
     @property
+    def label_maps(self) -> list[ComposedAppearance]:
+        """Return those of the chosen channels whose surfaces are objects."""
+        return [one for one in self.channels if read_columns(self.stage, one.id) is not None]
+
+    def show_as_viewer(self) -> None:
+        """Choose label maps alone where there are any, as the viewer opens, if none are named.
+
+        Surfaces of their image's channels would show through them in patches.
+        """
+        if not self.options.channels and (maps := self.label_maps):
+            if len(maps) < len(self.channels):
+                names = ", ".join(one.name for one in maps)
+                self.report(f"{names} alone, as the viewer opens: --channels takes others")
+            self.channels = maps
+
+    @property
     def region(self) -> Region | None:
         return self.options.region
 
@@ -122,11 +138,23 @@ class Chosen:
             return box
         low, high = np.maximum(box[0], self.region.low), np.minimum(box[1], self.region.high)
         if not (low < high).all():
-            raise UsageError("--region: no tile is in it")
+            raise self.nothing("tile")
         return low, high
 
+    def nothing(self, kind: str) -> UsageError | StageError:
+        """Return the error that no such thing is left: a region is told where there are some."""
+        if self.region is None:
+            return StageError(f"{self.path}: no {kind} is left to export")
+        low, high = (np.array([self.all_tiles[tile][end] for tile in self.tiles]) for end in (0, 1))
+        ends = zip(low.min(axis=0).tolist(), high.max(axis=0).tolist(), strict=True)
+        box = ",".join(f"{a:.6g}:{b:.6g}" for a, b in ends)
+        return UsageError(f"--region: no {kind} is in it, expected a part of {box}")
+
     def count_triangles(self) -> list[int]:
-        """Return the triangles of the chosen tiles and channels at each level, finest first."""
+        """Return the triangles of the chosen tiles and channels at each level, finest first.
+
+        Of a region those within it, for which the surfaces are read.
+        """
         by_tile: list[list[int]] = []
         for name in self.tiles:
             with self._loaded(name) as (tile, choice):
@@ -134,7 +162,10 @@ class Chosen:
                 counts = [self._count(tile, max(level, choice.finest_lod)) for level in levels]
                 by_tile.append(counts)
         longest = max(map(len, by_tile))
-        return [sum(n[min(level, len(n) - 1)] for n in by_tile) for level in range(longest)]
+        counts = [sum(n[min(level, len(n) - 1)] for n in by_tile) for level in range(longest)]
+        if self.region is None or self.options.max_triangles is None:
+            return counts
+        return [sum(len(p.mesh.triangles) for p in self.pieces(i)) for i in range(longest)]
 
     def _count(self, tile: Usd.Prim, level: int) -> int:
         prims = [mesh_at(tile, channel.id, level) for channel in self.channels]
@@ -142,7 +173,7 @@ class Chosen:
         return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
 
     def levels(self, light: int | None = None) -> list[int]:
-        """Return the levels to try, finest first: by --lod one, by --max-triangles those below it.
+        """Return the levels to try, finest first: from --lod on, those within --max-triangles.
 
         light  triangles that are enough if neither is given; a coarsest level of more is taken
 
@@ -152,12 +183,11 @@ class Chosen:
         if not any(counts):
             channels = ", ".join(channel.name for channel in self.channels)
             raise StageError(f"{self.path}: no surface is drawn of {channels}")
-        if self.options.lod is not None:
-            return [min(self.options.lod, len(counts) - 1)]
-        most = self.options.max_triangles
-        if most is None and light is not None:
+        most, finest = self.options.max_triangles, self.options.lod
+        if most is None and finest is None and light is not None:
             return [i for i, n in enumerate(counts) if n <= light] or [len(counts) - 1]
-        levels = [i for i, n in enumerate(counts) if most is None or n <= most]
+        from_here = range(min(finest or 0, len(counts) - 1), len(counts))
+        levels = [i for i in from_here if most is None or counts[i] <= most]
         if not levels:
             least = min(counts)
             raise UsageError(

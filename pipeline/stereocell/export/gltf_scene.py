@@ -56,7 +56,7 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
                 count += 1
                 triangles += len(mesh.triangles)
         if not count:
-            raise StageError(f"{chosen.path}: no surface is left to export")
+            raise chosen.nothing("surface")
         document.write(path)
     return f"{counted(count, 'mesh', 'meshes')}, {triangles:,} triangles at lod{level}"
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from stereocell.export.chosen import Chosen
 from stereocell.formats.gltf import vertex_colors
-from stereocell.model.errors import OutputError, StageError, UsageError
+from stereocell.model.errors import OutputError, UsageError
 from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
 
 PICTURE_TRIANGLES = 2_000_000  # more do not show on 1600 pixels
@@ -92,4 +92,4 @@ def _shapes(chosen: Chosen, level: int) -> Iterator[Shape]:
         mesh = piece.mesh
         yield Shape(mesh.positions, mesh.triangles, mesh.normals, color)
     if not count:
-        raise StageError(f"{chosen.path}: no surface is left to export")
+        raise chosen.nothing("surface")

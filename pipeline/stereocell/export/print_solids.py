@@ -26,13 +26,13 @@ from stereocell.formats.stl import write_stl_file
 from stereocell.formats.threemf import write_3mf
 from stereocell.model.color import to_srgb8
 from stereocell.model.counted import counted
-from stereocell.model.errors import StageError
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_stage import specimen_name
 
 HAND_M = 0.1  # longest edge of a specimen in print, if no --scale is given
 WALL_MM = 0.8  # two lines of the usual nozzle of 0.4 mm
+_MOST_TOLD = 8  # parts with thin bodies: of a label map there may be thousands
 Color = tuple[float, float, float]
 
 
@@ -69,14 +69,18 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
     thin: list[str] = []
     for part, solid in _solids(chosen, level, is_one=ending == ".stl"):
         thin += describe_thin(
-            solid, part.name, wall_um=wall * 1e-3 / scale / METERS_PER_UNIT, um_per_mm=1e3 / scale
+            solid,
+            part.name,
+            wall_um=wall * 1e-3 / scale / METERS_PER_UNIT,
+            um_per_mm=1e3 / scale,
+            um_per_unit=1 / factor,
         )
         places, triangles = to_mesh(solid)
         red, green, blue = to_srgb8(np.array(part.color, np.float32)).tolist()
         positions = (places.astype(np.float64) * factor).astype(np.float32)
         bodies.append(Body(part.name, (red, green, blue), positions, triangles))
     if not bodies:
-        raise StageError(f"{chosen.path}: no surface is left to export")
+        raise chosen.nothing("surface")
     if ending == ".3mf":
         write_3mf(path, bodies, title=specimen_name(chosen.stage), unit=unit)
     elif ending == ".ply":
@@ -89,6 +93,8 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
     count = sum(len(body.triangles) for body in bodies)
     size = f"{x:.3g} x {y:.3g} x {z:.3g} {unit}, {scale:g} times the specimen"
     line = f"{counted(len(bodies), 'body', 'bodies')}, {count:,} triangles at lod{level}, {size}"
+    if len(thin) > _MOST_TOLD:
+        thin[_MOST_TOLD:] = [f"... and of {len(thin) - _MOST_TOLD} more parts"]
     return "\n".join([line, *thin])
 
 
@@ -187,5 +193,5 @@ def _boxes(chosen: Chosen) -> list[Corners]:
         if (start < end).all():
             boxes.append((start, end))
     if not boxes:
-        raise StageError(f"{chosen.path}: no tile is in --region")
+        raise chosen.nothing("tile")
     return boxes

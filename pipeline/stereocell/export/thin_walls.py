@@ -17,9 +17,12 @@ _MOST = 500  # bodies that are measured, the smallest: large ones are thick
 
 
 def describe_thin(
-    solid: manifold3d.Manifold, name: str, *, wall_um: float, um_per_mm: float
+    solid: manifold3d.Manifold, name: str, *, wall_um: float, um_per_mm: float, um_per_unit: float
 ) -> Iterator[str]:
-    """Yield a line where bodies of a solid are thinner than a wall; lengths are printed in mm."""
+    """Yield a line where bodies of a solid are thinner than a wall.
+
+    Lengths are printed in mm, places in the file's unit: there they are looked up.
+    """
     mesh = solid.to_mesh()
     positions = mesh.vert_properties[:, :3].astype(np.float64)
     corners = positions[mesh.tri_verts]
@@ -51,7 +54,7 @@ def describe_thin(
         return
     thin.sort(key=lambda one: one[0])
     named = ", ".join(
-        f"{um / um_per_mm:.2g} mm at ({', '.join(f'{n / um_per_mm:.3g}' for n in place)})"
+        f"{um / um_per_mm:.2g} mm at ({', '.join(f'{n / um_per_unit:.3g}' for n in place)})"
         for um, place in thin[:_NAMED]
     )
     more = " ..." if len(thin) > _NAMED else ""

@@ -76,5 +76,8 @@ def _relative(asset: str, folder: Path) -> str:
     """Return a path as USD looks it up beside the layer."""
     if not os.path.isabs(asset):
         return asset
-    found = Path(os.path.relpath(asset, folder)).as_posix()
+    try:
+        found = Path(os.path.relpath(asset, folder)).as_posix()
+    except ValueError:  # on Windows: another drive
+        return Path(asset).as_posix()
     return found if found.startswith("../") else f"./{found}"

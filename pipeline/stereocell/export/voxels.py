@@ -7,6 +7,7 @@ over again; a patient's are DICOM's (left, posterior, superior).
 
 import os
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -102,13 +103,18 @@ def find_layout(chosen: Chosen) -> Layout:
             span.add(channel, volume, chosen, is_needed=bits == 16)
     if start is None:
         names = ", ".join(channel.name for channel in chosen.channels)
-        raise StageError(f"{chosen.path}: no volume of {names}")
+        are_maps = len(chosen.label_maps) == len(chosen.channels)
+        why = ": of a label map the stage has surfaces alone" if are_maps else ""
+        raise StageError(f"{chosen.path}: no volume of {names}{why}")
     channels = tuple(channel for channel in chosen.channels if channel.id in found)
     if options.unity and len(channels) > 1:
         names = ", ".join(channel.name for channel in channels)
         raise UsageError(f"--unity takes one channel, expected --channels with one of {names}")
     first, end = np.min(list(firsts.values()), axis=0), np.max(ends, axis=0)
-    first, end = _cut(chosen.region, start, steps, first, end)
+    within = _cut(chosen.region, start, steps, first, end)
+    if within is None:
+        raise chosen.nothing("voxel")
+    first, end = within
     dtype = np.dtype("u1") if bits == 8 or not span.is_known else span.dtype
     grid = _grid(chosen, start + first @ steps, steps, end - first)
     is_measured = dtype != np.dtype("u1") and span.are_whole
@@ -223,19 +229,28 @@ def _cut(
     steps: NDArray[np.float64],
     first: NDArray[np.int64],
     end: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the lattice's voxels whose centres lie in a region of the world."""
+) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """Return the lattice's box of voxels whose centres lie in a region of the world; None: none.
+
+    Where the volumes lie turned in the world, as a scanner has a patient, it is the least box round
+    the region.
+    """
     if region is None:
         return first, end
-    along = np.diag(steps)
-    if np.abs(steps - np.diag(along)).max() > 1e-6 * np.abs(along).min():
-        raise UsageError("--region: the volumes lie turned in the world, expected none")
-    ends = np.sort((np.array([region.low, region.high]) - start) / along, axis=0)
-    low = np.maximum(first, np.ceil(ends[0] - _OFF).clip(-1e15, 1e15).astype(np.int64))
-    high = np.minimum(end, np.floor(ends[1] + _OFF).clip(-1e15, 1e15).astype(np.int64) + 1)
-    if not (low < high).all():
-        raise UsageError("--region: no voxel is in it")
-    return low, high
+    whole = _corners(first, end - 1) @ steps + start
+    low, high = (
+        np.maximum(region.low, whole.min(axis=0)),
+        np.minimum(region.high, whole.max(axis=0)),
+    )
+    at = (_corners(low, high) - start) @ np.linalg.inv(steps)
+    start_at = np.maximum(first, np.ceil(at.min(axis=0) - _OFF).astype(np.int64))
+    end_at = np.minimum(end, np.floor(at.max(axis=0) + _OFF).astype(np.int64) + 1)
+    return (start_at, end_at) if (low <= high).all() and (start_at < end_at).all() else None
+
+
+def _corners(low: NDArray[Any], high: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the eight corners of a box."""
+    return np.array(list(product(*zip(low.tolist(), high.tolist(), strict=True))), np.float64)
 
 
 def places_of_world(chosen: Chosen) -> NDArray[np.float64]:

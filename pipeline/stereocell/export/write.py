@@ -39,11 +39,13 @@ class Format:
     write      is given the level of detail, 0 where the format has none; returns a line about the
                file
     triangles  the most that are wanted if nothing is said; a coarsest level of more is taken
+    is_seen    a picture: without --channels it has those that the viewer opens with
     """
 
     write: Callable[[Chosen, Path, int], str]
     takes: frozenset[str]
     triangles: int | None = None
+    is_seen: bool = False
 
     @property
     def has_levels(self) -> bool:
@@ -65,9 +67,9 @@ FORMATS = {
     ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES),
     ".usdc": Format(write_flattened, _USD),
     ".usda": Format(write_flattened, _USD),
-    ".png": Format(write_picture, _PICTURE, PICTURE_TRIANGLES),
-    ".mp4": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES),
-    ".webm": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES),
+    ".png": Format(write_picture, _PICTURE, PICTURE_TRIANGLES, is_seen=True),
+    ".mp4": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
+    ".webm": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
     ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}),
     ".raw": Format(write_raw, _VOLUME | {"unity"}),
     ".nii.gz": Format(write_nifti, _VOLUME),
@@ -115,6 +117,8 @@ def export_stage(
         raise OutputError(f"{file.parent}: no such folder")
     _require_replaceable(file)
     chosen = Chosen(stage_path, options, report)
+    if way.is_seen:
+        chosen.show_as_viewer()
     with _folder_beside(file) as beside:
         line = _write_smallest(chosen, way, beside / file.name)
         # what goes with the file comes first: whoever sees the file sees it whole

@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 from stereocell.formats.media_types import media_type
 
+INDEX = "index.html"
 _AT_ONCE = 8
 _WAIT_S = 30.0
 _BLOCK = 1 << 20
@@ -32,6 +33,14 @@ def fetch_faults(
         faults = {path: fault for path, fault in zip(entries, found, strict=True) if fault}
     report(f"{len(entries) - len(faults)} of {len(entries)} files are right at {address}")
     return faults
+
+
+def find_page(address: str, entries: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the address of the page: of the folder, or of its index.html where the host, as S3,
+    answers with no page for a folder.
+    """
+    index = entries.get(INDEX)
+    return address if index is None or _fault(address, "", index) is None else address + INDEX
 
 
 def _fault(address: str, path: str, entry: Mapping[str, Any]) -> str | None:

@@ -16,21 +16,22 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from stereocell.model.errors import OutputError, UsageError
-from stereocell.publish.over_http import fetch_faults
+from stereocell.publish.over_http import INDEX, fetch_faults, find_page
 from stereocell.publish.targets import Target, digest, target_of
-from stereocell.storage.file_list import find_faults, read_list, to_json
+from stereocell.storage.file_list import DAMAGED, find_faults, read_list, to_json
+from stereocell.storage.json_files import read_json
 from stereocell.storage.workspace import cached
 
 PUBLISHED = "stereocell-published.json"
-FILES = "files.json"
-_LAST = ("sw.js", "manifest.json", FILES, "index.html")
+FILES, MANIFEST = "files.json", "manifest.json"
+_LAST = ("sw.js", FILES, MANIFEST, INDEX)
 _REMEDY = "run `stereocell bundle OUT` first"
 _SMALL_BYTES = 1000  # JSON below is as short as it is
 
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """What a run has done. address: where browsers find it, or None."""
+    """What a run has done. address: of the page, for browsers, or None."""
 
     address: str | None
     files: int
@@ -106,7 +107,8 @@ def publish(
         )
     size = sum(entry["bytes"] for entry in entries.values())
     sent = sum(entries[path]["bytes"] for path in changed)
-    return Published(address, len(files), size, len(changed), sent, len(gone))
+    page = address and find_page(address, entries)
+    return Published(page, len(files), size, len(changed), sent, len(gone))
 
 
 def _files_of(bundle: Path) -> dict[str, _File]:
@@ -116,8 +118,12 @@ def _files_of(bundle: Path) -> dict[str, _File]:
         path, fault = next(iter(faults.items()))
         raise OutputError(f"{bundle / path}: {fault}: {_REMEDY}")
     files = {path: _File(entry, partial(_content, bundle / path)) for path, entry in listed.items()}
-    index = _content(bundle / FILES)
-    files[FILES] = _made(index)
+    # the list names all files but itself and the manifest, which names the list
+    index = _made(_content(bundle / FILES))
+    manifest = read_json(bundle / MANIFEST, None, _REMEDY)
+    if not isinstance(manifest, dict) or manifest.get("files") != {"path": FILES, **index.entry}:
+        raise OutputError(f"{bundle / MANIFEST}: {DAMAGED}, names another {FILES}: {_REMEDY}")
+    files |= {FILES: index, MANIFEST: _made(_content(bundle / MANIFEST))}
     for path, file in list(files.items()):
         is_long = file.entry["bytes"] >= _SMALL_BYTES
         if path.endswith(".json") and is_long and f"{path}.gz" not in files:
