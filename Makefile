@@ -199,12 +199,15 @@ test: setup browser mono ## All tests, in headless Chromium too
 # A browser is a session of its own, and Linux shares the cores between sessions before it looks at
 # who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
 BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
+# Beside a browser, and behind it, a server of a test may wait longer than its client does: in CI what has
+# failed is tried once more, by itself and not behind. What is wrong is wrong twice
+AGAIN := $(if $(CI),|| $(BIN)/pytest --last-failed --last-failed-no-failures none)
 # Three processes for two cores: builds, servers and clusters wait for one another, and each process
 # reads all tests first. A file's tests share what it has built, so they stay together. In a fresh clone
 # one process compiles all for the three, which would each do it, side by side
 test-python: setup
 	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
-	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25
+	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
 
 test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test
