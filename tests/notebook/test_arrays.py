@@ -77,6 +77,8 @@ def test_xarray_s_units_are_lengths_and_its_channels_have_names(tmp_path):
         (np.zeros((4, 4, 4)), {"spacing_um": None}, "no voxel spacing: name it, as spacing_um="),
         (np.zeros((4, 4, 4)), {"spacing_um": (1, 0, 1)}, "each above 0"),
         (np.zeros((4, 4, 4)), {"spacing_um": (1, 1)}, "expected z, y, x in um"),
+        (np.zeros((4, 4, 4)), {"spacing_um": 2}, "spacing_um is 2, expected z, y, x in um"),
+        (np.zeros((4, 4, 4)), {"spacing_um": "2,1,1"}, "expected z, y, x in um"),
         (np.zeros((2, 4, 4, 4)), {"channels": ["a"]}, "expected 2 different names"),
         (np.zeros((2, 4, 4, 4)), {"channels": ["a", "a"]}, "expected 2 different names"),
         (

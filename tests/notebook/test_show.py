@@ -4,12 +4,14 @@ import io
 import os
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import stereocell
+from stereocell.model.errors import UsageError
 from stereocell.notebook import arrays
 
 pytestmark = pytest.mark.slow
@@ -79,4 +81,22 @@ def test_a_build_that_nobody_keeps_goes_when_python_ends(built_page, tmp_path):
         env={**os.environ, "TMPDIR": str(place)},
     )
     assert done.stdout == "200\n1\n", done.stderr
+    assert not list(place.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "message"),
+    [
+        ("", {}, "an empty name, expected a path"),  # not the build that one stands in
+        ("x.tif", {"spacing_um": 2}, "spacing_um is 2, expected z, y, x in um"),
+    ],
+)
+def test_what_can_not_be_shown_is_told_in_a_line(
+    built_page, tmp_path, monkeypatch, source, more, message
+):
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
+    with pytest.raises(UsageError, match=message):
+        stereocell.show(source, **more)
     assert not list(place.iterdir())

@@ -93,15 +93,24 @@ def as_source(
         raise UsageError(
             "an array states no voxel spacing: name it, as spacing_um=(0.5, 0.25, 0.25) (z, y, x)"
         )
-    spacing = tuple(float(v) for v in found)
-    if len(spacing) != 3 or not all(isfinite(v) and v > 0 for v in spacing):
-        raise UsageError(f"spacing_um is {found!r:.60}, expected z, y, x in um, each above 0")
+    spacing = check_spacing(found)
     count = shape[0] if len(shape) == 4 else 1
     names = list(channels) if channels is not None else _names_of(array, count)
     if len(names) != count or len(set(names)) != count or not all(names):
         raise UsageError(f"channels are {names!r:.80}, expected {count} different names")
     data = getattr(array, "variable", array)  # of xarray, whose own slices carry coordinates
     return ArraySource(getattr(data, "data", data) if dims else data, spacing, tuple(names))
+
+
+def check_spacing(given: Any) -> Triple:
+    """Return a voxel spacing (z, y, x), um. Raises UsageError for anything else."""
+    try:
+        z, y, x = (float(v) for v in given)
+    except (TypeError, ValueError):  # one number, words
+        z = y = x = 0.0
+    if not all(isfinite(v) and v > 0 for v in (z, y, x)):
+        raise UsageError(f"spacing_um is {given!r:.60}, expected z, y, x in um, each above 0")
+    return z, y, x
 
 
 def _spacing_of(array: Any) -> tuple[float, ...] | None:

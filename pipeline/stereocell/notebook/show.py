@@ -64,6 +64,7 @@ def show(
         ) from None
     from stereocell.notebook.arrays import is_array
     from stereocell.notebook.page import find_page
+    from stereocell.storage.location import Location
 
     if quality not in _QUALITIES:
         raise UsageError(f"quality is {quality!r:.40}, expected one of {', '.join(_QUALITIES)}")
@@ -73,6 +74,7 @@ def show(
     if not is_array(source):
         if not isinstance(source, str | Path):
             raise UsageError(f"{source!r:.60} is no array, expected one, or a path")
+        Location.of(source)  # an empty name is refused, before it is taken for this folder
         if spacing_um is None and channels is None and (found := _find_bundle(Path(source))):
             return _viewer(*found, height=height, state=state)
     kept = None if out is None else Path(out)
@@ -164,7 +166,7 @@ def _build(
     else:
         plan = wanted.setdefault("plan", {})
         if spacing_um is not None:
-            plan["spacing_um"] = tuple(spacing_um)
+            plan["spacing_um"] = arrays.check_spacing(spacing_um)
         if channels is not None:
             plan["channels"] = tuple(channels)
     with _heard() as said:

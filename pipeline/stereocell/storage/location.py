@@ -76,9 +76,12 @@ class Location:
     def of(cls, source: str | Path) -> "Location":
         """Return the location of a path or of an address such as `https://...` or `s3://...`.
 
-        Raises UsageError for an invalid address.
+        Raises UsageError for an invalid address, and for an empty name: it would be the folder in
+        which the program runs.
         """
         text = str(source)
+        if not text:
+            raise UsageError("an empty name, expected a path or an address (. is this folder)")
         if not _ADDRESS.match(text):
             path, key = _split_key(text)
             return cls(os.path.abspath(os.path.expanduser(path)) + key, True)
