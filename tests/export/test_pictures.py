@@ -13,7 +13,7 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 from PIL import Image
-from pxr import Gf, Sdf, Usd
+from pxr import Gf, Sdf, Usd, UsdGeom
 
 from stereocell.export import pictures
 from stereocell.export.chosen import Chosen
@@ -61,6 +61,21 @@ def test_a_picture_opens_with_label_maps_alone_as_the_viewer(
     chosen = Chosen(layer, small)
     chosen.show_as_viewer()
     assert [channel.name for channel in chosen.channels] == ["CD31"]
+
+
+def test_label_maps_that_an_edit_has_hidden_leave_the_picture_to_the_others(
+    edited: Callable[..., Path],
+) -> None:
+    def hide_label_map(stage: Usd.Stage) -> None:
+        prim = stage.GetPrimAtPath(CD31)
+        prim.CreateAttribute(COLUMNS, Sdf.ValueTypeNames.TokenArray).Set([])
+        for tile in stage.GetPrimAtPath("/Specimen/Tiles").GetChildren():
+            surface = stage.OverridePrim(tile.GetPath().AppendChild(prim.GetName()))
+            UsdGeom.Imageable(surface).MakeInvisible()
+
+    chosen = Chosen(edited(hide_label_map), ExportOptions(width=64))
+    chosen.show_as_viewer()
+    assert len(chosen.channels) > 1
 
 
 def test_a_picture_shows_the_sphere_in_its_edited_colour(

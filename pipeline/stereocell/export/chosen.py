@@ -115,15 +115,19 @@ class Chosen:
         return [one for one in self.channels if read_columns(self.stage, one.id) is not None]
 
     def show_as_viewer(self) -> None:
-        """Choose label maps alone where there are any, as the viewer opens, if none are named.
+        """Choose label maps alone where any is drawn, as the viewer opens, if no channel is named.
 
         Surfaces of their image's channels would show through them in patches.
         """
-        if not self.options.channels and (maps := self.label_maps):
-            if len(maps) < len(self.channels):
-                names = ", ".join(one.name for one in maps)
-                self.report(f"{names} alone, as the viewer opens: --channels takes others")
-            self.channels = maps
+        every, maps = self.channels, self.label_maps
+        if self.options.channels or not maps or len(maps) == len(every):
+            return
+        self.channels = maps
+        if any(self.count_triangles()):
+            names = ", ".join(one.name for one in maps)
+            self.report(f"{names} alone, as the viewer opens: --channels takes others")
+        else:  # an edit has hidden them
+            self.channels = every
 
     @property
     def region(self) -> Region | None:
