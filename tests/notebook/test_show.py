@@ -100,3 +100,9 @@ def test_what_can_not_be_shown_is_told_in_a_line(
     with pytest.raises(UsageError, match=message):
         stereocell.show(source, **more)
     assert not list(place.iterdir())
+
+
+def test_a_build_without_a_bundle_is_named_as_one(built_page, tmp_path):
+    (tmp_path / "plan.json").write_text("{}")
+    with pytest.raises(UsageError, match=r"a build without a bundle, .*`stereocell bundle`"):
+        stereocell.show(tmp_path)

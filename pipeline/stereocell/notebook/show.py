@@ -102,11 +102,19 @@ def show(
 
 
 def _find_bundle(path: Path) -> tuple[Path, Path | None] | None:
-    """Return the folders of a bundle and of its OUT, if a path is one of them."""
+    """Return the folders of a bundle and of its OUT, if a path is one of them.
+
+    Raises UsageError for a build that has no bundle.
+    """
     if (path / "bundle" / _MANIFEST).is_file():
         return path / "bundle", path
     if (path / _MANIFEST).is_file() and (path / "files.json").is_file():
         return path, None
+    if (path / "plan.json").is_file():
+        raise UsageError(
+            f"{path}: a build without a bundle, expected {path / 'bundle' / _MANIFEST}: "
+            "`stereocell bundle` writes it"
+        )
     return None
 
 
