@@ -96,3 +96,39 @@ def test_a_coarser_sight_of_the_region_names_the_same_voxels() -> None:
     out = holder.at(WHOLE)
     assert (out & cradle).sum() > 0.7 * cradle.sum()
     assert not (out & body).any()
+
+
+def _left_out(hu: NDArray[np.int16]) -> NDArray[np.bool_]:
+    holder = find_holder(hu, SPACING, WHOLE)
+    return np.zeros(SHAPE, bool) if holder is None else holder.at(WHOLE)
+
+
+def _skull() -> NDArray[np.bool_]:
+    """Return a shell of 6 mm, open where the volume ends, as the neck of a dry skull is."""
+    z, y, x = _places()
+    outer = (z / 120) ** 2 + (y / 75) ** 2 + (x / 62) ** 2
+    inner = (z / 114) ** 2 + (y / 69) ** 2 + (x / 56) ** 2
+    return (outer < 1) & (inner > 1)
+
+
+def test_a_dry_skull_with_something_thick_in_it_stays_and_its_cradle_goes() -> None:
+    z, y, x = _places()
+    skull, cradle = _skull(), _cradle(8.0)
+    core = np.hypot(y, x - 10) < 20
+    rod = (np.hypot(y - 30, x + 20) < 9) & (abs(z) < 60)  # long and thin, and within
+    hu = np.where(skull, 700, np.where(core | rod, 90, -1000)).astype(np.int16)
+    out = _left_out(_with(hu, cradle & ~skull))
+    assert not (out & (skull | core | rod)).any()
+    assert (out & cradle).sum() > 0.7 * cradle.sum()
+
+
+def test_an_animal_s_ears_and_tail_stay() -> None:
+    z, y, x = _places()
+    body = (z / 70) ** 2 + (y / 45) ** 2 + (x / 40) ** 2 < 1
+    ears = (abs(abs(x) - 30) < 3) & (y < -35) & (y > -95) & (abs(z) < 25)
+    tail = (np.hypot(y - 20, x) < 6) & (z > 50)
+    vertebrae = (np.hypot(y - 20, x) < 3) & (z > 50)
+    for part in (ears, tail):
+        hu = np.where(body | part, 40, -1000).astype(np.int16)
+        out = _left_out(np.where(vertebrae & part, np.int16(800), hu))
+        assert not out.any()

@@ -4,6 +4,10 @@ At the level of skin such a piece is a solid like the body, and often touches it
 or a bar: thinner than the body, long, and joined to it by a small part of its surface. So the body
 is what lies near its own cores, voxels deep inside; what is left is apart where it is long and
 hardly joined. An ear or a nose is short, a face that the volume's end cuts is joined by its cut.
+
+Some bodies are sheets themselves: a dry skull, a shell with something thick in it, an animal's
+ears and tail. So a holder is smaller than what it holds, comes in through the volume's end, is not
+within the body, and is no bone.
 """
 
 import base64
@@ -27,6 +31,9 @@ _CORE_SHARE = 0.02  # of the largest core's voxels: arms and legs have cores of 
 _SLACK = 1.5  # coarsest spacings that the body reaches beyond a core's depth
 _LENGTH = 8.0  # depths: diagonal of the box of a piece that is apart, at least
 _JOINED = 0.18  # share of its surface that joins it to the body or to the volume's end, at most
+_SMALLER = 0.5  # of the body's voxels: what has more is body
+_BONE_HU, _BONE_SHARE = 500.0, 0.1  # of its voxels, at most; of five head holders .02
+_WITHIN = 4  # of six directions: where most of a piece sees the body in as many, it lies within
 _CELLS = 1 << 20  # most cells of the mask that is kept
 
 
@@ -116,19 +123,33 @@ def find_holder(
     if body is None:
         return None
     labels = cc3d.connected_components(solid & ~body, connectivity=26)
+    measures = cc3d.statistics(labels, no_slice_conversion=True)
+    counts = np.asarray(measures["voxel_counts"], np.int64)
+    boxes = np.asarray(measures["bounding_boxes"], np.int64).reshape(-1, 3, 2)
+    largest_first = np.argsort(-counts[1:], kind="stable") + 1
+    for number in largest_first:
+        if counts[number] <= _SMALLER * np.count_nonzero(body):
+            break
+        body |= labels == number
     found, pieces = np.zeros(voxels.shape, bool), []
-    boxes = cc3d.statistics(labels, no_slice_conversion=True)["bounding_boxes"]
-    for number, ends in enumerate(np.asarray(boxes, np.int64).reshape(-1, 3, 2)[1:], start=1):
+    for number in largest_first:
+        ends = boxes[number]
         size = (ends[:, 1] - ends[:, 0] + 1) * spacing
-        if np.linalg.norm(size) < _LENGTH * depth:
+        if np.linalg.norm(size) < _LENGTH * depth or not _comes_in(ends, voxels.shape):
             continue
         near = tuple(
             slice(max(a - 1, 0), min(b + 2, n))
             for (a, b), n in zip(ends, voxels.shape, strict=True)
         )
-        if _joined(labels[near] == number, body[near], solid[near], spacing) <= _JOINED:
-            found |= labels == number
-            pieces.append(" x ".join(f"{length / 1000:.0f}" for length in size) + " mm (z, y, x)")
+        piece = labels[near] == number
+        if body[near][piece].any() or np.mean(voxels[near][piece] > _BONE_HU) > _BONE_SHARE:
+            continue
+        if _joined(piece, body[near], solid[near], spacing) > _JOINED:
+            continue
+        if _is_within(labels == number, body):
+            continue
+        found[near] |= piece
+        pieces.append(" x ".join(f"{length / 1000:.0f}" for length in size) + " mm (z, y, x)")
     if not pieces:
         return None
     # as far as it is blurred, and not into the body
@@ -155,6 +176,21 @@ def _body(
     holds[np.unique(near[core])] = True  # what is near and not joined is none of it
     holds[0] = False
     return np.asarray(holds[near])
+
+
+def _comes_in(ends: NDArray[np.int64], shape: tuple[int, ...]) -> bool:
+    """Return whether a piece reaches the volume's end: nothing holds it within."""
+    return bool((ends[:, 0] == 0).any() or (ends[:, 1] == np.array(shape) - 1).any())
+
+
+def _is_within(piece: NDArray[np.bool_], body: NDArray[np.bool_]) -> bool:
+    """Return whether most of a piece has the body on most sides."""
+    sides = np.zeros(np.count_nonzero(piece), np.uint8)
+    for axis in range(3):
+        for way in (slice(None), slice(None, None, -1)):
+            along = tuple(way if k == axis else slice(None) for k in range(3))
+            sides += np.logical_or.accumulate(body[along], axis=axis)[along][piece]
+    return bool(np.mean(sides >= _WITHIN) > 0.5)
 
 
 def _joined(
