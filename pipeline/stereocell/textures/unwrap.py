@@ -9,11 +9,10 @@ charts apart up to the level k for which padding >= 3 * 2^k; with 6 that is leve
 viewer replaces a level of detail by a coarser one before its texels, a coarse voxel wide, are much
 below a pixel. So deeper mip levels matter for the coarsest level only, and mix edges of charts.
 
-Charts cover 15 to 38 % of the texels on six of the demo's units, lod1 to lod3: a nucleus has two or
-three, which are 20 texels across, a voxel each, so that the padding takes more than they do. With 3
-texels of padding (mip level 0 alone) it is 25 to 41 %, by brute force at packing .01 to .02 more,
-with charts of four times the cost as much; with texels of a quarter, 6 to 13 times as many, 38 to
-55 %. None shows more than these texels do: what is empty compresses to nothing in files.
+Charts cover 15 to 38 % of the texels on six of the demo's units, lod1 to lod3: they are small, and
+padding takes much of the rest. With 3 texels of padding (mip level 0 alone) they cover 25 to 41 %,
+with texels of a quarter, 6 to 13 times as many, 38 to 55 %. Packing by brute force gives up to 4 %
+more, and a larger `max_cost` of charts hardly any.
 """
 
 import atexit
