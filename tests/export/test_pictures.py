@@ -53,6 +53,7 @@ def test_a_picture_opens_with_label_maps_alone_as_the_viewer(
     for file, options, is_said in (
         ("s.png", small, True),
         ("t.png", replace(small, channels=("CD31", "Hoechst 33342")), False),
+        ("s.usdz", ExportOptions(), True),
         ("s.glb", ExportOptions(), False),
     ):
         told: list[str] = []

@@ -1,11 +1,14 @@
 """Volumes that simplification takes are given back."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from stereocell.meshes import keep_volume
 from stereocell.meshes.keep_volume import FineVolumes
 from stereocell.meshes.simplify_valid import simplify_without_defects
-from stereocell.meshes.validity import border, find_defects
+from stereocell.meshes.validity import Defects, border, find_defects
 from stereocell.model.mesh import Mesh
 from support.meshes import ball, enclosed_volume, joined, kinds, moved, turned
 
@@ -59,6 +62,25 @@ def test_no_vertex_leaves_the_tile_s_box_or_the_fine_mesh_s() -> None:
     assert mesh.positions[:, 1].max() <= high[1]
     assert np.linalg.norm(mesh.positions, axis=1).max() > 5.05  # elsewhere they moved out
     assert enclosed_volume(mesh) == pytest.approx(enclosed_volume(fine), rel=0.003)
+
+
+def test_where_very_many_would_cross_the_bodies_stay_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of noise all tries would fail, and cost more than the rest of the level."""
+    one = ball(5.0, 60)
+    pair = joined(one, moved(one, (10.02, 0.0, 0.0)))
+    checks = []
+
+    def count_checks(*given: Any) -> Defects:
+        checks.append(given)
+        return find_defects(*given)
+
+    monkeypatch.setattr(keep_volume, "find_defects", count_checks)
+    monkeypatch.setattr(keep_volume, "COSTLY", 1)
+    simple, mesh = kept(pair)
+    np.testing.assert_array_equal(mesh.positions, simple.positions)
+    assert len(checks) == 2
 
 
 def test_bodies_that_would_cross_stay_apart() -> None:

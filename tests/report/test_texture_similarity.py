@@ -8,13 +8,16 @@ from scipy import ndimage
 
 from stereocell.building.settings import Settings
 from stereocell.building.unit import UnitInput, build_unit
+from stereocell.isosurface.array_levels import find_array_levels
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Lod
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
-from stereocell.report.texture_similarity import VIEWS, draw, find_likeness
+from stereocell.report.texture_similarity import CLOSE_PX, VIEWS, compare, draw, find_likeness
+from stereocell.samples.cycif_geometry import grow_tissue
+from stereocell.samples.microscope import SPACING_UM, STAINS, record
 
 SPACING = (1.0, 1.0, 1.0)
 BOX = Box((0, 0, 0), (56, 72, 72))
@@ -64,6 +67,34 @@ def test_level_with_maps_looks_like_the_finest(
     assert np.mean(found) >= 0.95
     assert min(found) >= least
     assert np.mean(found) > np.mean(bare) + 0.005
+
+
+@pytest.mark.parametrize("stain", range(len(STAINS)), ids=[stain.name for stain in STAINS])
+def test_coarsest_level_has_the_finest_s_outlines(stain: int) -> None:
+    """SSIM of the outlines, close up, is .9 or more at each view: nuclei, membranes, vessels."""
+    box = Box((0, 0, 0), (48, 96, 96))
+    depth, height, width = (n * h for n, h in zip(box.shape, SPACING_UM, strict=True))
+    tissue = grow_tissue((depth, height, width), 0, 1.0)
+    volume = Volume(record(tissue, stain, box=box, seed=0), SPACING_UM)
+    level = find_array_levels(volume).levels.clear[0].value
+    settings = Settings()
+    given = UnitInput(
+        lattice=Lattice.of_whole(box, SPACING_UM),
+        iso=LatticeField(((0.0,), (0.0,), (0.0,)), np.full((1, 1, 1), level)),
+        background=None,
+        repair=RepairOptions(0.6, 0.9, 1.2),
+        step=(1, 1, 1),
+        intensity_window=(0.0, float(volume.voxels.max())),
+        settings=replace(settings, surface=settings.surface.resolved(SPACING_UM)),
+    )
+    fine, *_, coarse = build_unit(volume, given).lods
+    assert len(coarse.mesh.triangles) < 0.1 * len(fine.mesh.triangles)
+    ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
+    for view in VIEWS:
+        one, other = (
+            (draw(lod, view, ends=ends, size=CLOSE_PX) > 0).astype(float) for lod in (fine, coarse)
+        )
+        assert compare(one, other) >= 0.9
 
 
 def test_picture_shows_the_surface_lit_from_the_eye(lods: tuple[Lod, ...]) -> None:

@@ -4,14 +4,16 @@ import hashlib
 import multiprocessing
 import shutil
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Gf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.usd import write_usdz as usdz_writer
 from stereocell.usd.validate import validate_usdz
+from stereocell.usd.write_objects import COLUMNS
 from stereocell.usd.write_usdz import write_usdz
 from stereocell.verify.formats import check
 from support.stages import BALL_ID, COLORS, F_ID, HEAD, SHAPE, SPACING_UM, write_whole
@@ -98,6 +100,52 @@ def test_a_heavy_specimen_is_shown_at_a_coarser_level(
     (source,) = material.ComputeSurfaceSource()[0].GetInput("normal").GetValueProducingAttributes()
     file = UsdShade.Shader(source.GetPrim()).GetInput("file").Get()
     assert file.resolvedPath.endswith(f"specimen.usdz[textures/{F_ID}_r0_c0_normal.png]")
+
+
+def as_label_map(stage_path: Path, edit: Path, channel: str) -> Usd.Stage:
+    """Open a layer over the stage in which a channel's surfaces are objects."""
+    edit.write_text(f"{HEAD}subLayers = [@{stage_path}@])\n")
+    stage = Usd.Stage.Open(str(edit))
+    prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel}")
+    prim.CreateAttribute(COLUMNS, Sdf.ValueTypeNames.TokenArray).Set([])
+    return stage
+
+
+def test_label_maps_are_shown_alone_unless_they_are_hidden(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    """Surfaces of their image would break through them."""
+    edit = tmp_path / "edit.usda"
+    stage = as_label_map(stage_path, edit, BALL_ID)
+    stage.Save()
+    balls = {f"{BALL_ID}_r0_c0", f"{BALL_ID}_r0_c1"}
+    every = balls | {f"{F_ID}_r0_c0", f"{F_ID}_r0_c1"}
+
+    def shown(channels: Sequence[str] = ()) -> set[str]:
+        path = tmp_path / "edit.usdz"
+        assert write_usdz(edit, path, channels=channels) == 0
+        assert validate_usdz(path) == []
+        return set(meshes(Usd.Stage.Open(str(path))))
+
+    assert shown() == balls
+    assert shown(channels=[F_ID, BALL_ID]) == every
+    for prim in [p for p in stage.Traverse() if p.GetName() in balls]:
+        UsdGeom.Imageable(prim).MakeInvisible()
+    stage.Save()
+    assert shown() == every - balls
+
+
+def test_other_channels_weigh_nothing_beside_label_maps(
+    stage_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    edit, path = tmp_path / "edit.usda", tmp_path / "edit.usdz"
+    as_label_map(stage_path, edit, BALL_ID).Save()
+    write_usdz(edit, path)
+    balls = Usd.Stage.Open(str(path))
+    count = sum(len(mesh.GetFaceVertexCountsAttr().Get()) for mesh in meshes(balls).values())
+    monkeypatch.setattr(usdz_writer, "MAX_TRIANGLES", count)
+    assert write_usdz(edit, path) == 0
+    assert write_usdz(edit, path, channels=[F_ID, BALL_ID]) != 0
 
 
 def test_faults_of_a_usdz_are_found(stage_path: Path, small: Path, tmp_path: Path) -> None:

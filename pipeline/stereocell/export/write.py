@@ -39,7 +39,7 @@ class Format:
     write      is given the level of detail, 0 where the format has none; returns a line about the
                file
     triangles  the most that are wanted if nothing is said; a coarsest level of more is taken
-    is_seen    a picture: without --channels it has those that the viewer opens with
+    is_seen    made to be looked at: without --channels it has those that the viewer opens with
     """
 
     write: Callable[[Chosen, Path, int], str]
@@ -64,7 +64,7 @@ FORMATS = {
     ".3mf": _PRINT,
     ".ply": _PRINT,
     ".obj": _PRINT,
-    ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES),
+    ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES, is_seen=True),
     ".usdc": Format(write_flattened, _USD),
     ".usda": Format(write_flattened, _USD),
     ".png": Format(write_picture, _PICTURE, PICTURE_TRIANGLES, is_seen=True),

@@ -37,29 +37,26 @@ def match_twins(triangles: Ints, count: int) -> Ints:
     for v in range(count):
         first[v + 1] += first[v]
     place, listed = first[:-1].copy(), np.empty(edges, np.int32)
+    far, upward = np.empty(edges, np.int32), np.empty(edges, np.bool_)  # in the order of the lists
     for h in range(edges):
-        v = min(corner[h], corner[following(h)])
-        listed[place[v]] = h
+        start, end = corner[h], corner[following(h)]
+        v = min(start, end)
+        p = place[v]
+        listed[p], far[p], upward[p] = h, max(start, end), start < end
         place[v] += 1
     twins = np.full(edges, BORDER, np.int32)
     for v in range(count):
         for i in range(first[v], first[v + 1]):
-            h = listed[i]
-            start, end = corner[h], corner[following(h)]
             opposite, others = -1, 0
             for j in range(first[v], first[v + 1]):
-                g = listed[j]
-                if g == h:
+                if far[j] != far[i] or j == i:
                     continue
-                if corner[g] == end and corner[following(g)] == start and start != end:
-                    opposite = g
-                    others += 1
-                elif corner[g] == start and corner[following(g)] == end:
-                    others += 2
+                opposite = listed[j]
+                others += 1 if upward[j] != upward[i] else 2
             if others == 1:
-                twins[h] = opposite
+                twins[listed[i]] = opposite
             elif others > 1:
-                twins[h] = CROWDED
+                twins[listed[i]] = CROWDED
     return twins
 
 

@@ -7,7 +7,9 @@ distance is at its bound. Towards a cut the move fades out, so that vertices of 
 bit and no other reaches it. No vertex leaves the tile's box, or the fine mesh's where the caps of
 the data's end lie outside of that. Where bodies come to cross each other or themselves, the
 vertices there stay, and the others move farther for it, unless these are FEW; if that doesn't help,
-the whole body moves half as far, and at last not at all.
+the whole body moves half as far, and at last not at all. Where MANY cross, as in noise, of which
+walls are nearer than the move is long, these bodies stay at once: tries would cost more than all
+the rest of a level.
 """
 
 from dataclasses import replace
@@ -16,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.half_edges import label_bodies, measure_volumes, sum_gains, sum_normals
-from stereocell.meshes.validity import Defects, border, find_defects
+from stereocell.meshes.validity import Defects, border, find_defects, find_topology
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
@@ -26,6 +28,8 @@ CALMED = 3  # tries in which the vertices of defects stay, and more around them 
 HALVINGS = 3  # tries with half the move after that, before a body with defects stays
 
 FEW = 0.02  # share of a body's vertices that may stay without others moving farther for them
+MANY = 0.05  # share of a level's vertices in defects of its first try, and their number
+COSTLY = 10_000
 
 Points = NDArray[np.float64]
 Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
@@ -73,7 +77,8 @@ class FineVolumes:
         max_move_um  largest distance of a move
         """
         triangles = np.ascontiguousarray(mesh.triangles, np.int32)
-        label, count = label_bodies(triangles, len(mesh.positions))
+        topology = find_topology(triangles, len(mesh.positions))
+        label, count = topology.bodies
         first = np.unique(label, return_index=True)[1]
         wanted = self._volume[self._label[vertices[first]]]
         start = mesh.positions.astype(np.float64)
@@ -94,13 +99,15 @@ class FineVolumes:
                 other[faulty] = True
                 fresh = other[mesh.triangles].any(axis=1)
             placed = replace(mesh, positions=positions)
-            defects = find_defects(placed, planes, fresh)
+            defects = find_defects(placed, planes, fresh, topology)
             faulty = defects.vertices(mesh.triangles)
             worst = np.unique(label[faulty])
             worst = worst[part[worst] > 0]
             if not len(worst):
                 break
-            if number < CALMED:
+            if number == 0 and len(faulty) > max(MANY * len(start), COSTLY):
+                part[worst] = 0.0
+            elif number < CALMED:
                 share[_grow(faulty, mesh.triangles, len(start), number)] = 0.0
                 stay = np.bincount(label[share == 0], minlength=count)
                 few = (stay < FEW * np.bincount(label, minlength=count))[label][:, None]

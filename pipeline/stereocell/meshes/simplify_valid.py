@@ -117,19 +117,22 @@ def _around(
     tree: cKDTree, draft: Mesh, defects: Defects, tries: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Return the tree's vertices in balls around the defects; a ball grows with each try there."""
-    corners = draft.positions[draft.triangles].astype(np.float64)
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    first, second = defects.crossings.T
-    edges = draft.positions[np.concatenate([defects.open, defects.non_manifold_edges])]
-    vertices = draft.positions[defects.non_manifold_vertices]
-    whole = np.concatenate([defects.degenerate, defects.walls])
+    at = draft.positions.astype(np.float64)
+    first, second, whole = (
+        at[draft.triangles[some]]
+        for some in (*defects.crossings.T, np.concatenate([defects.degenerate, defects.walls]))
+    )
+    edges = at[np.concatenate([defects.open, defects.non_manifold_edges])]
+    vertices = at[defects.non_manifold_vertices]
     # two triangles can meet only where their boxes do
-    lows = [np.maximum(low[first], low[second]), edges.min(axis=1), vertices, low[whole]]
-    highs = [np.minimum(high[first], high[second]), edges.max(axis=1), vertices, high[whole]]
-    start, end = (np.concatenate(ends).astype(np.float64) for ends in (lows, highs))
+    lows = [np.maximum(first.min(axis=1), second.min(axis=1)), edges.min(axis=1), vertices]
+    highs = [np.minimum(first.max(axis=1), second.max(axis=1)), edges.max(axis=1), vertices]
+    lows, highs = [*lows, whole.min(axis=1)], [*highs, whole.max(axis=1)]
+    start, end = np.concatenate(lows), np.concatenate(highs)
     if not len(start):
         return np.zeros(0, np.int64)
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    a, b, c = at[draft.triangles.T]
+    sides = np.concatenate([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))])
     size = np.maximum(np.linalg.norm(end - start, axis=1) / 2, float(np.median(sides)) / 4)
     away, nearest = tree.query((start + end) / 2)
     # at least one vertex, or the next try would equal this one

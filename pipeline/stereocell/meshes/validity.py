@@ -73,14 +73,48 @@ class Defects:
         return np.unique(np.concatenate(parts))
 
 
+@dataclass(frozen=True, slots=True)
+class Topology:
+    """The parts of the check that don't depend on where vertices are; `find_topology` makes it.
+
+    corners                int32 (m, 3), the triangles
+    rim, crowded           directed edges (n, 2) without a triangle beyond, and with several
+    non_manifold_vertices  (n,)
+    bodies                 the number of each vertex's body, and how many there are
+    """
+
+    corners: NDArray[np.int32]
+    rim: Indices
+    crowded: Indices
+    non_manifold_vertices: Indices
+    bodies: tuple[NDArray[np.int32], int]
+
+
+def find_topology(triangles: NDArray[np.integer], vertices: int) -> Topology:
+    """Return how triangles (m, 3) of so many vertices hang together."""
+    corners = np.ascontiguousarray(triangles, np.int32)
+    twins = match_twins(corners, vertices)
+    return Topology(
+        corners,
+        _ends_of(corners.astype(np.int64), np.flatnonzero(twins == BORDER)),
+        _ends_of(corners.astype(np.int64), np.flatnonzero(twins == CROWDED)),
+        np.flatnonzero(count_fans(corners, twins, vertices)[1] < 0),
+        label_bodies(corners, vertices),
+    )
+
+
 def find_defects(
-    mesh: Mesh, planes: tuple[Plane, ...] = (), fresh: NDArray[np.bool_] | None = None
+    mesh: Mesh,
+    planes: tuple[Plane, ...] = (),
+    fresh: NDArray[np.bool_] | None = None,
+    topology: Topology | None = None,
 ) -> Defects:
     """Return the mesh's defects; it may be open on the planes and nowhere else.
 
-    mesh    positions float32 (n, 3), triangles uint32 (m, 3)
-    planes  the cut planes: axis (0 x, 1 y, 2 z) and value in um
-    fresh   bool (m,): crossings are looked for only in pairs with such a triangle; None: in all
+    mesh      positions float32 (n, 3), triangles uint32 (m, 3)
+    planes    the cut planes: axis (0 x, 1 y, 2 z) and value in um
+    fresh     bool (m,): crossings are looked for only in pairs with such a triangle; None: in all
+    topology  of the triangles, for meshes that differ in positions alone; None: it is found
 
     A body's winding is the sign of the volume that it encloses with the planes that cut it. A body
     of negative volume is a cavity, if it lies in the box of a solid.
@@ -97,21 +131,17 @@ def find_defects(
     degenerate = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     degenerate[find_flat(positions, triangles)] = True
     used = np.flatnonzero(~degenerate)
-    corners = np.ascontiguousarray(triangles, np.int32)
-    twins = match_twins(corners, len(mesh.positions))
-    rim = _ends_of(triangles, np.flatnonzero(twins == BORDER))
-    non_manifold_vertices = np.flatnonzero(count_fans(corners, twins, len(mesh.positions))[1] < 0)
+    topology = topology or find_topology(triangles, len(mesh.positions))
+    rim = topology.rim
     crossings = find_crossings(
         positions, triangles[used], fresh=None if fresh is None else fresh[used]
     )
     return Defects(
         degenerate=np.flatnonzero(degenerate),
         open=rim[~_on_planes(mesh.positions, rim, planes)],
-        non_manifold_edges=np.unique(
-            np.sort(_ends_of(triangles, np.flatnonzero(twins == CROWDED)), axis=1), axis=0
-        ),
-        non_manifold_vertices=non_manifold_vertices,
-        inside_out=_inside_out(mesh, positions, corners, rim, planes),
+        non_manifold_edges=np.unique(np.sort(topology.crowded, axis=1), axis=0),
+        non_manifold_vertices=topology.non_manifold_vertices,
+        inside_out=_inside_out(mesh, positions, topology, planes),
         crossings=used[crossings],
         walls=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
     )
@@ -154,16 +184,12 @@ def _ends_of(triangles: Indices, half_edges: NDArray[np.integer]) -> Indices:
 
 
 def _inside_out(
-    mesh: Mesh,
-    positions: NDArray[np.float64],
-    triangles: NDArray[np.int32],
-    rim: Indices,
-    planes: tuple[Plane, ...],
+    mesh: Mesh, positions: NDArray[np.float64], topology: Topology, planes: tuple[Plane, ...]
 ) -> Indices:
-    """Return one triangle of each body that is wound inwards. `rim`: its boundary edges."""
+    """Return one triangle of each body that is wound inwards."""
+    triangles, rim, (labels, bodies) = topology.corners, topology.rim, topology.bodies
     if not len(triangles):
         return np.zeros(0, np.int64)
-    labels, bodies = label_bodies(triangles, len(positions))
     first = find_first(triangles, labels, bodies).astype(np.int64)
     zero, cuts = positions[triangles[first, 0]], np.zeros((bodies, 3), int)
     for column, value in planes:

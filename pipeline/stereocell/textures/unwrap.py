@@ -8,6 +8,11 @@ beyond it, and two charts share the texels between them half and half. So `paddi
 charts apart up to the level k for which padding >= 3 * 2^k; with 6 that is levels 0 and 1. The
 viewer replaces a level of detail by a coarser one before its texels, a coarse voxel wide, are much
 below a pixel. So deeper mip levels matter for the coarsest level only, and mix edges of charts.
+
+Charts cover 15 to 38 % of the texels on six of the demo's units, lod1 to lod3: they are small, and
+padding takes much of the rest. With 3 texels of padding (mip level 0 alone) they cover 25 to 41 %,
+with texels of a quarter, 6 to 13 times as many, 38 to 55 %. Packing by brute force gives up to 4 %
+more, and a larger `max_cost` of charts hardly any.
 """
 
 import atexit

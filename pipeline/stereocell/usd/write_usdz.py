@@ -4,7 +4,9 @@ AR viewers expect metres, a scene that stands on the floor, and a few hundred th
 the specimen is scaled to the size of a hand (its longest edge is SIZE_M long), stands with its
 lowest point at y = 0 and its middle above the origin, and has the finest level of detail of at most
 MAX_TRIANGLES triangles (the coarsest, if none is that small). The layer's customLayerData states
-`stereocell:scale`, metres in the file for one metre of the specimen, and `size`.
+`stereocell:scale`, metres in the file for one metre of the specimen, and `size`. Of label maps and
+an image it has the maps alone, as the viewer opens, if any is drawn: both would break through each
+other.
 
 Volumes are left out: usdz allows no .vdb. The archive holds one .usdc without variants or payloads,
 which comes first, and the baked maps of that level. The same stage gives the same bytes.
@@ -28,16 +30,18 @@ from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
 from stereocell.storage.workspace import fetch, remove
 from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
-from stereocell.usd.read_attributes import select_variant
+from stereocell.usd.read_objects import read_columns
 from stereocell.usd.read_stage import (
     ComposedLod,
     hinted_box,
     loaded,
+    mesh_at,
     open_stage,
     read_lods,
     specimen_name,
     tile_prims,
 )
+from stereocell.usd.read_variants import lod_levels
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
 from stereocell.usd.written_files import AsWritten
 
@@ -73,39 +77,48 @@ def write_usdz(
 
     as_written  the lists to compare the stage's files with; None: no comparison
     level       of detail; None: the finest that is light enough
-    tiles, channels  IDs of those that are written; empty: all
+    tiles       IDs of those that are written; empty: all
+    channels    the same; empty: label maps where any is drawn, else all
 
     Returns None where no mesh is drawn; then no file is left at `path`. Raises StageError where
     the stage can't be read, OutputError where the file can't be written.
     """
     as_written = as_written or AsWritten({stage_path.parent: {}})
     stage = open_stage(stage_path)
-    level = _choose_level(stage, as_written) if level is None else level
-    if level is None:
+    prims = [prim for prim in tile_prims(stage) if not tiles or prim.GetName() in tiles]
+    found: list[_Part] = []
+    shown = level
+    for some in [channels] if channels else _choices(stage):
+        shown = _choose_level(stage, some, as_written) if level is None else level
+        if shown is not None and (found := list(_read_parts(stage, prims, some, shown))):
+            break
+    if shown is None or not found:
         remove(path)
         return None
-    prims = [prim for prim in tile_prims(stage) if not tiles or prim.GetName() in tiles]
-    parts = list(_read_parts(stage, prims, channels, level))
     boxes = [hinted_box(prim) for prim in prims]
     low = np.min([box[0] for box in boxes], axis=0)
     high = np.max([box[1] for box in boxes], axis=0)
-    flat = _new_stage(specimen_name(stage), float((high - low).max()), level)
-    _define_parts(flat, parts, low, high)
-    _pack(flat.GetRootLayer(), parts, path, as_written)
-    return level
+    flat = _new_stage(specimen_name(stage), float((high - low).max()), shown)
+    _define_parts(flat, found, low, high)
+    _pack(flat.GetRootLayer(), found, path, as_written)
+    return shown
 
 
-def _choose_level(stage: Usd.Stage, as_written: AsWritten) -> int | None:
+def _choices(stage: Usd.Stage) -> list[list[str]]:
+    """Return the IDs of the channels to show: the first choice of which any is drawn."""
+    every = [str(prim.GetName()) for prim in stage.GetPrimAtPath(CHANNELS).GetChildren()]
+    maps = [channel for channel in every if read_columns(stage, channel) is not None]
+    return [maps, every] if maps else [every]
+
+
+def _choose_level(stage: Usd.Stage, channels: Collection[str], as_written: AsWritten) -> int | None:
     """Return the finest level within MAX_TRIANGLES, else the coarsest; None: there is no mesh."""
     counts: list[list[int]] = []
     for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
         with loaded(stage, name, as_written) as (tile, _):
-            counts.append([])
-            variants = tile.GetVariantSet("lod").GetVariantNames()
-            for variant in sorted(variants, key=lambda v: int(v.removeprefix("lod"))) or [""]:
-                if variant:
-                    select_variant(tile, "lod", variant)
-                counts[-1].append(_count_triangles(tile))
+            counts.append(
+                [_count_triangles(tile, channels, level) for level in lod_levels(tile) or [0]]
+            )
     if not any(map(sum, counts)):
         return None
     levels = range(max(map(len, counts)))
@@ -114,26 +127,19 @@ def _choose_level(stage: Usd.Stage, as_written: AsWritten) -> int | None:
     return light[0] if light else levels[-1]
 
 
-def _count_triangles(tile: Usd.Prim) -> int:
-    found = (prim for prim in Usd.PrimRange(tile) if prim.IsA(UsdGeom.Mesh))
-    meshes = [mesh for mesh in map(UsdGeom.Mesh, found) if _is_drawn(mesh)]
+def _count_triangles(tile: Usd.Prim, channels: Collection[str], level: int) -> int:
+    found = (mesh_at(tile, channel, level) for channel in channels)
+    meshes = (UsdGeom.Mesh(prim) for prim in found if prim is not None)
     return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
 
 
-def _is_drawn(mesh: UsdGeom.Mesh) -> bool:
-    return bool(mesh.ComputeVisibility() != UsdGeom.Tokens.invisible)
-
-
 def _read_parts(
-    stage: Usd.Stage, prims: list[Usd.Prim], wanted: Collection[str], level: int
+    stage: Usd.Stage, prims: list[Usd.Prim], channels: Collection[str], level: int
 ) -> Iterator[_Part]:
     """Yield every drawn mesh with triangles at a level, or at its coarsest where it has fewer."""
-    channels = [str(prim.GetName()) for prim in stage.GetPrimAtPath(CHANNELS).GetChildren()]
     for name in [str(prim.GetName()) for prim in prims]:
         with loaded(stage, name) as (tile, _):
             for channel in channels:
-                if wanted and channel not in wanted:
-                    continue
                 lods = [lod for lod in read_lods(tile, channel) if lod.level <= level]
                 if lods and len(lods[-1].mesh.triangles):
                     yield _Part(name, channel, lods[-1])
