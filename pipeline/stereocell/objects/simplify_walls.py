@@ -14,6 +14,13 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from stereocell.kernels.collapse_walls import collapse_walls
+from stereocell.kernels.walls import (
+    bound_objects,
+    couple,
+    least_of_objects,
+    press,
+    slope_volumes,
+)
 from stereocell.meshes.simplify import OF_DIAGONAL, OF_SIDE, SHARPEST_DEG, STRAY
 from stereocell.objects.walls import Walls, find_faults, measure_volumes, put_on_lattice
 
@@ -127,53 +134,26 @@ def _shift(
     walls: Walls, missing_um3: NDArray[np.float64], fixed: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Return how far each vertex moves (n, 3), um; `missing_um3` is NaN where nothing is asked."""
-    at, asked = walls.positions, np.isfinite(missing_um3)
-    row = np.concatenate([[-1], np.where(asked, np.cumsum(asked) - 1, -1)])
+    asked = np.isfinite(missing_um3)
+    row = np.concatenate([[-1], np.where(asked, np.cumsum(asked) - 1, -1)]).astype(np.int32)
     count = int(asked.sum())
-    corners = at[walls.triangles]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    own = np.zeros(len(at))
-    rows, columns, values = [], [], []
-    for k in range(3):
-        own += np.bincount(walls.triangles[:, k], area / 6, len(at))
-        slope = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6
-        for side, sign in ((0, 1.0), (1, -1.0)):
-            rows_here = row[walls.sides[:, side]]
-            held = rows_here >= 0
-            for axis in range(3):
-                rows.append(rows_here[held])
-                columns.append(walls.triangles[held, k].astype(np.int64) * 3 + axis)
-                values.append(sign * slope[held, axis])
-    shape = (count, 3 * len(at))
-    slopes = sparse.coo_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape
-    ).tocsr()
-    moves = (own > 0) & ~fixed
-    light = sparse.diags(np.repeat(np.where(moves, 1 / np.maximum(own, 1e-12), 0.0), 3))
-    pulls = slopes @ light @ slopes.T
+    entries, own = slope_volumes(walls.positions, walls.triangles, walls.sides, row)
+    light = np.where((own > 0) & ~fixed, 1 / np.maximum(own, 1e-12), 0.0)
+    among, pairs, values = couple(*entries, light, count)
     # an object of which nothing is left pulls nothing
-    pulls += sparse.diags(np.full(count, 1e-9 * max(float(pulls.diagonal().mean()), 1e-12)))
+    among += 1e-9 * max(float(among.mean()), 1e-12)
+    pulls = sparse.coo_matrix((values, pairs.T), (count, count)).tocsc() + sparse.diags(among)
     pressure = spsolve(pulls.tocsc(), missing_um3[asked])
-    return np.asarray(light @ (slopes.T @ np.atleast_1d(pressure))).reshape(-1, 3)
+    return press(*entries, light, np.atleast_1d(pressure))
 
 
 def _errors(walls: Walls, max_error_um: float, count: int) -> NDArray[np.float64]:
     """Return the error that each vertex may have (n,), um: that of the smallest object there."""
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    for side in walls.sides.T:
-        for k in range(3):
-            np.minimum.at(low, side, walls.positions[walls.triangles[:, k]])
-            np.maximum.at(high, side, walls.positions[walls.triangles[:, k]])
+    low, high = bound_objects(walls.positions, walls.triangles, walls.sides, count)
     lengths = np.maximum(high - low, 0)
     own = np.minimum(OF_DIAGONAL * np.linalg.norm(lengths, axis=1), OF_SIDE * lengths.min(axis=1))
     own[0] = np.inf
-    least = own[walls.sides].min(axis=1)
-    errors = np.full(len(walls.positions), max_error_um)
-    for k in range(3):
-        np.minimum.at(errors, walls.triangles[:, k], least)
-    return errors
+    return least_of_objects(walls.triangles, walls.sides, own, max_error_um, len(walls.positions))
 
 
 def _compact(walls: Walls) -> tuple[Walls, NDArray[np.int32]]:

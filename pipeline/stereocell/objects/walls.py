@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from stereocell.kernels.walls import smooth_walls
 from stereocell.meshes.self_intersections import find_crossings, find_flat
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import zyx_to_xyz
@@ -134,14 +135,10 @@ def _smoothed(centres: NDArray[np.float64], quads: NDArray[np.int64]) -> NDArray
     is_line = edges.data != 2
     from_vertex = np.repeat(np.arange(count), np.diff(edges.indptr))
     on_line = np.bincount(from_vertex, is_line, count) == 2
-    edges.data = np.where(on_line[from_vertex], is_line, True).astype(np.float64)
-    mean = sparse.diags(1 / np.maximum(np.asarray(edges.sum(axis=1)).ravel(), 1)) @ edges
-    low, high = centres - _REACH, centres + _REACH
-    placed = centres.copy()
-    for _ in range(SMOOTHINGS):
-        for share in (_INWARD, _OUTWARD):
-            placed = np.clip(placed + share * (mean @ placed - placed), low, high)
-    return placed
+    edges.data = np.where(on_line[from_vertex], is_line, True)
+    edges.eliminate_zeros()
+    shares = np.tile([_INWARD, _OUTWARD], SMOOTHINGS)
+    return smooth_walls(centres, edges.indptr, edges.indices, shares, _REACH)
 
 
 def _squares(positions: NDArray[np.float64], pairs: NDArray[np.int64]) -> NDArray[np.float64]:
