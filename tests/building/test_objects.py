@@ -23,8 +23,10 @@ from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
+from stereocell.objects import build_objects as building
 from stereocell.objects.build_objects import BuiltObjects
 from stereocell.objects.intensities import Measured
+from stereocell.objects.walls import Walls
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
@@ -559,6 +561,27 @@ def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: st
     assert set(found) == {(3, 5), (5, 3), (5, 8), (8, 5)}
     for one, other, area in ((3, 5, 160), (5, 8, 80)):
         assert found[one, other] == found[other, one] == pytest.approx(0.1 * area, rel=0.05)
+
+
+def test_levels_that_stop_early_are_told_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    labels = np.zeros((16, 24, 24), np.uint16)
+    labels[3:13, 4:20, 4:20] = 3
+    write_ome_tiff(tmp_path / "l.ome.tif", labels)
+    right = building.simplify_walls
+
+    def simplify_walls(walls: Walls, error: float, *given: Any, **named: Any) -> Any:
+        return (walls, False) if error > 0.2 else right(walls, error, *given, **named)
+
+    monkeypatch.setattr(building, "simplify_walls", simplify_walls)
+    build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".")
+    wanted = "l: lod3 has more triangles or other volumes than are asked for in r0_c0: triangles"
+    told = said(capsys)
+    assert wanted in told
+    assert "lod2 has" not in told
+    assert run("report", tmp_path / "out") == 0
+    assert wanted in (tmp_path / "out/report/index.html").read_text()
 
 
 @pytest.mark.parametrize("measure_of", ["mean", "p95"])

@@ -36,8 +36,11 @@ def simplify_walls(
     volumes_um3: NDArray[np.float64],
     step_um: float,
     locked: NDArray[np.bool_] | None = None,
-) -> Walls:
-    """Return the walls with fewer triangles; where that can't be, as they are.
+) -> tuple[Walls, bool]:
+    """Return the walls with fewer triangles, and whether that came to an end.
+
+    It doesn't where triangles still meet after as many rounds as there are: then the walls are as
+    they were, or their objects' volumes not made up for.
 
     walls         valid, on the lattice; open where the objects beyond are not looked at
     max_error_um  largest root of the mean squared distance of a vertex from the planes of the
@@ -47,7 +50,7 @@ def simplify_walls(
     locked        bool (n,), the vertices that stay where they are; None: none
     """
     if not len(walls.triangles):
-        return walls
+        return walls, True
     fixed = np.zeros(len(walls.positions), bool) if locked is None else locked
     errors = _errors(walls, max_error_um, len(volumes_um3))
     centre = (walls.positions.min(axis=0) + walls.positions.max(axis=0)) / 2
@@ -67,7 +70,7 @@ def simplify_walls(
         around[at_fault] = True
         around[walls.triangles[around[walls.triangles].any(axis=1)]] = True
         stays |= around
-    return walls
+    return walls, False
 
 
 def keep_volumes(
@@ -76,8 +79,10 @@ def keep_volumes(
     most_um: float,
     volumes_um3: NDArray[np.float64],
     step_um: float,
-) -> Walls:
+) -> tuple[Walls, bool]:
     """Return the walls with each object as large as it should be, as far as nothing comes to cross.
+
+    And whether that came to an end; if not, they are as they were.
 
     fixed    bool (n,), vertices that stay
     most_um  how far a vertex may move
@@ -92,10 +97,10 @@ def keep_volumes(
             positions = put_on_lattice(_moved(walls, volumes_um3, fixed, most_um), step_um)
         at_fault = find_faults(replace(walls, positions=positions))
         if not len(at_fault):
-            return replace(walls, positions=positions)
+            return replace(walls, positions=positions), True
         fixed[at_fault] = True
         positions = np.where(fixed[:, np.newaxis], walls.positions, positions)
-    return walls
+    return walls, False
 
 
 def _moved(
