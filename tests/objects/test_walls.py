@@ -14,7 +14,7 @@ from corpus.real import data_folder
 from stereocell.meshes.validity import find_defects, label_components
 from stereocell.objects import simplify_walls as simplifying
 from stereocell.objects.simplify_walls import keep_volumes, simplify_walls
-from stereocell.objects.walls import Walls, extract_walls, measure_volumes, surfaces_of
+from stereocell.objects.walls import Walls, extract_walls, find_faults, measure_volumes, surfaces_of
 from stereocell.objects.well_composed import make_well_composed
 from support.touching_cells import RADIUS_UM, touching_cells
 
@@ -54,6 +54,7 @@ def test_each_object_is_closed_and_valid_at_each_level() -> None:
     assert len(centres) >= 12
     for walls in levels:
         require_sound(walls, len(centres))
+        assert not len(find_faults(walls))  # nor does one meet another beside their wall
     triangles = [len(walls.triangles) for walls in levels]
     assert all(fewer < 0.75 * many for many, fewer in pairwise(triangles)), triangles
 
@@ -198,7 +199,7 @@ def test_walls_that_would_cross_after_all_rounds_are_left_and_said_so(
 ) -> None:
     levels, volumes, _ = tissue()
     walls = levels[1]
-    monkeypatch.setattr(simplifying, "find_faults", lambda walls: walls.triangles[0])
+    monkeypatch.setattr(simplifying, "find_faults", lambda walls, fresh: walls.triangles[0])
     left, is_done = simplify_walls(walls, AIMS_UM[1], volumes, STEP_UM)
     assert (left is walls, is_done) == (True, False)
     free = np.zeros(len(walls.positions), bool)

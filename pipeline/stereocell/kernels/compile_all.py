@@ -11,7 +11,7 @@ import numpy as np
 from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse
-from stereocell.kernels.collapse_walls import collapse_walls
+from stereocell.kernels.collapse_walls import collapse_walls, find_orders
 from stereocell.kernels.critical import find_critical
 from stereocell.kernels.crossings import find_doubtful, find_maybe_flat, find_spread
 from stereocell.kernels.depth_buffer import find_visible
@@ -90,7 +90,8 @@ def compile_others() -> None:
     count_entries(low, high, origin, edge)
     first, listed = list_by_cell(low, high, origin, edge, shape)
     find_maybe_flat(at, triangles)
-    collapse_walls(at, triangles, flags, np.full(4, 0.1), 3.0, 0.9)
+    orders, nothing = find_orders(triangles, 4), np.zeros((0, 2), np.int32)
+    collapse_walls(at, triangles, flags, np.full(4, 0.1), 3.0, 0.9, orders, nothing)
     sides = np.tile(np.array([0, 1], np.int32), (4, 1))
     entries, own = slope_volumes(at, triangles, sides, np.array([-1, 0], np.int32))
     couple(*entries, own, 1)

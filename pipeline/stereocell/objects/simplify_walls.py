@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from stereocell.kernels.collapse_walls import collapse_walls
+from stereocell.kernels.collapse_walls import collapse_walls, find_orders
 from stereocell.kernels.walls import (
     bound_objects,
     couple,
@@ -56,12 +56,21 @@ def simplify_walls(
     centre = (walls.positions.min(axis=0) + walls.positions.max(axis=0)) / 2
     stays = fixed.copy()
     sharpest = float(np.cos(np.radians(SHARPEST_DEG)))
+    orders, made = find_orders(walls.triangles, len(stays)), np.zeros((0, 2), np.int32)
     for _ in range(_ROUNDS):
-        triangles, gone = collapse_walls(
-            walls.positions - centre, walls.triangles, stays, errors, STRAY, sharpest
+        triangles, gone, made = collapse_walls(
+            walls.positions - centre,
+            walls.triangles,
+            stays,
+            errors,
+            STRAY,
+            sharpest,
+            orders,
+            made,
         )
         fewer = Walls(walls.positions, triangles[~gone], walls.sides[~gone])
-        at_fault = find_faults(fewer)
+        # triangles that are as they were don't meet one another
+        at_fault = find_faults(fewer, (triangles != walls.triangles).any(axis=1)[~gone])
         if not len(at_fault):
             fewer, used = _compact(fewer)
             most_um = STRAY * max_error_um
@@ -91,26 +100,36 @@ def keep_volumes(
     linear system of one unknown an object.
     """
     fixed = fixed | _at_ends(walls)
-    positions = walls.positions
+    positions, past = walls.positions, walls.positions
+    at_fault = np.zeros(0, np.int64)
     for turn in range(_ROUNDS):
         if turn < _ANEW:  # what can't move makes the others move more
-            positions = put_on_lattice(_moved(walls, volumes_um3, fixed, most_um), step_um)
-        at_fault = find_faults(replace(walls, positions=positions))
+            moved = _moved(walls, positions, volumes_um3, fixed, most_um)
+            positions = put_on_lattice(moved, step_um)
+        fresh = (positions != past).any(axis=1)
+        fresh[at_fault] = True
+        moved_now = fresh[walls.triangles].any(axis=1)
+        at_fault = find_faults(replace(walls, positions=positions), moved_now)
         if not len(at_fault):
             return replace(walls, positions=positions), True
         fixed[at_fault] = True
+        past = positions
         positions = np.where(fixed[:, np.newaxis], walls.positions, positions)
     return walls, False
 
 
 def _moved(
     walls: Walls,
+    start: NDArray[np.float64],
     volumes_um3: NDArray[np.float64],
     fixed: NDArray[np.bool_],
     most_um: float,
 ) -> NDArray[np.float64]:
-    """Return where the vertices are when each object has its volume (n, 3), um, if they may go."""
-    moved = walls
+    """Return where the vertices are when each object has its volume (n, 3), um, if they may go.
+
+    start  where they are, not far from the walls
+    """
+    moved = replace(walls, positions=start)
     for _ in range(_NEWTON):
         missing = volumes_um3[1:] - measure_volumes(moved, len(volumes_um3) - 1)[1:]
         if not (np.abs(missing) > _CLOSE * volumes_um3[1:]).any():
