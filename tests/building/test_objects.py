@@ -23,8 +23,10 @@ from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
+from stereocell.objects import build_objects as building
 from stereocell.objects.build_objects import BuiltObjects
 from stereocell.objects.intensities import Measured
+from stereocell.objects.walls import Walls
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
@@ -436,7 +438,13 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     spacing = [2 * s for s in SPACING_UM]
     group.attrs["ome"] = {
         "version": "0.5",
-        "image-label": {"colors": [{"label-value": 1, "rgba": [0, 0, 255, 255]}]},
+        "image-label": {
+            "colors": [{"label-value": 1, "rgba": [0, 0, 255, 255]}],
+            "properties": [
+                {"label-value": number, "side": "left" if number % 2 else "right"}
+                for number in range(1, 40)
+            ],
+        },
         "multiscales": [
             {
                 "axes": [
@@ -464,7 +472,8 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     voxels = np.asarray(zarr.open_group(sample, mode="r")["0"][3])[::2, ::2, ::2]
     for label, mean in zip(found, column_of(out, "mean_CD3"), strict=True):
         assert mean == pytest.approx(voxels[coarse == label].mean(), rel=1e-5)
-    # the file's own colour of one object; the others have hues
+    # the file's own colour of one object; the others have hues, not those of a column of its words
+    assert any(column["id"] == "side" for column in objects_of(out)["columns"])
     for tile, rows in objects_of(out)["tiles"].items():
         mesh = read_glb(out / f"bundle/channels/cells/{tile}/lod1.glb")
         own = np.array(found[rows["first"] : rows["first"] + rows["count"]])[mesh.objects]
@@ -554,8 +563,33 @@ def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: st
         assert found[one, other] == found[other, one] == pytest.approx(0.1 * area, rel=0.05)
 
 
-def test_the_deep_check_measures_the_image_anew(
+def test_levels_that_stop_early_are_told_of(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    labels = np.zeros((16, 24, 24), np.uint16)
+    labels[3:13, 4:20, 4:20] = 3
+    write_ome_tiff(tmp_path / "l.ome.tif", labels)
+    right = building.simplify_walls
+
+    def simplify_walls(walls: Walls, error: float, *given: Any, **named: Any) -> Any:
+        return (walls, False) if error > 0.2 else right(walls, error, *given, **named)
+
+    monkeypatch.setattr(building, "simplify_walls", simplify_walls)
+    build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".")
+    wanted = "l: lod3 has more triangles or other volumes than are asked for in r0_c0: triangles"
+    told = said(capsys)
+    assert wanted in told
+    assert "lod2 has" not in told
+    assert run("report", tmp_path / "out") == 0
+    assert wanted in (tmp_path / "out/report/index.html").read_text()
+
+
+@pytest.mark.parametrize("measure_of", ["mean", "p95"])
+def test_the_deep_check_measures_the_image_anew(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    measure_of: str,
 ) -> None:
     """A unit that counted wrong: the stage has what it said, the voxels have not."""
     labels = np.zeros((16, 24, 60), np.uint16)
@@ -570,14 +604,16 @@ def test_the_deep_check_measures_the_image_anew(
 
     def measure(*given: Any) -> Measured:
         found = right(*given)
-        found.mean[-1] += 1
+        getattr(found, measure_of)[-1] += 30
         return found
 
     monkeypatch.setattr(objects_maker, "measure_intensities", measure)
     build(tmp_path / "i.ome.tif", tmp_path / "wrong", *flags)
     said(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
-    assert "cells: column mean_DNA is not the voxels' mean of 3, 8" in said(capsys)  # last of tiles
+    told = said(capsys)  # of the last object of each tile
+    assert f"cells: column {measure_of}_DNA is not the voxels' {measure_of} of 3, 8" in told
+    assert told.count("voxels'") == 1
 
 
 def test_the_deep_check_measures_the_surfaces_anew(
@@ -597,6 +633,54 @@ def test_the_deep_check_measures_the_surfaces_anew(
     said(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
     assert "column area_um2 is not that of the surface of 3" in said(capsys)
+
+
+@pytest.mark.parametrize("fault", ["none", "a wall too many", "a wall that is missing", "smaller"])
+@pytest.mark.parametrize("grid", ["1x1", "2x1"])
+def test_the_deep_check_finds_shared_walls_anew(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    grid: str,
+    fault: str,
+) -> None:
+    """Two boxes that touch, in one tile or at the plane between two, and one by itself."""
+    labels = np.zeros((16, 24, 72), np.uint16)
+    labels[3:13, 4:20, 22:36], labels[3:13, 4:20, 36:50], labels[3:13, 4:20, 54:66] = 3, 5, 8
+    write_ome_tiff(tmp_path / "l.ome.tif", labels)
+    right = objects_maker.build_objects
+
+    def build_objects(labels: np.ndarray, owned: np.ndarray, **named: Any) -> BuiltObjects:
+        built = right(labels, owned, **named)
+        walls, areas = built.walls, built.wall_um2
+        if fault == "a wall too many":
+            walls = np.concatenate([walls, [[0, walls[0, 1] + 1]]]).astype(np.int32)
+            areas = np.append(areas, 0.01)
+        elif fault == "a wall that is missing":
+            walls, areas = walls[1:], areas[1:]
+        elif fault == "smaller":
+            areas = 0.7 * areas
+        return replace(built, walls=walls, wall_um2=areas)
+
+    monkeypatch.setattr(objects_maker, "build_objects", build_objects)
+    build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".", "--grid", grid)
+    said(capsys)
+    assert run("check", tmp_path / "out", "--deep", "--workers", 0) == (fault != "none")
+    told = said(capsys)
+    odd = {
+        column
+        for column in ("neighbours", "contact")
+        if f"column {column} is not that of the surface of" in told
+    }
+    assert (
+        odd
+        == {
+            "none": set(),
+            "a wall too many": {"neighbours"},
+            "a wall that is missing": {"neighbours", "contact"},
+            "smaller": {"contact"},
+        }[fault]
+    )
 
 
 def test_numbers_of_objects_are_read_as_they_are(

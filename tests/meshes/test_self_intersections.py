@@ -6,6 +6,7 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
+from stereocell.kernels.crossings import find_spread
 from stereocell.meshes.self_intersections import are_collinear, find_crossings, orient_2d, orient_3d
 
 CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
@@ -172,3 +173,40 @@ def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:
         fresh = rng.random(len(triangles)) < share
         found = find_crossings(positions, triangles, fresh=fresh)
         np.testing.assert_array_equal(found, everything[fresh[everything].any(axis=1)])
+
+
+@pytest.mark.parametrize("kind", ["a star", "round twice", "anyhow", "in a plane", "on edge"])
+def test_triangles_round_a_vertex_against_each_pair_of_them(kind: str) -> None:
+    """All at once, where most pairs need no look, find what each pair by itself does."""
+    rng = np.random.default_rng(len(kind))
+    met, spread = 0, 0
+    for _ in range(150):
+        count = int(rng.integers(3, 9))
+        turns = 2 if kind == "round twice" else 1
+        angle = turns * 2 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
+        ring = np.stack([np.cos(angle), np.sin(angle), 0.5 * rng.normal(size=count)], axis=1)
+        if kind == "anyhow":
+            ring = rng.normal(size=(count, 3))
+        elif kind == "in a plane":
+            ring[:, 2] = 0
+            ring = np.round(2 * ring)
+            ring[0] *= rng.choice([-1, 1])  # folded back
+        elif kind == "on edge":
+            ring[:, 1] *= 0.02
+        positions = np.concatenate([np.zeros((1, 3)), ring])
+        around = np.arange(count)
+        triangles = np.stack([0 * around, 1 + around, 1 + (around + 1) % count], axis=1)
+        if are_collinear(*positions[triangles].transpose(1, 0, 2)).any():
+            continue
+        alone = [
+            (i, j)
+            for i, j in combinations(range(count), 2)
+            if len(find_crossings(positions, triangles[[i, j]]))
+        ]
+        assert find_crossings(positions, triangles).tolist() == [list(pair) for pair in alone]
+        met += bool(alone)
+        is_spread = find_spread(positions, triangles.astype(np.int32))
+        assert not is_spread[1:].any()  # those of the ring have two triangles each
+        spread += bool(is_spread[0])
+    assert met >= {"round twice": 100, "anyhow": 40, "in a plane": 5}.get(kind, 0)
+    assert spread >= {"a star": 120, "in a plane": 20}.get(kind, 0)

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from corpus.real import data_folder
 from stereocell.meshes.validity import find_defects, label_components
+from stereocell.objects import simplify_walls as simplifying
 from stereocell.objects.simplify_walls import keep_volumes, simplify_walls
-from stereocell.objects.walls import Walls, extract_walls, measure_volumes, surfaces_of
+from stereocell.objects.walls import Walls, extract_walls, find_faults, measure_volumes, surfaces_of
 from stereocell.objects.well_composed import make_well_composed
 from support.touching_cells import RADIUS_UM, touching_cells
 
@@ -29,7 +30,9 @@ def levels_of(
     volumes = np.bincount(mended.ravel()) * np.prod(spacing_um)
     found = [extract_walls(mended, spacing_um, STEP_UM)]
     for aim in aims_um:
-        found.append(simplify_walls(found[-1], aim, volumes, STEP_UM))
+        walls, is_done = simplify_walls(found[-1], aim, volumes, STEP_UM)
+        assert is_done
+        found.append(walls)
     return found, volumes
 
 
@@ -51,6 +54,7 @@ def test_each_object_is_closed_and_valid_at_each_level() -> None:
     assert len(centres) >= 12
     for walls in levels:
         require_sound(walls, len(centres))
+        assert not len(find_faults(walls))  # nor does one meet another beside their wall
     triangles = [len(walls.triangles) for walls in levels]
     assert all(fewer < 0.75 * many for many, fewer in pairwise(triangles)), triangles
 
@@ -181,10 +185,23 @@ def test_few_vertices_that_may_move_do_not_go_far() -> None:
     coarse = levels[-1]
     low, high = coarse.positions.min(axis=0), coarse.positions.max(axis=0)
     aim_um = 2.0
-    coarser = simplify_walls(coarse, aim_um, volumes, STEP_UM)
+    coarser, _ = simplify_walls(coarse, aim_um, volumes, STEP_UM)
     assert (coarser.positions > low - 3 * aim_um).all()
     assert (coarser.positions < high + 3 * aim_um).all()
-    keeps = keep_volumes(
+    keeps, _ = keep_volumes(
         coarse, np.arange(len(coarse.positions)) % 9 > 0, aim_um, 3 * volumes, STEP_UM
     )
     assert np.abs(keeps.positions - coarse.positions).max() <= aim_um + STEP_UM
+
+
+def test_walls_that_would_cross_after_all_rounds_are_left_and_said_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    levels, volumes, _ = tissue()
+    walls = levels[1]
+    monkeypatch.setattr(simplifying, "find_faults", lambda walls, fresh: walls.triangles[0])
+    left, is_done = simplify_walls(walls, AIMS_UM[1], volumes, STEP_UM)
+    assert (left is walls, is_done) == (True, False)
+    free = np.zeros(len(walls.positions), bool)
+    left, is_done = keep_volumes(walls, free, 1.0, volumes, STEP_UM)
+    assert (left is walls, is_done) == (True, False)

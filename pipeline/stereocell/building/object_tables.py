@@ -68,10 +68,14 @@ def make_table(
         place, [(rows[tile], one) for tile, one in facts.items()], _measured(plan)
     )
     remarks: list[str] = []
-    columns += _noted(notes, names)
+    noted = _noted(notes, names)
+    # the file's colours go before those that would be made up for its own words
+    behind = {column.name for column in noted if notes.colors} - {NAMES}
+    columns += noted
     if table is not None:
         joined, remarks = _joined(table, names)
         columns += joined
+        behind -= {column.name for column in joined}
     columns, renamed = _unique(columns)
     corners = np.stack([zyx_to_xyz(low), zyx_to_xyz(high)])
     return (
@@ -84,12 +88,15 @@ def make_table(
             if notes.names
             else (),
             _default(
-                columns, plan.settings.objects.color_by, is_first=labels.id == plan.labels[0].id
+                columns,
+                plan.settings.objects.color_by,
+                behind,
+                is_first=labels.id == plan.labels[0].id,
             ),
             *_walls(facts, rows, names),
             _colors(notes, names),
         ),
-        _told_of_thin(labels, thin) + remarks + renamed,
+        _told_of_thin(labels, thin) + told_of_stopped(labels.name, facts) + remarks + renamed,
     )
 
 
@@ -133,6 +140,19 @@ def _told_of_thin(labels: Labels, thin: NDArray[np.uint64]) -> list[str]:
     return [
         f"{labels.name}: {counted(len(thin), 'object')} left out, too thin to be built, or full of "
         f"holes: {listed(thin.tolist())}; where labels are finer they can be"
+    ]
+
+
+def told_of_stopped(name: str, facts: Mapping[str, ObjectFacts]) -> list[str]:
+    """Return what is said of levels of which simplifying did not come to an end, or nothing."""
+    tiles: dict[int, list[str]] = {}
+    for tile, one in facts.items():
+        for level in one.stopped:
+            tiles.setdefault(level, []).append(tile)
+    return [
+        f"{name}: lod{level} has more triangles or other volumes than are asked for in "
+        f"{listed(sorted(found))}: triangles would have come to cross"
+        for level, found in sorted(tiles.items())
     ]
 
 
@@ -233,9 +253,10 @@ def _unique(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
     return list(found.values()), remarks
 
 
-def _default(columns: Sequence[Column], wanted: str, *, is_first: bool) -> str:
+def _default(columns: Sequence[Column], wanted: str, behind: set[str], *, is_first: bool) -> str:
     """Return the ID of the column that colours first: the one asked for, or of categories.
 
+    behind    names of columns that don't unless they are asked for
     is_first  whether it is the label map that has the table: it needs the column that is asked for
     """
     for column in columns:
@@ -243,7 +264,7 @@ def _default(columns: Sequence[Column], wanted: str, *, is_first: bool) -> str:
             return column.id
     if wanted and is_first:
         raise _no_column(wanted, [column.name for column in columns])
-    categories = [column.id for column in columns if column.categories]
+    categories = [one.id for one in columns if one.categories and one.name not in behind]
     return categories[0] if categories else ""
 
 

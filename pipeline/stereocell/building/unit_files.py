@@ -168,7 +168,8 @@ def load_objects(directory: Path) -> ObjectFacts:
     except (OSError, ValueError, LookupError, EOFError, BadZipFile) as error:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
     bias = tuple(float(share) for share in found.pop("bias"))
-    return ObjectFacts(changed=int(found.pop("changed")), bias=bias, **found)
+    stopped = tuple(int(level) for level in found.pop("stopped"))
+    return ObjectFacts(changed=int(found.pop("changed")), bias=bias, stopped=stopped, **found)
 
 
 def _facts(objects: ObjectFacts) -> dict[str, NDArray[Any]]:

@@ -147,6 +147,74 @@ def distance_after(
     return np.sqrt(least)
 
 
+@part
+def link_corners(n: int, corner: Ints) -> tuple[Ints, Ints]:
+    """Return each vertex's first corner, or -1 (n,), and each corner's next of the same vertex."""
+    first, after = np.full(n, -1, np.int32), np.empty(len(corner), np.int32)
+    for c in range(len(corner) - 1, -1, -1):
+        after[c] = first[corner[c]]
+        first[corner[c]] = c
+    return first, after
+
+
+@part
+def move_onto(
+    u: int,
+    v: int,
+    size: int,
+    out: Ints,
+    corner: Ints,
+    first: Ints,
+    after: Ints,
+    gone: NDArray[np.bool_],
+    quadrics: Points,
+) -> None:
+    """Let u, of which `out` has the corners, become v."""
+    last = first[v]
+    while after[last] >= 0:
+        last = after[last]
+    for q in range(size):
+        c = out[q]
+        if corner[following(c)] == v or corner[preceding(c)] == v:
+            gone[c // 3] = True
+            continue
+        corner[c] = v
+        after[last], after[c] = c, -1
+        last = c
+    first[u] = -1
+    for q in range(11):
+        quadrics[v, q] += quadrics[u, q]
+    # what v's own list holds of triangles that are gone is left out
+    c, before = first[v], -1
+    while c >= 0:
+        onward = after[c]
+        if gone[c // 3]:
+            if before < 0:
+                first[v] = onward
+            else:
+                after[before] = onward
+        else:
+            before = c
+        c = onward
+
+
+@kernel
+def find_orders(triangles: Ints, n: int) -> NDArray[np.int8]:
+    """Return where each of n vertices is: within a wall, on a line, or in a corner (n,)."""
+    corner, gone = triangles.copy().ravel(), np.zeros(len(triangles), np.bool_)
+    first, after = link_corners(n, corner)
+    out, seen = np.empty(MOST, np.int32), np.empty(2 * MOST, np.int32)
+    ring, shared = np.empty(2 * MOST, np.int32), np.empty(2 * MOST, np.int32)
+    slot, stamp = np.zeros(n, np.int32), np.zeros(n, np.int32)
+    order_of = np.full(n, CORNER, np.int8)
+    for u in range(n):
+        size = list_around(u, first, after, gone, out)
+        if 0 < size <= MOST:
+            count = list_ring(size, out, corner, ring, shared, slot, stamp, u + 1)
+            order_of[u] = find_order(size, out, corner, shared, count, slot, seen)
+    return order_of
+
+
 @kernel
 def collapse_walls(
     at: Points,
@@ -155,8 +223,12 @@ def collapse_walls(
     errors: Points,
     stray: float,
     sharpest: float,
-) -> tuple[Ints, NDArray[np.bool_]]:
+    order_of: NDArray[np.int8],
+    past: Ints,
+) -> tuple[Ints, NDArray[np.bool_], Ints]:
     """Return the triangles by the vertices that are left, int32 (m, 3), and which are gone.
+
+    And what was done, int32 (k, 2): a vertex, and the one onto which it moved.
 
     at         float64 (n, 3); near the origin, for the quadrics' sake
     triangles  int32 (m, 3), of all walls
@@ -164,15 +236,16 @@ def collapse_walls(
     errors     float64 (n,), largest root of the mean squared distance from the planes
     stray      errors; largest distance of a vertex from the result, added up over its collapses
     sharpest   cosine of the smallest angle that a triangle may get
+    order_of   of `find_orders`
+    past       what was done before more vertices were locked: it is done again, without a look,
+               where nothing around is otherwise than it was, and all else is tried anew. (0, 2):
+               nothing was
     """
     n, m = len(at), len(triangles)
     result = triangles.copy()
     corner = result.ravel()
     gone = np.zeros(m, np.bool_)
-    first, after = np.full(n, -1, np.int32), np.empty(3 * m, np.int32)
-    for c in range(3 * m - 1, -1, -1):
-        after[c] = first[corner[c]]
-        first[corner[c]] = c
+    first, after = link_corners(n, corner)
     out, out_v = np.empty(MOST, np.int32), np.empty(MOST, np.int32)
     ring, shared = np.empty(2 * MOST, np.int32), np.empty(2 * MOST, np.int32)
     ring_v, shared_v = np.empty(2 * MOST, np.int32), np.empty(2 * MOST, np.int32)
@@ -181,20 +254,41 @@ def collapse_walls(
     slot_v, stamp_v, tick_v = np.zeros(n, np.int32), np.zeros(n, np.int32), 0
     quadrics = np.zeros((n, 11))
     sum_planes(at, corner, errors, quadrics)
-    order_of, cost = np.full(n, CORNER, np.int8), np.full(n, NEVER, np.int16)
+    made, steps = np.empty((n, 2), np.int32), 0
+    away = np.zeros(n)
+    differs = np.full(n, len(past) == 0, np.bool_)  # from what was around a vertex at that time
+    for i in range(len(past)):
+        u, v = past[i]
+        size = list_around(u, first, after, gone, out)
+        if not (locked[u] or differs[u] or differs[v]):
+            beyond = -1
+            if order_of[u] == ON_LINE:
+                tick += 1
+                count = list_ring(size, out, corner, ring, shared, slot, stamp, tick)
+                for q in range(count):
+                    if shared[q] != 2 and ring[q] != v:
+                        beyond = ring[q]
+            strayed = away[u] + distance_after(at, corner, u, v, beyond, size, out)
+            away[v] = max(away[v], strayed)
+            move_onto(u, v, size, out, corner, first, after, gone, quadrics)
+            made[steps] = u, v
+            steps += 1
+            continue
+        differs[u] = differs[v] = True
+        for k in range(min(size, MOST)):
+            differs[corner[following(out[k])]] = differs[corner[preceding(out[k])]] = True
+    cost = np.full(n, NEVER, np.int16)
     for u in range(n):
+        if not differs[u] or order_of[u] == CORNER or locked[u]:
+            continue
         size = list_around(u, first, after, gone, out)
         if not 0 < size <= MOST:
             continue
         tick += 1
         count = list_ring(size, out, corner, ring, shared, slot, stamp, tick)
-        order_of[u] = find_order(size, out, corner, shared, count, slot, seen)
-        if order_of[u] == CORNER or locked[u]:
-            continue
         for j in range(count):
             if order_of[u] == WITHIN or shared[j] != 2:
                 cost[u] = min(cost[u], class_of(price_of(quadrics, u, at, ring[j])))
-    away = np.zeros(n)
     touched, turn = np.zeros(n, np.int32), 0
     price, order = np.empty(2 * MOST), np.empty(2 * MOST, np.int32)
     waiting = np.empty(n, np.int32)
@@ -277,33 +371,10 @@ def collapse_walls(
                     if strayed > stray * errors[u]:
                         continue
                     away[v] = max(away[v], strayed)
-                    last = first[v]
-                    while after[last] >= 0:
-                        last = after[last]
-                    for q in range(size):
-                        c = out[q]
-                        if corner[following(c)] == v or corner[preceding(c)] == v:
-                            gone[c // 3] = True
-                            continue
-                        corner[c] = v
-                        after[last], after[c] = c, -1
-                        last = c
-                    first[u] = -1
-                    for q in range(11):
-                        quadrics[v, q] += quadrics[u, q]
+                    move_onto(u, v, size, out, corner, first, after, gone, quadrics)
+                    made[steps] = u, v
+                    steps += 1
                     later = NEVER
-                    # what v's own list holds of triangles that are gone is left out
-                    c, before = first[v], -1
-                    while c >= 0:
-                        onward = after[c]
-                        if gone[c // 3]:
-                            if before < 0:
-                                first[v] = onward
-                            else:
-                                after[before] = onward
-                        else:
-                            before = c
-                        c = onward
                     if order_of[v] != CORNER and not locked[v]:
                         least = NEVER
                         for q in range(count):
@@ -324,4 +395,4 @@ def collapse_walls(
                 cost[u] = later
             if done == 0 or (k < CLASSES and (done * 200 < waits or done < 50)):
                 break
-    return result, gone
+    return result, gone, made[:steps]

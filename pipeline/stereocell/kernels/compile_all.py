@@ -11,9 +11,9 @@ import numpy as np
 from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse
-from stereocell.kernels.collapse_walls import collapse_walls
+from stereocell.kernels.collapse_walls import collapse_walls, find_orders
 from stereocell.kernels.critical import find_critical
-from stereocell.kernels.crossings import find_doubtful, find_maybe_flat
+from stereocell.kernels.crossings import find_doubtful, find_maybe_flat, find_spread
 from stereocell.kernels.depth_buffer import find_visible
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
@@ -37,6 +37,14 @@ from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_com
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.visibility import cast_rays
+from stereocell.kernels.walls import (
+    bound_objects,
+    couple,
+    least_of_objects,
+    press,
+    slope_volumes,
+    smooth_walls,
+)
 
 OF_MESHES = "of-meshes"  # the argument of the process that compiles these
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
@@ -82,9 +90,18 @@ def compile_others() -> None:
     count_entries(low, high, origin, edge)
     first, listed = list_by_cell(low, high, origin, edge, shape)
     find_maybe_flat(at, triangles)
-    collapse_walls(at, triangles, flags, np.full(4, 0.1), 3.0, 0.9)
+    orders, nothing = find_orders(triangles, 4), np.zeros((0, 2), np.int32)
+    collapse_walls(at, triangles, flags, np.full(4, 0.1), 3.0, 0.9, orders, nothing)
+    sides = np.tile(np.array([0, 1], np.int32), (4, 1))
+    entries, own = slope_volumes(at, triangles, sides, np.array([-1, 0], np.int32))
+    couple(*entries, own, 1)
+    press(*entries, own, np.ones(1))
+    bound_objects(at, triangles, sides, 2)
+    least_of_objects(triangles, sides, own, 1.0, 4)
+    smooth_walls(at, np.arange(5, dtype=np.int32), triangles[:, 0].copy(), own, 0.5)
     find_critical(np.zeros((3, 3, 3), np.int32), 1)
-    find_doubtful(at, triangles, flags, low, high, first, listed, origin, edge, shape)
+    spread = find_spread(at, triangles)
+    find_doubtful(at, triangles, flags, spread, low, high, first, listed, origin, edge, shape)
     _, nearest, parts = find_nearest(at, at, triangles, first, listed, origin, edge, shape)
     find_sides(at, nearest, parts, at, triangles, twins)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints
-from stereocell.kernels.triangles import Points
+from stereocell.kernels.triangles import Points, Triple, doubled_area
 
 # relative errors of the determinants of orient3d and orient2d: Shewchuk's bounds A
 ERROR_3D = (7 + 56 * 2.0**-53) * 2.0**-53
@@ -23,11 +23,18 @@ FACING = 1e-6  # least cosine of two normals that says on which side of an edge 
 
 
 @part
-def _orient(at: Points, a: int, b: int, c: int, d: int) -> int:
-    """Return the sign of the volume of a, b, c, d, or UNSURE."""
-    ux, uy, uz = at[a, 0] - at[d, 0], at[a, 1] - at[d, 1], at[a, 2] - at[d, 2]
-    vx, vy, vz = at[b, 0] - at[d, 0], at[b, 1] - at[d, 1], at[b, 2] - at[d, 2]
-    wx, wy, wz = at[c, 0] - at[d, 0], at[c, 1] - at[d, 1], at[c, 2] - at[d, 2]
+def _sign(
+    ux: float,
+    uy: float,
+    uz: float,
+    vx: float,
+    vy: float,
+    vz: float,
+    wx: float,
+    wy: float,
+    wz: float,
+) -> int:
+    """Return the sign of the volume of three ways, differences of points each, or UNSURE."""
     p1, p2, q1, q2, r1, r2 = vy * wz, vz * wy, vz * wx, vx * wz, vx * wy, vy * wx
     volume = ux * (p1 - p2) + uy * (q1 - q2) + uz * (r1 - r2)
     size = (abs(p1) + abs(p2)) * abs(ux) + (abs(q1) + abs(q2)) * abs(uy)
@@ -35,6 +42,15 @@ def _orient(at: Points, a: int, b: int, c: int, d: int) -> int:
     if volume > ERROR_3D * size:
         return 1
     return -1 if volume < -ERROR_3D * size else UNSURE
+
+
+@part
+def _orient(at: Points, a: int, b: int, c: int, d: int) -> int:
+    """Return the sign of the volume of a, b, c, d, or UNSURE."""
+    ux, uy, uz = at[a, 0] - at[d, 0], at[a, 1] - at[d, 1], at[a, 2] - at[d, 2]
+    vx, vy, vz = at[b, 0] - at[d, 0], at[b, 1] - at[d, 1], at[b, 2] - at[d, 2]
+    wx, wy, wz = at[c, 0] - at[d, 0], at[c, 1] - at[d, 1], at[c, 2] - at[d, 2]
+    return _sign(ux, uy, uz, vx, vy, vz, wx, wy, wz)
 
 
 @part
@@ -127,11 +143,82 @@ def _may_meet(at: Points, triangles: Ints, i: int, j: int) -> bool:
     return True
 
 
+@part
+def _is_seen_as_fan(
+    at: Points, v: int, size: int, start: int, onward: Ints, stamp: Ints, n: Triple, r: Triple
+) -> bool:
+    """Return whether all triangles of v turn one way along n, and go round once, for sure.
+
+    onward  of each neighbour the next one, where stamp is v
+    r       no neighbour is likely to lie towards it
+    """
+    ax, ay, az = at[start, 0] - at[v, 0], at[start, 1] - at[v, 1], at[start, 2] - at[v, 2]
+    past = _sign(n[0], n[1], n[2], r[0], r[1], r[2], ax, ay, az)
+    b, rounds = start, 0
+    for step in range(size):
+        b = onward[b]
+        if past == UNSURE or stamp[b] != v or (b == start) != (step == size - 1):
+            return False
+        bx, by, bz = at[b, 0] - at[v, 0], at[b, 1] - at[v, 1], at[b, 2] - at[v, 2]
+        if _sign(n[0], n[1], n[2], ax, ay, az, bx, by, bz) != 1:
+            return False
+        side = _sign(n[0], n[1], n[2], r[0], r[1], r[2], bx, by, bz)
+        rounds += past < side
+        ax, ay, az, past = bx, by, bz, side
+    return past != UNSURE and rounds == 1
+
+
+@kernel
+def find_spread(at: Points, triangles: Ints) -> NDArray[np.bool_]:
+    """Return at which vertices all triangles lie side by side, for sure, bool (n,).
+
+    Along some direction they are seen as a fan that goes round the vertex once. So any two of them
+    have nothing in common but their common corners and what lies between those.
+    """
+    count = len(at)
+    first, place = np.zeros(count + 1, np.int32), np.zeros(count, np.int32)
+    for t in range(len(triangles)):
+        for k in range(3):
+            first[triangles[t, k] + 1] += 1
+    for v in range(count):
+        first[v + 1] += first[v]
+        place[v] = first[v]
+    ends = np.empty((3 * len(triangles), 2), np.int32)  # of the sides opposite to each vertex
+    for t in range(len(triangles)):
+        for k in range(3):
+            v = triangles[t, k]
+            ends[place[v], 0] = triangles[t, (k + 1) % 3]
+            ends[place[v], 1] = triangles[t, (k + 2) % 3]
+            place[v] += 1
+    spread = np.zeros(count, np.bool_)
+    onward, stamp = np.empty(count, np.int32), np.full(count, -1, np.int32)
+    for v in range(count):
+        low, high = first[v], first[v + 1]
+        if high - low < 3:
+            continue
+        nx, ny, nz, is_ring = 0.0, 0.0, 0.0, True
+        for e in range(low, high):
+            a, b = ends[e]
+            x, y, z = doubled_area(at, v, a, b)
+            nx, ny, nz = nx + x, ny + y, nz + z
+            is_ring = is_ring and stamp[a] != v
+            stamp[a], onward[a] = v, b
+        if is_ring:
+            a, b = ends[low]
+            rx = 0.7 * (at[a, 0] - at[v, 0]) + 0.3 * (at[b, 0] - at[v, 0])
+            ry = 0.7 * (at[a, 1] - at[v, 1]) + 0.3 * (at[b, 1] - at[v, 1])
+            rz = 0.7 * (at[a, 2] - at[v, 2]) + 0.3 * (at[b, 2] - at[v, 2])
+            n, r = (nx, ny, nz), (rx, ry, rz)
+            spread[v] = _is_seen_as_fan(at, v, high - low, a, onward, stamp, n, r)
+    return spread
+
+
 @kernel
 def find_doubtful(
     at: Points,
     triangles: Ints,
     fresh: NDArray[np.bool_],
+    spread: NDArray[np.bool_],
     low: Points,
     high: Points,
     first: Ints,
@@ -142,31 +229,50 @@ def find_doubtful(
 ) -> NDArray[np.int64]:
     """Return the pairs of triangles (n, 2) that may meet, each with a fresh one.
 
+    spread                              vertices whose triangles meet nowhere else: `find_spread`
     low, high                           corners of the triangles' boxes
     first, listed, origin, edge, shape  of their grid: kernels/grid.py
     """
     _, ny, nz = shape
     found, count = np.empty((1024, 2), np.int64), 0
+    most = 1
     for c in range(len(first) - 1):
-        if first[c + 1] - first[c] < 2:
+        most = max(most, first[c + 1] - first[c])
+    # a cell's own, side by side: their boxes, corners, and along which axes they start in the cell
+    boxes, corners = np.empty((most, 6)), np.empty((most, 3), np.int32)
+    starts, due = np.empty(most, np.int8), np.empty(most, np.bool_)
+    for c in range(len(first) - 1):
+        size = first[c + 1] - first[c]
+        if size < 2:
             continue
         cx, cy, cz = c // (ny * nz), (c // nz) % ny, c % nz
-        for p in range(first[c], first[c + 1]):
-            i = listed[p]
-            for q in range(p + 1, first[c + 1]):
-                j = listed[q]
-                if not (fresh[i] or fresh[j]):
-                    continue
-                x, y, z = max(low[i, 0], low[j, 0]), max(low[i, 1], low[j, 1]), 0.0
-                z = max(low[i, 2], low[j, 2])
-                if x > min(high[i, 0], high[j, 0]) or y > min(high[i, 1], high[j, 1]):
-                    continue
-                if z > min(high[i, 2], high[j, 2]):
-                    continue
+        for p in range(size):
+            i = listed[first[c] + p]
+            for k in range(3):
+                boxes[p, k], boxes[p, 3 + k] = low[i, k], high[i, k]
+                corners[p, k] = triangles[i, k]
+            starts[p] = int((low[i, 0] - origin[0]) / edge) == cx
+            starts[p] |= (int((low[i, 1] - origin[1]) / edge) == cy) << 1
+            starts[p] |= (int((low[i, 2] - origin[2]) / edge) == cz) << 2
+            due[p] = fresh[i]
+        for p in range(size):
+            x0, y0, z0, x1, y1, z1 = boxes[p]
+            a, b, d = corners[p]
+            for q in range(p + 1, size):
                 # only in the cell that holds the least corner of the common box
-                if int((x - origin[0]) / edge) != cx or int((y - origin[1]) / edge) != cy:
+                if (starts[p] | starts[q]) != 7 or not (due[p] or due[q]):
                     continue
-                if int((z - origin[2]) / edge) != cz or not _may_meet(at, triangles, i, j):
+                if boxes[q, 0] > x1 or boxes[q, 1] > y1 or boxes[q, 2] > z1:
+                    continue
+                if boxes[q, 3] < x0 or boxes[q, 4] < y0 or boxes[q, 5] < z0:
+                    continue
+                is_beside = False
+                for k in range(3):
+                    v = corners[q, k]
+                    if v in (a, b, d) and spread[v]:
+                        is_beside = True
+                i, j = listed[first[c] + p], listed[first[c] + q]
+                if is_beside or not _may_meet(at, triangles, i, j):
                     continue
                 if count == len(found):
                     larger = np.empty((2 * count, 2), np.int64)

@@ -17,7 +17,7 @@ import numpy as np
 from igl import predicates
 from numpy.typing import NDArray
 
-from stereocell.kernels.crossings import ERROR_3D, find_doubtful, find_maybe_flat
+from stereocell.kernels.crossings import ERROR_3D, find_doubtful, find_maybe_flat, find_spread
 from stereocell.meshes.triangle_grid import make_grid
 
 Points = NDArray[np.float64]
@@ -45,6 +45,7 @@ def find_crossings(
         positions,
         corners,
         fresh,
+        find_spread(positions, corners),
         grid.low,
         grid.high,
         grid.first,

@@ -37,6 +37,7 @@ class ObjectFacts:
               evenly from its least to its largest: the pieces' p95s are found together
     changed   voxels that were changed so that no object touches itself by an edge or a corner
     bias      the largest share of an object's volume that a level has more or less, by level
+    stopped   levels of which simplifying did not come to an end: they are finer than is asked for
     thin      uint64 (k,), the numbers of objects too thin to be built, which are not among the n
     """
 
@@ -52,6 +53,7 @@ class ObjectFacts:
     quantiles: NDArray[np.float32]
     changed: int
     bias: tuple[float, ...]
+    stopped: tuple[int, ...]
     thin: NDArray[np.uint64]
 
 

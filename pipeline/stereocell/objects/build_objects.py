@@ -35,6 +35,7 @@ class BuiltObjects:
     volumes_um3   float64 (n,), of their voxels
     areas_um2     float64 (n,), of their surfaces at the finest level
     largest_bias  largest share of an object's volume that a level has more or less, by level
+    stopped       levels of which simplifying did not come to an end
     walls         int32 (m, 2): an object, and the number of another one that it touches, in the
                   labels; and `wall_um2` float64 (m,), the area of that wall
     changed       voxels that were changed so that no object touches itself by an edge
@@ -45,6 +46,7 @@ class BuiltObjects:
     volumes_um3: NDArray[np.float64]
     areas_um2: NDArray[np.float64]
     largest_bias: tuple[float, ...]
+    stopped: tuple[int, ...]
     walls: NDArray[np.int32]
     wall_um2: NDArray[np.float64]
     changed: int
@@ -93,12 +95,13 @@ def build_objects(
     touching, areas = mine[0][kept], mine[1][kept]
     place = np.searchsorted(owned, touching[:, 0]).astype(np.int32)
     shared = touching[:, 1] > 0
-    lods, biases = _levels(walls, owned, volumes, min(spacing_um), step_um, options, clock)
+    lods, biases, stopped = _levels(walls, owned, volumes, min(spacing_um), step_um, options, clock)
     return BuiltObjects(
         lods,
         volumes[owned],
         np.bincount(place, areas, len(owned)).astype(np.float64),
         biases,
+        stopped,
         np.stack([place[shared], touching[shared, 1]], axis=1).astype(np.int32),
         areas[shared],
         changed,
@@ -120,21 +123,23 @@ def _levels(
     step_um: float,
     options: ObjectOptions,
     clock: Clock,
-) -> tuple[tuple[Lod, ...], tuple[float, ...]]:
+) -> tuple[tuple[Lod, ...], tuple[float, ...], tuple[int, ...]]:
     if not len(walls.triangles):
-        return (), ()
+        return (), (), ()
     foreign = (walls.sides > 0) & ~np.isin(walls.sides, owned)
     seam = np.zeros(len(walls.positions), bool)
     seam[walls.triangles[foreign.any(axis=1)]] = True
     with clock("measure"):
         exact = Nearest(_mesh(walls), options.samples)
     lods: list[Lod] = []
-    biases = []
+    biases, stopped = [], []
     for level, error in enumerate(options.errors):
         with clock("simplify"):
-            walls = simplify_walls(
+            walls, is_done = simplify_walls(
                 walls, error * finest_um, volumes, step_um, locked=seam if level == 0 else None
             )
+        if not is_done:
+            stopped.append(level)
         with clock("measure"):
             made = Nearest(_mesh(walls), options.samples)
             away, back = measure_spread(exact, made), measure_spread(made, exact)
@@ -143,7 +148,7 @@ def _levels(
             held = measure_volumes(walls, len(volumes) - 1)[owned]
             biases.append(float(np.abs(held / volumes[owned] - 1).max()))
         lods.append(Lod(surfaces_of(walls, owned), distance, farthest_um=largest))
-    return tuple(lods), tuple(biases)
+    return tuple(lods), tuple(biases), tuple(stopped)
 
 
 def _mesh(walls: Walls) -> Mesh:

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from stereocell.kernels.collapse_walls import collapse_walls
+from stereocell.kernels.collapse_walls import collapse_walls, find_orders
+from stereocell.kernels.walls import (
+    bound_objects,
+    couple,
+    least_of_objects,
+    press,
+    slope_volumes,
+)
 from stereocell.meshes.simplify import OF_DIAGONAL, OF_SIDE, SHARPEST_DEG, STRAY
 from stereocell.objects.walls import Walls, find_faults, measure_volumes, put_on_lattice
 
@@ -29,8 +36,11 @@ def simplify_walls(
     volumes_um3: NDArray[np.float64],
     step_um: float,
     locked: NDArray[np.bool_] | None = None,
-) -> Walls:
-    """Return the walls with fewer triangles; where that can't be, as they are.
+) -> tuple[Walls, bool]:
+    """Return the walls with fewer triangles, and whether that came to an end.
+
+    It doesn't where triangles still meet after as many rounds as there are: then the walls are as
+    they were, or their objects' volumes not made up for.
 
     walls         valid, on the lattice; open where the objects beyond are not looked at
     max_error_um  largest root of the mean squared distance of a vertex from the planes of the
@@ -40,18 +50,27 @@ def simplify_walls(
     locked        bool (n,), the vertices that stay where they are; None: none
     """
     if not len(walls.triangles):
-        return walls
+        return walls, True
     fixed = np.zeros(len(walls.positions), bool) if locked is None else locked
     errors = _errors(walls, max_error_um, len(volumes_um3))
     centre = (walls.positions.min(axis=0) + walls.positions.max(axis=0)) / 2
     stays = fixed.copy()
     sharpest = float(np.cos(np.radians(SHARPEST_DEG)))
+    orders, made = find_orders(walls.triangles, len(stays)), np.zeros((0, 2), np.int32)
     for _ in range(_ROUNDS):
-        triangles, gone = collapse_walls(
-            walls.positions - centre, walls.triangles, stays, errors, STRAY, sharpest
+        triangles, gone, made = collapse_walls(
+            walls.positions - centre,
+            walls.triangles,
+            stays,
+            errors,
+            STRAY,
+            sharpest,
+            orders,
+            made,
         )
         fewer = Walls(walls.positions, triangles[~gone], walls.sides[~gone])
-        at_fault = find_faults(fewer)
+        # triangles that are as they were don't meet one another
+        at_fault = find_faults(fewer, (triangles != walls.triangles).any(axis=1)[~gone])
         if not len(at_fault):
             fewer, used = _compact(fewer)
             most_um = STRAY * max_error_um
@@ -60,7 +79,7 @@ def simplify_walls(
         around[at_fault] = True
         around[walls.triangles[around[walls.triangles].any(axis=1)]] = True
         stays |= around
-    return walls
+    return walls, False
 
 
 def keep_volumes(
@@ -69,8 +88,10 @@ def keep_volumes(
     most_um: float,
     volumes_um3: NDArray[np.float64],
     step_um: float,
-) -> Walls:
+) -> tuple[Walls, bool]:
     """Return the walls with each object as large as it should be, as far as nothing comes to cross.
+
+    And whether that came to an end; if not, they are as they were.
 
     fixed    bool (n,), vertices that stay
     most_um  how far a vertex may move
@@ -79,26 +100,36 @@ def keep_volumes(
     linear system of one unknown an object.
     """
     fixed = fixed | _at_ends(walls)
-    positions = walls.positions
+    positions, past = walls.positions, walls.positions
+    at_fault = np.zeros(0, np.int64)
     for turn in range(_ROUNDS):
         if turn < _ANEW:  # what can't move makes the others move more
-            positions = put_on_lattice(_moved(walls, volumes_um3, fixed, most_um), step_um)
-        at_fault = find_faults(replace(walls, positions=positions))
+            moved = _moved(walls, positions, volumes_um3, fixed, most_um)
+            positions = put_on_lattice(moved, step_um)
+        fresh = (positions != past).any(axis=1)
+        fresh[at_fault] = True
+        moved_now = fresh[walls.triangles].any(axis=1)
+        at_fault = find_faults(replace(walls, positions=positions), moved_now)
         if not len(at_fault):
-            return replace(walls, positions=positions)
+            return replace(walls, positions=positions), True
         fixed[at_fault] = True
+        past = positions
         positions = np.where(fixed[:, np.newaxis], walls.positions, positions)
-    return walls
+    return walls, False
 
 
 def _moved(
     walls: Walls,
+    start: NDArray[np.float64],
     volumes_um3: NDArray[np.float64],
     fixed: NDArray[np.bool_],
     most_um: float,
 ) -> NDArray[np.float64]:
-    """Return where the vertices are when each object has its volume (n, 3), um, if they may go."""
-    moved = walls
+    """Return where the vertices are when each object has its volume (n, 3), um, if they may go.
+
+    start  where they are, not far from the walls
+    """
+    moved = replace(walls, positions=start)
     for _ in range(_NEWTON):
         missing = volumes_um3[1:] - measure_volumes(moved, len(volumes_um3) - 1)[1:]
         if not (np.abs(missing) > _CLOSE * volumes_um3[1:]).any():
@@ -127,53 +158,26 @@ def _shift(
     walls: Walls, missing_um3: NDArray[np.float64], fixed: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Return how far each vertex moves (n, 3), um; `missing_um3` is NaN where nothing is asked."""
-    at, asked = walls.positions, np.isfinite(missing_um3)
-    row = np.concatenate([[-1], np.where(asked, np.cumsum(asked) - 1, -1)])
+    asked = np.isfinite(missing_um3)
+    row = np.concatenate([[-1], np.where(asked, np.cumsum(asked) - 1, -1)]).astype(np.int32)
     count = int(asked.sum())
-    corners = at[walls.triangles]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    own = np.zeros(len(at))
-    rows, columns, values = [], [], []
-    for k in range(3):
-        own += np.bincount(walls.triangles[:, k], area / 6, len(at))
-        slope = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6
-        for side, sign in ((0, 1.0), (1, -1.0)):
-            rows_here = row[walls.sides[:, side]]
-            held = rows_here >= 0
-            for axis in range(3):
-                rows.append(rows_here[held])
-                columns.append(walls.triangles[held, k].astype(np.int64) * 3 + axis)
-                values.append(sign * slope[held, axis])
-    shape = (count, 3 * len(at))
-    slopes = sparse.coo_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape
-    ).tocsr()
-    moves = (own > 0) & ~fixed
-    light = sparse.diags(np.repeat(np.where(moves, 1 / np.maximum(own, 1e-12), 0.0), 3))
-    pulls = slopes @ light @ slopes.T
+    entries, own = slope_volumes(walls.positions, walls.triangles, walls.sides, row)
+    light = np.where((own > 0) & ~fixed, 1 / np.maximum(own, 1e-12), 0.0)
+    among, pairs, values = couple(*entries, light, count)
     # an object of which nothing is left pulls nothing
-    pulls += sparse.diags(np.full(count, 1e-9 * max(float(pulls.diagonal().mean()), 1e-12)))
+    among += 1e-9 * max(float(among.mean()), 1e-12)
+    pulls = sparse.coo_matrix((values, pairs.T), (count, count)).tocsc() + sparse.diags(among)
     pressure = spsolve(pulls.tocsc(), missing_um3[asked])
-    return np.asarray(light @ (slopes.T @ np.atleast_1d(pressure))).reshape(-1, 3)
+    return press(*entries, light, np.atleast_1d(pressure))
 
 
 def _errors(walls: Walls, max_error_um: float, count: int) -> NDArray[np.float64]:
     """Return the error that each vertex may have (n,), um: that of the smallest object there."""
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    for side in walls.sides.T:
-        for k in range(3):
-            np.minimum.at(low, side, walls.positions[walls.triangles[:, k]])
-            np.maximum.at(high, side, walls.positions[walls.triangles[:, k]])
+    low, high = bound_objects(walls.positions, walls.triangles, walls.sides, count)
     lengths = np.maximum(high - low, 0)
     own = np.minimum(OF_DIAGONAL * np.linalg.norm(lengths, axis=1), OF_SIDE * lengths.min(axis=1))
     own[0] = np.inf
-    least = own[walls.sides].min(axis=1)
-    errors = np.full(len(walls.positions), max_error_um)
-    for k in range(3):
-        np.minimum.at(errors, walls.triangles[:, k], least)
-    return errors
+    return least_of_objects(walls.triangles, walls.sides, own, max_error_um, len(walls.positions))
 
 
 def _compact(walls: Walls) -> tuple[Walls, NDArray[np.int32]]:

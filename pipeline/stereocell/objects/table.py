@@ -14,6 +14,7 @@ from stereocell.objects.intensities import merge_quantiles
 
 Triple = tuple[float, float, float]
 MEAN = "mean_"  # before a channel's identifier: its mean over each object
+P95 = "p95_"  # the same, its 95th percentile
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,7 @@ def own_columns(
             )
         )
         about = f"95th percentile of {name} over its voxels"
-        made.append((f"p95_{to_identifier(name)}", f"p95 {name}", p95, about, "counts"))
+        made.append((f"{P95}{to_identifier(name)}", f"p95 {name}", p95, about, "counts"))
     return [
         Column(id_, name, np.asarray(values, np.float32), about, unit)
         for id_, name, values, about, unit in made

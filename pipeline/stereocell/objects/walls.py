@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from stereocell.kernels.walls import smooth_walls
 from stereocell.meshes.self_intersections import find_crossings, find_flat
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import zyx_to_xyz
@@ -64,14 +65,18 @@ def extract_walls(
     cubes, quads, sides = _faces(labels)
     centres = (cubes - 0.5).astype(np.float64)
     placed = _smoothed(centres, quads)
+    before, fresh = np.zeros((0, 3), np.int32), None
     for _ in range(_ROUNDS):
         at = placed * np.asarray(spacing_um) + np.asarray(origin_um)
         positions = put_on_lattice(zyx_to_xyz(at), step_um)
         walls = Walls(positions, *_split(positions, quads, sides))
-        at_fault = find_faults(walls)
+        if fresh is not None:
+            fresh |= (walls.triangles != before).any(axis=1)
+        at_fault = find_faults(walls, fresh)
         if not len(at_fault):
             return walls
         placed[at_fault] = centres[at_fault]
+        before, fresh = walls.triangles, touch(walls.triangles, at_fault)
     raise RuntimeError("walls between voxels meet: their labels are not well-composed")
 
 
@@ -80,12 +85,23 @@ def put_on_lattice(positions: NDArray[np.float64], step_um: float) -> NDArray[np
     return np.round(positions / step_um) * step_um
 
 
-def find_faults(walls: Walls) -> NDArray[np.int64]:
-    """Return the vertices (n,) of triangles without area, or that meet beside their corners."""
+def find_faults(walls: Walls, fresh: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
+    """Return the vertices (n,) of triangles without area, or that meet beside their corners.
+
+    fresh  bool (m,), which triangles are looked at, and held against all; None: all
+    """
     triangles = walls.triangles.astype(np.int64)
-    crossings = find_crossings(walls.positions, triangles)
-    flat = find_flat(walls.positions, triangles)
-    return np.unique(np.concatenate([triangles[crossings.ravel()], triangles[flat]]))
+    crossings = find_crossings(walls.positions, triangles, fresh=fresh)
+    looked_at = triangles if fresh is None else triangles[fresh]
+    flat = looked_at[find_flat(walls.positions, looked_at)]
+    return np.unique(np.concatenate([triangles[crossings.ravel()], flat]))
+
+
+def touch(triangles: NDArray[np.int32], vertices: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which triangles have any of some vertices for a corner (m,)."""
+    is_one = np.zeros(int(triangles.max(initial=0)) + 1, bool)
+    is_one[vertices] = True
+    return np.asarray(is_one[triangles].any(axis=1))
 
 
 def _split(
@@ -134,14 +150,10 @@ def _smoothed(centres: NDArray[np.float64], quads: NDArray[np.int64]) -> NDArray
     is_line = edges.data != 2
     from_vertex = np.repeat(np.arange(count), np.diff(edges.indptr))
     on_line = np.bincount(from_vertex, is_line, count) == 2
-    edges.data = np.where(on_line[from_vertex], is_line, True).astype(np.float64)
-    mean = sparse.diags(1 / np.maximum(np.asarray(edges.sum(axis=1)).ravel(), 1)) @ edges
-    low, high = centres - _REACH, centres + _REACH
-    placed = centres.copy()
-    for _ in range(SMOOTHINGS):
-        for share in (_INWARD, _OUTWARD):
-            placed = np.clip(placed + share * (mean @ placed - placed), low, high)
-    return placed
+    edges.data = np.where(on_line[from_vertex], is_line, True)
+    edges.eliminate_zeros()
+    shares = np.tile([_INWARD, _OUTWARD], SMOOTHINGS)
+    return smooth_walls(centres, edges.indptr, edges.indices, shares, _REACH)
 
 
 def _squares(positions: NDArray[np.float64], pairs: NDArray[np.int64]) -> NDArray[np.float64]:

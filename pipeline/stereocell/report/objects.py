@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from stereocell.building.object_tables import told_of_stopped
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.unit_files import load_objects, load_record
@@ -30,6 +31,7 @@ class LabelFacts:
 
     objects  of it; `pieces`: further pieces of those that tiles cut
     changed  voxels that were changed, so that no object touches itself by an edge or a corner
+    stopped  what is said of levels of which simplifying did not come to an end
     units    the folders of its units that have a surface
     """
 
@@ -38,6 +40,7 @@ class LabelFacts:
     objects: int
     pieces: int
     changed: int
+    stopped: tuple[str, ...]
     levels: tuple[ObjectLevel, ...]
     units: tuple[Path, ...]
 
@@ -77,6 +80,7 @@ def gather_labels(out_folder: OutFolder, plan: Plan) -> tuple[LabelFacts, ...]:
                 len(set(numbers)),
                 len(numbers) - len(set(numbers)),
                 sum(one.changed for one in facts.values()),
+                tuple(told_of_stopped(labels.name, facts)),
                 tuple(levels),
                 tuple(folders[tile] for tile, one in records.items() if one),
             )

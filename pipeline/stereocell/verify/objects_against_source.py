@@ -1,12 +1,14 @@
 """Compare the objects of a stage with their label map: voxels are counted anew, surfaces measured.
 
-Of each object its voxels' volume, box and centroid are found again, and the channels' means over it
-(not of those that are cut, of which too thin a piece may be left out). The table is joined again.
-All is held against the columns in the stage. The volume inside each level's surface may differ from
-the voxels' by what the units state. The area of whole objects' finest surfaces is measured again in
-the stage, and what is made of area and volume is made anew.
+Of each object its voxels' volume, box and centroid are found again, and the channels' means over
+it; the 95th percentile is one if as many voxels lie below it and above (not of those that are cut,
+of which too thin a piece may be left out). The table is joined again. All is held against the
+columns in the stage. The volume inside each level's surface may differ from the voxels' by what the
+units state. The area of whole objects' finest surfaces is measured again in the stage, and what is
+made of area and volume is made anew; so is that of their walls, and who shares one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,10 +29,17 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.objects.extents import Runs
-from stereocell.objects.table import MEAN
+from stereocell.objects.intensities import PERCENTILE
+from stereocell.objects.table import MEAN, P95
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
 from stereocell.usd.read_stage import loaded, mesh_at, open_stage, read_lods
 from stereocell.verify.formats import raise_on
+from stereocell.verify.shared_walls import (
+    NO_SURFACES,
+    Surfaces,
+    find_surfaces,
+    join_surfaces,
+)
 
 _CLOSE = 1e-4  # share by which a level's volume may exceed what is stated: float32
 _SHOWN = 5  # problems of a column
@@ -42,6 +51,7 @@ class _TileTask:
     stage_file: Path
     tile: str
     labels_id: str
+    beyond: NDArray[np.float32]  # boxes of other tiles' objects: see find_surfaces
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +59,8 @@ class _SumsTask:
     labels: Labels
     box: Box
     images: tuple[ImageRef, ...]
+    names: NDArray[np.uint64]  # of whole objects, ascending
+    p95s: NDArray[np.float64]  # (n, images), which are held against their voxels
 
 
 def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> str:
@@ -67,17 +79,24 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
     }
     notes = read_notes(out_folder, plan, labels)
     table, _ = make_table(plan, labels, located, facts, notes, table_of(plan, labels))
-    tasks = [(tile.id, _TileTask(out_folder.stage_file, tile.id, labels.id)) for tile in plan.tiles]
+    beyond = _boxes_beyond(table, max(labels.spacing_um))
+    tasks = [
+        (tile.id, _TileTask(out_folder.stage_file, tile.id, labels.id, beyond[tile.id]))
+        for tile in plan.tiles
+    ]
     found = engine.run("stage", _read_tile, tasks)
-    problems = _odd_means(plan, labels, located, table, engine)
+    problems = _odd_intensities(plan, labels, located, table, engine)
+    cut = located.extents.labels[located.owners == CUT]
+    problems += _odd_walls(labels, table, [tile[2:] for tile in found], cut)
     worst: list[float] = []
-    for tile, (there, volumes, area) in zip(plan.tiles, found, strict=True):
+    for tile, (there, volumes, surfaces, largest_um) in zip(plan.tiles, found, strict=True):
         problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd(table, tile.id, there)]
         if there is None or problems:
             continue
         own = facts[tile.id]
-        whole = ~np.isin(own.labels, located.extents.labels[located.owners == CUT])
-        problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd_areas(there, area, whole)]
+        whole = ~np.isin(own.labels, cut)
+        areas = surfaces.area_um2, largest_um
+        problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd_areas(there, areas, whole)]
         voxels = own.voxels * float(np.prod(labels.spacing_um))
         for level, held in enumerate(volumes):
             bias = float(np.abs(held / voxels - 1).max(initial=0.0))
@@ -96,45 +115,125 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
     )
 
 
-def _odd_means(
+def _boxes_beyond(table: ObjectTable, margin_um: float) -> dict[str, NDArray[np.float32]]:
+    """Return the boxes (n, 6) of all other tiles' objects, by tile, each with a margin."""
+    boxes = {
+        tile: np.concatenate(
+            [
+                table.boxes[rows, :3].min(axis=0) - margin_um,
+                table.boxes[rows, 3:].max(axis=0) + margin_um,
+            ]
+        )
+        for tile, rows in table.rows.items()
+        if len(rows)
+    }
+    return {
+        tile: np.array([box for other, box in boxes.items() if other != tile]).reshape(-1, 6)
+        for tile in table.rows
+    }
+
+
+def _odd_walls(
+    labels: Labels,
+    table: ObjectTable,
+    tiles: Sequence[tuple[Surfaces, float]],
+    cut: NDArray[np.uint64],
+) -> list[str]:
+    """Return which objects have other neighbours, or walls of other size, than their surfaces.
+
+    tiles  their surfaces in the stage, and how far those lie from what was measured, um
+    cut    labels of objects of which the surfaces hold the planes that cut them, too
+    """
+    shared, pairs = join_surfaces([surfaces for surfaces, _ in tiles])
+    touching = dict(zip(*np.unique(pairs, return_counts=True), strict=True))
+    odd: dict[str, list[int]] = {"neighbours": [], "contact": []}
+    row_of = {label: row for row, label in enumerate(table.labels.tolist())}
+    known = {column.id: column.values for column in table.columns}
+    for (surfaces, largest_um), walls_um2 in zip(tiles, shared, strict=True):
+        rows = np.array([row_of.get(label, -1) for label in surfaces.labels.tolist()], np.int64)
+        there = rows >= 0  # others are told of beside
+        names, rows = surfaces.labels[there], rows[there]
+        counts = np.array([touching.get(name, 0) for name in names])
+        odd["neighbours"] += names[known["neighbours"][rows] != counts].tolist()
+        radius = np.cbrt(3 * known["volume_um3"][rows] / (4 * np.pi))
+        most = 2 * largest_um / radius + _ROUGH
+        share = walls_um2[there] / np.maximum(surfaces.area_um2[there], 1e-12)
+        off = np.abs(known["contact"][rows] - share) > most
+        odd["contact"] += names[off & ~np.isin(names, cut)].tolist()
+    return [
+        f"{labels.id}: column {column} is not that of the surface of {_shown(found)}"
+        for column, found in odd.items()
+        if found
+    ]
+
+
+def _shown(names: Sequence[int]) -> str:
+    return ", ".join(map(str, sorted(set(names))[:_SHOWN]))
+
+
+def _odd_intensities(
     plan: Plan, labels: Labels, located: Located, table: ObjectTable, engine: Engine
 ) -> list[str]:
-    """Return which means of a channel over an object are others than those of its voxels."""
+    """Return which means and percentiles of a channel are others than those of objects' voxels."""
     images = images_of(plan)
-    boxes = tile_boxes(located.grid).items()
-    tasks = [(f"{tile}/{labels.name}", _SumsTask(labels, box, images)) for tile, box in boxes]
+    if not images:
+        return []
     whole = located.extents.labels[located.owners != CUT]
-    voxels, sums = np.zeros(len(whole)), np.zeros((len(whole), len(images)))
-    for names, counts, totals in engine.run("intensities", _sum_up, tasks) if images else []:
-        _, place, found = np.intersect1d(whole, names, return_indices=True)
-        voxels[place] += counts[found]
-        sums[place] += totals[found]
-    _, place, rows = np.intersect1d(whole, table.labels, return_indices=True)
-    means = sums[place] / np.maximum(voxels[place], 1)[:, np.newaxis]
-    columns = [column for column in table.columns if column.id.startswith(MEAN)][: len(images)]
+    names, _, rows = np.intersect1d(whole, table.labels, return_indices=True)
+    means, p95s = (
+        [column for column in table.columns if column.id.startswith(start)][: len(images)]
+        for start in (MEAN, P95)
+    )
+    stated = np.stack([column.values[rows] for column in p95s], axis=1).astype(np.float64)
+    tasks = [
+        (f"{tile}/{labels.name}", _SumsTask(labels, box, images, names, stated))
+        for tile, box in tile_boxes(located.grid).items()
+    ]
+    voxels, totals = np.zeros(len(names), np.int64), np.zeros((3, len(names), len(images)))
+    for counts, found in engine.run("intensities", _sum_up, tasks):
+        voxels += counts
+        totals += found
+    sums, below, up_to = totals
+    expected = sums / np.maximum(voxels, 1)[:, np.newaxis]
+    # the percentile lies between the two voxels that are next to its place among all
+    at = PERCENTILE / 100 * (voxels - 1)[:, np.newaxis]
+    is_p95 = (below <= np.ceil(at)) & (up_to >= np.floor(at) + 1)
     problems = []
-    for column, expected in zip(columns, means.T, strict=True):
-        same = np.isclose(column.values[rows], expected, rtol=1e-4, atol=1e-6, equal_nan=True)
-        if not same.all():
-            shown = ", ".join(map(str, whole[place][~same][:_SHOWN].tolist()))
-            problems.append(f"{labels.id}: column {column.id} is not the voxels' mean of {shown}")
+    for index, (mean, p95) in enumerate(zip(means, p95s, strict=True)):
+        values = mean.values[rows]
+        same = np.isclose(values, expected[:, index], rtol=1e-4, atol=1e-6, equal_nan=True)
+        for column, kind, right in ((mean, "mean", same), (p95, "p95", is_p95[:, index])):
+            if not right.all():
+                told = _shown(names[~right].tolist())
+                problems.append(
+                    f"{labels.id}: column {column.id} is not the voxels' {kind} of {told}"
+                )
     return problems
 
 
-def _sum_up(
-    task: _SumsTask,
-) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return the labels of a box (n,), their voxels (n,) and sums of intensities (n, images)."""
-    if 0 in task.box.shape:
-        return np.zeros(0, np.uint64), np.zeros(0, np.int64), np.zeros((0, len(task.images)))
+def _sum_up(task: _SumsTask) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the objects' voxels in a box (n,), and of each channel (3, n, images) the sum of
+    their intensities, how many are less than the object's p95, and how many are not more.
+    """
+    count = len(task.names)
+    totals = np.zeros((3, count, len(task.images)))
+    if 0 in task.box.shape or not count:
+        return np.zeros(count, np.int64), totals
     runs = Runs.of(task.labels.open().read(task.box))
-    names, place = np.unique(runs.values, return_inverse=True)
-    sums = np.zeros((len(names), len(task.images)))
+    values = runs.values.astype(np.uint64)
+    place = np.searchsorted(task.names, values).clip(0, count - 1)
+    place[task.names[place] != values] = count  # of no object that is looked at
     for index, image in enumerate(task.images):
         voxels = read_on_labels(task.labels, task.box, image).ravel().astype(np.float64)
-        sums[:, index] = np.bincount(place, np.add.reduceat(voxels, runs.starts), len(names))
-    counts = np.bincount(place, runs.lengths, len(names))
-    return names.astype(np.uint64), counts.astype(np.int64), sums
+        p95s = np.append(task.p95s[:, index], np.nan)[place]
+        near = np.abs(p95s) * _CLOSE  # float32
+        less = voxels < np.repeat(p95s - near, runs.lengths)
+        not_more = voxels <= np.repeat(p95s + near, runs.lengths)
+        for total, what in zip(totals, (voxels, less, not_more), strict=True):
+            added = np.add.reduceat(what.astype(np.float64), runs.starts)
+            total[:, index] = np.bincount(place, added, count + 1)[:count]
+    counts = np.bincount(place, runs.lengths, count + 1)[:count]
+    return counts.astype(np.int64), totals
 
 
 def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
@@ -184,28 +283,20 @@ def _odd_areas(
 
 def _read_tile(
     task: _TileTask,
-) -> tuple[TileObjects | None, list[NDArray[np.float64]], tuple[NDArray[np.float64], float]]:
-    """Return a tile's objects in the stage, their volumes by level, um^3, and `_odd_areas`'."""
+) -> tuple[TileObjects | None, list[NDArray[np.float64]], Surfaces, float]:
+    """Return a tile's objects in the stage, their volumes by level, um^3, their finest surfaces,
+    and how far those may lie, um, from what was measured."""
     stage = open_stage(task.stage_file)
     described = read_columns(stage, task.labels_id)
     with loaded(stage, task.tile) as (tile, _):
         prim = mesh_at(tile, task.labels_id, 0)
         there = None if prim is None or described is None else read_tile_objects(prim, described[0])
         if there is None:
-            return None, [], (np.zeros(0), 0.0)
-        count = len(there.labels)
+            return None, [], NO_SURFACES, 0.0
         lods = list(read_lods(tile, task.labels_id))
-        area = _areas(lods[0].mesh, count), lods[0].largest_um
-        return there, [_volumes(lod.mesh, count) for lod in lods], area
-
-
-def _areas(mesh: Mesh, count: int) -> NDArray[np.float64]:
-    """Return the area of each object's surface, um^2, float64 (n,)."""
-    if mesh.objects is None:
-        return np.zeros(count)
-    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
-    parts = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    return np.bincount(mesh.objects[mesh.triangles[:, 0]], parts, count).astype(np.float64)
+        surfaces = find_surfaces(lods[0].mesh, there.labels, task.beyond)
+        volumes = [_volumes(lod.mesh, len(there.labels)) for lod in lods]
+        return there, volumes, surfaces, lods[0].largest_um
 
 
 def _volumes(mesh: Mesh, count: int) -> NDArray[np.float64]:

@@ -273,6 +273,7 @@ def _facts(
         held,
         built.changed,
         built.largest_bias,
+        built.stopped,
         thin,
     )
 
@@ -292,6 +293,7 @@ def _none(task: ObjectsTask) -> ObjectFacts:
         np.zeros(0, np.int32),
         np.zeros((0, len(task.images), QUANTILES), np.float32),
         0,
+        (),
         (),
         np.zeros(0, np.uint64),
     )
