@@ -51,7 +51,7 @@ WHOLE = len(cut(REGION, REAL)) * CHANNELS  # units of the CyCIF dataset
 PRICE = 0.04  # dollars for a core-hour: about what clouds ask for a core with 4 GB
 GIB = 1024**3
 MOST_GROWTH = 0.1  # of a process's peak, from some tiles to four times as many
-MOST_BYTES = 3.5e9  # of the process that builds a unit of REAL
+MOST_BYTES = 2e9  # of the process that builds a unit of REAL
 
 # Run in a process of its own, which builds one unit and looks at itself meanwhile
 WATCHED = """

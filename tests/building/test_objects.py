@@ -777,3 +777,17 @@ def test_names_of_columns_that_mean_something_else_and_places_that_tell_too_much
     for phase in PHASES[1:]:
         assert run(phase, out, "--workers", 0) == 0
         assert f"{phase}: up to date" in said(capsys)
+
+
+def test_more_objects_than_a_file_can_name_need_more_tiles(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edges = (120, 120, 132)  # 40 x 40 x 44 cubes of 27 voxels
+    z, y, x = (index // 3 for index in np.indices(edges, np.uint32))
+    mask, wide = tmp_path / "many.ome.tif", ["--labels", ".", "--spacing-um", "1,1,1"]
+    tifffile.imwrite(mask, (z * 40 + y) * 44 + x + 1, metadata={"axes": "ZYX"})
+    assert run("plan", mask, "-o", tmp_path / "one", *wide, "--grid", "1x1") == 2
+    said = capsys.readouterr().err
+    assert "found 70,400 objects in tile r0_c0, expected at most 65,536" in said
+    assert "--grid" in said
+    assert run("plan", mask, "-o", tmp_path / "two", *wide, "--grid", "2x1") == 0

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from stereocell.building.label_maps import Labels
 from stereocell.building.plan import Plan
+from stereocell.formats.gltf_features import MOST_OBJECTS
+from stereocell.model.errors import UsageError
 from stereocell.model.tiling import Box
 from stereocell.objects.extents import Extents, merge_extents
 
@@ -119,7 +121,10 @@ class Located:
 def locate(
     plan: Plan, labels: Labels, parts: Mapping[str, Extents], smallest_voxels: int
 ) -> Located:
-    """Return the objects of a label map with their tiles; `parts`: what each tile holds."""
+    """Return the objects of a label map with their tiles; `parts`: what each tile holds.
+
+    Raises UsageError where a tile has more objects than its file can name.
+    """
     grid = TileGrid.of(plan, labels)
     whole = merge_extents(list(parts.values()))
     large = whole.voxels >= smallest_voxels
@@ -134,7 +139,7 @@ def locate(
         mine = owners == tile
         inside = (whole.low >= box.start - reach) & (whole.high <= box.stop + reach)
         owners[mine & ~inside.all(axis=1)] = CUT
-    return Located(
+    located = Located(
         grid,
         Extents(
             *(getattr(whole, name)[large] for name in ("labels", "voxels", "low", "high", "sums"))
@@ -144,6 +149,13 @@ def locate(
         int((~large).sum()),
         {tile: part.labels for tile, part in parts.items()},
     )
+    for id_ in tiles:
+        if (count := len(located.owned(id_))) > MOST_OBJECTS:
+            raise UsageError(
+                f"{labels.name}: found {count:,} objects in tile {id_}, expected at most "
+                f"{MOST_OBJECTS:,}: give it more tiles (--grid COLUMNSxROWS)"
+            )
+    return located
 
 
 def tile_boxes(grid: TileGrid) -> dict[str, Box]:
