@@ -1,7 +1,8 @@
 /**
  * What the surfaces of a label map have beside all others: each object has the colour of its value, or is gone.
  * Colouring anew is one upload of a byte an object. Each object is drawn in a little from its walls: two
- * neighbours' common wall would else be two surfaces in one place where a cut looks into them.
+ * neighbours' common wall would else be two surfaces in one place where a cut looks into them. By a gap it is
+ * drawn smaller as a whole, see gap.ts.
  */
 import {
   BufferAttribute,
@@ -9,6 +10,8 @@ import {
   Color,
   DataTexture,
   Float32BufferAttribute,
+  FloatType,
+  type Matrix4,
   type Mesh,
   NearestFilter,
   RedFormat,
@@ -18,9 +21,11 @@ import {
 import { includeChunks } from "../gpu/glsl_include";
 import type { Rgb } from "../math/color";
 import type { SurfacePart } from "../surfaces/blend_material";
+import objectGap from "./chunks/object_gap.glsl?raw";
 import objectLight from "./chunks/object_light.glsl?raw";
 import objectStain from "./chunks/object_stain.glsl?raw";
 import objectTexel from "./chunks/object_texel.glsl?raw";
+import { middleOf } from "./gap";
 
 /** Of a vertex: the row of its object, in place of the glb's number in the tile. */
 export const ROW = "object_row";
@@ -35,6 +40,7 @@ const LINE = 256;
 const UM_PER_METRE = 1e6;
 
 const CHUNKS = {
+  "chunks/object_gap": objectGap,
   "chunks/object_texel": objectTexel,
   "chunks/object_light": objectLight,
   "chunks/object_stain": objectStain,
@@ -48,7 +54,11 @@ flat varying float vObject;
 varying float vStain;
 uniform sampler2D uFlags;
 uniform float uInset;
+uniform sampler2D uMiddles;
+uniform mat4 uUmToRoom;
+uniform float uGap;
 #include <chunks/object_texel>
+#include <chunks/object_gap>
 `;
 const FRAGMENT = `flat varying float vObject;
 varying float vStain;
@@ -96,11 +106,23 @@ export function outwards({ attributes }: BufferGeometry, rows: Float32Array): In
   return found;
 }
 
+/** Texels of a texture with one a row. */
+const texelsOf = (count: number) => LINE * Math.max(1, Math.ceil(count / LINE));
+
 function bytesTexture(count: number): DataTexture {
-  const texels = new Uint8Array(LINE * Math.max(1, Math.ceil(count / LINE)));
+  const texels = new Uint8Array(texelsOf(count));
   const texture = new DataTexture(texels, LINE, texels.length / LINE, RedFormat);
   texture.minFilter = texture.magFilter = NearestFilter;
   texture.unpackAlignment = 1;
+  return texture;
+}
+
+function middlesTexture(boxes: Float32Array): DataTexture {
+  const count = boxes.length / 6;
+  const texels = new Float32Array(4 * texelsOf(count));
+  for (let row = 0; row < count; row++) texels.set(middleOf(boxes, row), 4 * row);
+  const texture = new DataTexture(texels, LINE, texelsOf(count) / LINE, RGBAFormat, FloatType);
+  texture.needsUpdate = true;
   return texture;
 }
 
@@ -109,17 +131,23 @@ export class ObjectMaterial {
   private readonly column: DataTexture;
   private readonly colors = new DataTexture(new Uint8Array(4 * LINE), LINE, 1, RGBAFormat);
   private readonly uniforms;
-  private metresPerStep = 0;
-  private gap_um = 0;
+  private readonly middles: DataTexture;
   readonly part: SurfacePart;
 
-  /** @param least_um by which each object is always drawn in */
+  /**
+   * @param boxes six a row, um
+   * @param inset_um by which each object is always drawn in
+   * @param umToRoom as it is when a frame is drawn
+   */
   constructor(
-    count: number,
-    private readonly least_um: number,
+    boxes: Float32Array,
+    private readonly inset_um: number,
+    umToRoom: Matrix4,
   ) {
+    const count = boxes.length / 6;
     this.flags = bytesTexture(count);
     this.column = bytesTexture(count);
+    this.middles = middlesTexture(boxes);
     this.colors.colorSpace = SRGBColorSpace;
     this.uniforms = {
       uFlags: { value: this.flags },
@@ -127,6 +155,9 @@ export class ObjectMaterial {
       uColors: { value: this.colors },
       uIsColored: { value: false },
       uInset: { value: 0 },
+      uMiddles: { value: this.middles },
+      uUmToRoom: { value: umToRoom },
+      uGap: { value: 0 },
       uStained: { value: 0 },
       uStain: { value: new Color(1, 1, 1) },
     };
@@ -135,7 +166,10 @@ export class ObjectMaterial {
       uniforms: this.uniforms,
       vertex: {
         declared: include(VERTEX),
-        place: `vObject = ${ROW};\n\tvStain = ${PAINT};\n\ttransformed -= uInset * ${OUTWARDS};`,
+        place: `vObject = ${ROW};
+	vStain = ${PAINT};
+	transformed -= uInset * ${OUTWARDS};
+	transformed = objectDrawnIn(transformed, modelMatrix, uUmToRoom, objectMiddle(uMiddles, ${ROW}), uGap);`,
         // a triangle whose corners all lie there is none
         end: `if (objectTexel(uFlags, ${ROW}) == 0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);`,
       },
@@ -159,17 +193,13 @@ export class ObjectMaterial {
     geometry.setAttribute(ROW, new Float32BufferAttribute(rows, 1));
     geometry.deleteAttribute(FEATURE);
     geometry.setAttribute(OUTWARDS, new BufferAttribute(outwards(geometry, rows), 3, true));
-    this.metresPerStep = scale.x; // the same in all files of a bundle
-    this.setGap(this.gap_um);
+    // the same in all files of a bundle
+    this.uniforms.uInset.value = this.inset_um / (scale.x * UM_PER_METRE);
     return true;
   }
 
-  /** Space that each object leaves along its walls, um. */
   setGap(gap_um: number): void {
-    this.gap_um = gap_um;
-    const inset_um = Math.max(gap_um / 2, this.least_um);
-    const { uInset } = this.uniforms;
-    uInset.value = this.metresPerStep > 0 ? inset_um / (this.metresPerStep * UM_PER_METRE) : 0;
+    this.uniforms.uGap.value = gap_um;
   }
 
   /** @param color linear, of the stain that is painted on them; null: none is */
@@ -194,7 +224,7 @@ export class ObjectMaterial {
   }
 
   dispose(): void {
-    for (const each of [this.flags, this.column, this.colors]) each.dispose();
+    for (const each of [this.flags, this.column, this.colors, this.middles]) each.dispose();
   }
 }
 

@@ -10,6 +10,7 @@ import type { ChannelState, ViewerState } from "../state/viewer_state";
 import type { SurfaceSet } from "../surfaces/surface_set";
 import { objectsCsv } from "./csv";
 import { filtered, flag, GONE } from "./flags";
+import { middleOf } from "./gap";
 import { readLinked, writeLinked } from "./linked";
 import { ObjectMaterial } from "./object_material";
 import { tableOf } from "./palettes";
@@ -60,7 +61,8 @@ export class Objects {
   ) {
     const { min, max } = options.manifest.specimen.bounds_um;
     const edge_um = Math.max(...max.map((v, i) => v - min[i]));
-    this.material = new ObjectMaterial(table.count, INSET * edge_um);
+    const umToRoom = options.specimen.matrixWorld;
+    this.material = new ObjectMaterial(table.boxes, INSET * edge_um, umToRoom);
     this.flags = new Uint8Array(table.count);
     this.adoptAll();
   }
@@ -105,7 +107,7 @@ export class Objects {
     const { boxes, count } = this.table;
     const widths = Array.from({ length: Math.min(count, 1000) }, (_, i) => {
       const row = Math.floor((i * count) / Math.min(count, 1000));
-      return Math.min(...[0, 1, 2].map((k) => boxes[6 * row + 3 + k] - boxes[6 * row + k]));
+      return middleOf(boxes, row)[3];
     }).sort((one, other) => one - other);
     return Math.max(0.5 * (widths[widths.length >> 1] ?? 1), 1e-3);
   }
@@ -208,7 +210,8 @@ export class Objects {
     const { surfaces, specimen, channel } = this.options;
     const meshes = surfaces.meshes.filter((each) => each.channel === channel);
     const world = new Matrix4().copy(specimen.matrixWorld);
-    return pickObject(ray, world, meshes, this.table.boxes, this.flags, this.clip);
+    const { boxes } = this.table;
+    return pickObject(ray, world, meshes, boxes, this.view.gap_um, this.flags, this.clip);
   }
 
   /** Also where nothing is met at all: what is beside the view is not on screen, and can't be asked. */

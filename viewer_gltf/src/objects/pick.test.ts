@@ -1,5 +1,16 @@
-import { BufferAttribute, BufferGeometry, Group, Matrix4, Mesh, SphereGeometry } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  ExtrudeGeometry,
+  Group,
+  Matrix4,
+  Mesh,
+  Shape,
+  SphereGeometry,
+  Vector2,
+} from "three";
 import { describe, expect, it } from "vitest";
+import { BOXES, CELLS, WALL, WIDTH_UM } from "../../test/support/concave_cells";
 import { WHOLE } from "../math/clip";
 import type { Ray } from "../math/vec3";
 import { ROW } from "./object_material";
@@ -53,8 +64,8 @@ const ALL = Uint8Array.of(1, 1, 1);
 describe("a ray among objects", () => {
   const { mesh, world, boxes } = balls();
   const surfaces = [{ mesh, tile: "r0_c0", channel: "cells" }];
-  const pick = (ray: Ray, flags = ALL, clip = WHOLE) =>
-    pickObject(ray, world, surfaces, boxes, flags, clip);
+  const pick = (ray: Ray, flags = ALL, clip = WHOLE, gap_um = 0) =>
+    pickObject(ray, world, surfaces, boxes, gap_um, flags, clip);
 
   it("meets the nearest, at its surface, in lengths of its direction", () => {
     const met = pick(ALONG);
@@ -85,7 +96,51 @@ describe("a ray among objects", () => {
     expect(pick({ origin: [5, 0, -10], direction: [0, 0, 1] })).toBeNull();
   });
 
+  it("meets an object where it is drawn, smaller by the gap", () => {
+    const gapped = (ray: Ray, clip = WHOLE) => pick(ray, ALL, clip, 0.8); // balls of 0.6
+    const met = gapped(ALONG);
+    expect(met?.row).toBe(0);
+    expect(met?.distance).toBeCloseTo((10 - Math.sqrt(0.36 - 0.02)) / 2, 1);
+    const beside: Ray = { origin: [0.7, 0, -10], direction: [0, 0, 1] };
+    expect(pick(beside)?.row).toBe(0);
+    expect(gapped(beside)).toBeNull();
+    // a cut before what is drawn, through where it would be without a gap
+    const plane = { normal: [0, 0, -1] as const, offset_um: 0.7 };
+    expect(gapped(ALONG, { ...WHOLE, plane })?.distance).toBeCloseTo(met?.distance ?? 0, 9);
+    expect(pick(ALONG, ALL, WHOLE, 99)?.row).toBe(0); // a fifth is left
+  });
+
   it("meets what it begins inside of", () => {
     expect(pick({ origin: [0, 0, 4], direction: [1, 0, 0] })?.row).toBe(1);
+  });
+});
+
+describe("a ray among cells that touch at a concave corner", () => {
+  const meshes = CELLS.map((outline, row) => {
+    const shape = new Shape(outline.map(([x, y]) => new Vector2(x, y)));
+    const geometry = new ExtrudeGeometry(shape, { depth: WIDTH_UM, bevelEnabled: false });
+    const { count } = geometry.attributes.position;
+    geometry.setAttribute(ROW, new BufferAttribute(new Float32Array(count).fill(row), 1));
+    geometry.setIndex(Array.from({ length: count }, (_, i) => i));
+    return { mesh: new Mesh(geometry), tile: "r0_c0", channel: "cells" };
+  });
+  const at = ([x, y]: readonly [number, number], gap_um: number) => {
+    const ray: Ray = { origin: [x, y, -9], direction: [0, 0, 1] };
+    return pickObject(ray, new Matrix4(), meshes, BOXES, gap_um, Uint8Array.of(1, 1), WHOLE);
+  };
+
+  it("meets nothing in the gap, and each where it is drawn", () => {
+    for (const [x, y] of WALL) {
+      for (const [row, by] of [
+        [0, -0.05],
+        [1, 0.05],
+      ]) {
+        const beside = [x + by, y + by] as const;
+        expect(at(beside, 0)?.row, `${beside}`).toBe(row);
+        expect(at(beside, 0.6), `${beside}`).toBeNull();
+      }
+    }
+    expect(at([1.5, 1.5], 0.6)?.row).toBe(0);
+    expect(at([2.5, 2.5], 0.6)?.row).toBe(1);
   });
 });

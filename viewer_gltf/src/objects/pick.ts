@@ -1,12 +1,14 @@
 /**
  * The object that a ray meets: first the boxes of the objects that show, then the triangles of those few whose
- * box is nearer than what was met. What is hidden or cut away is not there. No GPU is asked.
+ * box is nearer than what was met. What is hidden or cut away is not there. Where objects are drawn smaller, the
+ * ray is held against each as large as it is, from as much farther away. No GPU is asked.
  */
 import { type BufferAttribute, type InterleavedBufferAttribute, Matrix4, Vector3 } from "three";
 import { type Clip, isKept } from "../math/clip";
 import { along, type Ray } from "../math/vec3";
 import type { ShownSurface } from "../state/on_screen";
 import { GONE } from "./flags";
+import { grownFrom } from "./gap";
 import { ROW } from "./object_material";
 
 /** `distance`: in lengths of the ray's direction. */
@@ -60,6 +62,8 @@ const [a, ab, ac, n, off] = Array.from({ length: 5 }, () => new Vector3());
  * @param ray um, world
  * @param world of the space that the ray is in: the specimen's
  * @param surfaces the meshes on screen, of one channel
+ * @param boxes six a row, um
+ * @param gap_um by which objects are drawn smaller: see gap.ts
  * @param flags by row: see flags.ts
  */
 export function pickObject(
@@ -67,28 +71,30 @@ export function pickObject(
   world: Matrix4,
   surfaces: readonly ShownSurface[],
   boxes: Float32Array,
+  gap_um: number,
   flags: Uint8Array,
   clip: Clip,
 ): MetObject | null {
   const near: [row: number, from: number][] = [];
   for (let row = 0; row < flags.length; row++) {
     if (flags[row] === GONE) continue;
-    const from = entry(boxes, row, ray);
+    const from = entry(boxes, row, ray); // the box that is drawn lies within
     if (from !== false) near.push([row, from]);
   }
   near.sort((one, other) => one[1] - other[1]);
   let best: MetObject | null = null;
   for (const [row, from] of near) {
     if (best !== null && from > best.distance) break;
+    const { origin, direction } = gap_um > 0 ? grownFrom(ray, boxes, row, gap_um) : ray;
     for (const { mesh, tile } of surfaces) {
       const { index, attributes } = mesh.geometry;
       if (index === null || attributes[ROW] === undefined) continue;
       const range = rangesOf(index, attributes[ROW] as Attribute).get(row);
       if (range === undefined) continue;
       toMesh.copy(mesh.matrixWorld).invert().multiply(world);
-      start.fromArray(ray.origin).applyMatrix4(toMesh);
+      start.fromArray(origin).applyMatrix4(toMesh);
       way
-        .fromArray(along(ray.origin, ray.direction, 1))
+        .fromArray(along(origin, direction, 1))
         .applyMatrix4(toMesh)
         .sub(start);
       const limit = best?.distance ?? Number.POSITIVE_INFINITY;

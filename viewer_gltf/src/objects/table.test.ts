@@ -62,11 +62,14 @@ describe("the table of objects", () => {
 });
 
 describe("objects.json", () => {
-  it("is refused where a column is too short, and where a tile names rows that are not there", () => {
+  it("is refused where a column or the boxes are too short, and where a tile names rows that are not there", () => {
     expect(checkObjects(sampleContent(), "o").count).toBe(6);
     const short = sampleContent();
     short.columns[0].exact.bytes -= 4;
     expect(() => checkObjects(short, "o")).toThrow("o: columns: size: expected 6 rows");
+    const boxes = { ...sampleContent().boxes, bytes: 24 };
+    const few = { ...sampleContent(), boxes };
+    expect(() => checkObjects(few, "o")).toThrow("o: boxes: expected 6 rows");
     for (const rows of [
       { first: 3, count: 4 },
       { first: 0, count: 1, more: [6] },

@@ -10,7 +10,8 @@ import { checkSchema } from "../bundle/schema_check";
 /** Throws BundleError. */
 export function checkObjects(value: unknown, path: string): ChannelObjects {
   checkSchema(objectsSchema, value, path);
-  const { count, columns, tiles } = value as ChannelObjects;
+  const { count, boxes, columns, tiles } = value as ChannelObjects;
+  if (boxes.bytes !== 24 * count) throw new BundleError(`${path}: boxes: expected ${count} rows`);
   for (const { id, bytes, exact } of columns) {
     if (bytes.bytes !== count || exact.bytes !== 4 * count) {
       throw new BundleError(`${path}: columns: ${id}: expected ${count} rows`);

@@ -60,8 +60,8 @@ export function makeSurfaceFrame(
 export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean; isSolid: boolean }>;
 
 /**
- * What some surfaces have beside all others, as text in their shaders. `place` may move `transformed` along
- * `normal`, `end` changes `gl_Position`, `color` changes `diffuseColor`.
+ * What some surfaces have beside all others, as text in their shaders. `place` may move `transformed`,
+ * `end` changes `gl_Position`, `color` changes `diffuseColor`.
  */
 export type SurfacePart = Readonly<{
   /** Of the text: the same for the same one. */

@@ -246,6 +246,12 @@ describeInChromium("the objects of a label map", () => {
     await stand.viewer.settled();
     expect((await view()).gap_um).toBeCloseTo(2, 1); // half of its 40 steps, of half a ball's width
     expect(await drawn()).toBeLessThan(0.75 * before);
+    const aside = rowAt(0, 0, 1, 1); // nothing lies to the left of it
+    const [x, y, z] = centerOf(aside);
+    await tap([x - 3.5, y, z]); // of a radius of 4 um, 3 are left
+    expect((await view()).picked).toBeNull();
+    await tap([x - 2.5, y, z]);
+    expect((await view()).picked).toBe(aside);
   });
 
   it("are selected by a lasso in the plot, saved as a file, and all of it is in the link", async () => {

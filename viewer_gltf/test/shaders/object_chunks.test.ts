@@ -1,9 +1,12 @@
-/** Numbers out of the chunks that colour objects: the byte of a row, and the light of a flag. */
+/** Numbers out of the chunks of objects: the byte of a row, the light of a flag, a place drawn in by the gap. */
 import { readdir, readFile } from "node:fs/promises";
+import { Matrix4 } from "three";
 import { expect, it } from "vitest";
 import { NEIGHBOUR, PICKED, PLAIN, SELECTED } from "../../src/objects/flags";
+import { middleOf } from "../../src/objects/gap";
 import { prepareBarePage } from "../support/browser/bare_page";
 import { describeInChromium } from "../support/browser/skip";
+import { along, BOXES, CELLS, isWithin, WALL, WIDTH_UM } from "../support/concave_cells";
 import { runProgram } from "../support/shaders/chunk";
 
 const FOLDER = new URL("../../src/objects/chunks/", import.meta.url);
@@ -17,6 +20,7 @@ describeInChromium("the chunks of objects", () => {
 
   it("are all tested here", async () => {
     expect((await readdir(FOLDER)).sort()).toEqual([
+      "object_gap.glsl",
       "object_light.glsl",
       "object_stain.glsl",
       "object_texel.glsl",
@@ -38,6 +42,62 @@ describeInChromium("the chunks of objects", () => {
         uniforms,
       );
       expect(found, `row ${row}`).toBe((row * 7) % 256);
+    }
+  });
+
+  // a mesh's own steps, in um, in the room
+  const umToRoom = new Matrix4().makeRotationY(0.7).scale({ x: 0.01, y: 0.01, z: 0.01 } as never);
+  umToRoom.setPosition(0.1, 1.5, -0.8);
+  const stepToUm = new Matrix4().makeScale(0.002, 0.002, 0.002).setPosition(-1, -2, -3);
+  const matrix = ({ elements }: Matrix4) => `mat4(${elements.map((v) => v.toFixed(9)).join(", ")})`;
+  const toRoom = umToRoom.clone().multiply(stepToUm);
+  /** A place of a row's object, as it is drawn, um. */
+  const drawn = async (row: number, place_um: readonly number[], gap_um: number) => {
+    const steps = place_um.map((v, i) => ((v + 1 + i) / 0.002).toFixed(3));
+    const head = "uniform sampler2D uMiddles;\n#include <chunks/object_gap>\n";
+    const body = `oColor.xyz = objectDrawnIn(vec3(${steps}), ${matrix(toRoom)}, ${matrix(umToRoom)},
+      objectMiddle(uMiddles, ${256 + row}.0), ${gap_um.toFixed(3)});`;
+    const texels = [0, 1].flatMap((line) =>
+      Array.from({ length: 256 }, (_, i) =>
+        line === 1 && i < 2 ? middleOf(BOXES, i) : [9, 9, 9, 9],
+      ),
+    );
+    const uniforms = {
+      uMiddles: { size: [256, 2], channels: 4 as const, texels: texels.flat(), isFloat: true },
+    };
+    const found = await runProgram(bare.page, await chunk("object_gap"), head, body, uniforms);
+    return found.slice(0, 3).map((v, i) => 0.002 * v - 1 - i);
+  };
+
+  it("draw cells that touch at a concave corner in within their own walls, and nothing between", async () => {
+    const gap_um = 0.2 * WIDTH_UM;
+    const outlines: [number, number][][] = [];
+    for (const [row, outline] of CELLS.entries()) {
+      const places: [number, number][] = [];
+      for (const [x, y] of outline) {
+        const [toX, toY, toZ] = await drawn(row, [x, y, 0], gap_um);
+        places.push([toX, toY]);
+        expect(toZ).toBeCloseTo(gap_um / 2, 3); // half of it at either end of its narrowest side
+      }
+      outlines.push(places);
+      for (const place of along(places)) expect(isWithin(outline, place), `${place}`).toBe(true);
+    }
+    for (const place of WALL) {
+      for (const outline of outlines) expect(isWithin(outline, place), `${place}`).toBe(false);
+    }
+    const [one, next] = outlines;
+    expect(next[0][0] - one[3][0]).toBeCloseTo(0.4, 3); // corner and notch: .1 and .3
+  });
+
+  it("leave a fifth of an object, however wide the gap, and all of it without", async () => {
+    for (const [gap_um, left] of [
+      [0, 1],
+      [99, 0.2],
+    ]) {
+      const found = await drawn(0, [3, 0, 1], gap_um);
+      for (const [i, v] of [1.5, -1.5, -0.5].entries()) {
+        expect(found[i]).toBeCloseTo(1.5 + left * v, 3);
+      }
     }
   });
 
