@@ -55,7 +55,13 @@ const UNUSED_PARTS = [
   "cube_uv_reflection_fragment",
 ];
 
-/** Their shaders don't travel: three lists them all, so that no bundler sees that nobody asks for them. */
+/** Spaces within round brackets, too; tabs within a line part words. */
+const INDENTS = /(?<=\\n(?:\\t)*)\\t|(?<=\() | (?=\))/g;
+
+/**
+ * Their shaders don't travel: three lists them all, so that no bundler sees that nobody asks for them. Those of the
+ * others travel without indents.
+ */
 function stripMaterials(): Plugin {
   return {
     name: "strip-materials",
@@ -69,7 +75,7 @@ function stripMaterials(): Plugin {
       for (const part of UNUSED_PARTS) left.add(part);
       const text = /^(const|var) ([\w$]+) = ".*";$/gm;
       return code.replace(text, (line, kind, name) =>
-        left.has(name) ? `${kind} ${name} = "";` : line,
+        left.has(name) ? `${kind} ${name} = "";` : line.replace(INDENTS, ""),
       );
     },
   };

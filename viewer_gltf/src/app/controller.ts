@@ -162,6 +162,7 @@ export class Controller {
     viewer.setScreen(rememberedScreen());
     for (const action of rememberedEyes()) viewer.dispatch(action);
     viewer.onAnnounce = (text) => this.say(text);
+    viewer.onCard = (control) => this.panel.reveal(control);
     viewer.onCommand = (command) => {
       if (command === "share") void this.share();
       return command === "share";

@@ -23,6 +23,8 @@ export type ObjectsPartOptions = Readonly<{
   dispatch: (action: Action, isStep?: boolean) => void;
   onAim: (box: Box, isSeen: (eye: Vec3) => boolean) => void;
   announce: (text: string) => void;
+  /** A card has been opened, and not by a gaze: by the control that it begins with. */
+  onCard: (control: string) => void;
   onChange: () => void;
   onError: (error: unknown) => void;
 }>;
@@ -124,6 +126,7 @@ export class ObjectsPart {
     objects.pick(met.row, isByGaze);
     if (this.state?.objects[met.channel]?.picked === met.row) {
       this.options.announce(`Object ${objects.table.title(met.row)}`);
+      if (!isByGaze) this.options.onCard(`${met.channel}/objects-card`);
     }
     return true;
   }

@@ -31,6 +31,7 @@ export type ContentsOptions = Readonly<{
   view: HTMLElement;
   dispatch: (action: Action, isStep?: boolean) => void;
   announce: (text: string) => void;
+  onCard: (control: string) => void;
   /** An object is to be flown to, um, world; `isSeen`: whether nothing lies before it for an eye. */
   onAim: (box: Box, isSeen: (eye: Vec3) => boolean) => void;
   /** The picture is no longer true. */

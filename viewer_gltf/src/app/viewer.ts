@@ -89,6 +89,8 @@ export class Viewer {
   private perInch: number | null = null;
   /** Announces what a change has brought besides what it shows; the page sets it. */
   onAnnounce: (text: string) => void = () => undefined;
+  /** A tap or a key on the flat screen has opened a card, by the control that it begins with; the page sets it. */
+  onCard: (control: string) => void = () => undefined;
   /** Where someone has tapped, um; for what stands round the page. */
   onTap: (ray: Ray) => void = () => undefined;
   readonly contents: Contents;
@@ -144,6 +146,9 @@ export class Viewer {
       dispatch: (action, isStep) => this.dispatch(action, isStep),
       announce: (text) => this.onAnnounce(text),
       onAim: (box, isSeen) => this.flyTo(box, isSeen),
+      onCard: (control) => {
+        if (this.stereo.kind === null) this.onCard(control);
+      },
       onChange: () => this.loop.come(),
       onError: (error) => this.report(error),
     });

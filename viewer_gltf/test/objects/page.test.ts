@@ -176,6 +176,30 @@ describeInChromium("the objects of a label map", () => {
     expect(isBackground(at(picture, centerOf(BEHIND)))).toBe(true);
   });
 
+  it("open their card in view, with what can be done", async () => {
+    const { page } = stand.viewer;
+    await stand.open();
+    await stand.viewer.settled();
+    const isInView = (part: string) =>
+      control(part).evaluate((found) => {
+        const body = found.closest(".body")?.getBoundingClientRect() as DOMRect;
+        const { top, bottom } = found.getBoundingClientRect();
+        return top >= body.top && bottom <= body.bottom;
+      });
+    expect(await isInView("card")).toBe(false);
+    await tap(centerOf(FRONT));
+    for (const part of ["card", "fly", "only", "hide"]) {
+      await expect.poll(() => isInView(part), { message: part }).toBe(true);
+    }
+    await tap(centerOf(FRONT)); // closed
+    await page.locator(".panel .body").evaluate((body) => body.scrollTo(0, 0));
+    await page.emulateMedia({ reducedMotion: "reduce" });
+    await tap(centerOf(FRONT));
+    expect(await isInView("card"), "at once").toBe(true);
+    await page.emulateMedia({ reducedMotion: null });
+    expect(await page.evaluate(() => scrollY)).toBe(0);
+  });
+
   it("open their card by a gaze that rests, which is no step to undo", async () => {
     await stand.open();
     await stand.viewer.settled();

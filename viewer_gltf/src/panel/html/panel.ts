@@ -164,9 +164,18 @@ export class Panel {
 
   /** Bring the keyboard to a control, by its id; whether there is one. */
   focus(id: string): boolean {
-    const selector = `[data-control="${CSS.escape(id)}"]:not([tabindex="-1"])`;
-    const found = this.root.querySelector<HTMLElement>(selector);
+    const found = this.find(id);
     found?.focus();
     return found !== null;
+  }
+
+  /** Scroll a control into view; of a section that is closed, or of a panel that is folded away, nothing moves. */
+  reveal(id: string): void {
+    const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.find(id)?.scrollIntoView({ block: "nearest", behavior: isCalm ? "auto" : "smooth" });
+  }
+
+  private find(id: string): HTMLElement | null {
+    return this.root.querySelector(`[data-control="${CSS.escape(id)}"]:not([tabindex="-1"])`);
   }
 }

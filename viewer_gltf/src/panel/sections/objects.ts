@@ -347,7 +347,7 @@ class Layout {
     ];
   }
 
-  /** All that is known of the object that was picked. */
+  /** What can be done with the object that was picked, and all that is known of it: there may be many columns. */
   private card(): readonly Control[] {
     const { table, view } = this;
     const row = view.picked;
@@ -360,11 +360,6 @@ class Layout {
     const wall = largestWall(table, row);
     return [
       this.text("card", "Object", title === label ? title : `${title} (${label})`),
-      ...table.columns.map((column) =>
-        this.text(`card-${column.id}`, column.name, this.valueText(column, row)),
-      ),
-      ...(table.hasNeighbours ? [this.text("card-next", "Neighbours", String(others.length))] : []),
-      ...(wall === "" ? [] : [this.text("card-wall", "Largest wall, to", wall)]),
       this.button("fly", "Go there", { aim: { row } }),
       this.button("only", "Only this one", { only: [row] }),
       ...(table.hasNeighbours
@@ -381,6 +376,11 @@ class Layout {
       ),
       this.button("hide", "Hide it", { hidden: [...view.hidden, row], picked: null }),
       this.button("close", "Close the card", { picked: null }),
+      ...table.columns.map((column) =>
+        this.text(`card-${column.id}`, column.name, this.valueText(column, row)),
+      ),
+      ...(table.hasNeighbours ? [this.text("card-next", "Neighbours", String(others.length))] : []),
+      ...(wall === "" ? [] : [this.text("card-wall", "Largest wall, to", wall)]),
     ];
   }
 
