@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from stereocell.building.label_maps import Labels
 from stereocell.building.located_objects import CUT, Located
 from stereocell.building.plan import Plan
+from stereocell.building.stopped_levels import told_of_stopped
 from stereocell.model.channel import Appearance
 from stereocell.model.counted import counted
 from stereocell.model.errors import UsageError
@@ -140,19 +141,6 @@ def _told_of_thin(labels: Labels, thin: NDArray[np.uint64]) -> list[str]:
     return [
         f"{labels.name}: {counted(len(thin), 'object')} left out, too thin to be built, or full of "
         f"holes: {listed(thin.tolist())}; where labels are finer they can be"
-    ]
-
-
-def told_of_stopped(name: str, facts: Mapping[str, ObjectFacts]) -> list[str]:
-    """Return what is said of levels of which simplifying did not come to an end, or nothing."""
-    tiles: dict[int, list[str]] = {}
-    for tile, one in facts.items():
-        for level in one.stopped:
-            tiles.setdefault(level, []).append(tile)
-    return [
-        f"{name}: lod{level} has more triangles or other volumes than are asked for in "
-        f"{listed(sorted(found))}: triangles would have come to cross"
-        for level, found in sorted(tiles.items())
     ]
 
 

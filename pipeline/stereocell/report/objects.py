@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from stereocell.building.object_tables import told_of_stopped
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
+from stereocell.building.stopped_levels import told_of_stopped
 from stereocell.building.unit_files import load_objects, load_record
 from stereocell.storage.workspace import sizes_below
 
