@@ -106,7 +106,16 @@ export default defineConfig({
     outDir: "dist",
     emptyOutDir: true,
     chunkSizeWarningLimit: 1500,
-    rolldownOptions: { output: { codeSplitting: { groups: [{ name: oneChunk(PAGE, "index") }] } } },
+    rolldownOptions: {
+      output: {
+        codeSplitting: {
+          groups: [
+            { name: oneChunk(PAGE, "index"), priority: 1 },
+            { name: "objects", test: /\/src\/objects\// }, // what their section shares with them, too
+          ],
+        },
+      },
+    },
   },
   server: { fs: { allow: [".."] } }, // the schemas lie beside this folder
   worker: {

@@ -54,15 +54,17 @@ export type Scene = Readonly<{
   labelled: Object3D;
   state: ViewerState;
   manifest: Manifest;
+  /** What the colours of a label map's objects mean. */
+  colorsOf: Parameters<typeof legendOf>[2];
 }>;
 
 /** What is written on it, as the camera stands now. */
-function captionOf({ navigation, height_px, specimen, state, manifest }: Scene): Caption {
+function captionOf({ navigation, height_px, specimen, state, manifest, colorsOf }: Scene): Caption {
   const { camera, controls } = navigation;
   const m_per_um = specimen.getMaxScaleOnAxis();
   return {
     um_per_px: umPerPixelAt(controls.target, camera, height_px, m_per_um),
-    legend: legendOf(state, manifest),
+    legend: legendOf(state, manifest, colorsOf),
     axes: axesOf(manifest.specimen.sides),
     head: camera.matrixWorld,
     specimen,

@@ -136,6 +136,11 @@ export class ObjectsPart {
     return this.shown.map(({ id, objects }) => ({ id, text: objects.csv() }));
   }
 
+  /** What the colours of a channel's objects mean; null: they have the stage's, or have not come. */
+  legend(channel: string): Objects["legend"] {
+    return this.objects.get(channel)?.legend ?? null;
+  }
+
   /** What a link says of a channel's objects; null: their table has not come. */
   linked(channel: string, view: ObjectView): ReturnType<Objects["linked"]> | null {
     return this.objects.get(channel)?.linked(view) ?? null;

@@ -346,6 +346,7 @@ export class Viewer {
       labelled: this.room.specimen.group,
       state: this.state,
       manifest: this.bundle.manifest,
+      colorsOf: (channel) => this.contents.objects.legend(channel),
     };
   }
 

@@ -6,7 +6,8 @@ import { AXIS_COLORS } from "../annotations/style";
 import { chooseScaleBar } from "../math/round_length";
 import { type Corner, clearestOf, inCorners, type Rect } from "./label_boxes";
 
-export type LegendEntry = Readonly<{ name: string; hex: string; range: string }>;
+/** A line: one colour is a dot, several are a bar from end to end; none: words alone. */
+export type LegendEntry = Readonly<{ name: string; colors: readonly string[]; text: string }>;
 
 export type Caption = Readonly<{
   /** Of the screen, at what is looked at; null: there is no scale. */
@@ -22,7 +23,7 @@ export type Caption = Readonly<{
 const FONT = 'system-ui, "Noto Sans", sans-serif';
 const BAR_FONT = `13px ${FONT}`;
 const NAME_FONT = `600 13px ${FONT}`;
-const RANGE_FONT = `12px ${FONT}`;
+const TEXT_FONT = `12px ${FONT}`;
 const EDGE = 16;
 const LINE = 20;
 const BAR_HEIGHT = 28;
@@ -92,16 +93,19 @@ function drawScaleBar(
   context.fillText(label, x, line + 14);
 }
 
-/** From the left: the dot, the name, the range. */
-const NAME_AT = 20;
+/** From the left: the dot or the bar, the name, the text. */
+const [DOT, BAR] = [12, 72];
 const GAP = 8;
 
+const markOf = ({ colors }: LegendEntry) =>
+  colors.length === 0 ? 0 : GAP + (colors.length === 1 ? DOT : BAR);
+
 function legendWidth(context: CanvasRenderingContext2D, legend: readonly LegendEntry[]): number {
-  const widths = legend.map(({ name, range }) => {
+  const widths = legend.map((entry) => {
     context.font = NAME_FONT;
-    const named = context.measureText(name).width;
-    context.font = RANGE_FONT;
-    return NAME_AT + named + GAP + context.measureText(range).width;
+    const named = entry.name === "" ? 0 : context.measureText(entry.name).width + GAP;
+    context.font = TEXT_FONT;
+    return markOf(entry) + named + context.measureText(entry.text).width;
   });
   return Math.max(0, ...widths);
 }
@@ -112,20 +116,41 @@ function drawLegend(
   legend: readonly LegendEntry[],
 ): void {
   context.textAlign = "left";
-  legend.forEach(({ name, hex, range }, i) => {
+  legend.forEach((entry, i) => {
+    const { name, colors, text } = entry;
     const y = top + 6 + i * LINE;
-    context.fillStyle = hex;
-    context.beginPath();
-    context.arc(x + 6, y, 6, 0, 2 * Math.PI);
-    context.fill();
-    context.fillStyle = "#fff";
-    context.font = NAME_FONT;
-    context.fillText(name, x + NAME_AT, y);
-    const after = x + NAME_AT + GAP + context.measureText(name).width;
-    context.font = RANGE_FONT;
+    drawMark(context, x, y, colors);
+    let at = x + markOf(entry);
+    if (name !== "") {
+      context.fillStyle = "#fff";
+      context.font = NAME_FONT;
+      context.fillText(name, at, y);
+      at += context.measureText(name).width + GAP;
+    }
+    context.font = TEXT_FONT;
     context.fillStyle = "#cfd6e4";
-    context.fillText(range, after, y);
+    context.fillText(text, at, y);
   });
+}
+
+function drawMark(
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  colors: LegendEntry["colors"],
+): void {
+  if (colors.length === 0) return;
+  context.beginPath();
+  if (colors.length === 1) {
+    context.fillStyle = colors[0];
+    context.arc(x + DOT / 2, y, DOT / 2, 0, 2 * Math.PI);
+  } else {
+    const across = context.createLinearGradient(x, y, x + BAR, y);
+    for (const [i, color] of colors.entries()) across.addColorStop(i / (colors.length - 1), color);
+    context.fillStyle = across;
+    context.rect(x, y - DOT / 2, BAR, DOT);
+  }
+  context.fill();
 }
 
 function drawAxes(

@@ -2,15 +2,29 @@
 import { unitOf, valueText } from "../annotations/measure";
 import type { Manifest } from "../bundle/generated/bundle";
 import { toHex } from "../math/color";
+import type { ColorLegend } from "../objects/legend";
 import type { ViewerState } from "../state/viewer_state";
 import type { LegendEntry } from "./caption";
 
-export function legendOf(state: ViewerState, manifest: Manifest): readonly LegendEntry[] {
-  return state.channels.flatMap(({ id, name, shown, color, window }) => {
-    const range = manifest.channels.find((channel) => channel.id === id)?.window;
-    if (!shown || range === undefined) return [];
+/** @param colorsOf what the colours of a label map's objects mean; null: they have the channel's, or the stage's */
+export function legendOf(
+  state: ViewerState,
+  manifest: Manifest,
+  colorsOf: (channel: string) => ColorLegend | null,
+): readonly LegendEntry[] {
+  return state.channels.flatMap(({ id, name, shown, color, window }): LegendEntry[] => {
+    const found = manifest.channels.find((channel) => channel.id === id);
+    if (!shown || found === undefined) return [];
+    const dot = [toHex(color)];
+    if (found.objects !== undefined) {
+      const legend = colorsOf(id);
+      if (legend === null) return [{ name, colors: dot, text: "" }]; // its numbers are names, no values
+      const rows = legend.rows.map((row) => ({ name: "", ...row }));
+      return [{ name, colors: [], text: `by ${legend.column}` }, ...rows];
+    }
+    const range = found.window;
     const at = (share: number) => valueText(range[0] + share * (range[1] - range[0]), range);
     const text = `${at(window[0])} – ${at(window[1])} ${unitOf(manifest)}`.trim();
-    return [{ name, hex: toHex(color), range: text }];
+    return [{ name, colors: dot, text }];
   });
 }

@@ -11,6 +11,7 @@ import type { SurfaceSet } from "../surfaces/surface_set";
 import { objectsCsv } from "./csv";
 import { filtered, flag, GONE } from "./flags";
 import { middleOf } from "./gap";
+import { type ColorLegend, colorLegend } from "./legend";
 import { readLinked, writeLinked } from "./linked";
 import { ObjectMaterial } from "./object_material";
 import { tableOf } from "./palettes";
@@ -238,6 +239,13 @@ export class Objects {
   csv(): string | null {
     const { selected } = this.view;
     return objectsCsv(this.table, selected.length > 0 ? selected : this.shown);
+  }
+
+  /** What the colours mean; null: no column colours, or it has not come. */
+  get legend(): ColorLegend | null {
+    const column = this.table.column(this.colorBy);
+    const bytes = column && this.table.bytes(column.id);
+    return column && bytes && colorLegend(column, bytes, this.flags, this.view);
   }
 
   linked(view: ObjectView): ReturnType<typeof writeLinked> {

@@ -22,7 +22,7 @@ const DEMO_TILES = 10;
  * and the phone viewer, what a notebook asks of the page.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|palettes|card_measure|qr_scanner|notebook_part/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|card_measure|qr_scanner|notebook_part/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {

@@ -1,0 +1,57 @@
+/** What the colours of objects mean, for a picture that has no panel beside it. Pure. */
+import type { ObjectColumn } from "../bundle/generated/objects";
+import { toHex } from "../math/color";
+import type { ObjectView } from "../state/objects";
+import { byteValue, categoryColor, colorAt, isLogarithmic, MISSING } from "./palettes";
+import { countBytes, NO_CATEGORY, numberText, ROWS_OF_LEGEND, unitText } from "./pictures";
+
+/** `column`: the name of the one that colours. Of a row, one colour, or a palette's from end to end; none: words alone. */
+export type ColorLegend = Readonly<{
+  column: string;
+  rows: readonly Readonly<{ colors: readonly string[]; text: string }>[];
+}>;
+
+/** Colours that a palette is drawn by. */
+const PALETTE_COLORS = 17;
+
+/** Of the objects that show: the first categories, and how many more; or the palette, with its ends. */
+export function colorLegend(
+  column: ObjectColumn,
+  bytes: Uint8Array,
+  flags: Uint8Array,
+  view: Pick<ObjectView, "palette" | "span" | "isLog">,
+): ColorLegend {
+  const [, left] = countBytes(bytes, flags);
+  const rows =
+    column.kind === "category" ? categoryRows(column, left) : numberRows(column, left[0], view);
+  return { column: column.name, rows };
+}
+
+function categoryRows(column: ObjectColumn, left: Uint32Array): ColorLegend["rows"] {
+  const { categories = [] } = column;
+  const shown = [...categories.keys(), -1].filter((index) => left[index + 1] > 0);
+  const rows = shown.slice(0, ROWS_OF_LEGEND).map((index) => ({
+    colors: [toHex(index < 0 ? MISSING : categoryColor(column, index))],
+    text: categories[index] ?? NO_CATEGORY,
+  }));
+  const more = shown.length - rows.length;
+  return more === 0 ? rows : [...rows, { colors: [], text: `and ${more} more` }];
+}
+
+/** @param missing how many have no value */
+function numberRows(
+  column: ObjectColumn,
+  missing: number,
+  view: Pick<ObjectView, "palette" | "span" | "isLog">,
+): ColorLegend["rows"] {
+  const { range, unit } = column;
+  const none = missing === 0 ? [] : [{ colors: [toHex(MISSING)], text: NO_CATEGORY }];
+  if (range === undefined) return none;
+  const [low, high] = view.span.map((byte) => numberText(byteValue(range, byte)));
+  const ends = `${low} – ${high} ${unitText(unit)}`.trim();
+  const colors = Array.from({ length: PALETTE_COLORS }, (_, i) =>
+    toHex(colorAt(view.palette, i / (PALETTE_COLORS - 1))),
+  );
+  const text = isLogarithmic(column, view) ? `${ends}, by the logarithm` : ends;
+  return [{ colors, text }, ...none];
+}
