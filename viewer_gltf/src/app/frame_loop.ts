@@ -281,7 +281,8 @@ export class FrameLoop {
 
   private poseMono(dt_s: number): Camera {
     const { navigation, contents, state } = this.options.shown();
-    if (!contents.hasOverview) navigation.surround(contents.occupied(state));
+    const outline = contents.outline(state);
+    if (outline !== null) navigation.surround(outline);
     navigation.update(dt_s);
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     return navigation.camera;

@@ -4,13 +4,14 @@ import { Marks, type MarksView } from "../annotations/annotations";
 import type { Bundle } from "../bundle/load";
 import { ValuesHost } from "../bundle/values_host";
 import { memoryBudget } from "../gpu/memory_budget";
-import type { Box } from "../math/box";
+import { type Box, cornersOf } from "../math/box";
+import { extremePoints } from "../math/extreme_points";
 import type { Vec3 } from "../math/vec3";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
 import type { Action } from "../state/actions";
-import { wantedTiles } from "../state/representation";
+import { wantedTiles, wantsSurface } from "../state/representation";
 import { isTwoD } from "../state/transfer_functions_2d";
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import { SurfaceLoader } from "../surfaces/gltf_loader";
@@ -58,6 +59,9 @@ export class Contents {
   private readonly loader: SurfaceLoader;
   /** Volumes come after the first picture of all tiles. */
   hasOverview = false;
+  /** Whether it is known for good where all lies that shows at the opening. */
+  private isOutlined = false;
+  private readonly bounds: Box;
 
   constructor(options: ContentsOptions) {
     const { bundle, renderer, picture, onChange, onError } = options;
@@ -113,6 +117,7 @@ export class Contents {
       onError,
     };
     const { manifest, base } = bundle;
+    this.bounds = manifest.specimen.bounds_um;
     const { sourceOf } = reading;
     const { view, dispatch } = options;
     this.slices = new SlicesPart({
@@ -171,10 +176,24 @@ export class Contents {
     this.traced.limitEdge(edge);
   }
 
-  /** The box round all that shows, um, as far as it is known: a volume may fill all of its box. */
-  occupied({ channels }: ViewerState): Box | null {
-    const isAllSurface = channels.every(({ shown, hasSurface }) => !shown || hasSurface);
-    return isAllSurface ? this.surfaces.bounds : null;
+  /**
+   * Outermost points of all that shows, um, world, as far as they are known; null: none are, or nothing better than was
+   * told before. A channel without a surface may show in all of the specimen.
+   */
+  outline(state: ViewerState): readonly Vec3[] | null {
+    if (this.isOutlined) return null;
+    const points: Vec3[] = [];
+    for (const channel of state.channels.filter(({ shown }) => shown)) {
+      const outline = !channel.hasSurface
+        ? cornersOf(this.bounds)
+        : wantsSurface(state, channel)
+          ? this.surfaces.outline(channel.id)
+          : this.volumes.outline(channel.id);
+      if (outline === null) return null;
+      points.push(...outline);
+    }
+    this.isOutlined = this.hasOverview;
+    return points.length === 0 ? null : extremePoints(points);
   }
 
   /** True once, when the overview has come: then `follow` again. */

@@ -1,5 +1,6 @@
 import { Spherical, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
+import { cornersOf } from "../math/box";
 import { place } from "../render/placement";
 import { Navigation } from "./orbit_camera";
 
@@ -105,7 +106,7 @@ describe("the opening", () => {
   it("is framed on what there is of the specimen, and follows the window's shape", () => {
     const navigation = start();
     const far = navigation.camera.position.length();
-    navigation.surround({ min: [0, -16, 0], max: [16, 0, 8] }); // a corner, a third as large
+    navigation.surround(cornersOf({ min: [0, -16, 0], max: [16, 0, 8] })); // a corner, a third as large
     const { target } = navigation.controls;
     expect(target.x).toBeLessThan(0);
     expect(target.y).toBeGreaterThan(0);
@@ -113,6 +114,24 @@ describe("the opening", () => {
     expect(near).toBeLessThan(far / 2);
     navigation.fit(0.5);
     expect(navigation.camera.position.distanceTo(target)).toBeGreaterThan(1.2 * near);
+  });
+
+  it("is never cut off by its turn, and stays as large as fits", () => {
+    const navigation = start();
+    const stick = [0, 1].map((i) => [64 * i, -48 * i, 24 * i] as const); // from corner to corner
+    navigation.surround(stick);
+    navigation.turnSlowly();
+    const { center, scale } = place({ min: [0, -48, 0], max: [64, 0, 24] });
+    for (let k = 0; k < 60; k++) {
+      navigation.update(0.5);
+      const seen = stick.map((point) => {
+        const inRoom = point.map((v, i) => (v - center[i]) * scale);
+        return new Vector3(...inRoom).project(navigation.camera);
+      });
+      const most = Math.max(...seen.flatMap(({ x, y }) => [Math.abs(x), Math.abs(y)]));
+      expect(most).toBeLessThan(0.95);
+      expect(most).toBeGreaterThan(0.9);
+    }
   });
 
   it("may be another view, which is then the one to return to", () => {

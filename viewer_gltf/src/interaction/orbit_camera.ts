@@ -6,8 +6,9 @@
  */
 import { PerspectiveCamera, Spherical, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import type { Box } from "../math/box";
-import { frameBox, openingView, towardsEye } from "../render/opening_view";
+import { around, cornersOf } from "../math/box";
+import type { Vec3 } from "../math/vec3";
+import { framePoints, openingView, towardsEye } from "../render/opening_view";
 import { distanceToSee, framingDistance, type Placement } from "../render/placement";
 import type { Command } from "../state/commands";
 
@@ -60,12 +61,10 @@ export class Navigation {
   /** Since the turn of the opening began, s; null: there is none. */
   private swayed_s: number | null = null;
   private readonly reach: Vector3;
-  /** What is there of the specimen, room: the opening is framed on it. */
-  private occupied: Box;
+  /** Outermost points of what is there of the specimen, room: the opening is framed on them. */
+  private occupied: readonly Vec3[];
   /** The opening is framed on what is free of the picture. */
   private covered: Covered = { top: 0, bottom: 0 };
-  /** The same as it was told. */
-  private surrounded = "";
 
   constructor(
     canvas: HTMLElement,
@@ -74,7 +73,7 @@ export class Navigation {
   ) {
     this.reach = new Vector3(...placement.size).multiplyScalar(0.5);
     const { x, y, z } = this.reach;
-    this.occupied = { min: [-x, -y, -z], max: [x, y, z] };
+    this.occupied = cornersOf({ min: [-x, -y, -z], max: [x, y, z] });
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
     this.controls.minDistance = NEAREST_M;
@@ -119,17 +118,15 @@ export class Navigation {
     this.reset();
   }
 
-  /** What is there of the specimen, um: the opening is framed on that. null: not known yet. */
-  surround(box: Box | null): void {
-    if (box === null || this.surrounded === JSON.stringify(box)) return;
-    this.surrounded = JSON.stringify(box);
-    const { min, max } = box;
+  /** Outermost points of what is there of the specimen, um: the opening is framed on them. */
+  surround(points: readonly Vec3[]): void {
     const { center, scale } = this.placement;
-    const inRoom = (at: Box["min"]): Box["min"] => {
-      const [x, y, z] = at.map((v, i) => (v - center[i]) * scale);
-      return [x, y, z];
-    };
-    this.occupied = { min: inRoom(min), max: inRoom(max) };
+    const [cx, cy, cz] = center;
+    this.occupied = points.map(([x, y, z]) => [
+      (x - cx) * scale,
+      (y - cy) * scale,
+      (z - cz) * scale,
+    ]);
     if (this.stand !== null) this.standAt(this.stand);
   }
 
@@ -261,10 +258,10 @@ export class Navigation {
     const free = 1 - top - bottom;
     const half = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360); // of the picture, a metre away
     const lens = { fov_rad: 2 * Math.atan(free * half), aspect: this.camera.aspect / free };
-    const still = openingView(this.occupied, lens);
+    const still = openingView(around(this.occupied), lens);
     const sway_rad = SWAY_RAD * Math.sin((2 * Math.PI * swayed_s) / SWAY_S);
     const direction = { ...still, aside_rad: still.aside_rad + sway_rad };
-    const framed = frameBox(this.occupied, direction, lens, (bottom - top) * half);
+    const framed = framePoints(this.occupied, direction, lens, (bottom - top) * half);
     const target = new Vector3(...framed.target).clamp(this.reach.clone().negate(), this.reach);
     const away_m = Math.min(FARTHEST_M, framed.distance);
     const eye = target.clone().addScaledVector(new Vector3(...towardsEye(direction)), away_m);

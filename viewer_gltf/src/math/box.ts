@@ -1,5 +1,5 @@
 /** Boxes along the axes, and the part of a ray that lies in one. Pure. */
-import type { Ray, Vec3 } from "./vec3";
+import { AXES, type Ray, type Vec3 } from "./vec3";
 
 export type Box = Readonly<{ min: Vec3; max: Vec3 }>;
 /** Part of a ray, in lengths of its direction; entry before exit. */
@@ -11,10 +11,17 @@ export function centerOf({ min, max }: Box): Vec3 {
   return [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
 }
 
-/** The box round two. */
-export function around(a: Box, b: Box): Box {
-  const [x0, y0, z0] = a.min.map((v, i) => Math.min(v, b.min[i]));
-  const [x1, y1, z1] = a.max.map((v, i) => Math.max(v, b.max[i]));
+/** The eight corners. */
+export function cornersOf({ min, max }: Box): readonly Vec3[] {
+  const at = (corner: number, axis: 0 | 1 | 2) => ((corner >> axis) & 1 ? max : min)[axis];
+  return Array.from({ length: 8 }, (_, i) => [at(i, 0), at(i, 1), at(i, 2)]);
+}
+
+/** The box round points. */
+export function around(points: readonly Vec3[]): Box {
+  const all = AXES.map((axis) => points.map((point) => point[axis]));
+  const [x0, y0, z0] = all.map((values) => Math.min(...values));
+  const [x1, y1, z1] = all.map((values) => Math.max(...values));
   return { min: [x0, y0, z0], max: [x1, y1, z1] };
 }
 

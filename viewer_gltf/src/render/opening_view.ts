@@ -3,8 +3,8 @@
  * that it fills the picture. Of such views one is taken in which it covers much: a long specimen lies
  * across a wide picture, and goes into the depth of a narrow one. Pure.
  */
-import { type Box, centerOf } from "../math/box";
-import type { Vec3 } from "../math/vec3";
+import { around, type Box, centerOf, cornersOf } from "../math/box";
+import { along, dot, type Vec3 } from "../math/vec3";
 
 /** Share of the picture that the specimen may fill. */
 const FILL = 0.94;
@@ -41,64 +41,57 @@ export function towardsEye(direction: Direction): Vec3 {
   return axesOf(direction)[2];
 }
 
-/** A box's corners about its middle, along the eye's axes. */
-function cornersOf({ min, max }: Box, direction: Direction): readonly (readonly number[])[] {
-  const axes = axesOf(direction);
-  const edges = max.map((v, i) => (v - min[i]) / 2);
-  return Array.from({ length: 8 }, (_, corner) => {
-    const at = edges.map((edge, i) => ((corner >> i) & 1 ? edge : -edge));
-    return axes.map((axis) => axis.reduce((sum, v, i) => sum + v * at[i], 0));
+/** Points about another, along the eye's axes. */
+function seenFrom(points: readonly Vec3[], middle: Vec3, direction: Direction): readonly Vec3[] {
+  const [right, up, back] = axesOf(direction);
+  return points.map((point) => {
+    const at = along(point, middle, -1);
+    return [dot(right, at), dot(up, at), dot(back, at)];
   });
 }
 
-/** Distance of the eye from a box's middle at which the whole box is in the picture. */
-export function distanceToFrame(box: Box, direction: Direction, lens: Lens): number {
-  return distanceTo(cornersOf(box, direction), lens);
-}
-
-/** The same of corners, for an eye that looks so far right of their middle, and above it. */
-function distanceTo(
-  corners: ReturnType<typeof cornersOf>,
-  { fov_rad, aspect }: Lens,
-  right = 0,
-  up = 0,
-): number {
+/** Distance of an eye at which all is in the picture; it looks so far right of the middle, and above it. */
+function distanceTo(seen: readonly Vec3[], { fov_rad, aspect }: Lens, right = 0, up = 0): number {
   const half = FILL * Math.tan(fov_rad / 2);
-  const needed = corners.map(
+  const needed = seen.map(
     ([x, y, z]) => z + Math.max(Math.abs(y - up), Math.abs(x - right) / aspect) / half,
   );
   return Math.max(...needed);
+}
+
+/** Distance of the eye from the middle of points at which all of them are in the picture. */
+export function distanceToFrame(points: readonly Vec3[], direction: Direction, lens: Lens): number {
+  return distanceTo(seenFrom(points, centerOf(around(points)), direction), lens);
 }
 
 /** Rounds in which middle and distance find each other. */
 const ROUNDS = 5;
 
 /**
- * Where the eye looks, and from how far, so that a box is seen as large as fits and in the middle: its own
+ * Where the eye looks, and from how far, so that points are seen as large as fits and in the middle: their own
  * middle is not there, since what is nearer is larger.
  *
- * @param up_tan how far above the picture's middle the box's is to be, a metre away
+ * @param up_tan how far above the picture's middle theirs is to be, a metre away
  */
-export function frameBox(
-  box: Box,
+export function framePoints(
+  points: readonly Vec3[],
   direction: Direction,
   lens: Lens,
   up_tan = 0,
 ): Readonly<{ target: Vec3; distance: number }> {
   const axes = axesOf(direction);
-  const middle = centerOf(box);
-  const corners = cornersOf(box, direction);
+  const middle = centerOf(around(points));
+  const seen = seenFrom(points, middle, direction);
   let [right, up, distance] = [0, 0, 0];
   for (let round = 0; round < ROUNDS; round++) {
-    distance = distanceTo(corners, lens, right, up);
-    const across = corners.map(([x, , z]) => (x - right) / (distance - z));
-    const along = corners.map(([, y, z]) => (y - up) / (distance - z));
+    distance = distanceTo(seen, lens, right, up);
+    const across = seen.map(([x, , z]) => (x - right) / (distance - z));
+    const upwards = seen.map(([, y, z]) => (y - up) / (distance - z));
     right += ((Math.max(...across) + Math.min(...across)) / 2) * distance;
-    up += ((Math.max(...along) + Math.min(...along)) / 2) * distance;
+    up += ((Math.max(...upwards) + Math.min(...upwards)) / 2) * distance;
   }
-  const lift = up - up_tan * distance;
-  const at = (i: 0 | 1 | 2) => middle[i] + axes[0][i] * right + axes[1][i] * lift;
-  return { target: [at(0), at(1), at(2)], distance };
+  const target = along(along(middle, axes[0], right), axes[1], up - up_tan * distance);
+  return { target, distance };
 }
 
 /** About the share of the picture that the box covers. */
@@ -106,7 +99,7 @@ function coverage(box: Box, direction: Direction, lens: Lens): number {
   const [x, y, z] = box.max.map((v, i) => v - box.min[i]);
   const [dx, dy, dz] = towardsEye(direction).map(Math.abs);
   const silhouette = dx * y * z + dy * x * z + dz * x * y;
-  return silhouette / distanceToFrame(box, direction, lens) ** 2;
+  return silhouette / distanceToFrame(cornersOf(box), direction, lens) ** 2;
 }
 
 export function openingView(box: Box, lens: Lens): Direction {

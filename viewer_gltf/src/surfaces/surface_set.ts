@@ -1,8 +1,8 @@
 /** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
 import { type Camera, Group, Mesh, ShaderMaterial } from "three";
 import type { Bundle } from "../bundle/load";
-import { around, type Box } from "../math/box";
 import { surfaceColor } from "../math/color";
+import type { Vec3 } from "../math/vec3";
 import type { ShownSurface } from "../state/on_screen";
 import {
   type FocusTiles,
@@ -56,10 +56,12 @@ export class SurfaceSet {
     return first === undefined || overview([first[1].progress]).isComplete;
   }
 
-  /** The box round the shown surfaces, um, world; null: one of them is not known yet, or there is none. */
-  get bounds(): Box | null {
-    const boxes = this.shown().map(([, tileset]) => tileset.bounds);
-    return boxes.reduce((all, box) => all && box && around(all, box), boxes[0] ?? null);
+  /**
+   * Outermost points of a channel's surfaces, um, world: those of the box round them, until all of the coarsest have
+   * come; null: not known yet.
+   */
+  outline(channel: string): readonly Vec3[] | null {
+    return this.tilesets.get(channel)?.outline ?? null;
   }
 
   get isLoading(): boolean {

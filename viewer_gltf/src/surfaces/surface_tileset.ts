@@ -14,14 +14,18 @@ import {
   DoubleSide,
   Group,
   type Material,
+  type Matrix4,
   Mesh,
   MeshStandardMaterial,
   type Object3D,
+  Vector3,
 } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Channel } from "../bundle/generated/bundle";
-import type { Box } from "../math/box";
+import { cornersOf } from "../math/box";
 import type { Rgb } from "../math/color";
+import { extremePoints } from "../math/extreme_points";
+import type { Vec3 } from "../math/vec3";
 import { BlendedSurface, type SurfaceFrame } from "./blend_material";
 import { branchOf, leaveOut, putBack } from "./failed_branch";
 import { TilesetFiles } from "./fetch_content";
@@ -31,6 +35,8 @@ import type { TileProgress } from "./overview_progress";
 const UM_PER_METRE = 1e6;
 /** The root holds no content; below it lie the tiles' coarsest LODs. */
 const DEPTH_OF_COARSEST = 1;
+/** Most vertices of a mesh that are looked at for where it ends. */
+const MOST_POINTS = 2000;
 /** Share of a full cache that stays after hidden surfaces were dropped. */
 const KEPT_SHARE = 0.75;
 
@@ -52,6 +58,8 @@ export class SurfaceTileset {
   /** Coarsest tiles that have been loaded or given up. */
   private readonly done = new Set<Tile>();
   private readonly failed = new Set<Tile>();
+  /** Outermost points of the coarsest that have come, um, world. */
+  private readonly outermost: Vec3[] = [];
 
   constructor(
     base: string,
@@ -107,13 +115,19 @@ export class SurfaceTileset {
     this.group.add(this.tiles.group);
   }
 
-  /** The box round all of it, um, world; null: it is not known yet. */
-  get bounds(): Box | null {
+  /** Outermost points, um, world: of the box round all until the coarsest have come; null: not known yet. */
+  get outline(): readonly Vec3[] | null {
+    if (this.done.size === this.total) return this.outermost;
     const box = new Box3();
     if (!this.tiles.getBoundingBox(box)) return null;
+    const { min, max } = box.applyMatrix4(this.matrix);
+    return cornersOf({ min: min.toArray(), max: max.toArray() });
+  }
+
+  /** To um, world. */
+  private get matrix(): Matrix4 {
     this.tiles.group.updateMatrix();
-    const { min, max } = box.applyMatrix4(this.tiles.group.matrix);
-    return { min: min.toArray(), max: max.toArray() };
+    return this.tiles.group.matrix;
   }
 
   get isShown(): boolean {
@@ -228,6 +242,9 @@ export class SurfaceTileset {
       blend: new BlendedSurface(scene, list, this.frame),
     };
     this.surfaces.set(scene, surface);
+    if (tile.internal.depth === DEPTH_OF_COARSEST && !this.done.has(tile)) {
+      this.outermost.push(...extremePoints(somePoints(scene, this.matrix)));
+    }
     this.onSurface(surface);
   }
 
@@ -236,6 +253,22 @@ export class SurfaceTileset {
     this.group.removeFromParent();
     this.surfaces.clear();
   }
+}
+
+/** Some of the vertices of what has no parent yet, moved by a matrix. */
+function somePoints(scene: Object3D, matrix: Matrix4): readonly Vec3[] {
+  const found: Vec3[] = [];
+  scene.updateMatrixWorld(true);
+  scene.traverse((object) => {
+    if (!(object instanceof Mesh)) return;
+    const { position } = object.geometry.attributes;
+    const step = Math.ceil(position.count / MOST_POINTS);
+    for (let i = 0; i < position.count; i += step) {
+      const at = new Vector3().fromBufferAttribute(position, i);
+      found.push(at.applyMatrix4(object.matrixWorld).applyMatrix4(matrix).toArray());
+    }
+  });
+  return found;
 }
 
 /** Paint a surface; the colour is linear. */

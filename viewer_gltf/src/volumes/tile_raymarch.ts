@@ -39,9 +39,11 @@ import {
 } from "../gpu/clip_uniforms";
 import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
+import { extremePoints } from "../math/extreme_points";
 import type { Vec3 } from "../math/vec3";
 import type { Compositing } from "../state/parameters/volumes";
 import { distanceInGrid } from "./blend_order";
+import { occupiedCorners } from "./occupied_bricks";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 import { brickCounts } from "./skip_bricks";
 import { textureCorners } from "./texture_space";
@@ -302,6 +304,24 @@ export class TileMarch {
       min.min(at);
       max.max(at);
     }
+  }
+
+  /** Outermost points, um, world, of what a channel shows; `ranges`: of its bricks. */
+  outline(ranges: Uint8Array, channel: number): readonly Vec3[] {
+    const { uSize, uTexLow, uTexHigh, uTexels } = this.mesh.material.uniforms;
+    const size: Vector3 = uSize.value;
+    const corners = occupiedCorners(
+      ranges,
+      this.opacitiesOf(channel),
+      brickCounts(this.volume.size),
+    );
+    const across = uTexHigh.value.clone().sub(uTexLow.value);
+    const points = corners.map((corner) => {
+      const at = new Vector3(...corner).multiplyScalar(SKIP_BRICK).divide(uTexels.value);
+      at.sub(uTexLow.value).divide(across).clampScalar(0, 1).multiply(size);
+      return at.applyMatrix4(this.fromBox).toArray();
+    });
+    return extremePoints(points);
   }
 
   /** Where the grid of the shading lies: its low corner, um, world, cells, and a cell's edge, um. */

@@ -4,6 +4,7 @@ import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { MarchClip } from "../gpu/clip_uniforms";
+import type { Vec3 } from "../math/vec3";
 import type { ShownVolume } from "../state/on_screen";
 import { canBeShaded, isTraced } from "../state/parameters/volumes";
 import { isInDisc, type WantedTile } from "../state/representation";
@@ -162,6 +163,19 @@ export class VolumeSet {
         return [{ tile, channel, source, table, isInDisc }];
       });
     });
+  }
+
+  /** Outermost points, um, world, of what a channel shows as volumes; null: not all has come. */
+  outline(channel: string): readonly Vec3[] | null {
+    const tiles = this.wanted.filter(({ channels }) => channels.includes(channel));
+    const points: Vec3[] = [];
+    for (const { tile } of tiles) {
+      const { march, packed } = this.residents.get(tile) ?? {};
+      const at = packed?.channels.indexOf(channel) ?? -1;
+      if (march == null || packed == null || at < 0) return null;
+      points.push(...march.outline(packed.bricks[at], at));
+    }
+    return points.length === 0 ? null : points;
   }
 
   /** Whether all that is wanted of a tile is there, at some level. */
