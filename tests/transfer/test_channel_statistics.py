@@ -12,7 +12,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.channel import OpacityPoints, SurfaceLevel
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
-from stereocell.transfer.opacity import NAMES, evaluate, make_transfer_functions
+from stereocell.transfer.opacity import FARTHEST, NAMES, evaluate, make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from support import phantoms
 
@@ -180,6 +180,32 @@ def test_noise_of_the_air_does_not_veil_a_surface_just_above_it() -> None:
     assert _veil(functions, air, 100) < 0.02
     assert _veil(make_transfer_functions(histogram, iso), air, 100) > 0.06  # of light: as it is
     assert evaluate(functions["default"])[int(iso * 255) + 1] > 0.1  # the surface itself shows
+
+
+def test_noise_that_goes_on_above_the_surface_is_no_dust_before_it() -> None:
+    x = np.arange(256.0)
+    # magnitudes of a coil that hears some places better: a longer tail than any one of them has
+    air = sum((x / s**2 * np.exp(-(x**2) / (2 * s**2)) for s in (5.0, 7.0, 9.0, 12.0)), 0 * x)
+    air /= air.sum()
+    tissue = 0.4 * np.exp(-0.5 * ((x - 110) / 20) ** 2) / 50
+    level = 34
+    assert air[level + 1 :].sum() > 0.004
+    functions = make_transfer_functions(
+        (1e7 * (air + tissue)).astype(np.int64), level / 255, has_magnitudes=True
+    )
+    opacity = evaluate(functions["default"])
+    assert air[opacity > 0].sum() < 0.3 * air[level + 1 :].sum()
+    assert (opacity[int(FARTHEST * level) + 4 :] > 0.12).all()  # what is brighter shows as before
+
+
+def test_the_even_counts_of_an_edge_are_no_noise_above_the_surface() -> None:
+    x = np.arange(256.0)
+    air = np.exp(-0.5 * ((x - 10) / 4) ** 2)
+    edge = np.full(256, 0.02)  # voxels that lie partly in the body
+    functions = make_transfer_functions(
+        (1e6 * (air + edge)).astype(np.int64), 34 / 255, has_magnitudes=True
+    )
+    assert functions["default"][2] == (round(34 / 255, 4), 0.12)
 
 
 def test_where_noise_ends_far_below_the_surface_what_is_between_shows() -> None:

@@ -16,6 +16,8 @@ THRESHOLD = "threshold"  # name of the function of channels that have a threshol
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
 NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them
+FAINT = 1e-2  # of the peak's count: noise that is rarer is left, dim materials are there, too
+FARTHEST = 1.5  # x the level, to which noise may push the start of the opacity
 
 
 def make_transfer_functions(
@@ -34,9 +36,11 @@ def make_transfer_functions(
 
     Opacity starts half-way between the median, since most voxels are background, and the level. The
     level is the iso-value, or the 99th percentile in a channel without a clear surface. Noise of
-    magnitudes would be dust in front of a surface: opacity starts where it ends, but below the
-    level. (Of light the background has structure, and a foot so steep would show the steps of
-    rays: of the brain-cells stack 35 instead of over 40 dB.)
+    magnitudes would be dust in front of a surface: opacity starts where it ends. That is below the
+    level, unless the counts still fall steeply there: then a part of the air lies above the level,
+    which the surface leaves out as specks, and the volume has to, too. (Of light the background has
+    structure, and a foot so steep would show the steps of rays: of the brain-cells stack 35 instead
+    of over 40 dB.)
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)
@@ -45,11 +49,17 @@ def make_transfer_functions(
     level = float(np.clip(level, 0.02, 0.96))
     halfway = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
     floor = halfway
-    if has_magnitudes and iso_normalized is not None:
-        floor = max(floor, min(_end_of_noise(histogram[: int(level * bins)]) / bins, FOOT * level))
     bright = max(level + 0.5 * (1 - level), level + 0.02)
+    if has_magnitudes and iso_normalized is not None:
+        below = histogram[: int(level * bins)]
+        floor = max(floor, min(_end_of_noise(below) / bins, FOOT * level))
+        beyond = level + _noise_beyond(below) / bins
+        if beyond > level:
+            floor = min(beyond, FARTHEST * level, FOOT * (level + bright) / 2)
+    top = max(level, floor / FOOT)
+    at_top = 0.12 + (0.45 - 0.12) * (top - level) / (bright - level)
     functions = {
-        "default": _points((floor, 0.0), (level, 0.12), (bright, 0.45), (1.0, 0.6)),
+        "default": _points((floor, 0.0), (top, at_top), (bright, 0.45), (1.0, 0.6)),
         "soft": _points((0.6 * floor, 0.0), (level, 0.04), (1.0, 0.2)),
         "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
         "surface": _points(
@@ -77,6 +87,24 @@ def _end_of_noise(below: NDArray[np.int64]) -> float:
     mode = int(smooth.argmax())
     beyond_half = np.flatnonzero(smooth[mode:] <= smooth[mode] / 2)
     return mode + NOISE_REACH * float(beyond_half[0]) if beyond_half.size else 0.0
+
+
+def _noise_beyond(below: NDArray[np.int64]) -> float:
+    """Return by how many bins noise goes on beyond the surface's level; 0: the counts that are left
+    there are few, or even, as those of the surface's own edge.
+
+    below  int64 (bins,), voxel counts below the surface
+    """
+    smooth = ndimage.gaussian_filter1d(below.astype(np.float64), 2.0, mode="nearest")
+    last = len(below) - 1
+    before = int(0.75 * last)
+    peak = float(smooth.max(initial=0.0))
+    if last < 4 or peak == 0 or smooth[last] <= FAINT * peak or smooth.argmax() >= before:
+        return 0.0
+    fall = float(np.log(smooth[before] / smooth[last]))
+    if fall < 1:
+        return 0.0
+    return float(np.log(smooth[last] / (FAINT * peak))) * (last - before) / fall
 
 
 def evaluate(points: OpacityPoints, size: int = 256) -> NDArray[np.float32]:
