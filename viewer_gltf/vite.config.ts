@@ -38,6 +38,16 @@ const UNUSED = new Set([
   ],
   ...["meshlambert", "meshmatcap", "meshnormal", "meshphong", "meshtoon"],
 ]);
+/** Features of three that none of the page's materials, lights and surfaces has: parts for one alone don't travel. */
+const NEVER =
+  /^"#if(def)? (USE_(IRIDESCENCE|ALPHAHASH|BATCHING|BUMPMAP|ENVMAP|FOG|SKINNING|(INSTANCING_)?MORPH\w*)|NUM_(CLIPPING_PLANES|LIGHT_PROBE_GRIDS) > 0)\\n/;
+
+/** Whether a part, as a string's source, is for such a feature alone: what begins first ends last. */
+function isNeverUsed(source: string): boolean {
+  const end = '\\n#endif"';
+  return NEVER.test(source) && source.indexOf(end.slice(0, -1)) === source.length - end.length;
+}
+
 /** Parts of the others for what none of the page's materials does, and parts of the unused ones alone. */
 const UNUSED_PARTS = [
   "lights_lambert_fragment",
@@ -53,6 +63,9 @@ const UNUSED_PARTS = [
   "transmission_fragment",
   "transmission_pars_fragment",
   "cube_uv_reflection_fragment",
+  "shadowmask_pars_fragment",
+  "map_particle_fragment",
+  "map_particle_pars_fragment",
 ];
 
 /** Spaces within round brackets, too; tabs within a line part words. */
@@ -73,9 +86,9 @@ function stripMaterials(): Plugin {
       const left = new Set([...listed].flatMap(([, of, name]) => (UNUSED.has(of) ? [name] : [])));
       if (left.size !== 2 * UNUSED.size) this.error(`found ${left.size} of three's shaders`);
       for (const part of UNUSED_PARTS) left.add(part);
-      const text = /^(const|var) ([\w$]+) = ".*";$/gm;
-      return code.replace(text, (line, kind, name) =>
-        left.has(name) ? `${kind} ${name} = "";` : line.replace(INDENTS, ""),
+      const text = /^(const|var) ([\w$]+) = (".*");$/gm;
+      return code.replace(text, (line, kind, name, source) =>
+        left.has(name) || isNeverUsed(source) ? `${kind} ${name} = "";` : line.replace(INDENTS, ""),
       );
     },
   };
