@@ -82,7 +82,6 @@ def grid(
 ORIENTATIONS = [  # of stored axes among those of LPS: the axis of each, and its sign
     (order, signs) for order in permutations(range(3)) for signs in product((1, -1), repeat=3)
 ]
-FEW_ORIENTATIONS = ORIENTATIONS[::5]  # among these are all orders, and all signs
 
 
 def oriented(order: Sequence[int], signs: Sequence[int], shape: Sequence[int]) -> Affine:

@@ -8,14 +8,18 @@ import numpy as np
 import pydicom
 import pytest
 from numpy.typing import NDArray
+from pxr import Gf, UsdGeom
 
 from stereocell import read
 from stereocell.cli.__main__ import main
+from stereocell.model.volume import zyx_to_xyz
+from stereocell.usd.layer import TILES
+from stereocell.usd.read_stage import open_stage, sides_of
+from stereocell.usd.write_stage import TileExtent, write_stage
 from support.bundles import load
 from support.dicom_reading import whole
 from support.dicom_series import (
     BRIGHTEST,
-    FEW_ORIENTATIONS,
     ORIENTATIONS,
     grid,
     oriented,
@@ -77,7 +81,7 @@ TRUTH = {"left": LEFT_MM, "posterior": POSTERIOR_MM, "superior": SUPERIOR_MM}
 
 
 @pytest.mark.parametrize("write", [nifti, dicom])
-@pytest.mark.parametrize(("order", "signs"), sweep(ORIENTATIONS, kept=FEW_ORIENTATIONS))
+@pytest.mark.parametrize(("order", "signs"), ORIENTATIONS)
 def test_the_reader_lays_voxels_to_the_sides_that_it_states(
     write: Source, order: Sequence[int], signs: Sequence[int], tmp_path: Path
 ) -> None:
@@ -88,6 +92,27 @@ def test_the_reader_lays_voxels_to_the_sides_that_it_states(
     z, y, x = (brightest - (np.array(voxels.shape) - 1) / 2) * dataset.levels[0].spacing_um / 1e3
     # canonical voxels run to anterior, inferior, left: the body lies in front, above, on the left
     assert (z, y, x) == pytest.approx((-POSTERIOR_MM, -SUPERIOR_MM, LEFT_MM), abs=1.3)
+
+    # and where the stage puts it, along the sides that the stage states
+    spacing_um = dataset.levels[0].spacing_um
+    last_um = tuple((np.array(voxels.shape) - 1) * spacing_um)
+    tile = TileExtent("r0_c0", (0.0, 0.0, 0.0), last_um, tuple(spacing_um))
+    write_stage(
+        tmp_path,
+        "patient",
+        appearances=[],
+        tiles=[tile],
+        provenance={},
+        placement=dataset.placement,
+        has_sides=True,
+    )
+    stage = open_stage(tmp_path / "stage.usda")
+    moved = UsdGeom.Xformable(stage.GetPrimAtPath(TILES)).ComputeLocalToWorldTransform(0)
+    at_um = moved.Transform(Gf.Vec3d(*zyx_to_xyz(brightest * spacing_um).tolist()))
+    sides = sides_of(stage)
+    assert sides is not None
+    found = {side: float(np.dot(at_um, along)) / 1e3 for side, along in sides.items()}
+    assert found == pytest.approx(TRUTH, abs=1.3)
 
 
 @pytest.mark.parametrize(("write", "order", "signs"), orientations())
