@@ -120,6 +120,7 @@ function rememberLens(lens: Pick<PanelView, "lenses" | "code">): void {
 
 export type ControllerOptions = Readonly<{
   subtitle: string;
+  isPhone: boolean;
   /** Enter stereo; called from within a click or a key, as is the other. */
   onStereo: () => void;
   /** Enter the user's own room. */
@@ -153,6 +154,10 @@ export class Controller {
   ) {
     const { manifest } = viewer.bundle;
     const unit = unitOf(manifest);
+    if (options.isPhone) {
+      // it comes first there, where it would hide the channels
+      this.view = { ...this.view, open: this.view.open.filter((id) => id !== "stereo") };
+    }
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
@@ -507,6 +512,7 @@ export class Controller {
     return {
       title: specimen.name,
       subtitle: this.options.subtitle,
+      isPhone: this.options.isPhone,
       shown: this.shown,
       ranges: this.ranges,
       histogram: hasHistogram ? viewer.histogram(picked) : null,

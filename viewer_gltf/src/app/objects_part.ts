@@ -9,7 +9,7 @@ import type { MetObject } from "../objects/pick";
 import type { ObjectsFacts } from "../panel/layout";
 import type { Action } from "../state/actions";
 import type { ObjectView } from "../state/objects";
-import type { ViewerState } from "../state/viewer_state";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
 import type { SurfaceSet } from "../surfaces/surface_set";
 
 const NOT_LOADED =
@@ -90,10 +90,10 @@ export class ObjectsPart {
     return this.coming.size > 0 || [...this.objects.values()].some(({ isLoading }) => isLoading);
   }
 
-  private get shown(): readonly Readonly<{ id: string; name: string; objects: Objects }>[] {
-    return (this.state?.channels ?? []).flatMap(({ id, name, shown }) => {
-      const objects = shown ? this.objects.get(id) : undefined;
-      return objects === undefined ? [] : [{ id, name, objects }];
+  private get shown(): readonly Readonly<{ channel: ChannelState; objects: Objects }>[] {
+    return (this.state?.channels ?? []).flatMap((channel) => {
+      const objects = channel.shown ? this.objects.get(channel.id) : undefined;
+      return objects === undefined ? [] : [{ channel, objects }];
     });
   }
 
@@ -101,9 +101,11 @@ export class ObjectsPart {
   get facts(): readonly ObjectsFacts[] {
     const { state, shown } = this;
     if (state === null) return [];
-    return shown.map(({ id, name, objects }, i) => ({
-      ...{ id, name },
-      items: this.layOut(objects, state, id, i === shown.length - 1),
+    return shown.map(({ channel, objects }, i) => ({
+      id: channel.id,
+      name: channel.name,
+      colors: objects.colorsBeside(channel),
+      items: this.layOut(objects, state, channel.id, i === shown.length - 1),
     }));
   }
 
@@ -133,7 +135,7 @@ export class ObjectsPart {
 
   /** The objects that are meant, as a table for each label map that is shown; null: it is on its way. */
   csv(): readonly Readonly<{ id: string; text: string | null }>[] {
-    return this.shown.map(({ id, objects }) => ({ id, text: objects.csv() }));
+    return this.shown.map(({ channel: { id }, objects }) => ({ id, text: objects.csv() }));
   }
 
   /** What the colours of a channel's objects mean; null: they have the stage's, or have not come. */

@@ -16,6 +16,7 @@ import { readLinked, writeLinked } from "./linked";
 import { ObjectMaterial } from "./object_material";
 import { tableOf } from "./palettes";
 import { type MetObject, pickObject } from "./pick";
+import { stageColors } from "./stage_colors";
 import { loadObjects, type ObjectTable } from "./table";
 
 /** By which each object is always drawn in, as a share of the specimen's longest edge. */
@@ -53,6 +54,7 @@ export class Objects {
     colors: "",
     flags: "",
   };
+  private stageColors: readonly string[] = [];
   private readonly adopted = new WeakSet<Object3D>();
   private isWaiting = false;
 
@@ -162,6 +164,7 @@ export class Objects {
     scene.traverse((object) => {
       if (!(object instanceof Mesh) || done.has(object.geometry)) return;
       done.add(object.geometry); // what writes depth alone shares it
+      if (this.stageColors.length === 0) this.stageColors = stageColors(object.geometry);
       hasObjects = this.material.adopt(object, rowOf) || hasObjects;
     });
     if (hasObjects) blend.wear(this.material.part);
@@ -246,6 +249,12 @@ export class Objects {
     const column = this.table.column(this.colorBy);
     const bytes = column && this.table.bytes(column.id);
     return column && bytes && colorLegend(column, bytes, this.flags, this.view);
+  }
+
+  /** Some of the objects' colours, in the legend's order; none: all have the channel's. */
+  colorsBeside({ color, original }: Pick<ChannelState, "color" | "original">): readonly string[] {
+    if (this.colorBy !== "") return this.legend?.rows.flatMap(({ colors }) => colors) ?? [];
+    return color.every((v, i) => v === original[i]) ? this.stageColors : [];
   }
 
   linked(view: ObjectView): ReturnType<typeof writeLinked> {

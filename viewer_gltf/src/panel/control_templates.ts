@@ -82,14 +82,22 @@ export function controlOf<On>(row: Parameter<On>, on: On, channel?: string): Con
       };
     }
     case "colour":
-      return { ...colourOf(row, on, channel), label: "Any colour" };
+      return colourOf(row, on, channel);
   }
 }
 
-function colourOf<On>(row: ColourParameter<On>, on: On, channel?: string): Colour {
+/** A field for any colour. @param shows what it shows instead of its own; none: nothing else */
+export function colourOf<On>(
+  row: ColourParameter<On>,
+  on: On,
+  channel?: string,
+  shows: readonly string[] = [],
+): Colour {
   return {
     ...baseOf(row, on, channel),
+    label: "Any colour",
     kind: "colour",
+    shows,
     value: toHex(row.get(on)),
     palettes: [],
     to: (hex) => setTo(row, fromHex(hex), channel),
@@ -103,7 +111,7 @@ export function paletteOf<On>(
   id: string,
   channel?: string,
 ): Control {
-  return { ...colourOf(row, on, channel), id, palettes: PALETTES };
+  return { ...colourOf(row, on, channel), label: row.label, id, palettes: PALETTES };
 }
 
 export function controlsOf<On>(rows: readonly Parameter<On>[], on: On): readonly Control[] {

@@ -135,6 +135,8 @@ export type Colour = Base &
     kind: "colour";
     value: string;
     palettes: readonly Palette[];
+    /** Colours that it shows instead of its own; none or absent: nothing else. */
+    shows?: readonly string[];
     to: (hex: string) => Wish;
   }>;
 export type Button = Base &

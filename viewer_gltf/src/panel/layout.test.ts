@@ -82,6 +82,18 @@ describe("the panel's layout", () => {
     expect(names(mixed)).toEqual(all);
   });
 
+  it("begins with stereo on a phone, whatever a bundle has, and keeps it where it is elsewhere", () => {
+    const objects = [{ id: "c0", name: "Cells", colors: [], items: [] }];
+    const names = (facts: Partial<typeof FACTS>) =>
+      laid(start(), START_VIEW, { ...FACTS, objects, ...facts }).sections.map(({ id }) => id);
+    const [onScreen, onPhone] = [names({}), names({ isPhone: true })];
+    expect(onPhone[0]).toBe("stereo");
+    expect(onScreen.indexOf("stereo")).toBeGreaterThan(onScreen.indexOf("view"));
+    expect(onPhone.slice(1)).toEqual(onScreen.filter((id) => id !== "stereo"));
+    const inStereo = names({ isPhone: true, isStereo: true });
+    expect(inStereo[0]).toBe("channels");
+  });
+
   it("gives every control an id of its own, and a name", () => {
     const controls = controlsOf(laid(start(70)));
     const ids = controls.map(({ id }) => id);
@@ -219,7 +231,7 @@ describe("the panel's layout", () => {
   });
 
   it("gives each of several label maps a section of its own", () => {
-    const map = (id: string) => ({ id, name: id.toUpperCase(), items: [] });
+    const map = (id: string) => ({ id, name: id.toUpperCase(), colors: [], items: [] });
     const named = (ids: readonly string[]) =>
       laid(start(), START_VIEW, { ...FACTS, objects: ids.map(map) })
         .sections.filter(({ id }) => id.startsWith("objects"))
@@ -230,6 +242,17 @@ describe("the panel's layout", () => {
       ["objects/cells", "Objects: CELLS"],
       ["objects/nuclei", "Objects: NUCLEI"],
     ]);
+  });
+
+  it("shows the objects' own colours beside a label map's name, and one colour where they have that", () => {
+    const state = ofObjects(start());
+    const shows = (colors: readonly string[]) => {
+      const objects = [{ id: "c0", name: "Cells", colors, items: [] }];
+      const layout = laid(state, START_VIEW, { ...FACTS, objects });
+      return ["c0/color", "c1/color"].map((id) => find(layout, "colour", id).shows);
+    };
+    expect(shows(["#112233", "#445566"])).toEqual([["#112233", "#445566"], []]);
+    expect(shows([])).toEqual([[], []]);
   });
 
   it("offers another try in stereo while a notice shows a fault that it may mend", () => {

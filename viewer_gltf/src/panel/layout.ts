@@ -38,6 +38,8 @@ export type Facts = StereoSupport &
     /** Where the limit of tiles in the disc ends it; null or absent: it covers no more. */
     discLimit_deg?: number | null;
     isStereo: boolean;
+    /** Whether this is a screen that is touched, as a phone's, which a viewer of lenses holds. */
+    isPhone?: boolean;
     /** null: not known yet. */
     frame_ms: number | null;
     settings: QualitySettings | null;
@@ -61,7 +63,13 @@ export type Facts = StereoSupport &
   }>;
 
 /** What the panel has of one label map: its channel, and the controls that its table asks for. */
-export type ObjectsFacts = Readonly<{ id: string; name: string; items: Section["items"] }>;
+export type ObjectsFacts = Readonly<{
+  id: string;
+  name: string;
+  /** Some of its objects' colours; none: all have the channel's. */
+  colors: readonly string[];
+  items: Section["items"];
+}>;
 
 /** Most notices on the panel: the newest few are enough. */
 const MOST_NOTICES = 3;
@@ -88,6 +96,9 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
     opener: { panel: "unfold", section: id },
     items,
   });
+  const stereo = section("stereo", "Stereo", stereoItems(state, facts, view));
+  // on a phone, whose panel shows little at once, before all that a bundle has much of
+  const isFirst = facts.isPhone === true && !facts.isStereo;
   const ofVolumes = (...sections: readonly Section[]) => (hasVolumes(state) ? sections : []);
   return {
     title: facts.title,
@@ -97,7 +108,8 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
       ...(facts.isStereo && state.notices.length > 0
         ? [section("notices", "Notices", noticeItems(state))]
         : []),
-      section("channels", "Channels", channelItems(state, facts.ranges, view, facts.histogram)),
+      ...(isFirst ? [stereo] : []),
+      section("channels", "Channels", channelItems(state, facts, view)),
       ...(facts.objects ?? []).map(({ id, name, items }, _, { length }) =>
         length === 1
           ? section("objects", "Objects", items)
@@ -117,7 +129,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
       ]),
       // a screen has fingers, wheel and arrow keys for it
       ...(facts.isStereo ? [section("move", "Move", MOVES)] : []),
-      section("stereo", "Stereo", stereoItems(state, facts, view)),
+      ...(isFirst ? [] : [stereo]),
       section("measure", "Measure", measureItems(state, facts.values)),
       section("cut", "Cut open", cutItems(state, facts.shown)),
       ...ofVolumes(section("slices", "Slices", sliceItems(state, facts.sliceValues))),

@@ -53,13 +53,38 @@ export const MEDIUM_NUMBERS = {
     about: "More shows darker material, too; less leaves the brightest alone.",
   },
   /** Factor to the extinction. */
-  density: { label: "Density", start: 1, limits: [0.05, 20], isLogarithmic: true, text: factor },
+  density: {
+    label: "Density",
+    start: 1,
+    limits: [0.05, 20],
+    isLogarithmic: true,
+    text: factor,
+    about: "How much light it stops: less is mist, more is solid.",
+  },
   /** How readily a gradient makes a surface. */
-  surface: { label: "Surfaces", start: 0.6, limits: [0, 1], text: percent },
+  surface: {
+    label: "Surfaces",
+    start: 0.6,
+    limits: [0, 1],
+    text: percent,
+    about: "How readily an edge in it is lit as a surface; at 0 % all is mist.",
+  },
   /** A surface's shine. */
-  shine: { label: "Shine", start: 0.5, limits: [0, 1], text: percent },
+  shine: {
+    label: "Shine",
+    start: 0.5,
+    limits: [0, 1],
+    text: percent,
+    about: "From dull surfaces to polished ones.",
+  },
   /** Henyey-Greenstein g. */
-  anisotropy: { label: "Scatters forward", start: 0, limits: [-0.95, 0.95], text: plain },
+  anisotropy: {
+    label: "Scatters forward",
+    start: 0,
+    limits: [-0.95, 0.95],
+    text: plain,
+    about: "Where light goes from where it is stopped: above 0 mostly on, below 0 mostly back.",
+  },
 } as const satisfies TraceNumbers;
 
 /** Factor to the environment's light, and by how much it is turned. */
@@ -70,13 +95,25 @@ export const ROOM_NUMBERS = {
 
 /** Numbers of the post-processing. */
 export const POST_NUMBERS = {
-  exposure: { label: "Exposure", start: 0, limits: [-4, 4], text: stops },
+  exposure: {
+    label: "Exposure",
+    start: 0,
+    limits: [-4, 4],
+    text: stops,
+    about: "One stop more is twice as bright.",
+  },
   hue: { label: "Hue", start: 0, limits: [-180, 180], text: degrees },
   /** Factor. */
   saturation: { label: "Saturation", start: 1, limits: [0, 3], text: percent },
   /** Added. */
   lightness: { label: "Lightness", start: 0, limits: [-0.5, 0.5], text: percent },
-  occlusion: { label: "Ambient occlusion", start: 0.3, limits: [0, 1], text: percent },
+  occlusion: {
+    label: "Ambient occlusion",
+    start: 0.3,
+    limits: [0, 1],
+    text: percent,
+    about: "How dark corners and hollows are.",
+  },
   sharpness: { label: "Sharpness", start: 0.2, limits: [0, 2], text: percent },
 } as const satisfies TraceNumbers;
 

@@ -122,6 +122,10 @@ describeInChromium("the objects of a label map", () => {
     await choose("color-by", "x_um");
     await choose("color-by", "CD8");
     for (const bytes of await uploads()) expect([256, 1024]).toContain(bytes);
+    // and the swatch beside the channel's name has the palette instead of one colour
+    const swatch = stand.viewer.page.locator(`[data-control="${CHANNEL}/color"]`);
+    const shown = () => swatch.evaluate((input) => input.style.getPropertyValue("--shows"));
+    await expect.poll(shown).toMatch(/^linear-gradient\(90deg,#440154 .*#fde725/);
     const picture = await takePicture(stand.viewer.page);
     const brightness = (row: number) => at(picture, centerOf(row))[1];
     expect(brightness(rowAt(1, 4, 1, 1))).toBeGreaterThan(brightness(rowAt(0, 0, 1, 1)) + 40);

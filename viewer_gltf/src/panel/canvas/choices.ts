@@ -74,8 +74,14 @@ export function stepper(choice: Choice, row: Rect): Block {
 
 /** Any colour: the palettes' next one. */
 export function nextSwatch(colour: Colour, rect: Rect): Block {
+  const { shows = [] } = colour;
+  const width = rect.width / shows.length;
+  const stripes = shows.map((hex, i): Mark => {
+    const stripe = { ...rect, x: rect.x + i * width, width };
+    return { kind: "box", rect: stripe, fill: toneOfHex(hex), stroke: null, radius: 0 };
+  });
   return one(
-    [box(rect, toneOfHex(colour.value), "line")],
+    [box(rect, toneOfHex(colour.value), "line"), ...stripes],
     unlessRefused(colour, [
       region(colour.id, colour.name ?? colour.label, rect, () =>
         colour.to(nextColour(colour.value)),

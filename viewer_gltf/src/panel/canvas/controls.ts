@@ -1,7 +1,7 @@
 /**
  * The controls of a layout as rows of the panel on a canvas, each tall enough to be gazed at. Pure.
  */
-import type { Button, Choice, Control, Group, Search, Toggle } from "../controls";
+import type { Button, Choice, Control, Group, Search, Slider, Toggle } from "../controls";
 import { chips, mapBlock, nextSwatch, palettes, stepper } from "./choices";
 import {
   type Block,
@@ -48,7 +48,7 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
     case "button":
       return [buttonIn(item, row)];
     case "slider":
-      return [sliderRow(item, row), ...(item.about ? [textBlock("", item.about, width)] : [])];
+      return [sliderRow(item, row), ...aboutOf(item, width)];
     case "window":
       return [windowRow(item, 0, row), windowRow(item, 1, row)];
     case "choice":
@@ -68,6 +68,11 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
     case "link":
       return [textBlock(item.label, "It is in the page's address: take it from there.", width)];
   }
+}
+
+/** What a slider does, in a sentence; those of light, whose list is long as it is, say it on the page alone. */
+function aboutOf({ id, about }: Slider, width: number): readonly Block[] {
+  return about && !id.startsWith("trace/") ? [textBlock("", about, width)] : [];
 }
 
 /** Nobody types by gaze: one hint after the other. */

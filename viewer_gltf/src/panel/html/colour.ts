@@ -27,8 +27,16 @@ function makePicker(first: Colour, send: Send): Widget<Colour> {
     update(control) {
       now = control;
       if (input.value !== control.value) input.value = control.value;
+      input.style.setProperty("--shows", stripes(control.shows ?? []));
     },
   };
+}
+
+/** Colours side by side. */
+function stripes(colors: readonly string[]): string {
+  const share = 100 / colors.length;
+  const stops = colors.map((color, i) => `${color} ${i * share}% ${(i + 1) * share}%`);
+  return colors.length === 0 ? "none" : `linear-gradient(90deg,${stops})`;
 }
 
 function makeSwatches(first: Colour, send: Send): Widget<Colour> {

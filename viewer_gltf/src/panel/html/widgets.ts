@@ -60,7 +60,7 @@ function makeToggle(first: Toggle, send: Send): Widget<Toggle> {
   const label = element("span", { className: "label" });
   const root = element("label", { className: "toggle" }, {}, input, label);
   return {
-    root,
+    root: first.about ? element("div", { className: "told" }, {}, root, ...aboutOf(first)) : root,
     update(control) {
       now = control;
       input.checked = control.value;
@@ -76,6 +76,11 @@ function refuse(target: HTMLElement, refusal = ""): void {
   if ((target.ariaDisabled === "true") === isRefused) return;
   target.ariaDisabled = isRefused ? "true" : null;
   target.title = refusal;
+}
+
+/** What a control does, in a sentence, where its name can't say it. */
+function aboutOf({ about }: Control): readonly HTMLElement[] {
+  return about ? [element("small", { textContent: about })] : [];
 }
 
 function makeSlider(first: Slider, send: Send): Widget<Slider> {
@@ -100,9 +105,8 @@ function makeSlider(first: Slider, send: Send): Widget<Slider> {
     element("span", {}, {}, first.label),
     text,
   );
-  const about = first.about ? [element("small", { textContent: first.about })] : [];
   return {
-    root: element("label", { className: "slider" }, {}, head, input, ...about),
+    root: element("label", { className: "slider" }, {}, head, input, ...aboutOf(first)),
     update(control) {
       now = control;
       input.value = String(Math.round(control.value * control.steps));
@@ -136,7 +140,7 @@ function makeSegments(first: Choice, send: Send): Widget<Choice> {
     ),
   );
   return {
-    root,
+    root: first.about ? element("div", { className: "told" }, {}, root, ...aboutOf(first)) : root,
     update(control) {
       now = control;
       for (const input of inputs) input.checked = input.value === control.value;

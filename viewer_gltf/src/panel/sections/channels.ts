@@ -8,7 +8,7 @@ import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel"
 import { isTwoD } from "../../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
-import { controlOf, paletteOf } from "../control_templates";
+import { colourOf, controlOf, paletteOf } from "../control_templates";
 import type { Control, Group, PanelView, Section } from "../controls";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
@@ -21,6 +21,14 @@ const WINDOW_STEPS = 255;
 export type Range = readonly [start: number, end: number, unit?: string];
 /** By channel. */
 export type Ranges = ReadonlyMap<string, Range>;
+
+/** What the channels' part takes of what is known beside the state. */
+type ChannelFacts = Readonly<{
+  ranges: Ranges;
+  histogram?: Histogram | null;
+  /** Some colours of each label map's objects. */
+  objects?: readonly Readonly<{ id: string; colors: readonly string[] }>[];
+}>;
 
 function tagsOf({ hasSurface, surfaceReason }: ChannelState): string[] {
   if (surfaceReason !== "") return [surfaceReason.split(":", 1)[0]];
@@ -56,9 +64,8 @@ export function windowTexts(
 
 function cardOf(
   channel: ChannelState,
-  ranges: Ranges,
+  { ranges, histogram = null, objects = [] }: ChannelFacts,
   view: PanelView,
-  histogram: Histogram | null,
 ): Group {
   const { id, name } = channel;
   const isOpen = view.picked === id;
@@ -75,7 +82,8 @@ function cardOf(
     opener: { panel: "pick", channel: isOpen ? null : id },
   } as const;
   if (channel.hasObjects) {
-    const controls = [controlOf(COLOR, channel, id), shownToggle(channel)];
+    const shows = objects.find((each) => each.id === id)?.colors ?? [];
+    const controls = [colourOf(COLOR, channel, id, shows), shownToggle(channel)];
     const opacity = controlOf(OPACITY, channel, id);
     return { ...head, controls, more: [opacity, paletteOf(COLOR, channel, `${id}/palette`, id)] };
   }
@@ -192,12 +200,11 @@ function addingOf(state: ViewerState, view: PanelView): readonly (Control | Grou
 
 export function channelItems(
   state: ViewerState,
-  ranges: Ranges,
+  facts: ChannelFacts,
   view: PanelView,
-  histogram: Histogram | null = null,
 ): Section["items"] {
   const cards = state.channels
     .filter(({ shown }) => shown)
-    .map((channel) => cardOf(channel, ranges, view, histogram));
+    .map((channel) => cardOf(channel, facts, view));
   return [...cards, ...addingOf(state, view)];
 }
