@@ -90,7 +90,7 @@ export class Contents {
       bundle,
       this.loader,
       picture.surfaceFrame,
-      budget.surfaces,
+      budget,
       (tile, channel) => this.volumes.presence(tile, channel),
       () => this.volumes.isInDisc,
       onChange,

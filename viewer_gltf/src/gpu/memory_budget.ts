@@ -1,13 +1,13 @@
-/** How much of the GPU's memory a device is asked for. Pure. */
+/** How much of the GPU's memory a device is asked for, and how many triangles. Pure. */
 
 export type Device = Readonly<{ userAgent: string; deviceMemory?: number }>;
 
-/** Bytes, for all volumes together and for all surfaces together. */
-export type MemoryBudget = Readonly<{ volumes: number; surfaces: number }>;
+/** Bytes, for all volumes together and for all surfaces together; and most triangles in view. */
+export type MemoryBudget = Readonly<{ volumes: number; surfaces: number; triangles: number }>;
 
 const MIB = 1024 * 1024;
-const SMALL: MemoryBudget = { volumes: 128 * MIB, surfaces: 128 * MIB };
-const LARGE: MemoryBudget = { volumes: 512 * MIB, surfaces: 384 * MIB };
+const SMALL: MemoryBudget = { volumes: 128 * MIB, surfaces: 128 * MIB, triangles: 1_500_000 };
+const LARGE: MemoryBudget = { volumes: 512 * MIB, surfaces: 384 * MIB, triangles: 8_000_000 };
 /** Memory, GiB, as browsers report it: a computer with so little is treated as a phone is. */
 const LITTLE = 4;
 

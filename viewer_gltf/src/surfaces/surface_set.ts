@@ -1,6 +1,7 @@
 /** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
 import { type Camera, Group, Mesh, ShaderMaterial } from "three";
 import type { Bundle } from "../bundle/load";
+import type { MemoryBudget } from "../gpu/memory_budget";
 import { surfaceColor } from "../math/color";
 import type { Vec3 } from "../math/vec3";
 import type { ShownSurface } from "../state/on_screen";
@@ -16,6 +17,7 @@ import type { BlendedScene, SurfaceFrame } from "./blend_material";
 import type { SurfaceLoader } from "./gltf_loader";
 import { overview, type Progress } from "./overview_progress";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
+import { coarserFor, FINEST } from "./triangle_budget";
 
 /** Screen-space error, in pixels, down to which LODs are refined where frames come in time. */
 export const ERROR_TARGET_PX = 2;
@@ -29,6 +31,8 @@ export class SurfaceSet {
   /** Whether the first picture is whole. */
   private hasBegun = false;
   private errorTarget_px = ERROR_TARGET_PX;
+  /** Since a device draws no more triangles in time. */
+  private coarser = FINEST;
   /** A surface has come. */
   onSurface: (channel: string, surface: Surface) => void = () => undefined;
 
@@ -36,8 +40,8 @@ export class SurfaceSet {
     private readonly bundle: Bundle,
     private readonly loader: SurfaceLoader,
     private readonly frame: SurfaceFrame,
-    /** Of the GPU's memory, for all channels. */
-    private readonly bytes: number,
+    /** For all channels. */
+    private readonly budget: Pick<MemoryBudget, "surfaces" | "triangles">,
     /** How far the volume of a tile and channel has faded in, 0..1. */
     private readonly presence: (tile: string, channel: string) => number,
     /** Whether all that is marched shows in the disc alone. */
@@ -130,8 +134,10 @@ export class SurfaceSet {
 
   update(camera: Camera, width_px: number, height_px: number): void {
     const isComplete = this.overview.isComplete;
+    const inView = this.shown().flatMap(([, tileset]) => tileset.inView);
+    this.coarser = coarserFor(inView, this.errorTarget_px, this.budget.triangles, this.coarser);
     for (const [, tileset] of this.shown()) {
-      if (isComplete) tileset.refine(this.errorTarget_px);
+      if (isComplete) tileset.refine(this.errorTarget_px, this.coarser);
       tileset.update(camera, width_px, height_px);
       // one channel after another: the first shows all tiles the sooner
       if (!this.hasBegun && !overview([tileset.progress]).isComplete) break;
@@ -151,7 +157,7 @@ export class SurfaceSet {
       channel,
       this.loader,
       this.frame,
-      this.bytes,
+      this.budget.surfaces,
       (surface) => {
         this.dress(id, surface);
         this.onSurface(id, surface);

@@ -31,6 +31,7 @@ import { branchOf, leaveOut, putBack } from "./failed_branch";
 import { TilesetFiles } from "./fetch_content";
 import type { SurfaceLoader } from "./gltf_loader";
 import type { TileProgress } from "./overview_progress";
+import type { Coarser, Levels } from "./triangle_budget";
 
 const UM_PER_METRE = 1e6;
 /** The root holds no content; below it lie the tiles' coarsest LODs. */
@@ -63,7 +64,7 @@ export class SurfaceTileset {
 
   constructor(
     base: string,
-    channel: Channel,
+    private readonly channel: Channel,
     loader: SurfaceLoader,
     private readonly frame: SurfaceFrame,
     bytes: number,
@@ -174,10 +175,29 @@ export class SurfaceTileset {
     return this.drawn.reduce((sum, { triangles }) => sum + triangles, 0);
   }
 
-  /** Go on to finer LODs, by screen-space error: `errorTarget_px` pixels. */
-  refine(errorTarget_px: number): void {
-    this.tiles.maxDepth = Number.POSITIVE_INFINITY;
-    this.tiles.errorTarget = errorTarget_px;
+  /** The levels of each tile that was in view last, as far as they are known. */
+  get inView(): readonly Levels[] {
+    const { triangles } = this.channel;
+    const coarsest = this.tiles.root?.children ?? [];
+    return coarsest.flatMap((tile) => {
+      const { inFrustum = false, error = 0 } = tile.traversal ?? {}; // none before its first look
+      if (!inFrustum) return [];
+      const px = error / tile.geometricError;
+      const levels: { error_px: number; triangles: number }[] = [];
+      for (let each: Tile | undefined = tile; each !== undefined; each = each.children?.[0]) {
+        const all = triangles[triangles.length - 1 - levels.length] ?? 0;
+        const error_px = each.geometricError && px * each.geometricError; // 0 also at the eye
+        levels.push({ error_px, triangles: all / coarsest.length });
+      }
+      return [levels];
+    });
+  }
+
+  /** Go on to finer LODs, by screen-space error: `errorTarget_px` pixels, or coarser. */
+  refine(errorTarget_px: number, { factor, leftOut }: Coarser): void {
+    const levels = Math.max(1, this.channel.triangles.length - leftOut);
+    this.tiles.maxDepth = leftOut === 0 ? Number.POSITIVE_INFINITY : DEPTH_OF_COARSEST + levels;
+    this.tiles.errorTarget = factor * errorTarget_px;
   }
 
   update(camera: Camera, width_px: number, height_px: number): void {
