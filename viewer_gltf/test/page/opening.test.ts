@@ -80,6 +80,34 @@ describeInChromium("the opening", () => {
     }
   });
 
+  it("has its words beside the picture's other marks, in small windows too", async () => {
+    const usual = page().viewportSize() ?? { width: 560, height: 360 };
+    for (const [width, height] of [
+      [320, 240],
+      [640, 240],
+      [568, 320],
+      [320, 568],
+    ]) {
+      await page().setViewportSize({ width, height });
+      await stand.viewer.open(address("&quality=low&mode=disc"));
+      const over = await page().evaluate(() => {
+        const boxOf = (found: Element) => found.getBoundingClientRect();
+        const [hint] = [...document.querySelectorAll('[data-overlay="hint"]')].map(boxOf);
+        const others = ".way:not([hidden]), .scale-bar, .orientation-mark, .panel";
+        return [...document.querySelectorAll(others)]
+          .filter((other) => {
+            const { left, right, top, bottom } = boxOf(other);
+            const isAside = left >= hint.right || right <= hint.left;
+            return !isAside && top < hint.bottom && bottom > hint.top;
+          })
+          .map((other) => other.getAttribute("class"))
+          .concat(hint.bottom - hint.top > 56 ? [`${hint.bottom - hint.top} px high`] : []);
+      });
+      expect(over, `${width} x ${height}`).toEqual([]);
+    }
+    await page().setViewportSize(usual);
+  });
+
   it("stops turning before volumes are blocks, where frames are late", async () => {
     await page().emulateMedia({ reducedMotion: "no-preference" });
     await addClock(page());

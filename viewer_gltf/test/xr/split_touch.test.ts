@@ -7,6 +7,22 @@ import { prepareStand } from "../support/browser/stand";
 const SIZE = { width: 640, height: 300 };
 type Finger = Readonly<{ x: number; y: number; id: number }>;
 
+describeInChromium("a Cardboard's phone with a notch", () => {
+  const stand = prepareStand({ viewport: SIZE, hasTouch: true });
+
+  it("shows both eyes as much, about the middle of the screen", async () => {
+    await stand.open("&mode=off");
+    const { page } = stand.viewer;
+    const devtools = await page.context().newCDPSession(page);
+    const insets = { left: 44, leftMax: 44 };
+    await devtools.send("Emulation.setSafeAreaInsetsOverride", { insets });
+    await page.locator('[data-overlay="stereo"]').tap();
+    await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
+    const canvas = await page.locator(".stage canvas").boundingBox();
+    expect(canvas).toMatchObject({ x: 44, width: SIZE.width - 88, height: SIZE.height });
+  });
+});
+
 describeInChromium("fingers in a Cardboard", () => {
   const stand = prepareStand({ viewport: SIZE, hasTouch: true });
 

@@ -82,14 +82,18 @@ const THEN: Readonly<Partial<Record<Mode, string>>> = {
 
 /** How to begin, beside a picture that nobody has touched yet. */
 export class FirstHint {
-  readonly root = element("p", { className: "first-hint" }, { overlay: "hint" });
+  /** What a small window has no room for. */
+  private readonly then = element("span");
+  readonly root: HTMLElement;
 
-  constructor(private readonly isTouch: boolean) {}
+  /** @param isTouch whether fingers do it */
+  constructor(isTouch: boolean) {
+    const words = `drag to turn, ${isTouch ? "pinch" : "wheel"} to zoom`;
+    this.root = element("p", { className: "first-hint" }, { overlay: "hint" }, words, this.then);
+  }
 
   update(state: Pick<ViewerState, "mode" | "channels">): void {
-    const zoom = this.isTouch ? "pinch" : "wheel";
-    const then = showsVolumes(state) ? (THEN[state.mode] ?? "") : "";
-    setText(this.root, `drag to turn, ${zoom} to zoom${then}`);
+    setText(this.then, showsVolumes(state) ? (THEN[state.mode] ?? "") : "");
   }
 
   /** From the first touch on nobody needs it. */

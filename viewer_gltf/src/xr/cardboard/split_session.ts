@@ -178,13 +178,17 @@ class Running {
     this.stage = stage;
     this.hold = screen;
     this.style = stage.style.cssText;
-    // Over the whole page, where a browser has no full screen.
+    // Over the whole page, where a browser has no full screen. What a notch hides of one eye's picture,
+    // the other's leaves out too: the lenses' middle stays the screen's.
     const zIndex = "2147483647";
+    const notch = "max(env(safe-area-inset-left), env(safe-area-inset-right))";
     Object.assign(stage.style, {
       position: "fixed",
       inset: 0,
       width: "100%",
       height: "100%",
+      border: "0 solid #000",
+      borderInlineWidth: notch,
       zIndex,
     });
     listenForFingers(stage, onGesture, signal);
