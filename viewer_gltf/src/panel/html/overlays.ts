@@ -83,17 +83,17 @@ const THEN: Readonly<Partial<Record<Mode, string>>> = {
 /** How to begin, beside a picture that nobody has touched yet. */
 export class FirstHint {
   /** What a small window has no room for. */
-  private readonly then = element("span");
+  private readonly outcome = element("span");
   readonly root: HTMLElement;
 
   /** @param isTouch whether fingers do it */
   constructor(isTouch: boolean) {
     const words = `drag to turn, ${isTouch ? "pinch" : "wheel"} to zoom`;
-    this.root = element("p", { className: "first-hint" }, { overlay: "hint" }, words, this.then);
+    this.root = element("p", { className: "first-hint" }, { overlay: "hint" }, words, this.outcome);
   }
 
   update(state: Pick<ViewerState, "mode" | "channels">): void {
-    setText(this.then, showsVolumes(state) ? (THEN[state.mode] ?? "") : "");
+    setText(this.outcome, showsVolumes(state) ? (THEN[state.mode] ?? "") : "");
   }
 
   /** From the first touch on nobody needs it. */
