@@ -34,7 +34,7 @@ from stereocell.kernels.triangles import Points, closest, doubled_area, smallest
 CLASSES = 6  # of cost
 PASSES = 4  # over one class; the last class has LAST
 LAST = 40
-MOST = 512  # neighbours of a vertex that is looked at
+MAX_NEIGHBOURS = 512  # neighbours of a vertex that is looked at
 NEVER = 32000  # class of a vertex that has no collapse
 TURN = 0.25  # squared cosine of the largest turn of a triangle: 60 degrees
 SLIVER = 0.9945  # cosine of 6 degrees: the normal of a sharper triangle says little
@@ -230,8 +230,8 @@ def collapse(
             cost[u] = class_of(_cheapest(quadrics, u, at, leaving, twins, corner))
     away, stamp, tick = np.zeros(n), np.zeros(n, np.int32), 0
     touched, turn = np.zeros(n, np.int32), 0
-    ring, out = np.empty(MOST, np.int32), np.empty(MOST, np.int32)
-    price, order = np.empty(MOST), np.empty(MOST, np.int32)
+    ring, out = np.empty(MAX_NEIGHBOURS, np.int32), np.empty(MAX_NEIGHBOURS, np.int32)
+    price, order = np.empty(MAX_NEIGHBOURS), np.empty(MAX_NEIGHBOURS, np.int32)
     waiting = np.empty(n, np.int32)
     for k in range(CLASSES + 1):
         for _ in range(PASSES if k < CLASSES else LAST):
@@ -247,7 +247,7 @@ def collapse(
                 # the neighbours, in order of price
                 size, h, worst = 0, leaving[u], 0.0
                 bx, by, bz = 0.0, 0.0, 0.0
-                while size < MOST:
+                while size < MAX_NEIGHBOURS:
                     v = corner[following(h)]
                     ring[size], out[size] = v, h
                     price[size] = price_of(quadrics, u, at, v)

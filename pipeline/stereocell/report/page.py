@@ -45,8 +45,8 @@ from stereocell.storage.atomic_write import write_bytes
 from stereocell.textures.unwrap import mip_levels_apart
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
-MOST_PICTURED = 60  # units
-MOST_ROWS = 400  # units in a table
+MAX_PICTURED = 60  # units
+MAX_ROWS = 400  # units in a table
 _TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # drawn in one picture
 # pixels: width, and the most height
 _TILE_PX, _WHOLE_PX = (420, 420), (1120, 620)
@@ -66,7 +66,7 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
     """Return the page as HTML."""
     plan = facts.plan
     tissue = find_tissue(out_folder.out, plan)  # first: what is damaged ends it before all is drawn
-    chosen = choose_units(len(plan.tiles), len(plan.channels), MOST_PICTURED)
+    chosen = choose_units(len(plan.tiles), len(plan.channels), MAX_PICTURED)
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
     labels = gather_labels(out_folder, plan)
@@ -201,7 +201,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
                 "picture": picture,
             }
         )
-        if len(rows) == MOST_PICTURED:
+        if len(rows) == MAX_PICTURED:
             break
     return rows
 
@@ -364,9 +364,9 @@ def _box_um(facts: Facts, tile: Tile) -> tuple[tuple[float, ...], tuple[float, .
 
 def _rows(units: Sequence[UnitFacts]) -> list[UnitFacts]:
     """Return the units that tables list: all, or evenly chosen ones."""
-    if len(units) <= MOST_ROWS:
+    if len(units) <= MAX_ROWS:
         return list(units)
-    return [units[i * len(units) // MOST_ROWS] for i in range(MOST_ROWS)]
+    return [units[i * len(units) // MAX_ROWS] for i in range(MAX_ROWS)]
 
 
 def _inline(picture: Picture) -> Mapping[str, Any]:

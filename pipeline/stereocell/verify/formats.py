@@ -41,7 +41,7 @@ from stereocell.usd.write_tile import closed_file, has_mesh
 from stereocell.usd.write_usdz import USDZ_NAME
 
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
-_MOST_SHOWN = 3  # problems printed in one line
+_MAX_SHOWN = 3  # problems printed in one line
 _NODE_TIMEOUT_S = 1200.0  # s for one script over all files
 _PLAN = "plan.schema.json"
 _BUNDLE = "bundle.schema.json"
@@ -497,5 +497,5 @@ def _raise_on_all(problems: list[str], remedy: str) -> None:
 def raise_on(problems: list[str]) -> None:
     """Raise CheckError with the first few of the problems, if there are any."""
     if problems:
-        more = f" (and {len(problems) - _MOST_SHOWN} more)" if len(problems) > _MOST_SHOWN else ""
-        raise CheckError("; ".join(problems[:_MOST_SHOWN]) + more)
+        more = f" (and {len(problems) - _MAX_SHOWN} more)" if len(problems) > _MAX_SHOWN else ""
+        raise CheckError("; ".join(problems[:_MAX_SHOWN]) + more)
