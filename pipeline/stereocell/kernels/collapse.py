@@ -54,6 +54,15 @@ def price_of(quadrics: Points, u: int, at: Points, v: int) -> float:
 
 @part
 def sum_planes(at: Points, corner: Ints, errors: Points, quadrics: Points) -> None:
+    """Add each triangle's plane, weighted by its doubled area, to its corners' quadrics.
+
+    at        float64 (n, 3)
+    corner    int32 (3 m,), three a triangle
+    errors    float64 (n,), largest allowed distance of each vertex from its planes
+    quadrics  float64 (n, 11), written
+    Source: Garland & Heckbert, "Surface simplification using quadric error metrics",
+    SIGGRAPH 1997. doi:10.1145/258734.258849
+    """
     for t in range(len(corner) // 3):
         a, b, c = corner[3 * t], corner[3 * t + 1], corner[3 * t + 2]
         x, y, z = doubled_area(at, a, b, c)
@@ -92,6 +101,7 @@ def _cheapest(
 
 @part
 def class_of(price: float) -> int:
+    """Return the class of cost of a price, a squared distance in squared bounds; NEVER above 1."""
     return int(np.sqrt(price) * CLASSES) if price <= 1 else NEVER
 
 

@@ -387,6 +387,7 @@ def srgb(linear: Sequence[float]) -> tuple[float, float, float]:
 
 
 def css_color(linear: Sequence[float]) -> str:
+    """Return a linear RGB colour, 0..1, as CSS writes it: #rrggbb in sRGB."""
     return "#" + "".join(f"{round(255 * v):02x}" for v in srgb(linear))
 
 

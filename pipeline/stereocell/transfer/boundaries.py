@@ -2,15 +2,16 @@
 
 A boundary between materials of values a < b, an ideal edge blurred by a Gaussian, crosses the
 value at a + t (b - a) with the gradient (b - a) / (s sqrt(2 pi)) exp(-erfinv(2t - 1)^2): an arc
-from one material to the other (Kindlmann & Durkin 1998).
+from one material to the other (Kindlmann & Durkin, "Semi-automatic generation of transfer
+functions for direct volume rendering", IEEE Volume Visualization 1998. doi:10.1145/288126.288167).
 
 Arcs of different pairs cross, and one that spans the whole window passes over the others' voxels.
 So no arc is looked for by itself: what lies above the noise is explained as a sum of boundaries of
 all pairs of materials (see transfer/material_peaks.py) at a row of blurs (see
 transfer/edge_model.py), and of what the materials' own noise leaves there, none of them negative
-(Lawson & Hanson, Solving Least Squares Problems, 1974). The pairs that it takes much of are the
-boundaries; one that passes over a third material, whose own noise it can pass for, only if the rest
-explains what is there clearly worse.
+(Lawson & Hanson, Solving Least Squares Problems, 1974. doi:10.1137/1.9781611971217). The pairs that
+it takes much of are the boundaries; one that passes over a third material, whose own noise it can
+pass for, only if the rest explains what is there clearly worse.
 """
 
 from dataclasses import dataclass
