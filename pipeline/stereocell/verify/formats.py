@@ -22,6 +22,7 @@ from stereocell.building.phase import digest_of_manifest
 from stereocell.building.survey_file import EVIDENCE, SOLIDS, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.bundle.write import FILES, MANIFEST
+from stereocell.bundle.write_objects import hash_parts
 from stereocell.formats.exr import check_exr
 from stereocell.formats.stl import check_stl
 from stereocell.formats.tiles3d import CONTENT_HASH, content_hash
@@ -350,11 +351,23 @@ def _check_objects(bundle: Path) -> str:
             for ref, width in sizes
             if ref["bytes"] != count * width
         ]
+        problems += [
+            f"{name}: {column['exact']['path']}: parts have other SHA-256 than stated"
+            for column in content["columns"]
+            if "parts" in column and not _has_parts(bundle / column["exact"]["path"], column)
+        ]
         for tile, rows in content["tiles"].items():
             if max([rows["first"] + rows["count"] - 1, *rows.get("more", [])]) >= max(count, 1):
                 problems.append(f"{name}: {tile}: names rows beyond the {count} that there are")
     raise_on(problems)
     return f"{objects} objects"
+
+
+def _has_parts(file: Path, column: dict[str, Any]) -> bool:
+    try:
+        return bool(column["parts"] == hash_parts(file.read_bytes()))
+    except OSError as error:
+        raise CheckError(f"{file}: {error.strerror or error}") from error
 
 
 def _check_tilesets(bundle: Path) -> str:

@@ -385,10 +385,10 @@ class Layout {
   }
 
   private valueText(column: ObjectColumn, row: number): string {
-    const values = this.table.exact(column.id);
-    if (values === null) return "…";
-    if (column.kind === "category") return column.categories?.[values[row]] ?? "none";
-    const text = numberText(values[row]);
+    const value = this.table.value(column.id, row);
+    if (value === null) return "…";
+    if (column.kind === "category") return column.categories?.[value] ?? "none";
+    const text = numberText(value);
     return text === "" ? "none" : `${text} ${unitText(column.unit)}`.trim();
   }
 
