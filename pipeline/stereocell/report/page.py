@@ -7,12 +7,12 @@ of units stays one that a phone opens; sums and remarks cover all units.
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from numpy.typing import NDArray
 
 from stereocell.building.channels import Channel
@@ -80,16 +80,8 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         for tile, channels in chosen
     ]
     pictured = [_inline(draw_scene(scene)) for scene in scenes]
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATE.parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     asked = out_folder.settings_file
-    environment.filters |= {"count": _count, "size": _size, "seconds": _seconds, "um": _um}
-    return environment.get_template(TEMPLATE.name).render(
+    return _template().render(
         facts=facts,
         plan=plan,
         generator=GENERATOR,
@@ -127,6 +119,19 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         },
         settings=asked.read_text("utf-8") if asked.is_file() else "",
     )
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATE.parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"count": _count, "size": _size, "seconds": _seconds, "um": _um}
+    return environment.get_template(TEMPLATE.name)
 
 
 def _tissue(found: TissueFacts) -> dict[str, Any]:
