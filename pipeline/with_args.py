@@ -9,6 +9,7 @@ import sys
 
 
 def main(command: list[str]) -> None:
+    """Become the command, its word `ARGS` replaced by the words of the variable."""
     text = os.environ.get("ARGS", "")
     try:
         words = shlex.split(text)

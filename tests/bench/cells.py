@@ -62,7 +62,7 @@ NEAR = 450  # triangles a cell at which peers are compared
 SAMPLES = 500  # points of each of a cell's surfaces
 INSIDE = 200_000  # points that are asked which cells they lie in
 IGNEOUS = 100, 0.04  # reduction_factor and max_error, um, when it isn't told otherwise
-MOST = 1000  # a reduction_factor that leaves it to max_error
+MAX_FACTOR = 1000  # a reduction_factor that leaves it to max_error
 HALVINGS = 12
 
 Triple = tuple[float, float, float]
@@ -191,7 +191,7 @@ def search_error(labels: NDArray[np.int32], spacing_um: Triple, wanted: float) -
 
     def triangles(error: float) -> float:
         parts = (
-            mesher.get(number, normals=False, reduction_factor=MOST, max_error=error)
+            mesher.get(number, normals=False, reduction_factor=MAX_FACTOR, max_error=error)
             for number in some
         )
         return float(np.mean([len(part.faces) for part in parts]))
@@ -254,7 +254,7 @@ def compare(case: Case, rounds: int) -> list[dict[str, Any]]:
         sizes = [len(mesh.triangles) / count for _, mesh, _ in first]
         error = search_error(*given, min(sizes, key=lambda size: abs(np.log(size / NEAR))))
         peers = [
-            (by_zmesh, *given, MOST, error, f"zmesh, max_error {error:.2g} um"),
+            (by_zmesh, *given, MAX_FACTOR, error, f"zmesh, max_error {error:.2g} um"),
             (by_zmesh, *given, *IGNEOUS, "zmesh, as igneous asks"),
         ]
     spent: dict[str, list[Spent]] = {}

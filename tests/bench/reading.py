@@ -33,7 +33,7 @@ from support.phantoms import write_ome_zarr
 REAL = (194, 512, 512)
 REGION, CHANNELS = Box((0, 0, 0), (194, 5508, 10908)), 70  # the dataset
 CHUNK = (32, 128, 128)  # as the sample's: four to a tile's width, six to its depth
-MOST_READ = 1.3  # bytes read over those of the chunks that what is wanted touches
+MAX_READ = 1.3  # bytes read over those of the chunks that what is wanted touches
 
 
 @contextmanager
@@ -194,12 +194,12 @@ def under_blocks(region: Box, chunk: tuple[int, ...]) -> int:
 
 def print_reading(reading: Reading, survey: Survey, windows: float) -> None:
     print(f"Read by a unit: {reading.chunks:.2f} x the chunks that its window touches (bound "
-          f"{MOST_READ}), {reading.window:.2f} x the window itself; by a command, to see that the "
+          f"{MAX_READ}), {reading.window:.2f} x the window itself; by a command, to see that the "
           f"source is the same, {reading.check / 1e6:.1f} MB")  # fmt: skip
     print(f"Read for iso-values, tiles of four chunks' width: {survey.chunks:.2f} x the chunks "
-          f"that they touch (bound {MOST_READ}), {survey.tiles:.2f} x the tiles themselves; for a "
+          f"that they touch (bound {MAX_READ}), {survey.tiles:.2f} x the tiles themselves; for a "
           f"channel's window {windows:.2f} x the level and the blocks that it comes from "
-          f"(bound {MOST_READ})")  # fmt: skip
+          f"(bound {MAX_READ})")  # fmt: skip
 
 
 def print_whole(

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import STEREOCELL, make_sample, plan
 from reading import (
     CHANNELS,
-    MOST_READ,
+    MAX_READ,
     REAL,
     REGION,
     measure_reading,
@@ -50,8 +50,8 @@ MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512
 WHOLE = len(cut(REGION, REAL)) * CHANNELS  # units of the CyCIF dataset
 PRICE = 0.04  # dollars for a core-hour: about what clouds ask for a core with 4 GB
 GIB = 1024**3
-MOST_GROWTH = 0.1  # of a process's peak, from some tiles to four times as many
-MOST_BYTES = 2e9  # of the process that builds a unit of REAL
+MAX_GROWTH = 0.1  # of a process's peak, from some tiles to four times as many
+MAX_BYTES = 2e9  # of the process that builds a unit of REAL
 
 # Run in a process of its own, which builds one unit and looks at itself meanwhile
 WATCHED = """
@@ -166,7 +166,7 @@ def print_slope(runs: list[Run]) -> list[float]:
             }
             growths += grown.values()
             told = ", ".join(f"{role} {growth:+.1%}" for role, growth in grown.items())
-            print(f"    from {few} to {many} units: {told} (bound {MOST_GROWTH:+.0%})")
+            print(f"    from {few} to {many} units: {told} (bound {MAX_GROWTH:+.0%})")
     return growths
 
 
@@ -215,7 +215,7 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
     seen = watch_memory(out)
     seconds = time.perf_counter() - start
     size = sum(file.stat().st_size for file in (out / "units").rglob("*") if file.is_file())
-    print(f"  {seconds:.0f} s; most memory while this ran, GiB (bound {MOST_BYTES / GIB:.2f}):")
+    print(f"  {seconds:.0f} s; most memory while this ran, GiB (bound {MAX_BYTES / GIB:.2f}):")
     for place, most in sorted(seen.items(), key=lambda item: -item[1])[:8]:
         print(f"    {most / GIB:5.2f}  {place}")
 
@@ -228,9 +228,9 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
     print_whole(reading, survey, windows, voxel, settled.halo)
 
     kept = {
-        "peaks": max(growths) <= MOST_GROWTH,
-        "reading": max(reading.chunks, survey.chunks, windows) <= MOST_READ,
-        "memory": max(seen.values()) <= MOST_BYTES,
+        "peaks": max(growths) <= MAX_GROWTH,
+        "reading": max(reading.chunks, survey.chunks, windows) <= MAX_READ,
+        "memory": max(seen.values()) <= MAX_BYTES,
     }
     for name, is_kept in kept.items():
         print(f"Bound of {name}: {'kept' if is_kept else 'NOT KEPT'}")

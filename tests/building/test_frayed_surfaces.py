@@ -17,7 +17,7 @@ from support.meshes import welded
 
 SPACING = (0.6, 0.3, 0.3)
 SHAPE = (24, 64, 128)  # two tiles
-MOST = 6000
+MAX_FACES = 6000
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     voxels = np.stack([np.clip(sponge, 0, None), ball]).astype(np.uint16)
     source, out = folder / "scene.ome.tif", folder / "out"
     phantoms.write_ome_tiff(source, voxels, spacing=SPACING, axes="CZYX", names=["sponge", "ball"])
-    (folder / "settings.toml").write_text(f"[surface]\nmax_faces = {MOST}\n")
+    (folder / "settings.toml").write_text(f"[surface]\nmax_faces = {MAX_FACES}\n")
     flags = ["--tile-size", "24,64,64", "--config", str(folder / "settings.toml")]
     given = ["--iso-value", "sponge=1000", "--iso-value", "ball=500"]
     assert main(["plan", str(source), "-o", str(out), *flags, *given]) == 0
@@ -48,11 +48,11 @@ def test_of_a_sponge_fewer_planes_carry_the_surface_and_it_is_said(
     plan, survey = folder.plan(), read_survey(folder)
     step = plan.with_grid(survey["sponge"].grid_um).step
     assert "of the planes along z, y, x one in {}, {}, {} carries it".format(*step) in said
-    assert survey["sponge"].most_faces > MOST
+    assert survey["sponge"].most_faces > MAX_FACES
     assert step[1] > step[0] >= 1  # as far apart along all axes as can be
     assert survey["ball"].grid_um == 0
     assert "ball: up to" not in said
-    assert f"{MOST:,} (surface.max_faces)" in survey["sponge"].thinning(plan)
+    assert f"{MAX_FACES:,} (surface.max_faces)" in survey["sponge"].thinning(plan)
 
 
 @pytest.mark.parametrize("channel", ["sponge", "ball"])
@@ -69,5 +69,5 @@ def test_its_tiles_make_one_sound_surface_of_no_more_triangles_than_that(
     assert len(meshes) == 2
     for mesh in meshes:
         # a vertex lies on each voxel edge that is crossed, and has two triangles
-        assert len(mesh.triangles) <= 2 * MOST
+        assert len(mesh.triangles) <= 2 * MAX_FACES
     assert not find_defects(welded(meshes)).total

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from hashlib import sha256
 
 import jsonschema
 import numpy as np
@@ -176,6 +177,15 @@ def test_a_recolouring_of_20_000_objects_is_20_kb(tmp_path):
     column = number("CD8", RNG.lognormal(5, 1, 20_000))
     (entry,) = written(tmp_path, replace(table(labels=labels), columns=(column,)))["columns"]
     assert entry["bytes"]["bytes"] == 20_000
+
+
+def test_one_value_of_a_long_column_can_be_had_by_a_checked_range(tmp_path):
+    (entry,) = written(tmp_path, table(number("extent", NORMAL)))["columns"]
+    data = (tmp_path / entry["exact"]["path"]).read_bytes()
+    assert entry["parts"] == [sha256(each).hexdigest() for each in (data[:16384], data[16384:])]
+    short = table(number("extent", NORMAL[:4096]), labels=np.arange(4096))
+    (entry,) = written(tmp_path / "short", short)["columns"]
+    assert "parts" not in entry
 
 
 def test_a_table_without_objects_is_written(tmp_path):

@@ -12,7 +12,7 @@ from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level_evidence import (
     HALO,
-    MOST_PADDING,
+    MAX_PADDING,
     Counting,
     Slices,
     TileEvidence,
@@ -55,7 +55,7 @@ def look_at(case: Case) -> Sight:
     field = denoise(Volume(voxels, case.spacing_um), sigma)
     darkest: float | None = float(voxels.min())
     padding = find_padding(voxels, darkest, denoising_reach(sigma, case.spacing_um))
-    if padding.mean() > MOST_PADDING:
+    if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, scale_above, above, under = Scale.of(voxels, padding), None, field, None
     if case.kind == "microscopy":

@@ -51,7 +51,7 @@ def test_a_gltf_has_a_node_an_object_with_label_name_and_colour(
 def test_of_very_many_objects_a_tile_is_one_mesh_in_their_colours(
     stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(gltf_scene, "MOST_NODES", 1)
+    monkeypatch.setattr(gltf_scene, "MAX_NODES", 1)
     export_stage(stage, tmp_path / "o.glb", ExportOptions())
     scene = trimesh.load(tmp_path / "o.glb")
     assert set(scene.geometry) == {"cells r0_c0", "cells r0_c1"}
@@ -77,7 +77,7 @@ def test_bodies_of_a_3mf_are_objects_closed_and_whole(stage: Path, tmp_path: Pat
 def test_of_many_thin_bodies_some_are_named_and_all_are_counted(
     stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(print_solids, "_MOST_TOLD", 1)
+    monkeypatch.setattr(print_solids, "_MAX_TOLD", 1)
     told = export_stage(stage, tmp_path / "o.3mf", ExportOptions(scale=1, wall_mm=5)).split("\n")
     assert len(told) == 3
     assert told[2] == f"... and of {len(NAMES) - 1} more parts"

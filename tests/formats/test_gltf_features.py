@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
-from stereocell.formats.gltf_features import MOST_COLUMNS, Features, tile_features
+from stereocell.formats.gltf_features import MAX_COLUMNS, Features, tile_features
 from stereocell.model.object_table import Column
 from stereocell.storage.assets import find_asset
 from support import object_bundle
@@ -137,7 +137,7 @@ def test_what_can_not_be_named_is_refused():
         encode(features=Features(TABLE.labels[:3], ()))
     one = Column("a", "a", np.zeros(4, np.float32))
     with pytest.raises(ValueError, match="8 at most"):
-        encode(features=Features(TABLE.labels[:40], (one,) * (MOST_COLUMNS + 1)))
+        encode(features=Features(TABLE.labels[:40], (one,) * (MAX_COLUMNS + 1)))
 
 
 def test_the_last_object_that_16_bits_name_is_written():

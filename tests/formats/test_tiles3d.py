@@ -5,7 +5,7 @@ import json
 import pytest
 
 from stereocell.formats.tiles3d import (
-    MOST_WHOLE_TILES,
+    MAX_WHOLE_TILES,
     TILESET,
     TileLod,
     content_hash,
@@ -43,8 +43,8 @@ def chain(tile):
 @pytest.fixture(scope="module")
 def many():
     """More tiles than one file describes; the last has one LOD."""
-    tiles = [lods(20 * n, [0.02, 0.1, 0.5]) for n in range(MOST_WHOLE_TILES)]
-    files = make_tilesets([*tiles, lods(20 * MOST_WHOLE_TILES, [0])])
+    tiles = [lods(20 * n, [0.02, 0.1, 0.5]) for n in range(MAX_WHOLE_TILES)]
+    files = make_tilesets([*tiles, lods(20 * MAX_WHOLE_TILES, [0])])
     return {address: json.loads(text) for address, text in files.items()}, files
 
 
@@ -139,9 +139,9 @@ def test_refinement_is_said_at_roots_and_inherited_below(many):
 
 
 def test_as_many_tiles_as_the_limit_are_one_file():
-    tiles = [lods(n, [0, 0.1]) for n in range(MOST_WHOLE_TILES)]
+    tiles = [lods(n, [0, 0.1]) for n in range(MAX_WHOLE_TILES)]
     assert list(make_tilesets(tiles)) == [TILESET]
-    assert len(make_tilesets([*tiles, lods(99, [0, 0.1])])) == 2 + MOST_WHOLE_TILES
+    assert len(make_tilesets([*tiles, lods(99, [0, 0.1])])) == 2 + MAX_WHOLE_TILES
 
 
 def test_of_many_tiles_the_finer_levels_are_files_of_their_own(many):

@@ -24,7 +24,7 @@ def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("out")
     spheres.write_one_tile(out / "stage")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tiles3d, "MOST_WHOLE_TILES", 0)
+        patch.setattr(tiles3d, "MAX_WHOLE_TILES", 0)
         write_bundle(out / "stage" / "stage.usda", out / "bundle", None, run=Engine(0).run)
     return out
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.isosurface.axis_profiles import MOST_LIGHT, Profiles, share_of_light
+from stereocell.isosurface.axis_profiles import MAX_LIGHT, Profiles, share_of_light
 
 SHAPE = (20, 30, 40)
 Z, Y, X = np.ogrid[: SHAPE[0], : SHAPE[1], : SHAPE[2]]
@@ -43,7 +43,7 @@ def test_a_product_is_light_but_for_what_its_factors_have_together() -> None:
 
 def test_a_ball_is_no_light_in_whatever_tiles() -> None:
     ball = 1.0 * ((Z - 10) ** 2 + (Y - 14) ** 2 + (X - 18) ** 2 < 64)
-    assert _share(ball) < MOST_LIGHT / 2
+    assert _share(ball) < MAX_LIGHT / 2
     assert _share(ball, TILES) == pytest.approx(_share(ball), rel=1e-9)
 
 

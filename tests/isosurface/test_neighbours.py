@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from stereocell.isosurface.neighbours import LEAST_KINSHIP, Neighbours, kinship
+from stereocell.isosurface.neighbours import MIN_KINSHIP, Neighbours, kinship
 
 SHAPE = (6, 160, 200)
 WIDE = (-1e9, 3.0, 1e9)
@@ -38,9 +38,9 @@ def test_noise_is_told_from_the_least_blur() -> None:
     none, shape = np.zeros((20, 200, 200), bool), (20, 200, 200)
     own = tuple(slice(0, n) for n in shape)
     noise = np.random.default_rng(9).poisson(0.1, shape).astype(np.uint8)
-    assert abs(kinship([Neighbours.of(noise, none, own, (0.0, 0.0, 10.0))])) < LEAST_KINSHIP
+    assert abs(kinship([Neighbours.of(noise, none, own, (0.0, 0.0, 10.0))])) < MIN_KINSHIP
     seen = noise + ndimage.gaussian_filter(noise.astype(np.float32), 0.6)
-    assert kinship([Neighbours.of(seen, none, own, (0.0, 0.0, 10.0))]) > 10 * LEAST_KINSHIP
+    assert kinship([Neighbours.of(seen, none, own, (0.0, 0.0, 10.0))]) > 10 * MIN_KINSHIP
 
 
 def test_lines_that_differ_hide_no_body() -> None:

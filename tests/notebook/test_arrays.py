@@ -10,7 +10,7 @@ import zarr
 from stereocell import open_volume
 from stereocell.model.errors import UsageError
 from stereocell.notebook.arrays import (
-    MOST_VOXELS,
+    MAX_VOXELS,
     as_source,
     find_blocks,
     is_array,
@@ -117,7 +117,7 @@ def test_a_large_array_is_made_coarser_as_cubes_where_that_can_be():
     source = as_source(dask.array.zeros((2, 100, 1000, 1000)), (2.0, 0.5, 0.5), None)
     z, y, x = find_blocks(source)
     assert (z, y, x) == (2, 8, 8)  # cubes of 4 um
-    assert 2 * 50 * 125 * 125 <= MOST_VOXELS < 2 * 100 * 143 * 143  # those of 3.5 um were too many
+    assert 2 * 50 * 125 * 125 <= MAX_VOXELS < 2 * 100 * 143 * 143  # those of 3.5 um were too many
     words = say_quality(source, (z, y, x))
     assert "2 x 8 x 8" in words
     assert "200,000,000" in words

@@ -27,7 +27,7 @@ ball, small = ((900 / (1 + np.exp(r - radius)) + 100).astype(np.uint16) for radi
 def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, capsys):
     made: dict = {}
     exec(BALLS, made)
-    monkeypatch.setattr(arrays, "MOST_VOXELS", 20_000)
+    monkeypatch.setattr(arrays, "MAX_VOXELS", 20_000)
     monkeypatch.setattr(arrays.find_blocks, "__defaults__", (20_000,))
     stack = np.stack([made["small"], made["ball"]])
     out = tmp_path / "out"

@@ -18,14 +18,14 @@ from stereocell.read import unmeasured
 from support.phantoms import write_ome_tiff, write_ome_zarr
 
 VOXELS = np.random.default_rng(0).normal(100, 20, (2, 12, 40, 36)).astype(np.float32)
-LEAST = (-3.5, 7.25)  # of the two channels, in one voxel each
+LOWEST = (-3.5, 7.25)  # of the two channels, in one voxel each
 
 
 def with_gaps() -> NDArray[np.float32]:
     voxels = VOXELS.copy()
     voxels[:, :, :9] = np.nan
     voxels[0, 3, 20, 5], voxels[0, 4, 21, 6] = np.inf, -np.inf
-    for channel, least in enumerate(LEAST):
+    for channel, least in enumerate(LOWEST):
         voxels[channel, 11, 30, 30] = least
     return voxels
 
@@ -54,7 +54,7 @@ def test_they_are_read_as_the_least_value_of_the_channel(
 ) -> None:
     voxels = with_gaps()
     dataset = read.open(write(tmp_path, voxels))
-    for channel, least in enumerate(LEAST):
+    for channel, least in enumerate(LOWEST):
         expected = np.where(np.isfinite(voxels[channel]), voxels[channel], np.float32(least))
         whole = dataset.read(channel, dataset.levels[0].box).voxels
         np.testing.assert_array_equal(whole, expected)
@@ -72,10 +72,10 @@ def test_levels_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_ome_zarr(tmp_path / "a.zarr", [fine, coarse], scales=scales)
     gap = Box((0, 0, 0), (1, 2, 2))
     dataset = read.open(path)
-    assert least > LEAST[0]
+    assert least > LOWEST[0]
     for level in (1, 0):
-        assert (dataset.read(0, gap, level).voxels == np.float32(LEAST[0])).all()
-    monkeypatch.setattr("stereocell.read.dataset.MOST_SEARCHED", fine.size - 1)
+        assert (dataset.read(0, gap, level).voxels == np.float32(LOWEST[0])).all()
+    monkeypatch.setattr("stereocell.read.dataset.MAX_SEARCHED", fine.size - 1)
     assert read.open(path).darkest(0) == least
 
 
@@ -83,7 +83,7 @@ def test_all_slabs_are_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     dataset = read.open(_zarr(tmp_path, with_gaps()))
     for slab_bytes in (1, 3000, 30_000):
         monkeypatch.setattr(unmeasured, "_SLAB_BYTES", slab_bytes)
-        assert unmeasured.least_finite(dataset.arrays[0], 0, 0) == LEAST[0]
+        assert unmeasured.least_finite(dataset.arrays[0], 0, 0) == LOWEST[0]
 
 
 def test_integers_are_not_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,7 +116,7 @@ def test_the_hand_of_a_map_goes_on_where_it_has_nan(tmp_path: Path) -> None:
         file.set_data(voxels)
         file.voxel_size = 10_000.0
     dataset = read.open(tmp_path / "a.mrc")
-    expected = np.where(np.isfinite(voxels), voxels, np.float32(LEAST[0]))[:, ::-1]
+    expected = np.where(np.isfinite(voxels), voxels, np.float32(LOWEST[0]))[:, ::-1]
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, expected)
 
 
@@ -124,4 +124,4 @@ def test_a_plain_tiff_of_doubles_is_read_so(tmp_path: Path) -> None:
     voxels = with_gaps()[0].astype(np.float64)
     tifffile.imwrite(tmp_path / "a.tif", voxels, photometric="minisblack")
     dataset = read.open(tmp_path / "a.tif", spacing_um=(1, 1, 1))
-    assert float(dataset.read(0, dataset.levels[0].box).voxels.min()) == LEAST[0]
+    assert float(dataset.read(0, dataset.levels[0].box).voxels.min()) == LOWEST[0]

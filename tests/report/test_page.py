@@ -353,8 +353,8 @@ def test_same_results_give_the_same_page(built: Path) -> None:
 def test_page_with_too_many_units_shows_some_and_says_so(
     built: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(page, "MOST_PICTURED", 4)
-    monkeypatch.setattr(page, "MOST_ROWS", 5)
+    monkeypatch.setattr(page, "MAX_PICTURED", 4)
+    monkeypatch.setattr(page, "MAX_ROWS", 5)
     html, parsed = _write(built)
     shown = sum(alt.startswith("Slices") for alt in parsed.alts)
     assert 0 < shown <= 4

@@ -243,7 +243,7 @@ def test_heights_fall(run: Run, errors: str, expected: list[float]) -> None:
 def test_tilesets_of_tilesets_are_followed(
     stage: Path, tmp_path: Path, imported: Import, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tiles3d, "MOST_WHOLE_TILES", 1)
+    monkeypatch.setattr(tiles3d, "MAX_WHOLE_TILES", 1)
     bundle = tmp_path / "many"
     write_bundle(stage, bundle, None, run=Engine(0).run)
     assert (bundle / "channels" / "CD31" / "r0_c0" / "finer.json").exists()

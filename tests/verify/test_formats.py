@@ -342,6 +342,18 @@ def test_a_table_that_is_too_short_and_rows_that_are_not_there_are_named(cells):
     assert "r0_c1: names rows beyond the 61" in detail
 
 
+def test_parts_of_a_column_that_are_others_than_stated_are_named(cells):
+    path = cells / "channels/cells/objects.json"
+    content = json.loads(path.read_text())
+    column = content["columns"][2]
+    column["parts"] = [column["exact"]["sha256"]]  # of all its rows, which are few
+    path.write_text(json.dumps(content))
+    assert lines(cells)["object tables"].ok
+    column["parts"] = ["0" * 64]
+    path.write_text(json.dumps(content))
+    assert "2_CD8.f32: parts have other SHA-256 than stated" in lines(cells)["object tables"].detail
+
+
 def test_a_column_that_is_damaged_is_named(cells):
     change_byte(cells / "channels/cells/objects/2_CD8.f32")
     assert "2_CD8.f32" in lines(cells)["hashes"].detail

@@ -26,7 +26,7 @@ const STYLE = /<link rel="stylesheet"[^>]* href="\.\/([^"]+\.css)"/;
 /** What is packed already gains nothing. */
 const SHRINKS = new Set([".js", ".css", ".html", ".json", ".svg", ".wasm", ".webmanifest"]);
 /** Less than a packet of the network. */
-const LEAST_BYTES = 1000;
+const MIN_BYTES = 1000;
 
 const gzipped = (bytes: Buffer) => promisify(gzip)(bytes, { level: 9 });
 const brotlied = (bytes: Buffer) =>
@@ -128,7 +128,7 @@ async function compressAll(folder: string): Promise<void> {
   const names = (await filesOf(folder)).filter((name) => SHRINKS.has(extname(name)));
   const compress = async (name: string) => {
     const bytes = await readFile(join(folder, name));
-    if (bytes.length < LEAST_BYTES) return;
+    if (bytes.length < MIN_BYTES) return;
     await writeFile(join(folder, `${name}.gz`), await gzipped(bytes));
     await writeFile(join(folder, `${name}.br`), await brotlied(bytes));
   };

@@ -13,7 +13,7 @@ import { MeshoptDecoder } from "meshoptimizer";
 import { bytesOf, packGlb, unpackGlb } from "./glb.mjs";
 
 const COMPRESSION = "EXT_meshopt_compression";
-const MOST_PROBLEMS = 5;
+const MAX_PROBLEMS = 5;
 
 // The validator doesn't know KHR_texture_basisu: the extension that allows image/ktx2.
 const KTX2_WARNINGS = new Set(["VALUE_NOT_IN_LIST", "IMAGE_UNRECOGNIZED_FORMAT"]);
@@ -92,6 +92,6 @@ async function check(path) {
 await MeshoptDecoder.ready;
 const results = [];
 for (const path of await json(process.stdin)) {
-  results.push({ path, problems: (await check(path)).slice(0, MOST_PROBLEMS) });
+  results.push({ path, problems: (await check(path)).slice(0, MAX_PROBLEMS) });
 }
 process.stdout.write(JSON.stringify(results));

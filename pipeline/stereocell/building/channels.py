@@ -16,8 +16,8 @@ ALL = "*"  # the key of settings by channel that stands for all that have none
 
 # Colours (linear RGB) of channels whose file names none, on a dark ground; blue stays nuclei's. Any
 # two differ by 10 (CIEDE2000, lightness for less: light changes it) to normal sight, without red
-# and without green (Machado et al., IEEE TVCG 15(6), 2009); the first three by 23. None is a pure
-# primary, which a screen can't shade.
+# and without green; the first three by 23. None is a pure primary, which a screen can't shade.
+# Source of the colour blindness: Machado et al., IEEE TVCG 15(6), 2009. doi:10.1109/TVCG.2009.113
 PALETTE = tuple(
     linear_color((code >> 16, code >> 8 & 255, code & 255))
     for code in (0x4F70F5, 0xF0CD3C, 0xB4566E, 0x92ECF6, 0xF6F0DC, 0xA0562C, 0x3F8CA0, 0xB4C078)

@@ -21,12 +21,12 @@ from stereocell.objects.label_rule import Kind, recognise
 from stereocell.read import Dataset
 
 _SIDE = 128  # voxels: largest edge of a block that is looked at
-_LEAST_SIDE = 32  # of many channels, whose blocks together are to be as those of _MOST
+_MIN_SIDE = 32  # of many channels, whose blocks together are to be as those of _MAX_CHANNELS
 _WIDE = 4  # bytes
-_MOST_EXACT = 2.0**53  # whole numbers below are exact as float64
+_MAX_EXACT = 2.0**53  # whole numbers below are exact as float64
 _FEW_VALUES = 8  # fewer tell nothing
 _IMAGE_S_PIECE = 7.5  # voxels of equal values in images (objects/label_rule.py), at most
-_MOST = 4  # channels that are looked at in blocks of _SIDE; most label maps come with fewer others
+_MAX_CHANNELS = 4  # looked at in blocks of _SIDE; most label maps come with fewer others
 
 
 def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, level: int) -> None:
@@ -50,7 +50,8 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
         for places in (region.start, region.stop)
     )
     finest = Box((z0, y0, x0), (z1, y1, x1))
-    side = max(_LEAST_SIDE, min(_SIDE, round(_SIDE * (_MOST / max(1, len(channels))) ** (1 / 3))))
+    share = _MAX_CHANNELS / max(1, len(channels))
+    side = max(_MIN_SIDE, min(_SIDE, round(_SIDE * share ** (1 / 3))))
     for index in channels:
         found = _look_at(dataset, index, finest, side)
         if found.kind == "labels":
@@ -126,7 +127,7 @@ def _whole_numbers(voxels: NDArray[Any]) -> NDArray[Any] | None:
     voxels = np.where(np.isnan(voxels), 0, voxels)
     if not np.isfinite(voxels).all() or (voxels % 1 != 0).any():
         return None
-    return voxels.astype(np.int64) if np.abs(voxels).max() < _MOST_EXACT else None
+    return voxels.astype(np.int64) if np.abs(voxels).max() < _MAX_EXACT else None
 
 
 def _blocks(region: Box, most: int) -> Iterator[Box]:

@@ -170,6 +170,13 @@ def _value_of(level: Level | float) -> float:
 def level_of_tile(
     plan: Plan, tile: Tile, found: Found, chosen: int, files: dict[str, str]
 ) -> TileIso:
+    """Return the level of one tile at the rung chosen for its channel, with the files it came from.
+
+    plan    its setting `isovalue.scope` says whether each tile has a level of its own
+    found   what the survey found of the channel
+    chosen  index into `found.rungs`
+    files   the tile's own results, relative to OUT, by what they hold
+    """
     if not found.rungs:
         return TileIso(None, 0.0, None, files)
     level, below = found.rungs[chosen], 0.0

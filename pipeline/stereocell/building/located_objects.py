@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stereocell.building.label_maps import Labels
 from stereocell.building.plan import Plan
-from stereocell.formats.gltf_features import MOST_OBJECTS
+from stereocell.formats.gltf_features import MAX_OBJECTS
 from stereocell.model.errors import UsageError
 from stereocell.model.tiling import Box
 from stereocell.objects.extents import Extents, merge_extents
@@ -150,10 +150,10 @@ def locate(
         {tile: part.labels for tile, part in parts.items()},
     )
     for id_ in tiles:
-        if (count := len(located.owned(id_))) > MOST_OBJECTS:
+        if (count := len(located.owned(id_))) > MAX_OBJECTS:
             raise UsageError(
                 f"{labels.name}: found {count:,} objects in tile {id_}, expected at most "
-                f"{MOST_OBJECTS:,}: give it more tiles (--grid COLUMNSxROWS)"
+                f"{MAX_OBJECTS:,}: give it more tiles (--grid COLUMNSxROWS)"
             )
     return located
 

@@ -10,7 +10,7 @@ from stereocell.building.plan import Plan
 from stereocell.isosurface.level import Level, clear_of
 from stereocell.isosurface.options import ADAPTIVE, RUNGS
 
-MOST = 3
+MAX_TOLD = 3
 LIKELY = 0.2  # confidence from which a doubtful rung goes before a level that was only moved
 # Shares of the contrast by which a level is moved where the ladder has no other
 _ASIDE = {"a little lower": -0.25, "a little higher": 0.25, "lower": -0.4, "higher": 0.4}
@@ -45,7 +45,7 @@ def find_other_levels(
     threshold: float | None,
     ends: tuple[float, float] | None,
 ) -> list[OtherLevel]:
-    """Return the next-best levels, at most MOST, best first; none for a channel without a ladder.
+    """Return the next-best levels, at most MAX_TOLD, best first; none where there is no ladder.
 
     ladder     all levels that were found; `subtracts`: above the background
     taken      the surface's level; None: there is no surface
@@ -78,7 +78,7 @@ def find_other_levels(
             near.append(taken)
         if all(abs(level.value - value) > _ALIKE * contrast for value in near):
             chosen.append(level)
-    return chosen[:MOST]
+    return chosen[:MAX_TOLD]
 
 
 def ends_of(values: Sequence[float]) -> tuple[float, float] | None:

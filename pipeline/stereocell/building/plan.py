@@ -29,7 +29,7 @@ from stereocell.model.tiling import Box, Tile, cut, cut_evenly
 # Largest window of a unit, at about 30 bytes a voxel: UNIT_VOXELS, or UNIT_TILES times its tile.
 UNIT_VOXELS = 1 << 27  # voxels
 UNIT_TILES = 8  # tiles
-LEAST_PLANES = 4  # smallest number of planes per axis of a tile that carry the surface
+MIN_PLANES = 4  # smallest number of planes per axis of a tile that carry the surface
 
 
 class LevelLike(Protocol):
@@ -95,7 +95,7 @@ class Plan:
         """Return how far apart planes lie, um, that carry a surface of at most surface.max_faces.
 
         Of a smooth surface every k-th plane along each axis leaves a k^2-th of the faces, of noise
-        less. Thinned are the axes whose planes lie nearest, as long as a tile keeps LEAST_PLANES
+        less. Thinned are the axes whose planes lie nearest, as long as a tile keeps MIN_PLANES
         and what a unit reads around it stays in proportion.
 
         faces  of voxels, of the surface in one tile
@@ -348,10 +348,10 @@ def _require_planes(settings: Settings, spacing_um: Sequence[float]) -> None:
     steps = _step_of(settings.surface.grid_um, spacing_um)
     for axis, n, k, h in zip("zyx", size, steps, spacing_um, strict=True):
         planes = -(-n // k)
-        if k > 1 and planes < LEAST_PLANES:
+        if k > 1 and planes < MIN_PLANES:
             raise UsageError(
                 f"surface.grid_um is {settings.surface.grid_um:g}, which leaves {planes} of the "
-                f"{n} planes along {axis} of a tile, {h:g} um apart: expected {LEAST_PLANES} or "
+                f"{n} planes along {axis} of a tile, {h:g} um apart: expected {MIN_PLANES} or "
                 "more of them: choose another --preset, or a smaller surface.grid_um"
             )
 

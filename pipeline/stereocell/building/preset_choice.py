@@ -18,7 +18,7 @@ _BY_MODALITY = {"MR": "mri", "CT": "ct"}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
 _PART_UM = 20_000.0  # um: of what is smaller across, presets of patients drop pieces half as large
 # of the voxels looked at so many lie this near to air, and 99 % below metal
-_AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MOST_HU = -1000.0, 150.0, 0.02, 4000.0
+_AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MAX_HU = -1000.0, 150.0, 0.02, 4000.0
 _PLANES = 8  # in the middle, that are looked at for Hounsfield units
 
 
@@ -93,4 +93,4 @@ def _has_hounsfield_units(dataset: Dataset) -> bool:
     middle = Box((first, 0, 0), (min(depth, first + _PLANES), height, width))
     voxels = dataset.read(0, middle).voxels
     is_air = np.abs(voxels - _AIR_HU) <= _AIR_SPREAD
-    return float(is_air.mean()) >= _AIR_SHARE and float(np.quantile(voxels, 0.99)) <= _MOST_HU
+    return float(is_air.mean()) >= _AIR_SHARE and float(np.quantile(voxels, 0.99)) <= _MAX_HU

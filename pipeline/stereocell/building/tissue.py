@@ -41,7 +41,7 @@ from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions, learn_tissue
 from stereocell.tissue.onnx_classifier import Network, apply_network
 
 LEVEL = 127.5  # iso-value, 0..255: probability 1/2
-MOST_VOXELS = 250_000_000  # largest region to learn in, voxels; about 40 bytes each
+MAX_VOXELS = 250_000_000  # largest region to learn in, voxels; about 40 bytes each
 # names and colours (linear RGB) of three classes in a head, by rising T1 intensity
 HEAD = (
     ("CSF", (0.03, 0.3, 1.0)),
@@ -94,9 +94,9 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     plan = without_tissue(out_folder.plan())
     channel = _find_channel(plan, request.channel)
     voxels = math.prod(plan.region.shape)
-    if voxels > MOST_VOXELS:
+    if voxels > MAX_VOXELS:
         raise UsageError(
-            f"tissue: the region holds {voxels:,} voxels, expected at most {MOST_VOXELS:,}: plan a "
+            f"tissue: the region holds {voxels:,} voxels, expected at most {MAX_VOXELS:,}: plan a "
             "coarser --level or a smaller --region"
         )
     network = None if request.model is None else Network.load(request.model)

@@ -4,7 +4,8 @@
     objects/            raw arrays: labels, boxes, and two files a column
 
 The viewer colours by one column at a time, so each is a file, of a byte an object: 20 000 objects
-are recoloured by 20 kB. The exact values lie beside it, for when they are read out.
+are recoloured by 20 kB. The exact values lie beside it, for when they are read out: by ranges of
+ROWS, so that one object's values of 20 columns don't take 20 files of 100 000.
 
 A byte's scale. 1 to 255 span the 0.1th to the 99.9th percentile, so that one wild value doesn't
 make all others equal. They lie evenly, or evenly in the logarithm where that shows more: all values
@@ -13,6 +14,7 @@ logarithm. Means of markers are such columns, shapes and places are not.
 """
 
 from dataclasses import asdict
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,7 @@ from stereocell.model.object_table import MISSING, Column, ObjectTable
 from stereocell.storage.json_files import compact_json
 
 OBJECTS = "objects.json"
+ROWS = 4096  # of a range of exact values: 16 kB
 _SPAN = (0.1, 99.9)  # percentiles that bytes 1 and 255 stand for
 _LOG_FROM = 10.0  # least ratio of the span's ends for a logarithmic scale
 
@@ -61,7 +64,10 @@ def write_objects(
         data, entry = _describe(column)
         # two IDs may differ by their case alone, and some disks don't tell such names apart
         entry["bytes"] = write(f"{i}_{column.id}.u8", data)
-        entry["exact"] = write(f"{i}_{column.id}.f32", column.values.astype("<f4"))
+        values = column.values.astype("<f4")
+        entry["exact"] = write(f"{i}_{column.id}.f32", values)
+        if count > ROWS:
+            entry["parts"] = hash_parts(values.tobytes())
         content["columns"].append(entry)
     if table.walls is not None:
         first, rows, order = _neighbours(table.walls, count)
@@ -74,6 +80,12 @@ def write_objects(
             content["neighbours"]["area_um2"] = write("neighbours_um2.f32", areas)
     index = write_file(root, f"{folder}/{OBJECTS}", compact_json(content))
     return index, [index, *files]
+
+
+def hash_parts(data: bytes) -> list[str]:
+    """Return the SHA-256 of each ROWS exact values of a column."""
+    size = ROWS * np.dtype("<f4").itemsize
+    return [sha256(data[at : at + size]).hexdigest() for at in range(0, len(data), size)]
 
 
 def _compact(rows: NDArray[np.int32]) -> dict[str, Any]:

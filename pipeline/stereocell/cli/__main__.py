@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _main(words: Sequence[str]) -> int:
     options = argparse.Namespace(json="--json" in words)  # until the arguments are parsed
     try:
-        options = _parser().parse_args(_with_their_flags(words))
+        options = _parser(words).parse_args(_with_their_flags(words))
         with answering_sigterm():
             return _run(options)
     except StereoCellError as error:
@@ -136,7 +136,8 @@ class _Parser(argparse.ArgumentParser):
         raise UsageError(f"{message}; `{self.prog} --help` says what there is")
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
+    """Return the parser of all commands; `words`: only of those among them the flags are needed."""
     parser = _Parser(
         prog="stereocell",
         description="Turn a multi-channel volume into a USD stage, a web bundle and a stereo view.",
@@ -153,7 +154,8 @@ def _parser() -> argparse.ArgumentParser:
             epilog=f"example: stereocell {example}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        declare(command)
+        if words is None or name in words:
+            declare(command)
         command.set_defaults(handler=handler, command=name)
         told = "one JSON object" if name not in ("view", "serve") else "JSON objects, one a line,"
         command.add_argument("--json", action="store_true", help=f"answer with {told} on stdout")

@@ -18,7 +18,7 @@ from stereocell.storage.processes import available_bytes, cores
 
 _GIB = 1 << 30
 UNIT_BYTES = 3.5 * _GIB  # memory planned for a unit of 194 x 512 x 512 voxels
-_LEAST_FREE = 20 * _GIB  # bytes of free disk
+_MIN_FREE = 20 * _GIB  # bytes of free disk
 _NODE = "20.19"  # oldest version of Node.js
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "open")
 
@@ -109,7 +109,7 @@ def _disk() -> Finding:
     free = shutil.disk_usage(Path.cwd()).free
     found = f"{free / _GIB:.1f} GiB free in this folder"
     cost = "a large build may not fit: some 0.2 GB for each tile of 194 x 512 x 512 and channel"
-    return _finding("disk", free >= _LEAST_FREE, found, cost)
+    return _finding("disk", free >= _MIN_FREE, found, cost)
 
 
 def _temporary() -> Finding:

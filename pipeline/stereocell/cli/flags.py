@@ -14,6 +14,7 @@ from stereocell.storage.processes import cores
 
 
 def declare_input(parser: argparse.ArgumentParser) -> None:
+    """Declare what is read, and the OUT folder that is written."""
     declare_source(parser)
     parser.add_argument(
         "-o", "--out", type=_place, required=True, help="folder of the results, or s3:// address"
@@ -21,6 +22,7 @@ def declare_input(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_slices(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `slices`."""
     declare_source(parser)
     parser.add_argument("-o", "--out", type=_place, required=True, help="folder of the pictures")
     parser.add_argument(
@@ -33,6 +35,7 @@ def declare_slices(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_source(parser: argparse.ArgumentParser) -> None:
+    """Declare INPUT and how it is read: series, channels, spacing, time."""
     parser.add_argument(
         "input",
         type=_named,
@@ -88,6 +91,7 @@ def _attribute(flag: str) -> str:
 
 
 def declare_workers(parser: argparse.ArgumentParser) -> None:
+    """Declare where tasks run: worker processes, or the address of a cluster."""
     parser.add_argument(
         "--workers",
         type=_worker_count,
@@ -103,6 +107,7 @@ def declare_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_out(parser: argparse.ArgumentParser) -> None:
+    """Declare OUT, an existing build."""
     parser.add_argument("out", type=_place, help="folder of a build, or its s3:// address")
 
 
@@ -224,6 +229,7 @@ def flags_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def declare_settings(parser: argparse.ArgumentParser) -> None:
+    """Declare presets, the settings file and a flag a setting."""
     from stereocell.building.settings import preset_names
 
     presets = ", ".join(preset_names())
@@ -234,11 +240,13 @@ def declare_settings(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_build(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `build`."""
     declare_input(parser)
     declare_workers(parser)
 
 
 def declare_iso(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `iso`."""
     declare_source(parser)
     parser.add_argument("--channel", required=True, metavar="X", help="by name or index, as CD31")
     parser.add_argument("--tile", required=True, help="as a build names it: r0_c0")
@@ -248,23 +256,27 @@ def declare_iso(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_units(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `units`."""
     declare_out(parser)
     declare_workers(parser)
     parser.add_argument("--only", metavar="TILE/CHANNEL", help="build one unit, as r0_c3/CD31")
 
 
 def declare_stage(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `stage`."""
     declare_out(parser)
     declare_workers(parser)
 
 
 def declare_bundle(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `bundle`."""
     declare_out(parser)
     declare_workers(parser)
     parser.add_argument("--stage", type=_file, help="an edited stage, instead of OUT/stage")
 
 
 def declare_check(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `check`."""
     declare_out(parser)
     declare_workers(parser)
     parser.add_argument(
@@ -278,6 +290,7 @@ def declare_check(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_tissue(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `tissue`."""
     declare_out(parser)
     declare_workers(parser)
     parser.add_argument(
@@ -297,6 +310,7 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_sample(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `sample`."""
     parser.add_argument("name", choices=["cycif", "brain-cells", "mri", "cells"])
     parser.add_argument("out", type=_place, metavar="OUT", help="file or folder to write")
     parser.add_argument(
@@ -313,11 +327,13 @@ def declare_sample(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_view(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `view`: those of `serve`, and the browser."""
     declare_serve(parser)
     parser.add_argument("--no-browser", action="store_true", help="don't open a browser")
 
 
 def declare_serve(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `serve`."""
     declare_out(parser)
     parser.add_argument("--port", type=_port, default=8000, help="default 8000; 0: any free one")
     parser.add_argument(
@@ -328,6 +344,7 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_export(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `export`."""
     declare_out(parser)
     parser.add_argument("file", type=_file, metavar="FILE", help="what to write, by its ending")
     parser.add_argument("--channels", type=_names, default=(), metavar="A,B", help="these alone")
@@ -392,6 +409,7 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_publish(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `publish`."""
     declare_out(parser)
     parser.add_argument(
         "target",

@@ -1,6 +1,6 @@
 """The whole specimen as one glTF file, metres, y up: a node a channel, below it one a tile.
 
-Of a label map each object is a node of its own, with its name, up to MOST_NODES of them; beyond
+Of a label map each object is a node of its own, with its name, up to MAX_NODES of them; beyond
 that a tile's objects are one mesh, in their colours.
 """
 
@@ -24,7 +24,7 @@ from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import specimen_name
 
-MOST_NODES = 5000  # objects; more of them take programs minutes to open
+MAX_NODES = 5000  # objects; more of them take programs minutes to open
 
 
 def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
@@ -37,7 +37,7 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
         document = Document(specimen_name(chosen.stage), buffers, extras)
         count = triangles = 0
         for piece in chosen.pieces(level):
-            is_split = count + len(piece.object_names) <= MOST_NODES
+            is_split = count + len(piece.object_names) <= MAX_NODES
             for name, mesh, more in _parts(piece, is_split):
                 positions = mesh.positions.astype(np.float64) * scale
                 where = {"tile": piece.tile, "channel": piece.channel.name, **more}

@@ -32,7 +32,7 @@ from stereocell.usd.read_stage import specimen_name
 
 HAND_M = 0.1  # longest edge of a specimen in print, if no --scale is given
 WALL_MM = 0.8  # two lines of the usual nozzle of 0.4 mm
-_MOST_TOLD = 8  # parts with thin bodies: of a label map there may be thousands
+_MAX_TOLD = 8  # parts with thin bodies: of a label map there may be thousands
 Color = tuple[float, float, float]
 
 
@@ -93,8 +93,8 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
     count = sum(len(body.triangles) for body in bodies)
     size = f"{x:.3g} x {y:.3g} x {z:.3g} {unit}, {scale:g} times the specimen"
     line = f"{counted(len(bodies), 'body', 'bodies')}, {count:,} triangles at lod{level}, {size}"
-    if len(thin) > _MOST_TOLD:
-        thin[_MOST_TOLD:] = [f"... and of {len(thin) - _MOST_TOLD} more parts"]
+    if len(thin) > _MAX_TOLD:
+        thin[_MAX_TOLD:] = [f"... and of {len(thin) - _MAX_TOLD} more parts"]
     return "\n".join([line, *thin])
 
 

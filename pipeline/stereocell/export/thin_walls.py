@@ -13,7 +13,7 @@ from stereocell.meshes.validity import label_components
 
 _RAYS = 33  # a body: an odd number, whose median is one of them
 _NAMED = 3  # bodies that are named with their places
-_MOST = 500  # bodies that are measured, the smallest: large ones are thick
+_MAX_BODIES = 500  # bodies that are measured, the smallest: large ones are thick
 
 
 def describe_thin(
@@ -36,7 +36,7 @@ def describe_thin(
     bodies = np.split(order, np.flatnonzero(np.diff(body_of[order])) + 1)
     bodies.sort(key=lambda rows: float(areas[rows].sum()))
     thin = []
-    for rows in bodies[:_MOST]:
+    for rows in bodies[:_MAX_BODIES]:
         # places that lie evenly over the area
         shares = (np.arange(_RAYS) + 0.5) / _RAYS * areas[rows].sum()
         picked = rows[np.searchsorted(np.cumsum(areas[rows]), shares).clip(max=len(rows) - 1)]

@@ -33,7 +33,7 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.version import GENERATOR
 
 _METRES_PER_UM = 1e-6
-_MOST_STEPS = 0xFFFF  # most steps along an axis: 16 bits
+_MAX_STEPS = 0xFFFF  # most steps along an axis: 16 bits
 _WANTED_STEPS = 1 << 14  # steps along an axis: a 20th of a voxel; more low bits don't compress
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5121, 5123, 5126
 AMBIENT_SHARE = 0.4  # share of ambient light in the viewer's room, about, 0..1
@@ -110,8 +110,8 @@ def encode_glb(
     lattice = steps.astype(np.int64)
     origin = lattice.min(axis=0)
     offsets = lattice - origin
-    if offsets.max() > _MOST_STEPS:
-        raise ValueError(f"{name} spans {offsets.max()} lattice steps, more than {_MOST_STEPS}")
+    if offsets.max() > _MAX_STEPS:
+        raise ValueError(f"{name} spans {offsets.max()} lattice steps, more than {_MAX_STEPS}")
     max_offset = offsets.max(axis=0)
 
     buffers = CompressedBuffers()

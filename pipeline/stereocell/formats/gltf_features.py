@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from stereocell.formats.meshopt import CompressedBuffers
 from stereocell.model.object_table import MISSING, Column, ObjectTable
 
-MOST_OBJECTS = 1 << 16  # in a file: 16 bits name them
-MOST_COLUMNS = 8  # in a file, besides the label
+MAX_OBJECTS = 1 << 16  # in a file: 16 bits name them
+MAX_COLUMNS = 8  # in a file, besides the label
 _LABEL = "label"
 _UNSIGNED_SHORT = 5123
 _NO_NUMBER = float(np.finfo(np.float32).min)  # stands for NaN, which JSON has not
@@ -33,14 +33,14 @@ class Features:
 
 
 def tile_features(table: ObjectTable, tile: str, wanted: tuple[str, ...] = ()) -> Features:
-    """Return a tile's objects, with `volume_um3` and the wanted columns, MOST_COLUMNS at most."""
+    """Return a tile's objects, with `volume_um3` and the wanted columns, MAX_COLUMNS at most."""
     rows = table.rows[tile]
     first = table.columns[0].id if table.columns else _LABEL
     names = [name for name in dict.fromkeys((first, *wanted)) if name != _LABEL]
     found = [column for name in names if (column := table.column(name)) is not None]
     columns = tuple(
         Column(c.id, c.name, c.values[rows], c.about, c.unit, c.categories, c.colors)
-        for c in found[:MOST_COLUMNS]
+        for c in found[:MAX_COLUMNS]
     )
     return Features(table.labels[rows], columns)
 
@@ -52,10 +52,10 @@ def require_whole(
     features: Features | None,
 ) -> None:
     """Raise ValueError where an object can't be named or isn't known, or a triangle is of two."""
-    if len(objects) and (objects.min() < 0 or objects.max() >= MOST_OBJECTS):
+    if len(objects) and (objects.min() < 0 or objects.max() >= MAX_OBJECTS):
         raise ValueError(
             f"{name} has objects {objects.min()} to {objects.max()}, and a file names "
-            f"{MOST_OBJECTS} at most: split the tile"
+            f"{MAX_OBJECTS} at most: split the tile"
         )
     if features is not None and len(objects) and objects.max() >= len(features.labels):
         raise ValueError(
@@ -79,10 +79,10 @@ def describe_features(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Store the table; return the primitive's EXT_mesh_features, and EXT_structural_metadata.
 
-    Raises ValueError for more than MOST_COLUMNS columns.
+    Raises ValueError for more than MAX_COLUMNS columns.
     """
-    if len(features.columns) > MOST_COLUMNS:
-        raise ValueError(f"{len(features.columns)} columns in a file, {MOST_COLUMNS} at most")
+    if len(features.columns) > MAX_COLUMNS:
+        raise ValueError(f"{len(features.columns)} columns in a file, {MAX_COLUMNS} at most")
     count = len(features.labels)
     is_wide = count > 0 and int(features.labels.max()) > np.iinfo(np.uint32).max
     labels = features.labels.astype("<u8" if is_wide else "<u4")

@@ -24,7 +24,7 @@ from stereocell.storage.atomic_write import replacing
 
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5121, 5123, 5125, 5126
 _VERTICES, _INDICES = 34962, 34963  # bufferView.target
-_MOST_BYTES = 2**32 - 1  # of a .glb, whose length is a number of 32 bits
+_MAX_BYTES = 2**32 - 1  # of a .glb, whose length is a number of 32 bits
 
 
 class Buffers(Protocol):
@@ -167,7 +167,7 @@ class Document:
                     return
                 text = _text(document)
                 length = 12 + 8 + len(text) + 8 + size
-                if length > _MOST_BYTES:
+                if length > _MAX_BYTES:
                     raise OutputError(
                         f"{path}: {length} bytes, more than a .glb can have: expected a coarser "
                         "--lod, fewer --tiles, or --compress meshopt"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 CHUNK = 64  # voxels, edge of a chunk
 QUANTIZATION_BITS = 16
-_MOST = (1 << QUANTIZATION_BITS) - 1
+_MAX_STEP = (1 << QUANTIZATION_BITS) - 1
 Encode = Callable[..., bytes]
 
 
@@ -116,13 +116,13 @@ def write_mesh(folder: Path, segment: int, levels: Sequence[Level], encode: Enco
     fragments, scales = [], [0.0]
     for number, level in enumerate(levels):
         cell = shape.astype(np.float64) * 2**number
-        steps = np.rint((level.positions - origin) / cell * _MOST)
+        steps = np.rint((level.positions - origin) / cell * _MAX_STEP)
         fragments.append(
             encode(
                 steps.astype(np.float32),
                 level.triangles,
                 quantization_bits=QUANTIZATION_BITS,
-                quantization_range=_MOST,
+                quantization_range=_MAX_STEP,
                 quantization_origin=[0.0, 0.0, 0.0],
             )
         )

@@ -33,7 +33,7 @@ _NM_PER_METRE = 1e9
 CONTENT_HASH = "sha-256-128"  # key in the extras of a content
 _CONTENT_HASH_BYTES = 16
 _ROOT_ERROR = 100.0  # diagonals of the channel: so large that readers always draw something
-MOST_WHOLE_TILES = 64  # most tiles that one file describes with all LODs: 59 kB with four each
+MAX_WHOLE_TILES = 64  # most tiles that one file describes with all LODs: 59 kB with four each
 TILESET = "tileset.json"
 _FINER = "finer.json"
 _UPWARDS = Context(prec=4, rounding=ROUND_CEILING)  # rounds up to four digits
@@ -69,7 +69,7 @@ def make_tilesets(tiles: Sequence[Sequence[TileLod]]) -> dict[str, bytes]:
 
     tiles  the LODs of each tile, finest first, at least one each
 
-    `tileset.json` describes up to MOST_WHOLE_TILES tiles alone; if there are more, it refers to the
+    `tileset.json` describes up to MAX_WHOLE_TILES tiles alone; if there are more, it refers to the
     other files. A coarser LOD never gets a smaller geometricError than a finer one, as readers
     require.
     """
@@ -81,7 +81,7 @@ def make_tilesets(tiles: Sequence[Sequence[TileLod]]) -> dict[str, bytes]:
     children = []
     for lods, box in zip(tiles, boxes, strict=True):
         folder = PurePosixPath(lods[0].uri).parent
-        if len(tiles) <= MOST_WHOLE_TILES or len(lods) == 1:
+        if len(tiles) <= MAX_WHOLE_TILES or len(lods) == 1:
             children.append(_nested(_levels(lods, box)))
             continue
         *finer, coarsest = _levels(lods, box)

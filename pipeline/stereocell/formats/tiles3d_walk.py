@@ -10,7 +10,7 @@ from stereocell.model.errors import CheckError
 from stereocell.storage.json_files import read_json
 
 _JSON = ".json"
-_MOST_CHARACTERS = 1024  # most characters of an address: no file system has longer names
+_MAX_CHARACTERS = 1024  # most characters of an address: no file system has longer names
 _REMEDY = "run `stereocell bundle OUT`"
 
 
@@ -79,8 +79,8 @@ def _walk_file(
             if "content" not in tile:
                 continue
             uri = tile["content"]["uri"]
-            if len(uri) > _MOST_CHARACTERS:
-                raise CheckError(f"{tileset}: {uri:.80}...: over {_MOST_CHARACTERS} characters")
+            if len(uri) > _MAX_CHARACTERS:
+                raise CheckError(f"{tileset}: {uri:.80}...: over {_MAX_CHARACTERS} characters")
             path = tileset.parent / uri
             place = _place(path)
             if not place.is_relative_to(bundle):

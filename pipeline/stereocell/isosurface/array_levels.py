@@ -9,7 +9,7 @@ from stereocell.filters.background import find_background
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level_evidence import (
-    MOST_PADDING,
+    MAX_PADDING,
     Counting,
     denoising_reach,
     find_padding,
@@ -59,7 +59,7 @@ def find_array_levels(
     field = denoise(volume, sigma)
     darkest: float | None = float(voxels.min())
     padding = find_padding(voxels, darkest, denoising_reach(sigma, spacing))
-    if padding.mean() > MOST_PADDING:
+    if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, scale_above, under = Scale.of(voxels, padding), None, None
     if modality not in _BODIES:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_LIGHT = 0.85  # share of the variance, beyond which all is light
+MAX_LIGHT = 0.85  # share of the variance, beyond which all is light
 _ONE_WAY = 1.25  # way up and down along z over its range, up to which the values only rise or fall
 _BLUR = 8  # planes averaged before that way is measured: noise goes up and down everywhere
 

@@ -44,15 +44,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.isosurface.axis_profiles import MOST_LIGHT, share_of_light
+from stereocell.isosurface.axis_profiles import MAX_LIGHT, share_of_light
 from stereocell.isosurface.edge_criteria import EdgeSums, choose_by_edges
-from stereocell.isosurface.level import MOST_RISE, Level, clear_of
+from stereocell.isosurface.level import MAX_RISE, Level, clear_of
 from stereocell.isosurface.level_evidence import Counting, Sums, TileEvidence, noise_edges
 from stereocell.isosurface.level_histogram import DIP, INSIDE, OUTSIDE, LevelHistogram, Scale
-from stereocell.isosurface.neighbours import LEAST_KINSHIP, kinship
+from stereocell.isosurface.neighbours import MIN_KINSHIP, kinship
 from stereocell.isosurface.options import IsoValueOptions
 
-LEAST_CONTRAST = 0.1  # share of the values' range: what a valley's level parts is more than this
+MIN_CONTRAST = 0.1  # share of the values' range: what a valley's level parts is more than this
 # A valley's level as sharp as this is none between two materials: by central differences a step
 # rises by half of itself a voxel. It lies in the blurred edge of something much brighter.
 FLANK = 0.6
@@ -65,7 +65,7 @@ AIR_DIP, DIM = 0.3, 0.25
 PADDING_SHARE = 0.5  # share of the outside's distance from padding within which padding is outside
 HALF_HEIGHTS = 3  # levels looked for above the last valley
 # voxels above a level: this share of all, within these bounds
-LEAST_SHARE, LEAST_VOXELS = 0.002, (100, 500)
+MIN_SHARE, MIN_VOXELS = 0.002, (100, 500)
 FEW_VOXELS = 100  # voxels below which nothing is said of a slope, or of a side of a level in a tile
 FEW_SHARE = 2e-3  # ... and share of a tile's voxels, where that is more
 WIDTH_SHARE = 0.05  # half of the range around a level, as a share of its contrast, judged there
@@ -75,7 +75,7 @@ TENTH = 0.1  # share of the contrast by which a level is moved to see what depen
 BRIGHTEST, ALIKE, NEAR = 0.95, 0.4, (0.75, 1.5)
 _TRIED, _BLUR = 128, 8  # levels, and the sigma that smooths their scores
 TILE_FACTOR = 2.0  # a tile's own level is at most so many times as high above the outside
-LEAST_NOISE = 1e-3  # share of the values' range: noise-free data is given so much
+MIN_NOISE = 1e-3  # share of the values' range: noise-free data is given so much
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,17 +111,17 @@ class ChannelLevels:
     @property
     def _nothing(self) -> str:
         """The reason why nothing is there, however clear levels look; empty: something may be."""
-        if self.kinship < LEAST_KINSHIP:
+        if self.kinship < MIN_KINSHIP:
             return (
                 "neighbouring voxels have nothing to do with one another, as in noise: their "
-                f"correlation is {self.kinship:z.3f}, expected at least {LEAST_KINSHIP:g}"
+                f"correlation is {self.kinship:z.3f}, expected at least {MIN_KINSHIP:g}"
             )
         first = next(iter(clear_of(self.ladder)), None)
         # a straight edge of tissue is a step along an axis too, but between two peaks
-        if self.light > MOST_LIGHT and first is not None and first.dip > DIP:
+        if self.light > MAX_LIGHT and first is not None and first.dip > DIP:
             return (
                 f"{self.light:.0%} of what varies lies along the axes alone, and in no valley, as "
-                f"light does and no body, expected at most {MOST_LIGHT:.0%}"
+                f"light does and no body, expected at most {MAX_LIGHT:.0%}"
             )
         return ""
 
@@ -318,7 +318,7 @@ class _Sight:
                 inside = min(inside, whole.above(valley.value).quantile(DIM))
             value = float(np.clip((inside + outside) / 2, valley.low, valley.high))
             level = (self.judge if is_air else self._refined)(value, part, valley.dip)
-            is_high = level.contrast >= LEAST_CONTRAST * span or (beneath and level.is_edge)
+            is_high = level.contrast >= MIN_CONTRAST * span or (beneath and level.is_edge)
             is_large = level.share * whole.total >= self._least_voxels
             if is_high and is_large and level.sharpness <= FLANK:
                 found.append(level)
@@ -331,8 +331,8 @@ class _Sight:
     @property
     def _least_voxels(self) -> float:
         """How many voxels a level must have above it."""
-        low, high = LEAST_VOXELS
-        return min(max(low, LEAST_SHARE * self.histogram.total), high)
+        low, high = MIN_VOXELS
+        return min(max(low, MIN_SHARE * self.histogram.total), high)
 
     def _half_heights(self, rest: LevelHistogram) -> list[Level]:
         """Return levels at half height, each of the voxels above the one before."""
@@ -401,8 +401,8 @@ class _Sight:
             stability=2 * high / max(1.0, low + high),
             share=self.histogram.above(value).total / self.histogram.total,
             # noise-free values have no slope beside
-            rise=min(slope / beside, MOST_RISE) if beside > 0 else MOST_RISE,
-            stands_out=min(slope / slope_outside, MOST_RISE) if slope_outside > 0 else MOST_RISE,
+            rise=min(slope / beside, MAX_RISE) if beside > 0 else MAX_RISE,
+            stands_out=min(slope / slope_outside, MAX_RISE) if slope_outside > 0 else MAX_RISE,
         )
 
     def _slope(self, value: float, width: float) -> float:
@@ -443,5 +443,5 @@ def _noise(tiles: Sequence[TileEvidence], scale: Scale, plain: Sums) -> float:
     median = float(np.interp(0.5 * sums[-1], sums, (edges[1:] + edges[:-1]) / 2))
     histogram = LevelHistogram(plain.counts.astype(np.float64), scale.edges())
     spread = histogram.quantile(0.99) - histogram.quantile(0.01) if histogram.total else 0.0
-    least = max(LEAST_NOISE * spread, 1e-9 * (scale.high - scale.low))
+    least = max(MIN_NOISE * spread, 1e-9 * (scale.high - scale.low))
     return max(1.4826 * median / 2**0.5, least) if sums[-1] else least

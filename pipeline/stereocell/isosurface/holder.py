@@ -25,7 +25,7 @@ from scipy import ndimage
 from stereocell.model.tiling import Box
 
 SKIN_HU = -300.0
-LEAST_HU = -500.0  # darkest voxel, at most: else the values are no Hounsfield units
+MIN_HU = -500.0  # darkest voxel, at most: else the values are no Hounsfield units
 _DEPTH_UM, _DEPTH_SHARE = 12_000.0, 0.1  # depth of a core; at most this share of the body's side
 _CORE_SHARE = 0.02  # of the largest core's voxels: arms and legs have cores of their own
 _SLACK = 1.5  # coarsest spacings that the body reaches beyond a core's depth
@@ -113,7 +113,7 @@ def find_holder(
     region      voxels of the level that is built
     """
     solid = voxels > SKIN_HU
-    if float(voxels.min()) > LEAST_HU or not solid.any():
+    if float(voxels.min()) > MIN_HU or not solid.any():
         return None
     spacing = np.asarray(spacing_um)
     (box,) = ndimage.find_objects(solid.astype(np.uint8))

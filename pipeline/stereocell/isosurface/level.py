@@ -6,10 +6,10 @@ from math import floor
 
 from stereocell.isosurface.level_histogram import DIP
 
-LEAST_SNR = 3.0  # contrast over noise of a clear level
-LEAST_SHARPNESS = 0.04  # share of the contrast that the finest spacing crosses at a clear level
-LEAST_SEPARATION = 0.70  # share of the variance between the groups at a level in no valley
-LEAST_STEEPNESS = 0.95  # ... unless the level lies on steeper slopes than there are in texture
+MIN_SNR = 3.0  # contrast over noise of a clear level
+MIN_SHARPNESS = 0.04  # share of the contrast that the finest spacing crosses at a clear level
+MIN_SEPARATION = 0.70  # share of the variance between the groups at a level in no valley
+MIN_STEEPNESS = 0.95  # ... unless the level lies on steeper slopes than there are in texture
 # ... and less again within a clear level, where something is for sure: bone in a head's skin, in
 # planes 5 mm apart, has .67, .11 and 157
 WITHIN = {"separation": 0.66, "sharpness": 0.08, "snr": 12.0}
@@ -19,7 +19,7 @@ WITHIN = {"separation": 0.66, "sharpness": 0.08, "snr": 12.0}
 EDGE_SNR, EDGE_STEEPNESS, EDGE_SHARPNESS = 6.0, 1.5, 0.4
 # Slope at a level over the least of the slopes at its inside and outside: where values rise evenly
 # through the volume, as light falls off, all three are the noise's
-LEAST_RISE, MOST_RISE = 1.35, 1000.0
+MIN_RISE, MAX_RISE = 1.35, 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,30 +80,30 @@ class Level:
     @property
     def doubt(self) -> str:
         """The reason why no surface can be relied on here; empty: one can."""
-        if self.snr < LEAST_SNR:
+        if self.snr < MIN_SNR:
             return (
                 f"at {self.value:.5g} inside and outside differ by {self.snr:.1f} times the noise, "
-                f"expected at least {LEAST_SNR:g}"
+                f"expected at least {MIN_SNR:g}"
             )
-        if self.sharpness < LEAST_SHARPNESS:
+        if self.sharpness < MIN_SHARPNESS:
             return (
                 f"at {self.value:.5g} the edges rise by {self.sharpness:.1%} of their height a "
-                f"voxel, expected at least {LEAST_SHARPNESS:.0%}"
+                f"voxel, expected at least {MIN_SHARPNESS:.0%}"
             )
-        if self.rise < LEAST_RISE:
+        if self.rise < MIN_RISE:
             return (
                 f"values rise evenly there: at {self.value:.5g} the slope is "
                 f"{floor(100 * self.rise) / 100:.2f} times that beside it, expected at least "
-                f"{LEAST_RISE:g}"
+                f"{MIN_RISE:g}"
             )
-        if self.dip <= DIP or self.separation >= LEAST_SEPARATION:
+        if self.dip <= DIP or self.separation >= MIN_SEPARATION:
             return ""
-        if self.steepness >= LEAST_STEEPNESS:
+        if self.steepness >= MIN_STEEPNESS:
             return ""
         return (
             f"no level parts two groups of voxels better than in noise: at {self.value:.5g} "
             f"{self.separation:.0%} of the variance lies between them, expected at least "
-            f"{LEAST_SEPARATION:.0%}"
+            f"{MIN_SEPARATION:.0%}"
         )
 
     @property

@@ -19,7 +19,7 @@ from stereocell.isosurface.level_histogram import BINS, Scale
 from stereocell.isosurface.neighbours import Neighbours
 from stereocell.isosurface.options import Criterion
 
-MOST_PADDING = 0.8  # share of the voxels: padding that covers more is the ground, without noise
+MAX_PADDING = 0.8  # share of the voxels: padding that covers more is the ground, without noise
 LAG = 4  # voxels along x between the two values whose difference is noise: beyond the denoising
 HALO = (1, 1, LAG)  # voxels (z, y, x) around a tile that its evidence reads
 NOISE_BINS = 1024

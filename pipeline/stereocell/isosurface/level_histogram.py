@@ -24,7 +24,7 @@ BINS = 4096
 INSIDE = 0.6  # quantile of the voxels above a level that is the height of the bodies
 OUTSIDE = 0.5  # quantile of the voxels below it that is the height of what surrounds them
 DARK = 0.05  # quantile that is the dark end, from which distances are measured in noise
-_LEAST = 0.001  # quantile that Li's threshold counts from: it wants values above 0
+_LOWEST_QUANTILE = 0.001  # quantile that Li's threshold counts from: it wants values above 0
 _FINE = 1 << 16  # even bins that values are put into first: faster than a hyperbolic sine of each
 _SPREAD = 90.0  # range over the distance from the middle at which bins begin to grow
 _STEPS = 200
@@ -150,7 +150,7 @@ class LevelHistogram:
 
     def li_threshold(self) -> float:
         """Return the level of least cross entropy (Li & Tam), in voxel values."""
-        least = self.quantile(_LEAST)
+        least = self.quantile(_LOWEST_QUANTILE)
         values = np.maximum(self.centres - least, 1e-6)
         level = float(np.average(values, weights=self.counts))
         for _ in range(_STEPS):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-LEAST_KINSHIP = 0.01  # correlation below which there is nothing but noise
+MIN_KINSHIP = 0.01  # correlation below which there is nothing but noise
 _Slices = tuple[slice, slice, slice]
 
 

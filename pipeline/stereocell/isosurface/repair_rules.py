@@ -27,7 +27,7 @@ from stereocell.model.settings import AUTO
 
 SHARE = 0.5  # share of a mean below which a fragment goes
 ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
-LEAST_ALPHA = 1.0  # least alpha in coarsest spacings: nearer voxels have no gap between them
+MIN_ALPHA = 1.0  # least alpha in coarsest spacings: nearer voxels have no gap between them
 OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 
 
@@ -107,7 +107,7 @@ def choose_repair(
             diagonal = sum(tile["kept_diagonal_um"] for tile in sums) / kept
             faces /= kept
             alpha = ALPHA_SIDES * diagonal / faces**0.5
-        least = LEAST_ALPHA * max(spacing_um)
+        least = MIN_ALPHA * max(spacing_um)
         options = replace(options, alpha_um=min(max(alpha, least), most.alpha_um))
     wraps_triangles = surface.wrap == "alpha-wrap"  # that wrap knows no offset of 0
     if surface.offset_um == AUTO or (wraps_triangles and not options.offset_um):

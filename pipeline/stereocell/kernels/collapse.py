@@ -34,7 +34,7 @@ from stereocell.kernels.triangles import Points, closest, doubled_area, smallest
 CLASSES = 6  # of cost
 PASSES = 4  # over one class; the last class has LAST
 LAST = 40
-MOST = 512  # neighbours of a vertex that is looked at
+MAX_NEIGHBOURS = 512  # neighbours of a vertex that is looked at
 NEVER = 32000  # class of a vertex that has no collapse
 TURN = 0.25  # squared cosine of the largest turn of a triangle: 60 degrees
 SLIVER = 0.9945  # cosine of 6 degrees: the normal of a sharper triangle says little
@@ -54,6 +54,15 @@ def price_of(quadrics: Points, u: int, at: Points, v: int) -> float:
 
 @part
 def sum_planes(at: Points, corner: Ints, errors: Points, quadrics: Points) -> None:
+    """Add each triangle's plane, weighted by its doubled area, to its corners' quadrics.
+
+    at        float64 (n, 3)
+    corner    int32 (3 m,), three a triangle
+    errors    float64 (n,), largest allowed distance of each vertex from its planes
+    quadrics  float64 (n, 11), written
+    Source: Garland & Heckbert, "Surface simplification using quadric error metrics",
+    SIGGRAPH 1997. doi:10.1145/258734.258849
+    """
     for t in range(len(corner) // 3):
         a, b, c = corner[3 * t], corner[3 * t + 1], corner[3 * t + 2]
         x, y, z = doubled_area(at, a, b, c)
@@ -92,6 +101,7 @@ def _cheapest(
 
 @part
 def class_of(price: float) -> int:
+    """Return the class of cost of a price, a squared distance in squared bounds; NEVER above 1."""
     return int(np.sqrt(price) * CLASSES) if price <= 1 else NEVER
 
 
@@ -230,8 +240,8 @@ def collapse(
             cost[u] = class_of(_cheapest(quadrics, u, at, leaving, twins, corner))
     away, stamp, tick = np.zeros(n), np.zeros(n, np.int32), 0
     touched, turn = np.zeros(n, np.int32), 0
-    ring, out = np.empty(MOST, np.int32), np.empty(MOST, np.int32)
-    price, order = np.empty(MOST), np.empty(MOST, np.int32)
+    ring, out = np.empty(MAX_NEIGHBOURS, np.int32), np.empty(MAX_NEIGHBOURS, np.int32)
+    price, order = np.empty(MAX_NEIGHBOURS), np.empty(MAX_NEIGHBOURS, np.int32)
     waiting = np.empty(n, np.int32)
     for k in range(CLASSES + 1):
         for _ in range(PASSES if k < CLASSES else LAST):
@@ -247,7 +257,7 @@ def collapse(
                 # the neighbours, in order of price
                 size, h, worst = 0, leaving[u], 0.0
                 bx, by, bz = 0.0, 0.0, 0.0
-                while size < MOST:
+                while size < MAX_NEIGHBOURS:
                     v = corner[following(h)]
                     ring[size], out[size] = v, h
                     price[size] = price_of(quadrics, u, at, v)

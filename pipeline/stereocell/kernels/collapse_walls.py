@@ -39,18 +39,18 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints, following, preceding
 from stereocell.kernels.triangles import Points, closest, doubled_area, smallest_angle_cosine
 
-MOST = 96  # triangles of a vertex that is looked at
+MAX_TRIANGLES = 96  # triangles of a vertex that is looked at
 WITHIN, ON_LINE, CORNER = 0, 1, 2
 
 
 @part
 def list_around(u: int, first: Ints, after: Ints, gone: NDArray[np.bool_], out: Ints) -> int:
-    """Write the corners of the triangles round u; return how many: MOST + 1, if there are more."""
+    """Write the corners of the triangles round u; return how many, at most MAX_TRIANGLES + 1."""
     size, c = 0, first[u]
     while c >= 0:
         if not gone[c // 3]:
-            if size == MOST:
-                return MOST + 1
+            if size == MAX_TRIANGLES:
+                return MAX_TRIANGLES + 1
             out[size] = c
             size += 1
         c = after[c]
@@ -203,13 +203,13 @@ def find_orders(triangles: Ints, n: int) -> NDArray[np.int8]:
     """Return where each of n vertices is: within a wall, on a line, or in a corner (n,)."""
     corner, gone = triangles.copy().ravel(), np.zeros(len(triangles), np.bool_)
     first, after = link_corners(n, corner)
-    out, seen = np.empty(MOST, np.int32), np.empty(2 * MOST, np.int32)
-    ring, shared = np.empty(2 * MOST, np.int32), np.empty(2 * MOST, np.int32)
+    out, seen = np.empty(MAX_TRIANGLES, np.int32), np.empty(2 * MAX_TRIANGLES, np.int32)
+    ring, shared = np.empty(2 * MAX_TRIANGLES, np.int32), np.empty(2 * MAX_TRIANGLES, np.int32)
     slot, stamp = np.zeros(n, np.int32), np.zeros(n, np.int32)
     order_of = np.full(n, CORNER, np.int8)
     for u in range(n):
         size = list_around(u, first, after, gone, out)
-        if 0 < size <= MOST:
+        if 0 < size <= MAX_TRIANGLES:
             count = list_ring(size, out, corner, ring, shared, slot, stamp, u + 1)
             order_of[u] = find_order(size, out, corner, shared, count, slot, seen)
     return order_of
@@ -246,10 +246,10 @@ def collapse_walls(
     corner = result.ravel()
     gone = np.zeros(m, np.bool_)
     first, after = link_corners(n, corner)
-    out, out_v = np.empty(MOST, np.int32), np.empty(MOST, np.int32)
-    ring, shared = np.empty(2 * MOST, np.int32), np.empty(2 * MOST, np.int32)
-    ring_v, shared_v = np.empty(2 * MOST, np.int32), np.empty(2 * MOST, np.int32)
-    seen = np.empty(2 * MOST, np.int32)
+    out, out_v = np.empty(MAX_TRIANGLES, np.int32), np.empty(MAX_TRIANGLES, np.int32)
+    ring, shared = np.empty(2 * MAX_TRIANGLES, np.int32), np.empty(2 * MAX_TRIANGLES, np.int32)
+    ring_v, shared_v = np.empty(2 * MAX_TRIANGLES, np.int32), np.empty(2 * MAX_TRIANGLES, np.int32)
+    seen = np.empty(2 * MAX_TRIANGLES, np.int32)
     slot, stamp, tick = np.zeros(n, np.int32), np.zeros(n, np.int32), 0
     slot_v, stamp_v, tick_v = np.zeros(n, np.int32), np.zeros(n, np.int32), 0
     quadrics = np.zeros((n, 11))
@@ -275,14 +275,14 @@ def collapse_walls(
             steps += 1
             continue
         differs[u] = differs[v] = True
-        for k in range(min(size, MOST)):
+        for k in range(min(size, MAX_TRIANGLES)):
             differs[corner[following(out[k])]] = differs[corner[preceding(out[k])]] = True
     cost = np.full(n, NEVER, np.int16)
     for u in range(n):
         if not differs[u] or order_of[u] == CORNER or locked[u]:
             continue
         size = list_around(u, first, after, gone, out)
-        if not 0 < size <= MOST:
+        if not 0 < size <= MAX_TRIANGLES:
             continue
         tick += 1
         count = list_ring(size, out, corner, ring, shared, slot, stamp, tick)
@@ -290,7 +290,7 @@ def collapse_walls(
             if order_of[u] == WITHIN or shared[j] != 2:
                 cost[u] = min(cost[u], class_of(price_of(quadrics, u, at, ring[j])))
     touched, turn = np.zeros(n, np.int32), 0
-    price, order = np.empty(2 * MOST), np.empty(2 * MOST, np.int32)
+    price, order = np.empty(2 * MAX_TRIANGLES), np.empty(2 * MAX_TRIANGLES, np.int32)
     waiting = np.empty(n, np.int32)
     for k in range(CLASSES + 1):
         for _ in range(PASSES if k < CLASSES else LAST):
@@ -304,7 +304,7 @@ def collapse_walls(
                 if touched[u] == turn or cost[u] > k:
                     continue
                 size = list_around(u, first, after, gone, out)
-                if not 0 < size <= MOST:
+                if not 0 < size <= MAX_TRIANGLES:
                     cost[u] = NEVER
                     continue
                 tick += 1
@@ -339,7 +339,7 @@ def collapse_walls(
                         break
                     v = ring[o]
                     size_v = list_around(v, first, after, gone, out_v)
-                    if size_v > MOST:
+                    if size_v > MAX_TRIANGLES:
                         continue
                     tick_v += 1
                     count_v = list_ring(

@@ -7,7 +7,7 @@ along the curve in which the plane cuts the surface: each side by itself is as s
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.collapse import MOST, VALENCE, count_common, join, keeps_form
+from stereocell.kernels.collapse import MAX_NEIGHBOURS, VALENCE, count_common, join, keeps_form
 from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import (
     Ints,
@@ -102,7 +102,7 @@ def thin_rim(
     target = np.arange(n).astype(np.int32)
     touched, turn = np.zeros(n, np.int32), 0
     stamp, tick = np.zeros(n, np.int32), 0
-    ring, out = np.empty(MOST, np.int32), np.empty(MOST, np.int32)
+    ring, out = np.empty(MAX_NEIGHBOURS, np.int32), np.empty(MAX_NEIGHBOURS, np.int32)
     for step in range(1, STEPS + 1):
         bound = error * step / STEPS
         for _ in range(PASSES):
@@ -113,7 +113,7 @@ def thin_rim(
                 size, h, worst, curve = 0, leaving[u], 0.0, 0
                 bx, by, bz = 0.0, 0.0, 0.0
                 first, second = -1, -1  # half-edges along the curve
-                while size < MOST:
+                while size < MAX_NEIGHBOURS:
                     v, last = corner[following(h)], corner[preceding(h)]
                     ring[size], out[size] = v, h
                     worst = max(worst, smallest_angle_cosine(at, u, v, last))

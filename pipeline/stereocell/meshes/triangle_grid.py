@@ -13,7 +13,7 @@ Ints = NDArray[np.int32]
 EDGE = 1.5  # of a cell, in lengths of the median side of a triangle
 ENTRIES = 12  # cells that a triangle may lie in, on average: large ones among small ask for more
 CELLS = 16  # a triangle, at most: a mesh fills little of its box
-FEWEST, MOST = 4096, 16_000_000  # cells, at most
+MIN_CELLS, MAX_CELLS = 4096, 16_000_000  # cells, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def make_grid(positions: Points, triangles: Ints) -> TriangleGrid:
     edge = EDGE * float(np.median(sides))
     if edge <= 0:
         edge = float(extent.max()) or 1.0
-    most = min(max(CELLS * len(triangles), FEWEST), MOST)
+    most = min(max(CELLS * len(triangles), MIN_CELLS), MAX_CELLS)
     while np.prod(np.floor(extent / edge) + 1) > most:
         edge *= 1.25
     while count_entries(low, high, origin, edge) > ENTRIES * len(triangles):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_CATEGORIES = 255  # of a column; a column of more words is left out, and said so
+MAX_CATEGORIES = 255  # of a column; a column of more words is left out, and said so
 MISSING = -1  # the code of an object without a category
 
 

@@ -20,9 +20,9 @@ from stereocell.read.spacing import um_per
 
 Triple = tuple[float, float, float]
 
-MOST_VOXELS = 4_000_000  # of all channels: a build of as many takes half a minute on two cores
-_MOST_READ = 2**30  # voxels: more take minutes to read
-_LEAST_EDGE = 4  # voxels: a thinner array has no surface
+MAX_VOXELS = 4_000_000  # of all channels: a build of as many takes half a minute on two cores
+_MAX_READ = 2**30  # voxels: more take minutes to read
+_MIN_EDGE = 4  # voxels: a thinner array has no surface
 _AXES = {3: "zyx", 4: "czyx"}
 _READ_AT_ONCE = 2**24  # voxels
 
@@ -76,15 +76,15 @@ def as_source(
         raise UsageError(
             f"the array's axes are {', '.join(dims)}, expected {', '.join(axes)}: transpose it"
         )
-    if min(shape[-3:]) < _LEAST_EDGE:
+    if min(shape[-3:]) < _MIN_EDGE:
         raise UsageError(
-            f"the array is {size}, expected {_LEAST_EDGE} voxels or more along z, y and x"
+            f"the array is {size}, expected {_MIN_EDGE} voxels or more along z, y and x"
         )
     if array.dtype.kind not in "buif":
         raise UsageError(f"the array's type is {array.dtype}, expected whole numbers or fractions")
-    if prod(shape) > _MOST_READ:
+    if prod(shape) > _MAX_READ:
         raise UsageError(
-            f"the array is {size}, {prod(shape):,} voxels, more than the {_MOST_READ:,} that a "
+            f"the array is {size}, {prod(shape):,} voxels, more than the {_MAX_READ:,} that a "
             "notebook reads: save it as OME-Zarr, run `stereocell build scan.ome.zarr -o out`, and "
             "show out; or show a part of it"
         )
@@ -147,7 +147,7 @@ def _names_of(array: Any, count: int) -> list[str]:
     return [f"channel {i + 1}" for i in range(count)]
 
 
-def find_blocks(source: ArraySource, most: int = MOST_VOXELS) -> tuple[int, int, int]:
+def find_blocks(source: ArraySource, most: int = MAX_VOXELS) -> tuple[int, int, int]:
     """Return the voxels (z, y, x) that become one, so that at most so many are left.
 
     The edges of the new voxels grow step by step until few enough are left: where those of the
@@ -155,7 +155,7 @@ def find_blocks(source: ArraySource, most: int = MOST_VOXELS) -> tuple[int, int,
     """
     count, *shape = source.shape
     finest = min(source.spacing_um)
-    widest = [max(1, n // _LEAST_EDGE) for n in shape]
+    widest = [max(1, n // _MIN_EDGE) for n in shape]
     for step in range(1, max(widest) * ceil(max(source.spacing_um) / finest) + 1):
         edge = step * finest * (1 + 1e-9)
         z, y, x = (
@@ -175,7 +175,7 @@ def say_quality(source: ArraySource, blocks: tuple[int, int, int]) -> str:
     voxels = prod(source.shape)
     return (
         f"means of {' x '.join(str(b) for b in blocks)} voxels (z, y, x): the array has "
-        f"{voxels:,}, and of at most {MOST_VOXELS:,} a build is quick; quality='full' takes all"
+        f"{voxels:,}, and of at most {MAX_VOXELS:,} a build is quick; quality='full' takes all"
     )
 
 

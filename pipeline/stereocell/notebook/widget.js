@@ -4,7 +4,7 @@
 /** The page's files, for all widgets; and files of bundles, for a view that comes again. */
 const pages = new Map();
 const kept = new Map();
-const MOST_KEPT = 64 * 2 ** 20;
+const MAX_KEPT = 64 * 2 ** 20;
 let keptBytes = 0;
 /** Of the state, what goes both ways. */
 const SHARED = ["link", "channels", "view", "picked"];
@@ -62,7 +62,7 @@ function keep(key, answer) {
   keptBytes += answer.bytes.length;
   kept.set(key, answer);
   for (const [oldest, { bytes }] of kept) {
-    if (keptBytes <= MOST_KEPT) return;
+    if (keptBytes <= MAX_KEPT) return;
     keptBytes -= bytes.length;
     kept.delete(oldest);
   }

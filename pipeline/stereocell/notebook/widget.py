@@ -26,7 +26,7 @@ from stereocell.notebook.shared_state import (
 
 _HERE = Path(__file__).parent
 _PNG = b"\x89PNG\r\n\x1a\n"
-_MOST_PICTURE = 4 * 2**20  # bytes: a notebook with larger ones is slow to open
+_MAX_PICTURE = 4 * 2**20  # bytes: a notebook with larger ones is slow to open
 _VIEW = "application/vnd.jupyter.widget-view+json"
 
 
@@ -135,7 +135,7 @@ class Viewer(anywidget.AnyWidget):
                 self.send({**about, "status": status}, [found])
             case "picture":
                 png = bytes(buffers[0]) if buffers else b""
-                if png.startswith(_PNG) and len(png) <= _MOST_PICTURE:
+                if png.startswith(_PNG) and len(png) <= _MAX_PICTURE:
                     self._picture = png
                     if self._display_id:
                         update_display(**self._shown(), raw=True, display_id=self._display_id)

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Kind = Literal["image", "mask", "labels"]
-LEAST_EQUAL = 0.8  # share of equal pairs, of a label map of any shape
-LEAST_BY_AXIS = 0.5  # the same along each axis
-LEAST_VOXELS = 20.0  # mean voxels of a component
-MOST_PIECES = 1.2  # components of a value, of a map of whole objects
-LEAST_OBJECTS = 8  # values from which whole objects are enough
+MIN_EQUAL = 0.8  # share of equal pairs, of a label map of any shape
+MIN_BY_AXIS = 0.5  # the same along each axis
+MIN_VOXELS = 20.0  # mean voxels of a component
+MAX_PIECES = 1.2  # components of a value, of a map of whole objects
+MIN_OBJECTS = 8  # values from which whole objects are enough
 ONE_OFF = 0.5  # share of the unequal pairs that differ by 1: a smooth image of many levels
 MANY_LEVELS = 32
 _NO_LABELS = 0.5  # share of equal pairs below which components are not looked for
@@ -61,7 +61,7 @@ def recognise(voxels: NDArray[Any]) -> LabelEvidence:
     # as small numbers, with 0 for the ground
     compact = 1 + places.reshape(voxels.shape).astype(np.uint32)
     compact[voxels == 0] = 0
-    if values > LEAST_OBJECTS:  # of a few classes each counts
+    if values > MIN_OBJECTS:  # of a few classes each counts
         compact[voxels == found[counts.argmax()]] = 0
     pairs, equal, one_off = np.zeros(3), np.zeros(3), 0
     for axis in range(3):
@@ -77,12 +77,12 @@ def recognise(voxels: NDArray[Any]) -> LabelEvidence:
     unequal = float((pairs - equal).sum())
     is_smooth = values > MANY_LEVELS and one_off >= ONE_OFF * unequal
     _, pieces = cc3d.connected_components(compact, connectivity=6, return_N=True)
-    are_large = np.count_nonzero(compact) >= LEAST_VOXELS * pieces
+    are_large = np.count_nonzero(compact) >= MIN_VOXELS * pieces
     by_axis = equal / np.maximum(pairs, 1)
-    are_even = equal.sum() >= LEAST_EQUAL * pairs.sum() and bool(
-        (by_axis[pairs > 0] >= LEAST_BY_AXIS).all()
+    are_even = equal.sum() >= MIN_EQUAL * pairs.sum() and bool(
+        (by_axis[pairs > 0] >= MIN_BY_AXIS).all()
     )
-    are_whole = pieces <= MOST_PIECES * values and values >= LEAST_OBJECTS
+    are_whole = pieces <= MAX_PIECES * values and values >= MIN_OBJECTS
     is_labels = are_large and not is_smooth and (are_even or are_whole)
     return LabelEvidence("labels" if is_labels else "image", values, int(pieces))
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.identifiers import to_identifier
-from stereocell.model.object_table import MISSING, MOST_CATEGORIES, Column, ObjectTable
+from stereocell.model.object_table import MAX_CATEGORIES, MISSING, Column, ObjectTable
 from stereocell.model.unit import ObjectFacts
 from stereocell.objects.intensities import merge_quantiles
 
@@ -116,11 +116,11 @@ def number_column(name: str, values: NDArray[np.float64], about: str) -> Column:
 def category_column(
     name: str, texts: Sequence[str], about: str, colors: Mapping[str, Triple] | None = None
 ) -> Column | None:
-    """Return a column of words; None: of more than MOST_CATEGORIES. An empty one is missing."""
+    """Return a column of words; None: of more than MAX_CATEGORIES. An empty one is missing."""
     words = sorted({text for text in texts if text})
     if not words:  # nobody has any: nothing is known
         return Column(to_identifier(name), name, np.full(len(texts), np.nan, np.float32), about)
-    if len(words) > MOST_CATEGORIES:
+    if len(words) > MAX_CATEGORIES:
         return None
     code = {word: float(place) for place, word in enumerate(words)}
     values = np.array([code.get(text, float(MISSING)) for text in texts], np.float32)

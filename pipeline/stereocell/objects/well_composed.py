@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.critical import find_critical
 
-MOST_SHARE = 0.03  # of an object's voxels that may change
-MOST_OF_SMALL = 4  # voxels that may change, of however small an object
+MAX_SHARE = 0.03  # of an object's voxels that may change
+MAX_OF_SMALL = 4  # voxels that may change, of however small an object
 _ROUNDS = 60
 _AT_ONCE = 1 << 20  # places of a round
 _AGAIN = 1000  # neighbours that a voxel needs more, to change a second time
@@ -30,7 +30,7 @@ def make_well_composed(
 
     labels  int32 (z, y, x), 0 outside; two voxels at each end of each axis are 0
 
-    Objects that would change by more than MOST_SHARE, as shells and threads of one voxel do, are
+    Objects that would change by more than MAX_SHARE, as shells and threads of one voxel do, are
     taken out: int32 (n,), ascending. Their voxels count as outside, and not as changed.
 
     >>> labels = np.zeros((7, 7, 7), np.int32)
@@ -93,11 +93,11 @@ def _best_change(
 
 
 def _find_thin(labels: NDArray[np.int32], mended: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the objects that have changed by more than MOST_SHARE (n,)."""
+    """Return the objects that have changed by more than MAX_SHARE (n,)."""
     where = labels != mended
     size = int(labels.max()) + 1
     voxels = np.bincount(labels.ravel(), minlength=size)
     moved = np.bincount(labels[where], minlength=size) + np.bincount(mended[where], minlength=size)
-    most = np.maximum(MOST_SHARE * voxels, MOST_OF_SMALL)
+    most = np.maximum(MAX_SHARE * voxels, MAX_OF_SMALL)
     found = np.flatnonzero(moved > most)
     return found[found > 0].astype(np.int32)

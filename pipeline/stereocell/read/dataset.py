@@ -27,7 +27,7 @@ from stereocell.storage.library_errors import one_line
 __all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
 
 
-MOST_SEARCHED = 2_000_000_000  # voxels of a level that are searched for the smallest: as a plan has
+MAX_SEARCHED = 2_000_000_000  # voxels of a level that are searched for the smallest: as a plan has
 MAX_VALUE = 1e30  # largest voxel value: squares and differences of larger ones overflow float32
 
 
@@ -217,12 +217,12 @@ class Dataset:
     def darkest(self, channel: int) -> float:
         """Return the smallest finite voxel of a channel, which stands for gaps at all its levels.
 
-        It is that of the finest level of MOST_SEARCHED voxels at most, whose averages the coarser
+        It is that of the finest level of MAX_SEARCHED voxels at most, whose averages the coarser
         ones are. All of it is read, at the first call. Raises SourceError where a chunk can't be
         decoded or no voxel is finite.
         """
         if channel not in self._darkest:
-            small = (i for i, one in enumerate(self.levels) if prod(one.shape) <= MOST_SEARCHED)
+            small = (i for i, one in enumerate(self.levels) if prod(one.shape) <= MAX_SEARCHED)
             level = next(small, len(self.levels) - 1)
             where = f"{self.shown}: channel {self.channels[channel].name!r}, level {level}"
             with one_line(where, "chunks that are whole"):

@@ -10,7 +10,7 @@ from stereocell.model.object_notes import ObjectNotes
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset
 
-_MOST_EXACT = 2.0**53  # whole numbers below are exact as float64
+_MAX_EXACT = 2.0**53  # whole numbers below are exact as float64
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class LabelMap:
 
     def _whole(self, stored: NDArray[np.floating]) -> NDArray[np.int64]:
         numbers = np.where(np.isnan(stored), 0, stored)
-        is_whole = (np.abs(numbers) < _MOST_EXACT) & (np.floor(numbers) == numbers)
+        is_whole = (np.abs(numbers) < _MAX_EXACT) & (np.floor(numbers) == numbers)
         if not is_whole.all():
             found = float(numbers[~is_whole][0])
             raise SourceError(f"{self._where}: found {found:g}, expected whole numbers in labels")

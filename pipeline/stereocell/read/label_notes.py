@@ -11,8 +11,8 @@ from typing import Any
 from stereocell.model.color import linear_color
 from stereocell.model.object_notes import ObjectNotes
 
-_MOST_LABELS = 1_000_000  # objects of which notes are taken
-_MOST_XML = 1 << 22  # bytes of a header extension that is parsed
+_MAX_LABELS = 1_000_000  # objects of which notes are taken
+_MAX_XML = 1 << 22  # bytes of a header extension that is parsed
 _LONGEST = 200  # characters of a name or a text
 
 
@@ -41,7 +41,7 @@ def notes_of_nifti(extensions: Iterable[bytes]) -> ObjectNotes:
     for content in extensions:
         text = content.rstrip(b"\0")
         # a document type could name files and multiply entities
-        if b"<Label" not in text or b"<!DOCTYPE" in text or len(text) > _MOST_XML:
+        if b"<Label" not in text or b"<!DOCTYPE" in text or len(text) > _MAX_XML:
             continue
         try:
             root = ElementTree.fromstring(text)
@@ -65,7 +65,7 @@ def notes_of_nifti(extensions: Iterable[bytes]) -> ObjectNotes:
 
 def _entries(image_label: Any, key: str) -> list[Mapping[str, Any]]:
     listed = image_label.get(key) if isinstance(image_label, Mapping) else None
-    entries = listed[:_MOST_LABELS] if isinstance(listed, list) else []
+    entries = listed[:_MAX_LABELS] if isinstance(listed, list) else []
     return [entry for entry in entries if isinstance(entry, Mapping)]
 
 

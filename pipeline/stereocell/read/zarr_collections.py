@@ -23,7 +23,7 @@ from stereocell.storage.location import Location, is_own, require_own_key
 CONTAINER = "bioformats2raw.layout"
 _SHOWN = 8  # parts that a line lists; the others are counted
 _LOOKED_AT = 4  # label images of which type and number of objects are read
-_MOST_SERIES = 1000  # images of a container without a list of them
+_MAX_SERIES = 1000  # images of a container without a list of them
 _NAME = 60  # characters of a path or name in a line
 _GROUP_FILES = ("zarr.json", ".zgroup", ".zarray")
 
@@ -80,7 +80,7 @@ def series_of(ome: Mapping[str, Any], tree: ZarrTree) -> list[str]:
     if isinstance(listed, list) and listed:
         return [path for path in map(str, listed) if path]
     found: list[str] = []
-    while len(found) < _MOST_SERIES and "multiscales" in tree.attributes(str(len(found))):
+    while len(found) < _MAX_SERIES and "multiscales" in tree.attributes(str(len(found))):
         found.append(str(len(found)))
     return found
 
@@ -219,7 +219,7 @@ def _groups_below(tree: ZarrTree) -> list[str]:
         return []
     folder = Path(tree.location.source)
     names = sorted(path.name for path in folder.iterdir() if path.is_dir())
-    return [name for name in names[:_MOST_SERIES] if tree.find(name) is not None]
+    return [name for name in names[:_MAX_SERIES] if tree.find(name) is not None]
 
 
 def _is_group(location: Location) -> bool:

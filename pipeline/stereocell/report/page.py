@@ -7,12 +7,12 @@ of units stays one that a phone opens; sums and remarks cover all units.
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from numpy.typing import NDArray
 
 from stereocell.building.channels import Channel
@@ -45,8 +45,8 @@ from stereocell.storage.atomic_write import write_bytes
 from stereocell.textures.unwrap import mip_levels_apart
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
-MOST_PICTURED = 60  # units
-MOST_ROWS = 400  # units in a table
+MAX_PICTURED = 60  # units
+MAX_ROWS = 400  # units in a table
 _TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # drawn in one picture
 # pixels: width, and the most height
 _TILE_PX, _WHOLE_PX = (420, 420), (1120, 620)
@@ -66,7 +66,7 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
     """Return the page as HTML."""
     plan = facts.plan
     tissue = find_tissue(out_folder.out, plan)  # first: what is damaged ends it before all is drawn
-    chosen = choose_units(len(plan.tiles), len(plan.channels), MOST_PICTURED)
+    chosen = choose_units(len(plan.tiles), len(plan.channels), MAX_PICTURED)
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
     labels = gather_labels(out_folder, plan)
@@ -80,16 +80,8 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         for tile, channels in chosen
     ]
     pictured = [_inline(draw_scene(scene)) for scene in scenes]
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATE.parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     asked = out_folder.settings_file
-    environment.filters |= {"count": _count, "size": _size, "seconds": _seconds, "um": _um}
-    return environment.get_template(TEMPLATE.name).render(
+    return _template().render(
         facts=facts,
         plan=plan,
         generator=GENERATOR,
@@ -127,6 +119,19 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         },
         settings=asked.read_text("utf-8") if asked.is_file() else "",
     )
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATE.parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"count": _count, "size": _size, "seconds": _seconds, "um": _um}
+    return environment.get_template(TEMPLATE.name)
 
 
 def _tissue(found: TissueFacts) -> dict[str, Any]:
@@ -201,7 +206,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
                 "picture": picture,
             }
         )
-        if len(rows) == MOST_PICTURED:
+        if len(rows) == MAX_PICTURED:
             break
     return rows
 
@@ -364,9 +369,9 @@ def _box_um(facts: Facts, tile: Tile) -> tuple[tuple[float, ...], tuple[float, .
 
 def _rows(units: Sequence[UnitFacts]) -> list[UnitFacts]:
     """Return the units that tables list: all, or evenly chosen ones."""
-    if len(units) <= MOST_ROWS:
+    if len(units) <= MAX_ROWS:
         return list(units)
-    return [units[i * len(units) // MOST_ROWS] for i in range(MOST_ROWS)]
+    return [units[i * len(units) // MAX_ROWS] for i in range(MAX_ROWS)]
 
 
 def _inline(picture: Picture) -> Mapping[str, Any]:
@@ -387,6 +392,7 @@ def srgb(linear: Sequence[float]) -> tuple[float, float, float]:
 
 
 def css_color(linear: Sequence[float]) -> str:
+    """Return a linear RGB colour, 0..1, as CSS writes it: #rrggbb in sRGB."""
     return "#" + "".join(f"{round(255 * v):02x}" for v in srgb(linear))
 
 

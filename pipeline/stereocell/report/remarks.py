@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from stereocell.model.counted import counted
 from stereocell.report.facts import Facts, UnitFacts
 
-LEAST_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
-_MOST_LINES = 30  # lines printed of one remark
+MIN_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
+_MAX_LINES = 30  # lines printed of one remark
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ def find_remarks(facts: Facts) -> list[Remark]:
         _remark("without a surface, in channels that have some", bare, is_note=True),
         _remark(
             f"with thin triangles in lod0 (1st percentile of their angles below "
-            f"{LEAST_ANGLE_DEG:g}°)",
+            f"{MIN_ANGLE_DEG:g}°)",
             _thin(units),
             "channel",
             is_note=True,
@@ -65,7 +65,7 @@ def _thin(units: Iterable[UnitFacts]) -> list[str]:
     thin: dict[str, list[tuple[float, str]]] = {}
     for unit in units:
         angle = unit.lods[0].angle_deg if unit.lods else None
-        if angle is not None and angle < LEAST_ANGLE_DEG:
+        if angle is not None and angle < MIN_ANGLE_DEG:
             thin.setdefault(unit.channel.name, []).append((angle, unit.tile.id))
     return [
         f"{channel}: {min(found)[0]:.1f}° in {min(found)[1]}"
@@ -103,5 +103,5 @@ def _counts(
 
 
 def _cut(lines: Sequence[str]) -> tuple[str, ...]:
-    more = len(lines) - _MOST_LINES
-    return (*lines[:_MOST_LINES], *([f"and {more:,} more"] if more > 0 else []))
+    more = len(lines) - _MAX_LINES
+    return (*lines[:_MAX_LINES], *([f"and {more:,} more"] if more > 0 else []))

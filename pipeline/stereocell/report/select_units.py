@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-FEWEST_TILES = 6  # tiles pictured at least, where channels are many
+MIN_TILES = 6  # tiles pictured at least, where channels are many
 _GOLDEN = (5**0.5 - 1) / 2  # 1 / golden ratio
 
 
@@ -14,7 +14,7 @@ def choose_units(tiles: int, channels: int, most: int) -> list[tuple[int, list[i
     """
     if tiles * channels <= most:
         return [(tile, list(range(channels))) for tile in range(tiles)]
-    chosen = min(tiles, most, max(FEWEST_TILES, most // channels))
+    chosen = min(tiles, most, max(MIN_TILES, most // channels))
     each = min(channels, most // chosen)
     picked = []
     for i in range(chosen):

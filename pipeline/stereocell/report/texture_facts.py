@@ -9,7 +9,7 @@ from stereocell.report.facts import Facts, UnitFacts
 from stereocell.report.select_units import thin_out
 from stereocell.report.texture_similarity import find_close_likeness, find_likeness
 
-MOST_COMPARED = 3  # units whose levels are drawn and compared: 4 to 10 s each
+MAX_COMPARED = 3  # units whose levels are drawn and compared: 4 to 10 s each
 COMPARED = 2  # the compared level; the coarsest where there are fewer
 
 
@@ -77,8 +77,8 @@ def compare(facts: Facts) -> list[Likeness]:
     """Return the likeness of some evenly chosen units that have several levels."""
     units = [unit for unit in facts.units if len(unit.lods) > 1]
     found = []
-    every = max(1, -(-len(units) // MOST_COMPARED))
-    for i in thin_out(len(units), every)[:MOST_COMPARED]:
+    every = max(1, -(-len(units) // MAX_COMPARED))
+    for i in thin_out(len(units), every)[:MAX_COMPARED]:
         lods = load_lods(units[i].directory)
         level = min(COMPARED, len(lods) - 1)
         views = find_likeness(lods[0], lods[level])

@@ -28,7 +28,7 @@ from stereocell.textures.rasterize import find_pixels
 # directions of the viewer, x right, y up, z towards the viewer: in front, then around
 VIEWS = ((0.0, 0.0, 1.0), (0.9, 0.3, 0.5), (-0.9, 0.3, 0.5), (0.1, 0.9, 0.4), (0.1, -0.9, 0.4))
 ERROR_PX = 2.0  # pixels, the viewer's target error
-LEAST_PX, MOST_PX = 48, 256  # pixels, smallest and largest edge of a picture
+MIN_PX, MAX_PX = 48, 256  # pixels, smallest and largest edge of a picture
 CLOSE_PX = 512  # pixels, edge of the close picture, equal for every level
 _FINE = 2  # factor by which a picture is drawn larger, then averaged down
 _AMBIENT, _GROUND = 0.35, 0.0  # grey values, 0..1
@@ -39,7 +39,7 @@ def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
     ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
     diagonal = float(np.linalg.norm(ends[1] - ends[0]))
     wanted = ERROR_PX * diagonal / max(coarse.distance_um, 1e-9)
-    size = int(np.clip(wanted, LEAST_PX, MOST_PX))
+    size = int(np.clip(wanted, MIN_PX, MAX_PX))
     return tuple(
         compare(draw(fine, view, ends=ends, size=size), draw(coarse, view, ends=ends, size=size))
         for view in VIEWS

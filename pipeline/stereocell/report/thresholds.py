@@ -29,7 +29,7 @@ READINGS = {  # format arguments: the levels of Threshold.between
     "and the next one, at {1:.5g}",
     "single peak": "at the foot of the longer side of the only peak, at {0:.5g}",
 }
-MOST_NAMED = 6  # largest number of chance rises that are listed
+MAX_NAMED = 6  # largest number of chance rises that are listed
 _ROOM = 1.6  # chart's top as a multiple of the second-highest peak: air, the highest, is cut
 _LI_VOXELS = 200_000  # about the number of voxels that represent the counts in Li's method
 
@@ -85,9 +85,9 @@ def draw_threshold(statistics: ChannelStatistics) -> ThresholdFigure | None:
 def describe(found: Threshold) -> str:
     """Return how a threshold follows from its peaks, and the rises that were dropped, as text."""
     reading = READINGS[found.reading].format(*found.between)
-    left_out = ", ".join(f"{level:.5g}" for level in found.chance[:MOST_NAMED])
-    if len(found.chance) > MOST_NAMED:
-        left_out += f" and {len(found.chance) - MOST_NAMED} more"
+    left_out = ", ".join(f"{level:.5g}" for level in found.chance[:MAX_NAMED])
+    if len(found.chance) > MAX_NAMED:
+        left_out += f" and {len(found.chance) - MAX_NAMED} more"
     if not left_out:
         return reading
     return f"{reading}. Rises that counting alone may make, at {left_out}, are no peaks"

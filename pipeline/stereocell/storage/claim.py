@@ -42,6 +42,7 @@ class Claim:
 
 
 def has_ended(out: str) -> OutputError:
+    """Return the error of a task whose command has ended."""
     return OutputError(f"{out}: the command that asked for this has ended")
 
 

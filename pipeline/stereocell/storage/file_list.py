@@ -46,6 +46,7 @@ def encode(listed: FileList) -> bytes:
 
 
 def to_json(content: object) -> bytes:
+    """Return a document as UTF-8, indented, with a newline at its end."""
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
 
 

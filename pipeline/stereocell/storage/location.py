@@ -23,7 +23,7 @@ _TIFF_SUFFIXES = (
     *(".companion.ome", ".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
 )
 _PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg")
-_MOST_OTHERS = 200  # files without an image's name that are looked into for DICOM
+_MAX_OTHERS = 200  # files without an image's name that are looked into for DICOM
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
@@ -307,7 +307,7 @@ def _holds_planes(folder: str) -> bool:
                 are_there = True
             elif lower.endswith(_DICOM_SUFFIXES):
                 return False
-            elif others < _MOST_OTHERS:
+            elif others < _MAX_OTHERS:
                 others += 1
                 if first_bytes(os.path.join(at, name))[128:132] == b"DICM":
                     return False

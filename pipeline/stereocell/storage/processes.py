@@ -12,7 +12,7 @@ from pathlib import Path
 from stereocell.model.errors import StereoCellError
 
 # bytes of address space; measured on 2 cores: below, OpenBLAS gives up, and USD (stage) crashes
-_LEAST, _LEAST_FOR_STAGE, _LEAST_PER_CORE = 1.5e9, 2.9e9, 0.15e9
+_MIN_FREE, _MIN_FOR_STAGE, _MIN_PER_CORE = 1.5e9, 2.9e9, 0.15e9
 _STAGE_WRITERS = ("build", "stage", "tissue")
 _SIGNS = re.compile(
     r"can't start new thread|resource temporarily unavailable|cannot allocate memory|"
@@ -52,8 +52,8 @@ def require_address_space(command: str) -> None:
 
     The need is that before any voxel: their code, and a stack and a heap for a thread of each core.
     """
-    least = _LEAST_FOR_STAGE if command in _STAGE_WRITERS else _LEAST
-    least += _LEAST_PER_CORE * (os.cpu_count() or 1)
+    least = _MIN_FOR_STAGE if command in _STAGE_WRITERS else _MIN_FREE
+    least += _MIN_PER_CORE * (os.cpu_count() or 1)
     if address_limit() < least:
         raise StereoCellError(
             f"memory: {_allowed()}; `{command}` needs at least {least / 1e9:.1f} GB, and more for "

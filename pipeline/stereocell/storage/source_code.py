@@ -22,7 +22,7 @@ from stereocell.storage.assets import find_asset
 _FINDER = find_asset.__name__
 _LOG_METHODS = {"print", "log", "debug", "info", "warning", "warn", "error"}
 _LOG_OBJECTS = {"console", "logger", "logging", "log", "warnings"}
-_MOST = 2000  # sources that are kept; beyond, those alone that this process has read
+_MAX_SOURCES = 2000  # sources that are kept; beyond, those alone that this process has read
 
 
 class Source(NamedTuple):
@@ -51,7 +51,7 @@ def keep_sources() -> None:
     known = _kept() | _read
     _kept().update(_read)
     _new.clear()
-    text = json.dumps(known if len(known) <= _MOST else _read)
+    text = json.dumps(known if len(known) <= _MAX_SOURCES else _read)
     with suppress(OSError):
         handle, name = tempfile.mkstemp(dir=place.parent)
         with open(handle, "w", encoding="utf-8") as file:

@@ -6,11 +6,11 @@ from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, Flag, length_um, setting
 
 TEXTURES = tuple(2**k for k in range(6, 14))  # allowed largest edges of a map, in texels
-MOST_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
+MAX_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
 # Texels finer than voxels show nothing new. At a tenth xatlas is slow, and far below it crashes.
-MOST_TEXELS = 10  # most texels along the finest voxel spacing
+MAX_TEXELS = 10  # most texels along the finest voxel spacing
 # Largest reach of rays into the body and past its ends: the voxels they cross are held in memory.
-MOST_REACH = 64.0  # coarsest voxel spacings
+MAX_REACH = 64.0  # coarsest voxel spacings
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +46,8 @@ class UnwrapOptions:
     def __post_init__(self) -> None:
         if self.first_lod < 0:
             raise UsageError(f"unwrap.first_lod is {self.first_lod}, expected 0 or more")
-        if not 3 <= self.padding <= MOST_PADDING:
-            raise UsageError(f"unwrap.padding is {self.padding}, expected 3 to {MOST_PADDING}")
+        if not 3 <= self.padding <= MAX_PADDING:
+            raise UsageError(f"unwrap.padding is {self.padding}, expected 3 to {MAX_PADDING}")
         if self.max_triangles < 0:
             raise UsageError(f"unwrap.max_triangles is {self.max_triangles}, expected 0 or more")
         if self.max_texture not in TEXTURES:
@@ -63,17 +63,17 @@ class UnwrapOptions:
         """
         finest, coarsest = min(spacing_um), max(spacing_um)
         texel_um = length_um("unwrap.texel_um", self.texel_um, coarsest)
-        if MOST_TEXELS * texel_um < finest * (1 - 1e-9):
+        if MAX_TEXELS * texel_um < finest * (1 - 1e-9):
             raise UsageError(
-                f"unwrap.texel_um is {texel_um:g}, expected at least {finest / MOST_TEXELS:g} "
-                f"(the finest voxel spacing / {MOST_TEXELS})"
+                f"unwrap.texel_um is {texel_um:g}, expected at least {finest / MAX_TEXELS:g} "
+                f"(the finest voxel spacing / {MAX_TEXELS})"
             )
         occlusion_um = length_um("unwrap.occlusion_um", self.occlusion_um, 8 * coarsest)
         paint_um = length_um("unwrap.paint_um", self.paint_um, 2 * coarsest)
         for key, length in (("occlusion_um", occlusion_um), ("paint_um", paint_um)):
-            if length > MOST_REACH * coarsest * (1 + 1e-9):
+            if length > MAX_REACH * coarsest * (1 + 1e-9):
                 raise UsageError(
-                    f"unwrap.{key} is {length:g}, expected at most {MOST_REACH * coarsest:g} "
-                    f"({MOST_REACH:g} times the coarsest voxel spacing)"
+                    f"unwrap.{key} is {length:g}, expected at most {MAX_REACH * coarsest:g} "
+                    f"({MAX_REACH:g} times the coarsest voxel spacing)"
                 )
         return replace(self, texel_um=texel_um, occlusion_um=occlusion_um, paint_um=paint_um)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 ROUNDS = 8  # rounds of projections
-MOST = 0.35  # largest change of a texel, values are 0..1
+MAX_CHANGE = 0.35  # largest change of a texel, values are 0..1
 PER_TEXEL = 2.0  # points per texel of a chart's edge
 
 
@@ -52,7 +52,7 @@ def fit_seam_texels(
     """Return the image with its free texels fitted to lookups.
 
     image    float64 (h, w, k), 0..1, row 0 at v = 1
-    is_free  bool (h, w), texels that may change, by MOST at most
+    is_free  bool (h, w), texels that may change, by MAX_CHANGE at most
     uvs      float64 (n, 2), where lookups are made
     wanted   float64 (n, k), 0..1, results of the bilinear lookups
     """
@@ -80,7 +80,8 @@ def fit_seam_texels(
         for k in range(depth):
             change = (off[:, k, None] * step * loose).ravel()
             fitted[:, k] += np.bincount(texel.ravel(), change, len(fitted)) / total
-        fitted = np.clip(fitted, np.maximum(start - MOST, 0), np.minimum(start + MOST, 1))
+        lowest, highest = np.maximum(start - MAX_CHANGE, 0), np.minimum(start + MAX_CHANGE, 1)
+        fitted = np.clip(fitted, lowest, highest)
     whole = image.reshape(-1, depth).copy()
     whole[used] = fitted
     return whole.reshape(image.shape)

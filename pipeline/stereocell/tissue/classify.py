@@ -30,7 +30,7 @@ Field = NDArray[np.float32]
 AUTO_CLASSES = range(2, 7)  # numbers of classes that `auto` tries
 MODE_BINS = 64  # bins of the histogram whose modes are counted
 SHALLOWEST_DIP = 0.9  # largest dip between two modes, as a share of the lower peak
-LEAST_SHARE = 0.01  # least share of the voxels in a class
+MIN_SHARE = 0.01  # least share of the voxels in a class
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +192,7 @@ def _score(
     means, shares = mixture.means_[order, 0], mixture.weights_[order]
     are_modes = _dips(values[:, 0], means) < SHALLOWEST_DIP
     bic = -2 * n * likelihood + parameters * np.log(n)
-    return float(bic), bool(are_modes.all() and shares.min() > LEAST_SHARE)
+    return float(bic), bool(are_modes.all() and shares.min() > MIN_SHARE)
 
 
 def _dips(values: NDArray[Any], means: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -33,7 +33,7 @@ from stereocell.tissue.brain_mask import find_foreground
 Field = NDArray[np.float32]
 PATCH = 64  # voxels along an edge where the model leaves it open
 LARGEST = 512  # most voxels along an edge that a model may ask for
-MOST_CLASSES = 32  # most outputs of a model
+MAX_CLASSES = 32  # most outputs of a model
 NAMES_KEY = "stereocell_classes"  # metadata of the model: a JSON list of K names, "" leaves out
 
 
@@ -194,11 +194,11 @@ def _run(where: str, session: Any, patch: Field) -> Field:
     result = np.asarray(found)
     shape = result.shape
     is_fit = len(shape) == 5 and shape[0] == 1 and shape[2:] == patch.shape
-    if not is_fit or not 2 <= shape[1] <= MOST_CLASSES or result.dtype.kind != "f":
+    if not is_fit or not 2 <= shape[1] <= MAX_CLASSES or result.dtype.kind != "f":
         expected = ", ".join(str(n) for n in patch.shape)
         raise SourceError(
             f"{where}: output is {result.dtype} of shape {shape}, expected floats of shape "
-            f"(1, K, {expected}) with K from 2 to {MOST_CLASSES}"
+            f"(1, K, {expected}) with K from 2 to {MAX_CLASSES}"
         )
     if not np.isfinite(result).all():
         raise SourceError(f"{where}: output holds NaN or infinity, expected finite numbers")

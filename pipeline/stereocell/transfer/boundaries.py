@@ -2,15 +2,16 @@
 
 A boundary between materials of values a < b, an ideal edge blurred by a Gaussian, crosses the
 value at a + t (b - a) with the gradient (b - a) / (s sqrt(2 pi)) exp(-erfinv(2t - 1)^2): an arc
-from one material to the other (Kindlmann & Durkin 1998).
+from one material to the other (Kindlmann & Durkin, "Semi-automatic generation of transfer
+functions for direct volume rendering", IEEE Volume Visualization 1998. doi:10.1145/288126.288167).
 
 Arcs of different pairs cross, and one that spans the whole window passes over the others' voxels.
 So no arc is looked for by itself: what lies above the noise is explained as a sum of boundaries of
 all pairs of materials (see transfer/material_peaks.py) at a row of blurs (see
 transfer/edge_model.py), and of what the materials' own noise leaves there, none of them negative
-(Lawson & Hanson, Solving Least Squares Problems, 1974). The pairs that it takes much of are the
-boundaries; one that passes over a third material, whose own noise it can pass for, only if the rest
-explains what is there clearly worse.
+(Lawson & Hanson, Solving Least Squares Problems, 1974. doi:10.1137/1.9781611971217). The pairs that
+it takes much of are the boundaries; one that passes over a third material, whose own noise it can
+pass for, only if the rest explains what is there clearly worse.
 """
 
 from dataclasses import dataclass
@@ -36,13 +37,13 @@ from stereocell.transfer.shapes2d import NAME
 
 BLURS = np.geomspace(0.3, 8.0, 14)  # sigma of an edge, in finest voxels
 NOISES = (1.0, 1.5)  # x a material's noise, which a bias field widens
-LEAST_CONTRAST = 0.06  # of the window, between two materials
+MIN_CONTRAST = 0.06  # of the window, between two materials
 OVER_NOISE = 1.1  # x the noise, to an arc's apex
-LEAST_SEEN = 0.02  # of an edge's voxels above the noise, to be told
-LEAST_SHARE = 0.05  # of what all boundaries explain, to one of them
-LEAST_MISSED = 0.05  # more squares left over without a boundary that passes over a third material
-LEAST_VOXELS = 2e-5  # of all, to a boundary: a ball of 40 voxels in 256^3 has twice as many
-FEWEST = 20.0  # voxels: cells of fewer weigh no more, as nothing is quite as ideal
+MIN_SEEN = 0.02  # of an edge's voxels above the noise, to be told
+MIN_SHARE = 0.05  # of what all boundaries explain, to one of them
+MIN_MISSED = 0.05  # more squares left over without a boundary that passes over a third material
+MIN_VOXELS = 2e-5  # of all, to a boundary: a ball of 40 voxels in 256^3 has twice as many
+MIN_COUNT = 20.0  # voxels: cells of fewer weigh no more, as nothing is quite as ideal
 MAX_BOUNDARIES = 6
 CLEAR = 2.0  # sigmas of noise that a shape keeps from a material's value
 EVEN: Ratios = (1.0, 1.0, 1.0)
@@ -123,7 +124,7 @@ def find_boundaries(
     z, y, x = (h / finest for h in spacing_um)
     grid = HistogramGrid(len(counts), counts.shape[1] // COARSER, gradient_max, (z, y, x))
     boundaries = _explain(counts, noise, materials, grid)
-    boundaries = [boundary for boundary in boundaries if boundary.share >= LEAST_VOXELS]
+    boundaries = [boundary for boundary in boundaries if boundary.share >= MIN_VOXELS]
     boundaries = sorted(
         boundaries, key=lambda boundary: (-boundary.share, boundary.low, boundary.high)
     )[:MAX_BOUNDARIES]
@@ -207,7 +208,7 @@ def _explain(
     grid: HistogramGrid,
 ) -> list[Boundary]:
     """Return the boundaries that have their share of what lies above the noise."""
-    pairs = [(a, b) for a, b in combinations(materials, 2) if b - a >= LEAST_CONTRAST]
+    pairs = [(a, b) for a, b in combinations(materials, 2) if b - a >= MIN_CONTRAST]
     terms = _make_terms(counts, noise, materials, pairs, grid)
     if terms is None:
         return []
@@ -216,7 +217,7 @@ def _explain(
     for number, (low, high) in enumerate(pairs):
         own = terms.pairs == number
         held = float(voxels[own].sum())
-        if held <= 0 or held < LEAST_SHARE * voxels.sum():
+        if held <= 0 or held < MIN_SHARE * voxels.sum():
             continue
         here = _noise_at(noise, (low + high) / 2)
         blur = float(np.exp(np.average(np.log(terms.blurs[own]), weights=voxels[own])))
@@ -226,7 +227,7 @@ def _explain(
             continue
         if any(low < other < high for other in materials):
             _, without = terms.fit(number)
-            if without < (1 + LEAST_MISSED) * left:
+            if without < (1 + MIN_MISSED) * left:
                 continue
         boundaries.append(
             Boundary(
@@ -254,7 +255,7 @@ def _make_terms(
     cells = counts.reshape(grid.rows, grid.columns, COARSER).sum(axis=2).astype(np.float64)
     level = noise.reshape(grid.columns, COARSER).max(axis=1)
     is_steep = np.arange(grid.rows)[:, np.newaxis] > level * (grid.rows - 1)
-    weight = 1 / np.sqrt(cells[is_steep] + FEWEST)  # counts are off by their root
+    weight = 1 / np.sqrt(cells[is_steep] + MIN_COUNT)  # counts are off by their root
     terms: list[NDArray[np.float64]] = []
     edges: list[tuple[int, float, float]] = []
     for number, (low, high) in enumerate(pairs):
@@ -262,7 +263,7 @@ def _make_terms(
         for blur in BLURS:
             share = count_edge(low, high, blur=float(blur), sigma=sigma, grid=grid)
             seen = share[is_steep]
-            if seen.sum() > LEAST_SEEN * share.sum():
+            if seen.sum() > MIN_SEEN * share.sum():
                 terms.append(seen * weight)
                 edges.append((number, float(blur), float(seen.sum())))
     if not edges:

@@ -13,9 +13,9 @@ NOISE_FACTOR = 1.9  # x the mode of the gradients: 93 % of such a vector's lengt
 BRIGHT = 0.3  # value, 0..1, above which noise that rises with the value is looked for
 RISING_PERCENTILE = 10.0  # percent of the columns that may rise less than the noise
 FLAT_STEP = 3.0 / 255  # least noise, values are 0..1: rounding to 8 bits and a slow drift
-LEAST_IN_COLUMN = 2e-5  # least share of all voxels in a column whose mode is used
-LEAST_SHARE = 0.004  # least share of the flat voxels that a material has
-LEAST_PROMINENCE = 0.2  # least prominence by the peak's height: a shoulder is no material
+MIN_IN_COLUMN = 2e-5  # least share of all voxels in a column whose mode is used
+MIN_SHARE = 0.004  # least share of the flat voxels that a material has
+MIN_PROMINENCE = 0.2  # least prominence by the peak's height: a shoulder is no material
 MAX_MATERIALS = 6  # most materials of a channel
 
 
@@ -40,7 +40,7 @@ def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.flo
     weight = np.cumsum(np.bincount(modes, sums, rows))
     floor = float(np.searchsorted(weight, weight[-1] / 2)) / (rows - 1)
     values = np.linspace(0, 1, columns)
-    rising = (values >= BRIGHT) & (sums >= max(8, LEAST_IN_COLUMN * sums.sum()))
+    rising = (values >= BRIGHT) & (sums >= max(8, MIN_IN_COLUMN * sums.sum()))
     slope = 0.0
     if rising.any():
         above = (modes[rising] / (rows - 1)) ** 2 - floor**2
@@ -67,14 +67,14 @@ def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tup
     pad = int(4 * sigma) + 2  # a peak may stand at an end of the window
     smooth = ndimage.gaussian_filter1d(np.pad(flat, pad), sigma, mode="constant")
     peaks, found = signal.find_peaks(smooth, prominence=0, height=0)
-    is_own = found["prominences"] >= LEAST_PROMINENCE * found["peak_heights"]
+    is_own = found["prominences"] >= MIN_PROMINENCE * found["peak_heights"]
     candidates = []
     for peak, left, right in zip(
         peaks[is_own], found["left_bases"][is_own], found["right_bases"][is_own], strict=True
     ):
         low, high = _foot(smooth, int(peak), int(left), int(right))
         mass = smooth[low : high + 1].sum()
-        if mass >= LEAST_SHARE * flat.sum():
+        if mass >= MIN_SHARE * flat.sum():
             candidates.append((float(mass), _centre(smooth, int(peak), low, high) - pad))
     heaviest = sorted(candidates, reverse=True)[:MAX_MATERIALS]
     return tuple(sorted(float(np.clip(place / (columns - 1), 0, 1)) for _, place in heaviest))

@@ -42,7 +42,7 @@ RESERVED = frozenset(
         "points",
     )
 )
-MOST_CLASSES = 32  # categories that are GeomSubsets: each is a prim in each level of each tile
+MAX_CLASSES = 32  # categories that are GeomSubsets: each is a prim in each level of each tile
 _FAMILY = UsdShade.Tokens.materialBind
 
 _Types = Sdf.ValueTypeNames
@@ -56,7 +56,7 @@ def class_name(column: Column, code: int) -> str:
 def classes_of(table: ObjectTable) -> Column | None:
     """Return the column whose categories are GeomSubsets; None: there is none."""
     column = table.column(table.default)
-    return column if column is not None and 0 < len(column.categories) <= MOST_CLASSES else None
+    return column if column is not None and 0 < len(column.categories) <= MAX_CLASSES else None
 
 
 def write_columns(prim: Usd.Prim, table: ObjectTable, roughness: float) -> None:

@@ -22,6 +22,7 @@ from stereocell.building.phase import digest_of_manifest
 from stereocell.building.survey_file import EVIDENCE, SOLIDS, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.bundle.write import FILES, MANIFEST
+from stereocell.bundle.write_objects import hash_parts
 from stereocell.formats.exr import check_exr
 from stereocell.formats.stl import check_stl
 from stereocell.formats.tiles3d import CONTENT_HASH, content_hash
@@ -41,7 +42,7 @@ from stereocell.usd.write_tile import closed_file, has_mesh
 from stereocell.usd.write_usdz import USDZ_NAME
 
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
-_MOST_SHOWN = 3  # problems printed in one line
+_MAX_SHOWN = 3  # problems printed in one line
 _NODE_TIMEOUT_S = 1200.0  # s for one script over all files
 _PLAN = "plan.schema.json"
 _BUNDLE = "bundle.schema.json"
@@ -350,11 +351,23 @@ def _check_objects(bundle: Path) -> str:
             for ref, width in sizes
             if ref["bytes"] != count * width
         ]
+        problems += [
+            f"{name}: {column['exact']['path']}: parts have other SHA-256 than stated"
+            for column in content["columns"]
+            if "parts" in column and not _has_parts(bundle / column["exact"]["path"], column)
+        ]
         for tile, rows in content["tiles"].items():
             if max([rows["first"] + rows["count"] - 1, *rows.get("more", [])]) >= max(count, 1):
                 problems.append(f"{name}: {tile}: names rows beyond the {count} that there are")
     raise_on(problems)
     return f"{objects} objects"
+
+
+def _has_parts(file: Path, column: dict[str, Any]) -> bool:
+    try:
+        return bool(column["parts"] == hash_parts(file.read_bytes()))
+    except OSError as error:
+        raise CheckError(f"{file}: {error.strerror or error}") from error
 
 
 def _check_tilesets(bundle: Path) -> str:
@@ -497,5 +510,5 @@ def _raise_on_all(problems: list[str], remedy: str) -> None:
 def raise_on(problems: list[str]) -> None:
     """Raise CheckError with the first few of the problems, if there are any."""
     if problems:
-        more = f" (and {len(problems) - _MOST_SHOWN} more)" if len(problems) > _MOST_SHOWN else ""
-        raise CheckError("; ".join(problems[:_MOST_SHOWN]) + more)
+        more = f" (and {len(problems) - _MAX_SHOWN} more)" if len(problems) > _MAX_SHOWN else ""
+        raise CheckError("; ".join(problems[:_MAX_SHOWN]) + more)

@@ -300,7 +300,7 @@ def test_a_text_that_stands_in_a_million_rows_is_kept_once(tmp_path: Path) -> No
 
 
 def test_a_column_of_parquet_beyond_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parquet_tables, "_MOST_BYTES", 50_000)
+    monkeypatch.setattr(parquet_tables, "_MAX_BYTES", 50_000)
     place = parquet(tmp_path, id=pa.array([1, 2]), a=pa.array(["x" * 60_000, "y"]), b=[1.5, 2])
     assert "column 'a': found 60" in refusal(place)
     (b,) = read_table(place, "", ("b",), "cells").columns

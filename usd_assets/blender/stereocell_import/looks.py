@@ -20,7 +20,7 @@ from .problem import StageProblem
 
 GLOW = 0.4  # emission for the same density of absorption
 _MAX_POINTS = 32  # a ramp of Blender's holds no more
-_LEAST = 0.001  # what light always passes of a voxel: an opacity of 1 has no logarithm
+_MIN_PASSED = 0.001  # what light always passes of a voxel: an opacity of 1 has no logarithm
 
 
 def make_color_group(channel, color):
@@ -87,7 +87,7 @@ def make_volume_material(channel, group, points, windows, voxel_um):
     tree.links.new(window.outputs["Result"], ramp.inputs["Fac"])
 
     passed = _math(tree, "SUBTRACT", -300, 1.0, ramp.outputs["Alpha"])
-    passed = _math(tree, "MAXIMUM", -150, passed, _LEAST)
+    passed = _math(tree, "MAXIMUM", -150, passed, _MIN_PASSED)
     depth = _math(tree, "LOGARITHM", 0, passed, math.e)
     density = _math(tree, "MULTIPLY", 150, depth, -1 / voxel_um)
     glow = _math(tree, "MULTIPLY", 300, density, GLOW)

@@ -13,7 +13,7 @@ import {
 } from "three";
 import type { Box } from "../math/box";
 import type { Clip, ClipPlane } from "../math/clip";
-import { MOST_CORNERS, planeSection } from "../math/plane_box_section";
+import { MAX_CORNERS, planeSection } from "../math/plane_box_section";
 import type { Vec3 } from "../math/vec3";
 import {
   BOX_HANDLES,
@@ -46,7 +46,7 @@ export class ClipMark {
   readonly group = new Object3D();
   private readonly handles = new Map<ClipHandleId, MarkMesh>();
   private readonly edges = markLine(new EdgesGeometry(new BoxGeometry()), DIM, { opacity: 0.8 });
-  private readonly rim = markLine(points(MOST_CORNERS), PLANE, { isLoop: true, opacity: 0.9 });
+  private readonly rim = markLine(points(MAX_CORNERS), PLANE, { isLoop: true, opacity: 0.9 });
   private readonly sheet = markMesh(fan(this.rim.geometry), PLANE, 0.08);
   private readonly arm = markLine(points(2), PLANE);
   private meant: HandleId | null = null;
@@ -132,7 +132,7 @@ function points(count: number): BufferGeometry {
 
 /** The area inside a convex rim; it shares the rim's points. */
 function fan(rim: BufferGeometry): BufferGeometry {
-  const corners = Array.from({ length: MOST_CORNERS - 2 }, (_, i) => [0, i + 1, i + 2]);
+  const corners = Array.from({ length: MAX_CORNERS - 2 }, (_, i) => [0, i + 1, i + 2]);
   return new BufferGeometry()
     .setAttribute("position", rim.attributes.position)
     .setIndex(corners.flat());

@@ -30,7 +30,7 @@ export type Probed = Readonly<{
   distance_um: number;
 }>;
 
-const MOST_SAMPLES = 512;
+const MAX_SAMPLES = 512;
 /** Least opacity along a whole ray that the user sees, 0..1. */
 const SEEN = 0.1;
 const BYTES = [0, 255] as const;
@@ -135,7 +135,7 @@ function sampleTile(
   const [from, to] = kept;
   const voxel = voxelOf(volume, volume.size);
   const count = Math.ceil((to - from) / voxelOf(volume, level.size));
-  const step = (to - from) / Math.min(MOST_SAMPLES, Math.max(1, count));
+  const step = (to - from) / Math.min(MAX_SAMPLES, Math.max(1, count));
   const samples: Sample[] = [];
   for (let t = from + step / 2; t < to; t += step) {
     const point = pointOn(ray, t);

@@ -16,7 +16,7 @@ import type { ViewerState } from "../state/viewer_state";
 import { type Still, TRACED_SAMPLES } from "./frame_loop";
 
 /** Most pixels of a picture: browsers refuse larger canvases, phones at less. */
-const MOST_PIXELS = 120e6;
+const MAX_PIXELS = 120e6;
 /** Longest time for one part of a picture, and for one frame of a video, ms: then it is as good as it is. */
 const PART_MS = 8000;
 const TRACED_PART_MS = 60_000;
@@ -116,10 +116,7 @@ export function savePicture(
   const { renderer, studio, navigation } = scene;
   const { camera } = navigation;
   const { width, height } = renderer.domElement;
-  const scale = Math.max(
-    1,
-    Math.min(wanted, Math.floor(Math.sqrt(MOST_PIXELS / (width * height)))),
-  );
+  const scale = Math.max(1, Math.min(wanted, Math.floor(Math.sqrt(MAX_PIXELS / (width * height)))));
   return studio.apart(async () => {
     const { canvas, context } = canvasOf(scale * width, scale * height);
     const words = clearCaptionOf(scene); // before the camera sees parts alone

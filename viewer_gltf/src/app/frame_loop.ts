@@ -19,7 +19,7 @@ import { Pulse } from "./pulse";
 import type { Contents } from "./scene_contents";
 
 /** Most frames of a picture that is saved that are averaged, where it is marched. */
-const MOST_SAMPLES = 64;
+const MAX_SAMPLES = 64;
 /** Samples of each pixel where it is traced: with so many nothing has to be denoised. */
 export const TRACED_SAMPLES = 192;
 /** Between two looks at whether all has come, ms. */
@@ -33,7 +33,7 @@ const LONGEST_FRAME_S = 0.1;
 const LONGEST_FADE_S = 1;
 
 /** Pixels of the volumes, as a share of the picture's along an edge: with fewer they are blocks. */
-const LEAST_TURNING = 0.5;
+const MIN_TURNING = 0.5;
 
 export type FrameOptions = Readonly<{
   renderer: WebGLRenderer;
@@ -188,7 +188,7 @@ export class FrameLoop {
     }
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
     // too slow a device to turn the specimen by itself shows it at rest, as well as can be
-    if (settings.resolution < LEAST_TURNING) this.options.shown().navigation.stopTurning();
+    if (settings.resolution < MIN_TURNING) this.options.shown().navigation.stopTurning();
     this.picture.marchFrame.uSteps.value = settings.steps;
     hybrid.radiusShare = settings.discShare;
     const [eye] = this.picture.eyes.all; // a headset has none before its first pose
@@ -270,7 +270,7 @@ export class FrameLoop {
       const { samples } = traced.status();
       const isDone = traced.isShown
         ? samples >= TRACED_SAMPLES
-        : state.quality !== "auto" || !this.picture.canGather || frames >= MOST_SAMPLES;
+        : state.quality !== "auto" || !this.picture.canGather || frames >= MAX_SAMPLES;
       // a pixel that is read waits for the drawing, which `finish` does not where another process draws
       this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, this.pixel);
       if (isDone || performance.now() - start_ms > most_ms) {

@@ -51,7 +51,7 @@ const BETWEEN_MS = 200;
 const REST_MS = 1200;
 const POSTER_PX = 960;
 /** Of light, a pixel: a picture of fewer is noise. */
-const LEAST_SAMPLES = 64;
+const MIN_SAMPLES = 64;
 /** Digits of what is told: more are noise of the camera. */
 const DIGITS = 6;
 
@@ -231,7 +231,7 @@ export class NotebookPart {
     const { link } = this.shared;
     // what is news will be told in a moment, and rest again
     if (link === this.pictured || link !== this.known.link || viewer.stereo.kind !== null) return;
-    if (isTraced(viewer.state) && viewer.snapshot().traced.samples < LEAST_SAMPLES) {
+    if (isTraced(viewer.state) && viewer.snapshot().traced.samples < MIN_SAMPLES) {
       this.rest = window.setTimeout(() => void this.picture(), REST_MS);
       return;
     }

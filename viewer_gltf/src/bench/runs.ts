@@ -30,11 +30,11 @@ export type Subject = Readonly<{
 }>;
 
 /** Volumes of fewer voxels along an edge are no volumes that anyone looks at. */
-const LEAST_EDGE = 32;
+const MIN_EDGE = 32;
 /** Frames before those that count: shaders are compiled at the first. */
 const WARM_UP_FRAMES = 3;
 /** Where frames take long, a flight takes so many nevertheless. */
-const LEAST_FRAMES = 6;
+const MIN_FRAMES = 6;
 
 /** What is announced before each run: which of how many, and what it is. */
 export type Step = Readonly<{ index: number; count: number; mode: BenchMode; eyes: Eyes }> &
@@ -51,7 +51,7 @@ export async function runAll(
   onStep: (step: Step) => void,
 ): Promise<Report> {
   const all = await subject.edges();
-  const large = all.filter((edge) => edge >= LEAST_EDGE);
+  const large = all.filter((edge) => edge >= MIN_EDGE);
   const edges = large.length > 0 ? large : all.slice(-1);
   const modes = MODES.filter((mode) => mode !== "traced" || subject.canTrace);
   // a tap lets a page into stereo for a moment only: so stereo is first
@@ -99,7 +99,7 @@ async function runOne(
   }
   const drawnAt_ms = [performance.now()];
   let [drawCalls, triangles] = [0, 0];
-  for (let share = 0; share < 1 || drawnAt_ms.length <= LEAST_FRAMES; ) {
+  for (let share = 0; share < 1 || drawnAt_ms.length <= MIN_FRAMES; ) {
     subject.fly(poseAt(share, eye, middle));
     await subject.nextFrame();
     const now = performance.now();

@@ -86,6 +86,48 @@ export async function fetchFile(
   return bytes;
 }
 
+/** Bytes of a file, from `offset` on. */
+export type FilePart = Readonly<{ offset: number; length: number; sha256: string }>;
+
+/**
+ * A checked part of a file, or the whole file, checked, if the host sends no parts. What was spoilt
+ * on its way may lie in a cache since: it is asked for once more, past all caches.
+ *
+ * @param name what the part is, in messages
+ */
+export async function fetchPart(
+  base: string,
+  file: FileRef,
+  part: FilePart,
+  name: string,
+  signal?: AbortSignal,
+  cache: RequestCache = "default",
+): Promise<{ bytes: Uint8Array<ArrayBuffer>; isWhole: boolean }> {
+  const { path } = file;
+  const { offset, length } = part;
+  const headers = { Range: `bytes=${offset}-${offset + length - 1}` };
+  const response = await request(fileAddress(base, path), path, { signal, cache, headers });
+  const bytes = await readBody(response, path);
+  if (response.status !== PART) {
+    await checkFile(file, bytes);
+    return { bytes, isWhole: true };
+  }
+  const total = response.headers.get("Content-Range")?.split("/")[1];
+  if (total !== undefined && total !== "*" && Number(total) !== file.bytes) {
+    throw new BundleError(`${path}: expected ${file.bytes} bytes, found ${total}`);
+  }
+  if (bytes.length !== length) {
+    throw new BundleError(`${path}: expected ${length} bytes of a range, found ${bytes.length}`);
+  }
+  try {
+    await checkHash(`${path}: ${name}`, bytes, part.sha256);
+  } catch (error) {
+    if (cache === "reload" || !(error instanceof BundleError)) throw error;
+    return fetchPart(base, file, part, name, signal, "reload");
+  }
+  return { bytes, isWhole: false };
+}
+
 /** Throws BundleError unless the bytes are the ones that the reference describes. */
 export async function checkFile(file: FileRef, bytes: Uint8Array<ArrayBuffer>): Promise<void> {
   if (bytes.length !== file.bytes) {

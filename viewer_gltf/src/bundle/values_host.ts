@@ -5,7 +5,7 @@ import { fileAddress, parseJson, readBody, request } from "./fetch";
 /** The server's word for it, on every answer. */
 const HEADER = "Stereocell-Values";
 /** Values that are kept. */
-const MOST = 4096;
+const MAX_KEPT = 4096;
 
 /** The address below which values are; null: the host has none. */
 export function valuesAddress(headers: Headers, base: string): string | null {
@@ -29,7 +29,7 @@ export class ValuesHost {
     const key = keyOf(tile, channel, voxel_um);
     const before = this.answers.get(key);
     if (before !== undefined) return before;
-    const [oldest] = this.answers.size < MOST ? [] : this.answers.keys();
+    const [oldest] = this.answers.size < MAX_KEPT ? [] : this.answers.keys();
     if (oldest !== undefined) {
       this.answers.delete(oldest);
       this.values.delete(oldest);

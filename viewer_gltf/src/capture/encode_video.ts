@@ -8,7 +8,7 @@ export const FRAMES_PER_S = 30;
 const BITS_PER_PIXEL = 0.25;
 const KEY_EVERY = 60;
 /** Most frames that wait to be encoded. */
-const MOST_WAITING = 4;
+const MAX_WAITING = 4;
 
 export type FilmedFile = Readonly<{ content: Blob; suffix: "webm" | "zip" }>;
 
@@ -61,7 +61,7 @@ class VideoWriter implements FrameWriter {
     this.encoder.encode(frame, { keyFrame: this.count % KEY_EVERY === 0 });
     frame.close();
     this.count++;
-    while (this.encoder.encodeQueueSize > MOST_WAITING && this.fault === null) {
+    while (this.encoder.encodeQueueSize > MAX_WAITING && this.fault === null) {
       await new Promise((resolve) => setTimeout(resolve, 5));
     }
   }

@@ -4,7 +4,7 @@ import type { Clip, ClipPlane } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
 import { CORNER_PLANES, type MarchClip, noCorner } from "./clip_uniforms";
 
-const MOST = 7; // six faces of the box, and the plane
+const MAX_PLANES = 7; // six faces of the box, and the plane
 /** um; beyond any specimen, within the precision of floats. */
 const FAR = 1e9;
 /** A plane beyond which nothing lies. */
@@ -16,7 +16,7 @@ export class Cuts {
    * the corner.
    */
   readonly uCuts = {
-    value: Array.from({ length: MOST + CORNER_PLANES }, () => new Vector4()),
+    value: Array.from({ length: MAX_PLANES + CORNER_PLANES }, () => new Vector4()),
   };
   readonly uCutCount = { value: 0 };
   /** The same for the march, um. */
@@ -58,7 +58,7 @@ export class Cuts {
     this.march.corner.forEach((each, i) => {
       const { normal, offset_um } = corner?.[i] ?? NOWHERE;
       each.set(...normal, offset_um);
-      put(MOST + i, normal, offset_um);
+      put(MAX_PLANES + i, normal, offset_um);
     });
   }
 }

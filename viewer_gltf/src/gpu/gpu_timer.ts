@@ -7,7 +7,7 @@
 const TIME_ELAPSED = 0x88bf;
 const GPU_DISJOINT = 0x8fbb;
 /** Most queries without an answer: a driver may never answer. */
-const MOST_PENDING = 8;
+const MAX_PENDING = 8;
 
 export type TimedContext = Pick<
   WebGL2RenderingContext,
@@ -36,7 +36,7 @@ export class GpuTimer {
 
   /** Before the frame's first draw call. */
   begin(): void {
-    if (this.current !== null || this.pending.length >= MOST_PENDING) return;
+    if (this.current !== null || this.pending.length >= MAX_PENDING) return;
     const query = this.free.pop() ?? this.gl.createQuery();
     if (query === null) return; // the context is lost
     this.gl.beginQuery(TIME_ELAPSED, query);

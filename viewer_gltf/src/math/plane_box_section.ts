@@ -5,7 +5,7 @@ import type { ClipPlane } from "./clip";
 import type { Vec3 } from "./vec3";
 
 /** Most corners of a plane's cut through a box. */
-export const MOST_CORNERS = 6;
+export const MAX_CORNERS = 6;
 /** Least distance of two corners, as a share of the box's diagonal: nearer ones are one. */
 const SAME = 1e-9;
 

@@ -7,7 +7,7 @@
 import { along, type Ray, type Vec3 } from "../math/vec3";
 
 /** Of an object, however wide the gap is: as in chunks/object_gap.glsl. */
-const LEAST_LEFT = 0.2;
+const MIN_LEFT = 0.2;
 
 /** The middle of a row's box, and its narrowest side, um. */
 export function middleOf(boxes: Float32Array, row: number): [number, number, number, number] {
@@ -19,7 +19,7 @@ export function middleOf(boxes: Float32Array, row: number): [number, number, num
 /** The ray that meets the object at its own size where the given one, as far along, meets it as it is drawn. */
 export function grownFrom(ray: Ray, boxes: Float32Array, row: number, gap_um: number): Ray {
   const [x, y, z, narrowest] = middleOf(boxes, row);
-  const growth = 1 / Math.max(LEAST_LEFT, 1 - gap_um / narrowest);
+  const growth = 1 / Math.max(MIN_LEFT, 1 - gap_um / narrowest);
   const middle: Vec3 = [x, y, z];
   const [dx, dy, dz] = ray.direction;
   const off = ray.origin.map((v, i) => v - middle[i]) as unknown as Vec3;

@@ -12,7 +12,7 @@ const BINS = 64;
 const [INK, LINE, TEXT, DIM] = ["#0b0d12", "#3a4458", "#e6e9f0", "#a3adbd"];
 const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif";
 /** Most points of a scatter plot: more would be one on the other. */
-const MOST_POINTS = 20_000;
+const MAX_POINTS = 20_000;
 
 /** Share of a picture's width at which a byte lies. */
 export const placeOf = (byte: number) => (byte - 1) / 254;
@@ -171,7 +171,7 @@ export function drawScatter(
   context.fillStyle = INK;
   context.fillRect(0, 0, width, height);
   const dot = Math.max(2, width / (table.count > 2000 ? 220 : 90));
-  const step = Math.max(1, Math.ceil(table.count / MOST_POINTS));
+  const step = Math.max(1, Math.ceil(table.count / MAX_POINTS));
   const put = (row: number, by: number) =>
     context.fillRect(
       placeOf(xs[row]) * (width - dot) - by,

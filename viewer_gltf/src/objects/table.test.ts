@@ -1,5 +1,6 @@
 import { describe, expect, it, vi } from "vitest";
 import { BundleError } from "../bundle/errors";
+import type { FilePart } from "../bundle/fetch";
 import { loadedTable, sampleContent, sampleTable } from "./sample_table";
 import { checkObjects, ObjectTable } from "./table";
 
@@ -22,6 +23,43 @@ describe("the table of objects", () => {
     expect([...(table.bytes("size") ?? [])]).toEqual([0, 1, 64, 128, 200, 255]);
     expect(table.bytes("no such")).toBeNull();
     expect(table.isLoading).toBe(false);
+  });
+
+  it("reads one value of a long column by the part that has it, of a short one by its file", async () => {
+    const count = 5000;
+    const values = Float32Array.from({ length: count }, (_, row) => row / 2);
+    const content = { ...sampleContent(), count };
+    const [size] = content.columns;
+    const hashes = ["a", "b"].map((digit) => digit.repeat(64));
+    content.columns = [{ ...size, exact: { ...size.exact, bytes: 4 * count }, parts: hashes }];
+    const asked: (FilePart | undefined)[] = [];
+    for (const knowsParts of [true, false]) {
+      asked.length = 0;
+      const table = new ObjectTable(
+        content,
+        Uint32Array.of(),
+        new Float32Array(),
+        null,
+        async (_, part) => {
+          asked.push(part);
+          const { offset, length } = (knowsParts && part) || { offset: 0, length: 4 * count };
+          return values.buffer.slice(offset, offset + length);
+        },
+        () => {},
+        () => {},
+      );
+      for (const row of [4100, 4999]) {
+        await vi.waitFor(() => expect(table.value("size", row)).toBe(row / 2));
+      }
+      expect(asked).toEqual([{ offset: 16384, length: 3616, sha256: hashes[1] }]);
+      await vi.waitFor(() => expect(table.value("size", 3)).toBe(1.5));
+      await vi.waitFor(() => expect(table.exact("size")?.length).toBe(count));
+      expect(table.value("size", 4999)).toBe(2499.5);
+      expect(asked.length).toBe(knowsParts ? 3 : 1);
+    }
+    const short = await loadedTable();
+    expect(short.value("size", 3)).toBe(1e7);
+    expect(short.value("no such", 3)).toBeNull();
   });
 
   it("reports a column that does not come, and fetches it again when it is told to", async () => {
@@ -67,6 +105,9 @@ describe("objects.json", () => {
     const short = sampleContent();
     short.columns[0].exact.bytes -= 4;
     expect(() => checkObjects(short, "o")).toThrow("o: columns: size: expected 6 rows");
+    const cut = sampleContent();
+    cut.columns[1].parts = [];
+    expect(() => checkObjects(cut, "o")).toThrow("o: columns: type: expected 6 rows");
     const boxes = { ...sampleContent().boxes, bytes: 24 };
     const few = { ...sampleContent(), boxes };
     expect(() => checkObjects(few, "o")).toThrow("o: boxes: expected 6 rows");

@@ -2,18 +2,22 @@
 
 import objectsSchema from "../../../schemas/objects.schema.json";
 import { BundleError } from "../bundle/errors";
-import { fetchFile, parseJson } from "../bundle/fetch";
+import { type FilePart, fetchFile, fetchPart, parseJson } from "../bundle/fetch";
 import type { FileRef } from "../bundle/generated/bundle";
 import type { ChannelObjects, ObjectColumn } from "../bundle/generated/objects";
 import { checkSchema } from "../bundle/schema_check";
+
+/** Rows of a part of exact values. */
+const PART_ROWS = 4096;
 
 /** Throws BundleError. */
 export function checkObjects(value: unknown, path: string): ChannelObjects {
   checkSchema(objectsSchema, value, path);
   const { count, boxes, columns, tiles } = value as ChannelObjects;
   if (boxes.bytes !== 24 * count) throw new BundleError(`${path}: boxes: expected ${count} rows`);
-  for (const { id, bytes, exact } of columns) {
-    if (bytes.bytes !== count || exact.bytes !== 4 * count) {
+  for (const { id, bytes, exact, parts } of columns) {
+    const isCut = parts === undefined || parts.length === Math.ceil(count / PART_ROWS);
+    if (bytes.bytes !== count || exact.bytes !== 4 * count || !isCut) {
       throw new BundleError(`${path}: columns: ${id}: expected ${count} rows`);
     }
   }
@@ -48,7 +52,10 @@ export async function loadObjects(
       rows: new Uint32Array(ofRows),
       area_um2: ofAreas === undefined ? null : new Float32Array(ofAreas),
     };
-  const fetchOne = async (ref: FileRef) => (await fetchFile(base, ref)).buffer;
+  const fetchOne = async (ref: FileRef, part?: FilePart) =>
+    part === undefined
+      ? (await fetchFile(base, ref)).buffer
+      : (await fetchPart(base, ref, part, "rows")).bytes.buffer;
   return new ObjectTable(
     content,
     content.label_bytes === 8 ? new BigUint64Array(ofLabels) : new Uint32Array(ofLabels),
@@ -73,14 +80,14 @@ export class ObjectTable {
   private readonly files = new Map<string, ArrayBuffer>();
   private readonly asked = new Set<string>();
 
-  /** @param fetchOne the bytes of a file of the table */
+  /** @param fetchOne the bytes of a file of the table, or of a part: the whole of it is as good */
   constructor(
     private readonly content: ChannelObjects,
     private readonly labels: Uint32Array | BigUint64Array,
     /** Six a row: least x, y, z and largest, um. */
     readonly boxes: Float32Array,
     private readonly next: Walls | null,
-    private readonly fetchOne: (file: FileRef) => Promise<ArrayBuffer>,
+    private readonly fetchOne: (file: FileRef, part?: FilePart) => Promise<ArrayBuffer>,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {
@@ -162,6 +169,19 @@ export class ObjectTable {
     return file && new Float32Array(file);
   }
 
+  /** One value, by a part of a long column; null: it is on its way. */
+  value(id: string, row: number): number | null {
+    const column = this.byId.get(id);
+    const sha256 = column?.parts?.[Math.floor(row / PART_ROWS)];
+    if (column === undefined || sha256 === undefined || this.files.has(column.exact.path)) {
+      return this.exact(id)?.[row] ?? null;
+    }
+    const first = row - (row % PART_ROWS);
+    const length = 4 * Math.min(PART_ROWS, this.count - first);
+    const part = this.file(column.exact, { offset: 4 * first, length, sha256 });
+    return part && new Float32Array(part)[row - first];
+  }
+
   /** Rows whose name or number has these words in it, those that begin with them first. */
   find(words: string, most: number): readonly number[] {
     const wanted = words.trim().toLowerCase();
@@ -176,22 +196,24 @@ export class ObjectTable {
     return [...starting, ...within].slice(0, most);
   }
 
-  private file(ref: FileRef | undefined): ArrayBuffer | null {
+  private file(ref: FileRef | undefined, part?: FilePart): ArrayBuffer | null {
     if (ref === undefined) return null;
-    const found = this.files.get(ref.path);
+    const key = part === undefined ? ref.path : `${ref.path} ${part.offset}`;
+    const found = this.files.get(key);
     if (found !== undefined) return found;
-    if (this.asked.has(ref.path) || this.failed.has(ref.path)) return null;
-    this.asked.add(ref.path);
-    this.fetchOne(ref)
+    if (this.asked.has(key) || this.failed.has(key)) return null;
+    this.asked.add(key);
+    this.fetchOne(ref, part)
       .then(
-        (bytes) => this.files.set(ref.path, bytes),
+        // a host that knows no parts has sent all
+        (bytes) => this.files.set(bytes.byteLength === ref.bytes ? ref.path : key, bytes),
         (error) => {
-          this.failed.add(ref.path);
+          this.failed.add(key);
           this.onError(error);
         },
       )
       .finally(() => {
-        this.asked.delete(ref.path);
+        this.asked.delete(key);
         this.onChange();
       });
     return null;

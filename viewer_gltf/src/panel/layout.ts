@@ -72,7 +72,7 @@ export type ObjectsFacts = Readonly<{
 }>;
 
 /** Most notices on the panel: the newest few are enough. */
-const MOST_NOTICES = 3;
+const MAX_NOTICES = 3;
 
 /** The middle half of what is shown along each axis: a cut that is seen at once, from every side. */
 export function middleBox({ min, max }: Box): Box {
@@ -173,7 +173,7 @@ function discNow({ mode }: ViewerState, { discLimit_deg = null }: Facts): Contro
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */
 function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
-  const groups = groupNotices(notices).slice(-MOST_NOTICES);
+  const groups = groupNotices(notices).slice(-MAX_NOTICES);
   const items = groups.flatMap(({ text, of }, i): Control[] => [
     { kind: "text", id: `notice-${i}`, label: "Notice", value: text },
     {

@@ -4,7 +4,7 @@ export type Cell = Readonly<{ id: string; row: number; column: number }>;
 export type Grid = Readonly<{ rows: number; columns: number; cells: readonly Cell[] }>;
 
 /** Most cells of a map: the user could not tap on more. */
-const MOST_CELLS = 400;
+const MAX_CELLS = 400;
 
 /** null: the ids are of another kind (or of several layers), or the map would be too large. */
 export function tileGrid(ids: readonly string[]): Grid | null {
@@ -20,7 +20,7 @@ export function tileGrid(ids: readonly string[]): Grid | null {
   const columns = cells.map(({ column }) => column);
   const [top, left] = [lowest(rows), lowest(columns)];
   const grid = { rows: highest(rows) - top + 1, columns: highest(columns) - left + 1 };
-  if (!(grid.rows * grid.columns <= MOST_CELLS)) return null;
+  if (!(grid.rows * grid.columns <= MAX_CELLS)) return null;
   if (new Set(cells.map(({ row, column }) => `${row} ${column}`)).size < cells.length) return null;
   return {
     ...grid,

@@ -10,9 +10,9 @@ import {
 } from "./environment_sampling";
 
 /** Most columns of a room's light: a volume would not show finer ones. */
-const MOST_COLUMNS = 512;
+const MAX_COLUMNS = 512;
 /** Most texels of a file: a larger one is refused. */
-const MOST_TEXELS = 16384 * 8192;
+const MAX_TEXELS = 16384 * 8192;
 
 /** A built-in one, which lies beside the viewer. Throws BundleError. */
 export async function loadEnvironment(base: string, name: string): Promise<EnvironmentTables> {
@@ -58,7 +58,7 @@ function radianceOf(name: string, isFromBelow: boolean, parse: () => Parsed): Ra
   }
   const { width = 0, height = 0, data } = parsed;
   const parts = data instanceof Float32Array ? data.length / (width * height) : 0;
-  if (!(data instanceof Float32Array) || width * height > MOST_TEXELS || parts < 3) {
+  if (!(data instanceof Float32Array) || width * height > MAX_TEXELS || parts < 3) {
     throw new BundleError(
       `${name}: expected a colour picture of light, found ${width} x ${height}`,
     );
@@ -66,7 +66,7 @@ function radianceOf(name: string, isFromBelow: boolean, parse: () => Parsed): Ra
   return reduced(data, width, height, parts, isFromBelow);
 }
 
-/** Rows from the top, RGB, averaged down to MOST_COLUMNS. */
+/** Rows from the top, RGB, averaged down to MAX_COLUMNS. */
 export function reduced(
   data: Float32Array,
   width: number,
@@ -74,7 +74,7 @@ export function reduced(
   parts: number,
   isFromBelow: boolean,
 ): Radiance {
-  const factor = Math.max(1, Math.ceil(width / MOST_COLUMNS));
+  const factor = Math.max(1, Math.ceil(width / MAX_COLUMNS));
   const [columns, rows] = [Math.ceil(width / factor), Math.ceil(height / factor)];
   const rgb = new Float32Array(3 * columns * rows);
   const counts = new Float32Array(columns * rows);

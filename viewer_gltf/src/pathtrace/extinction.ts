@@ -8,7 +8,7 @@ import { ENTRIES } from "../volumes/transfer_luts";
 import { envelopeOf, type TransferTable2d } from "../volumes/transfer_table_2d";
 
 /** Largest opacity, 0..1: 1 would be infinitely dense. */
-const MOST_OPACITY = 0.999;
+const MAX_OPACITY = 0.999;
 
 /** How one channel looks: see `tile_march`. */
 export type MediumAppearance = Readonly<{
@@ -70,7 +70,7 @@ function fillRow(
       row[4 * i + k] = (a + (table[4 * left + 4 + k] - a) * (at - left)) / 255;
     }
     for (let k = 0; k < 3; k++) row[4 * i + k] *= color[k];
-    const opacity = Math.min(row[4 * i + 3], MOST_OPACITY);
+    const opacity = Math.min(row[4 * i + 3], MAX_OPACITY);
     row[4 * i + 3] = opacity === 0 ? 0 : (-Math.log(1 - opacity) / voxel_um) * density;
   }
 }

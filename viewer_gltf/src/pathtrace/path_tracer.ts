@@ -53,7 +53,7 @@ const NOISE_EVERY = 8;
 /** Noise at which a tile is as good as done. */
 const CALM = 0.004;
 /** Most samples that are kept of a view a little aside. */
-const MOST_ASIDE = 48;
+const MAX_ASIDE = 48;
 
 /** How a frame is gathered. */
 export type Gathering = Readonly<{
@@ -116,7 +116,7 @@ export class Tracer {
     private readonly brick = 2 * SKIP_BRICK,
     private readonly calm = CALM,
   ) {
-    this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth, MOST_ASIDE), {
+    this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth, MAX_ASIDE), {
       CHANNELS: 1,
       NOISE_TILE,
     });
@@ -237,7 +237,7 @@ export class Tracer {
     this.seen = views;
     if (history === "none") this.restart();
     if (history === "aside") {
-      this.samples = Math.min(this.samples, MOST_ASIDE);
+      this.samples = Math.min(this.samples, MAX_ASIDE);
       this.rested = 0;
     }
     const begins = history === "same" ? this.anchors : views;

@@ -25,10 +25,10 @@ import type { TraceScene } from "./uniforms";
 
 const NOT_LOADED = "The part of the page that follows light could not be had.";
 /** Most pixels of a picture: more take more memory than a phone's browser gives. */
-const MOST_PIXELS = 2_000_000;
+const MAX_PIXELS = 2_000_000;
 const FIRST_SAMPLES = 6;
 /** Most pixels while the picture moves: the denoiser fills in the rest. */
-const MOST_MOVING_PIXELS = 160_000;
+const MAX_MOVING_PIXELS = 160_000;
 
 /** The part of the volumes that the tracer uses. */
 export type Volumes = Readonly<{
@@ -190,7 +190,7 @@ export class TracedVolume {
     const isClearing = this.isSmall && tracer.rested < FIRST_SAMPLES && standIn === null;
     const isFirst = isOther || isClearing;
     this.isSmall = isFirst;
-    const most = isFirst ? MOST_MOVING_PIXELS : MOST_PIXELS;
+    const most = isFirst ? MAX_MOVING_PIXELS : MAX_PIXELS;
     const fits = Math.sqrt(most / (eyes.width_px * eyes.height_px));
     if (isOther) this.resolution = resolution;
     if (!isMoving) this.resolutionAtRest = resolution;

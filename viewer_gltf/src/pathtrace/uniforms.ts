@@ -11,11 +11,11 @@ import type { MediumTexels } from "./medium_loader";
 import type { BlockFrame } from "./texel_frame";
 
 /** Most light of a path: halves of floats end at 65504 ... */
-const MOST_LIGHT = 60_000;
+const MAX_LIGHT = 60_000;
 /** ... and a picture of few samples would sparkle. */
-const MOST_LIGHT_MOVING = 200;
+const MAX_LIGHT_MOVING = 200;
 /** Most scatterings of a path, in a medium that swallows nothing. */
-const MOST_SCATTERS = 512;
+const MAX_SCATTERS = 512;
 /** ... in a picture that moves: the room's mean replaces the rest of the path. */
 const FEW_SCATTERS = 16;
 /** Exponent of a shiny surface's lobe. */
@@ -74,14 +74,14 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
     uLampCount: { value: 0 },
     uLamps: { value: Array.from({ length: LAMPS }, () => new Vector4()) },
     uLampLight: { value: Array.from({ length: LAMPS }, () => new Vector3()) },
-    uScatters: { value: MOST_SCATTERS },
+    uScatters: { value: MAX_SCATTERS },
     uBeyond: { value: new Vector3() },
     uAnisotropy: { value: 0 },
     uSurface: { value: 0 },
     uShine: { value: 0 },
     uGloss: { value: GLOSS },
     uOcclusionReach: { value: 1 },
-    uMostLight: { value: MOST_LIGHT },
+    uMostLight: { value: MAX_LIGHT },
     uSample: { value: 0 },
     uHistory: { value: 0 },
     uToBefore: { value: new Matrix4() },
@@ -135,8 +135,8 @@ export function sceneInto(
   const turn = new Matrix4().makeRotationY((settings.environmentTurn_deg * Math.PI) / 180);
   uniforms.uToRoom.value.copy(turnOf(turn.multiply(box)));
   uniforms.uEnvironmentLight.value = settings.environmentLight;
-  uniforms.uMostLight.value = isDraft ? MOST_LIGHT_MOVING : MOST_LIGHT;
-  const most = isDraft ? FEW_SCATTERS : MOST_SCATTERS;
+  uniforms.uMostLight.value = isDraft ? MAX_LIGHT_MOVING : MAX_LIGHT;
+  const most = isDraft ? FEW_SCATTERS : MAX_SCATTERS;
   uniforms.uScatters.value = settings.isMultiple ? most : 1;
   const beyond = settings.isMultiple && isDraft ? settings.environmentLight : 0;
   uniforms.uBeyond.value.set(...roomLight).multiplyScalar(beyond);

@@ -58,7 +58,7 @@ export type FramePace = Readonly<{
 const EVERYWHERE = [-2, -3] as const;
 const NOWHERE = [3, 2] as const;
 /** Most frames of a view at rest that are averaged. */
-const MOST_GATHERED = 64;
+const MAX_GATHERED = 64;
 /** Multiples of it fill 0..1 evenly, however many there are. */
 const GOLDEN = (Math.sqrt(5) - 1) / 2;
 /** Pixels of the march beyond the disc that those within it mix. */
@@ -200,7 +200,7 @@ export class Picture {
 
   /** Whether another frame of the view at rest would make the march's picture better. */
   get canGather(): boolean {
-    return this.march.isShown && this.march.gathered < MOST_GATHERED;
+    return this.march.isShown && this.march.gathered < MAX_GATHERED;
   }
 
   /**

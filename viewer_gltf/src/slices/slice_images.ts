@@ -20,7 +20,7 @@ import { compose, GREY, reslice, type Size, sizeOf, type TexelBlock } from "./re
 /** Pixels of a picture's longer edge. */
 const LONGEST_PX = 384;
 /** Most texels of all tiles and channels together that are looked up. */
-const MOST_TEXELS = 40 * 1024 * 1024;
+const MAX_TEXELS = 40 * 1024 * 1024;
 /** Most texels of one tile that come before any other. */
 const FIRST_TEXELS = 48 ** 3;
 
@@ -144,7 +144,7 @@ export class SliceImages {
     if (wanted === this.loaded) return;
     this.loaded = wanted;
     this.isLoading = true;
-    const most = MOST_TEXELS / Math.max(1, shown.length * tiles.length);
+    const most = MAX_TEXELS / Math.max(1, shown.length * tiles.length);
     try {
       for (const texels of [Math.min(FIRST_TEXELS, most), most]) {
         const layers = await Promise.all(

@@ -18,7 +18,7 @@ import type { Sight } from "../annotations/style";
 import { leaveUncut } from "../gpu/unclipped_material";
 import { AHEAD, type Box, boxSpan } from "../math/box";
 import type { ClipPlane } from "../math/clip";
-import { MOST_CORNERS } from "../math/plane_box_section";
+import { MAX_CORNERS } from "../math/plane_box_section";
 import { cornerTowards } from "../math/slice_corner";
 import { outlineOf, placeIn, type SliceFrame } from "../math/slice_frame";
 import type { Vec3 } from "../math/vec3";
@@ -40,10 +40,10 @@ class Planes {
     this.texture.colorSpace = SRGBColorSpace;
     this.texture.minFilter = LinearFilter;
     this.texture.generateMipmaps = false;
-    const count = slices.length * MOST_CORNERS;
+    const count = slices.length * MAX_CORNERS;
     const triangles = slices.flatMap((_, plane) =>
-      Array.from({ length: MOST_CORNERS - 2 }, (_, i) =>
-        [0, i + 1, i + 2].map((corner) => plane * MOST_CORNERS + corner),
+      Array.from({ length: MAX_CORNERS - 2 }, (_, i) =>
+        [0, i + 1, i + 2].map((corner) => plane * MAX_CORNERS + corner),
       ),
     );
     const geometry = new BufferGeometry()
@@ -71,11 +71,11 @@ class Planes {
     let left = BORDER_PX;
     this.slices.forEach((slice, plane) => {
       const outline = outlineOf(frames[plane], box);
-      for (let i = 0; i < MOST_CORNERS; i++) {
+      for (let i = 0; i < MAX_CORNERS; i++) {
         // the triangles that are left over have no area
         const corner = outline.length > 2 ? outline[Math.min(i, outline.length - 1)] : box.min;
         const { x, y } = placeIn(frames[plane], corner);
-        const at = plane * MOST_CORNERS + i;
+        const at = plane * MAX_CORNERS + i;
         position.setXYZ(at, ...corner);
         uv.setXY(at, (left + x * slice.width) / width, 1 - (BORDER_PX + y * slice.height) / height);
       }

@@ -30,11 +30,11 @@ const NAMES: Readonly<Record<MeasureKind, string>> = {
   line: "Line",
 };
 const WANTED: Readonly<Record<MeasureKind, number>> = { distance: 2, angle: 3, line: MAX_POINTS };
-const LEAST: Readonly<Record<MeasureKind, number>> = { distance: 2, angle: 3, line: 2 };
+const MIN_POINTS: Readonly<Record<MeasureKind, number>> = { distance: 2, angle: 3, line: 2 };
 
 /** How many points are missing at least; 0: it measures something. */
 export function missing(kind: MeasureKind, points: readonly Vec3[]): number {
-  return Math.max(0, LEAST[kind] - points.length);
+  return Math.max(0, MIN_POINTS[kind] - points.length);
 }
 
 /** With one more point: of the newest one, or, where that is done, of another. */

@@ -89,9 +89,9 @@ const USUAL_PRICE = 1.15;
 const FALLEN = 0.85;
 /** Factor over budget for which one notch is given up. */
 const FACTOR_A_NOTCH = 1.25;
-const MOST_NOTCHES = 6;
+const MAX_NOTCHES = 6;
 const PATIENCE = 90;
-const MOST_PATIENCE = 5400;
+const MAX_PATIENCE = 5400;
 
 export function initialQuality(timing: Timing, level: QualityLevel = "auto"): Quality {
   return {
@@ -172,7 +172,7 @@ function judge(quality: Quality, mean_ms: number, budget_ms: number): Quality {
   const known = withPrice(quality, mean_ms);
   const over = mean_ms / (budget_ms * TOLERANCE[known.timing]);
   if (over > 1 && isTry(quality)) {
-    const patience = Math.min(2 * known.patience, MOST_PATIENCE);
+    const patience = Math.min(2 * known.patience, MAX_PATIENCE);
     return moveTo({ ...known, patience }, quality.before_notch, mean_ms);
   }
   if (over > 1)
@@ -186,7 +186,7 @@ function judge(quality: Quality, mean_ms: number, budget_ms: number): Quality {
 function notchesFor(over: number, { timing }: Quality): number {
   const sure = timing === "interval" ? Math.max(1, over - 1) : over;
   const notches = Math.floor(Math.log(sure) / Math.log(FACTOR_A_NOTCH));
-  return Math.min(Math.max(notches, 1), MOST_NOTCHES);
+  return Math.min(Math.max(notches, 1), MAX_NOTCHES);
 }
 
 /** Whether the window that is judged is the first after a step up, which may fail. */

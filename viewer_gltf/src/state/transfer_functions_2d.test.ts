@@ -5,7 +5,7 @@ import type { Action } from "./actions";
 import { initialState } from "./initial_state";
 import { reduce } from "./reduce";
 import { editedName, isTwoD, OWN, STEPS, shapesOf } from "./transfer_functions_2d";
-import { LEAST_HEIGHT, LEAST_WIDTH, makeShape } from "./transfer_shapes";
+import { MIN_HEIGHT, MIN_WIDTH, makeShape } from "./transfer_shapes";
 import type { ChannelState } from "./viewer_state";
 
 const SHAPE = makeShape("triangle", { value: 0.5, gradient: 0.4 });
@@ -72,7 +72,7 @@ describe("the two-dimensional functions of a channel", () => {
   });
 
   it("lie on a lattice, however thin, and still are shapes", () => {
-    const [v, g] = [LEAST_WIDTH, LEAST_HEIGHT];
+    const [v, g] = [MIN_WIDTH, MIN_HEIGHT];
     const thin = [0, 0.12345, 1 - v, 0.9999 - v].flatMap((low) =>
       [0, 0.54321, 1 - g].map((bottom) => ({
         ...SHAPE,

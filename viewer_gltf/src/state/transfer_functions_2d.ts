@@ -12,7 +12,7 @@ import {
   type Transfer2d,
 } from "../bundle/transfer_2d";
 import { fromHex, toHex } from "../math/color";
-import { LEAST_HEIGHT, LEAST_WIDTH } from "./transfer_shapes";
+import { MIN_HEIGHT, MIN_WIDTH } from "./transfer_shapes";
 
 /** The function that a user's shapes make of a channel that is shown by a one-dimensional one. */
 export const OWN = "own";
@@ -87,8 +87,8 @@ export function onLattice(shape: Shape): Shape | null {
   if (faultOf(shape) !== null) return null;
   return {
     kind: shape.kind,
-    values: roundedRange(shape.values, LEAST_WIDTH),
-    gradients: roundedRange(shape.gradients, LEAST_HEIGHT),
+    values: roundedRange(shape.values, MIN_WIDTH),
+    gradients: roundedRange(shape.gradients, MIN_HEIGHT),
     tip: rounded(shape.tip),
     color: fromHex(toHex(shape.color)),
     opacity: rounded(shape.opacity),

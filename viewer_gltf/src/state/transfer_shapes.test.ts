@@ -4,8 +4,8 @@ import {
   addShape,
   type HistogramPoint,
   hitTest,
-  LEAST_HEIGHT,
-  LEAST_WIDTH,
+  MIN_HEIGHT,
+  MIN_WIDTH,
   makeShape,
   move,
   outline,
@@ -156,8 +156,8 @@ describe("an edit", () => {
       values: [0.2, 0.9],
       gradients: [0.3, 0.8],
     });
-    expect(resize(box, "left", at(2, 0)).values).toEqual([0.6 - LEAST_WIDTH, 0.6]);
-    expect(resize(box, "bottom", at(0, 9)).gradients).toEqual([0.7 - LEAST_HEIGHT, 0.7]);
+    expect(resize(box, "left", at(2, 0)).values).toEqual([0.6 - MIN_WIDTH, 0.6]);
+    expect(resize(box, "bottom", at(0, 9)).gradients).toEqual([0.7 - MIN_HEIGHT, 0.7]);
     expect(resize(box, "top-left", at(-1, 7))).toMatchObject({
       values: [0, 0.6],
       gradients: [0.3, 1],

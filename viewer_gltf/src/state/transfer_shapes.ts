@@ -14,8 +14,8 @@ import {
 } from "../bundle/transfer_2d";
 
 /** Least size of a shape, as a share of the plane's width and height: a cell of the table. */
-export const LEAST_WIDTH = 1 / (COLUMNS - 1);
-export const LEAST_HEIGHT = 1 / (ROWS - 1);
+export const MIN_WIDTH = 1 / (COLUMNS - 1);
+export const MIN_HEIGHT = 1 / (ROWS - 1);
 
 /** A place in the plane: value in the window, gradient magnitude of gradient_max. */
 export type HistogramPoint = Readonly<{ value: number; gradient: number }>;
@@ -203,10 +203,10 @@ export function resize(shape: Shape, part: Part, to: HistogramPoint): Shape {
   if (part === "tip") return { ...shape, tip: clamp(to.value, 0, 1) };
   let [v0, v1] = shape.values;
   let [g0, g1] = shape.gradients;
-  if (part.endsWith("left")) v0 = clamp(to.value, 0, v1 - LEAST_WIDTH);
-  if (part.endsWith("right")) v1 = clamp(to.value, v0 + LEAST_WIDTH, 1);
-  if (part.startsWith("bottom")) g0 = clamp(to.gradient, 0, g1 - LEAST_HEIGHT);
-  if (part.startsWith("top")) g1 = clamp(to.gradient, g0 + LEAST_HEIGHT, 1);
+  if (part.endsWith("left")) v0 = clamp(to.value, 0, v1 - MIN_WIDTH);
+  if (part.endsWith("right")) v1 = clamp(to.value, v0 + MIN_WIDTH, 1);
+  if (part.startsWith("bottom")) g0 = clamp(to.gradient, 0, g1 - MIN_HEIGHT);
+  if (part.startsWith("top")) g1 = clamp(to.gradient, g0 + MIN_HEIGHT, 1);
   const resized = { ...shape, values: [v0, v1] as const, gradients: [g0, g1] as const };
   return shape.kind === "rectangle" ? { ...resized, tip: (v0 + v1) / 2 } : resized;
 }

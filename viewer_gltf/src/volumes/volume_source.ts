@@ -3,9 +3,8 @@
  * no ranges answers the first request with the whole file, which then serves every level.
  */
 import { BundleError } from "../bundle/errors";
-import { checkFile, fetchFile, fileAddress, readBody, request } from "../bundle/fetch";
+import { fetchFile, fetchPart } from "../bundle/fetch";
 import type { TileVolume } from "../bundle/generated/volumes";
-import { checkHash } from "../bundle/hash";
 import { compressedLevel, readLevel, readTexture } from "../bundle/ktx2";
 import { brickCounts } from "./skip_bricks";
 
@@ -54,56 +53,18 @@ export class VolumeSource {
   }
 
   private async fetchLevel(index: number, signal: AbortSignal): Promise<Uint8Array> {
-    const { file, size } = this.volume;
-    const part = this.whole === null ? await this.fetchRange(index, signal) : null;
-    if (part !== null) return part;
-    if (this.whole === null) throw new Error("a whole file was promised");
+    const { file, levels, size } = this.volume;
+    if (this.whole === null) {
+      const level = levels[index];
+      const part = await fetchPart(this.base, file, level, `level ${index}`, signal);
+      if (!part.isWhole) return part.bytes;
+      this.whole = part.bytes;
+    }
     const texture = readTexture(this.whole, file.path, "R8", size);
     const frame = compressedLevel(texture, file.path, index);
     if (frame === null) {
       throw new BundleError(`${file.path}: supercompression: expected zstd, found none`);
     }
     return frame;
-  }
-
-  /**
-   * The compressed bytes of a level, or null if the host sent the whole file (then it is kept). What
-   * was spoilt on its way may lie in a cache since: it is asked for once more, past all caches.
-   */
-  private async fetchRange(
-    index: number,
-    signal: AbortSignal,
-    cache: RequestCache = "default",
-  ): Promise<Uint8Array | null> {
-    const { file, levels } = this.volume;
-    const level = levels[index];
-    const last = level.offset + level.length - 1;
-    const response = await request(fileAddress(this.base, file.path), file.path, {
-      signal,
-      cache,
-      headers: { Range: `bytes=${level.offset}-${last}` },
-    });
-    const bytes = await readBody(response, file.path);
-    if (response.status !== 206) {
-      await checkFile(file, bytes);
-      this.whole = bytes;
-      return null;
-    }
-    const total = response.headers.get("Content-Range")?.split("/")[1];
-    if (total !== undefined && total !== "*" && Number(total) !== file.bytes) {
-      throw new BundleError(`${file.path}: expected ${file.bytes} bytes, found ${total}`);
-    }
-    if (bytes.length !== level.length) {
-      throw new BundleError(
-        `${file.path}: expected ${level.length} bytes of a range, found ${bytes.length}`,
-      );
-    }
-    try {
-      await checkHash(`${file.path}: level ${index}`, bytes, level.sha256);
-    } catch (error) {
-      if (cache === "reload" || !(error instanceof BundleError)) throw error;
-      return this.fetchRange(index, signal, "reload");
-    }
-    return bytes;
   }
 }

@@ -11,7 +11,7 @@ const TAN_HALF_FIELD = Math.tan((20 * Math.PI) / 180);
 /** Of the disc, degrees, and of what is all volume within its soft rim. */
 const [DISC, WITHIN] = [12, 6.5];
 /** Largest difference of a channel's mean colours (CIEDE2000). */
-const MOST = 5;
+const MAX_DELTA_E = 5;
 
 /** Mean colours of two pictures over pixels of the disc's inside that show the specimen in both. */
 function meansWithin(a: Picture, b: Picture): Readonly<{ pixels: number; means: Pixel[] }> {
@@ -54,7 +54,7 @@ for (const { name, bundle, channels } of CASES) {
           const { pixels, means } = meansWithin(await at("disc"), await at("off"));
           expect(pixels).toBeGreaterThan(300);
           const [volume, surface] = means.map(toLab);
-          expect(colorDifference(volume, surface)).toBeLessThanOrEqual(MOST);
+          expect(colorDifference(volume, surface)).toBeLessThanOrEqual(MAX_DELTA_E);
         });
       }
     });

@@ -17,7 +17,7 @@ import { askPython, hasPython } from "../support/python";
 const REAL = process.env.STEREOCELL_REAL_BUNDLE;
 const FIELD_OF_VIEW_DEG = 40;
 const VIEWPORT = { width: 360, height: 240 };
-const LEAST_DB = 40;
+const MIN_DB = 40;
 
 /** Show these channels alone, as volumes everywhere, from the front; how near that comes, in dB. */
 async function hold(stand: Stand, channels: readonly string[]) {
@@ -53,7 +53,7 @@ describe.skipIf(!hasPython)("against the float64 reference", () => {
       it(`is as near as 40 dB: ${channels.join(", ")}`, async () => {
         const { psnr, drawn } = await hold(stand, channels);
         expect(drawn).toBeGreaterThan(280);
-        expect(psnr).toBeGreaterThan(LEAST_DB);
+        expect(psnr).toBeGreaterThan(MIN_DB);
       });
     }
   });
@@ -64,7 +64,7 @@ describe.skipIf(!hasPython)("against the float64 reference", () => {
       it("is as near as 40 dB", async () => {
         const { psnr, drawn } = await hold(stand, [stand.manifest.channels[0].id]);
         expect(drawn).toBeGreaterThan(280);
-        expect(psnr).toBeGreaterThan(LEAST_DB);
+        expect(psnr).toBeGreaterThan(MIN_DB);
       });
     });
   });

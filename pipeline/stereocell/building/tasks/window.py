@@ -15,7 +15,7 @@ from stereocell.building.settings import Settings
 from stereocell.filters.background import find_background
 from stereocell.isosurface.holder import Holder, find_holder
 from stereocell.isosurface.level_evidence import (
-    MOST_PADDING,
+    MAX_PADDING,
     Counting,
     denoising_reach,
     find_padding,
@@ -119,7 +119,7 @@ def measure_window(task: StatisticsTask) -> Window:
     darkest = float(voxels.min()) if mask is None else None
     reach = denoising_reach(float(surface.smoothing_um), dataset.levels[level].spacing_um)
     padding = find_padding(voxels, darkest, reach if step == 1 else (0, *reach[1:]))
-    if padding.mean() > MOST_PADDING:
+    if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, background = Scale.of(voxels, padding), None
     if task.subtracts and mask is None:

@@ -21,7 +21,7 @@ from stereocell.read.dicom.segmentation import BINARY, LABELMAP, Segmentation
 from stereocell.read.plane_stack import DRIFT, REGULAR, NoStackError, normal_of
 
 _AT_ONCE = 1 << 28  # pixels that are decoded together: a file is read anew for each such part
-_MOST_PLANES = 1 << 16
+_MAX_PLANES = 1 << 16
 _NEAR = 0.2  # planes: a gap that is further from a whole number of them is none
 
 
@@ -155,7 +155,7 @@ def _planes(heights_mm: NDArray[np.float64], stated_mm: float) -> tuple[list[int
             step = float(heights_mm.max()) / last
             exact = heights_mm / step
             planes = np.rint(exact)
-        if last < _MOST_PLANES and (np.abs(exact - planes) <= _NEAR).all():
+        if last < _MAX_PLANES and (np.abs(exact - planes) <= _NEAR).all():
             return [int(plane) for plane in planes], step
     raise NoStackError("with uneven gaps between planes")
 

@@ -32,7 +32,7 @@ _SIEMENS_TAGS: list[Any] = [
     *(0x00290010 + (block << 8) for block in (0x10, 0x11, 0x12)),
 ]
 _UIH_SLICES = 0x00651051
-_MOST = 4096  # slices of one image
+_MAX_SLICES = 4096  # slices of one image
 _ALIGNED = 0.01  # of the cosine between the stated normal and the rows' and columns' own
 
 
@@ -162,7 +162,7 @@ def _uih(path: Path, shape: tuple[int, int]) -> Mosaic | None:
 
 def _tile(shape: tuple[int, int], down: int, across: int, count: int, told: str) -> tuple[int, int]:
     """Return the pixels (rows, columns) of a slice in a grid of so many down and across."""
-    if count > _MOST or shape[0] % down or shape[1] % across:
+    if count > _MAX_SLICES or shape[0] % down or shape[1] % across:
         raise MosaicError(
             f"{told} in an image of {shape[0]} x {shape[1]} pixels, which they don't fill"
         )

@@ -23,7 +23,7 @@ _GROUPS = {
 _SEPARATORS = (re.compile(r"[/_\-\s.]+"), re.compile(r"[/_\s]+"))
 _WELL = re.compile(r"[A-P][0-9]{2}")
 _GUID = re.compile(r"[0-9A-Fa-f]{8}(-[0-9A-Fa-f]{4}){3}-[0-9A-Fa-f]{12}")
-_MOST_CHANNELS = 40  # values of a number that no letters tell: more are no channels
+_MAX_CHANNELS = 40  # values of a number that no letters tell: more are no channels
 _SUFFIX = re.compile(r"(\.ome)?\.[A-Za-z0-9]+$")
 
 
@@ -159,7 +159,7 @@ def _roles(
             channel = None
         others = [field for field in others if field is not plane]
     if channel is None:
-        few = [field for field in others if field.count <= _MOST_CHANNELS]
+        few = [field for field in others if field.count <= _MAX_CHANNELS]
         channel = next(iter(words or few), None)
     return plane, channel, time
 

@@ -12,7 +12,7 @@ _PARTS = {
     "{c}": r"(?P<c>[^/]+?)",
     "*": r"[^/]*?",
 }
-_MOST_STARS = 4  # each multiplies the time that a name takes
+_MAX_STARS = 4  # each multiplies the time that a name takes
 _EXPECTED = (
     "expected a name with {z} for the plane's number and, where there are any, {c} for the "
     "channel, {t} for the time, * for text that doesn't count, as img_c{c}_z{z}.tif"
@@ -55,10 +55,10 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     parts[1::2] = [part[:1] if part.startswith("*") else part for part in parts[1::2]]
     fields = [part for part in parts[1::2] if part != "*"]
     unknown = [part for part in fields if part not in _PARTS]
-    many = parts.count("*") > _MOST_STARS
+    many = parts.count("*") > _MAX_STARS
     if not pattern or unknown or many or len(set(fields)) < len(fields) or len(pattern) > 500:
         reason = f": {unknown[0]} is unknown" if unknown else ""
-        reason = f": more than {_MOST_STARS} *" if many else reason
+        reason = f": more than {_MAX_STARS} *" if many else reason
         raise UsageError(f"--pattern is {pattern!r:.200}{reason}; {_EXPECTED}")
     escaped = [_PARTS[part] if i % 2 else re.escape(part) for i, part in enumerate(parts)]
     return re.compile("".join(escaped))

@@ -27,6 +27,7 @@ class Volume:
 
 
 def groups_of(places: Sequence[Place]) -> list[list[Place]]:
+    """Return files by the group that their names tell, groups in natural order."""
     groups: dict[str, list[Place]] = {}
     for place in places:
         groups.setdefault(place.group, []).append(place)

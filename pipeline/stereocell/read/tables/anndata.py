@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.tables.table import (
-    MOST_NAMES,
-    MOST_ROWS,
+    MAX_NAMES,
+    MAX_ROWS,
     Table,
     TableColumn,
     choose_columns,
@@ -28,7 +28,7 @@ from stereocell.read.tables.table import (
 
 _ATTRIBUTES = "spatialdata_attrs"  # in `uns`: which label map the rows belong to
 _BLOCK = 1 << 22  # values of X that are read at a time
-_MOST_VALUES = 1 << 28  # of X that are taken
+_MAX_VALUES = 1 << 28  # of X that are taken
 
 
 class Node(Protocol):
@@ -61,10 +61,10 @@ def read_anndata(root: Node, where: str, key: str, wanted: tuple[str, ...], labe
             "a newer one: read and write it again there"
         )
     order = obs.attribute("column-order")
-    if order is None or len(order) > MOST_NAMES:
+    if order is None or len(order) > MAX_NAMES:
         found = "nothing" if order is None else f"{len(order)} names"
         raise SourceError(
-            f"{where}: obs: column-order: found {found}, expected at most {MOST_NAMES} names"
+            f"{where}: obs: column-order: found {found}, expected at most {MAX_NAMES} names"
         )
     names = [str(name) for name in order]
     about = _about(root)
@@ -144,9 +144,9 @@ def _series(node: Node, where: str) -> list[Any]:
 
 
 def _values(node: Node, where: str) -> NDArray[Any]:
-    if node.shape is None or len(node.shape) != 1 or node.shape[0] > MOST_ROWS:
+    if node.shape is None or len(node.shape) != 1 or node.shape[0] > MAX_ROWS:
         found = "a group" if node.shape is None else f"an array of {_by(node.shape)} values"
-        raise SourceError(f"{where}: found {found}, expected a list of at most {MOST_ROWS}")
+        raise SourceError(f"{where}: found {found}, expected a list of at most {MAX_ROWS}")
     return node.read(...)
 
 
@@ -171,10 +171,10 @@ def _columns_of(
 ) -> NDArray[np.float64]:
     """Return some columns of X, dense or sparse: float64 (rows, columns)."""
     rows, genes = size
-    if rows * len(places) > _MOST_VALUES:
+    if rows * len(places) > _MAX_VALUES:
         raise SourceError(
             f"{where}: X: found {rows} rows by {len(places)} columns, expected at most "
-            f"{_MOST_VALUES} values: name those you want by --columns"
+            f"{_MAX_VALUES} values: name those you want by --columns"
         )
     stated = matrix.shape if matrix.shape is not None else matrix.attribute("shape")
     if stated is None or tuple(stated) != size:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from stereocell.model.errors import SourceError
 from stereocell.read.tables.table import (
-    MOST_NAMES,
-    MOST_ROWS,
+    MAX_NAMES,
+    MAX_ROWS,
     Table,
     as_column,
     choose_columns,
@@ -19,7 +19,7 @@ from stereocell.read.tables.table import (
 )
 from stereocell.storage.location import Location
 
-_MOST_BYTES = 4 << 30  # of a table
+_MAX_BYTES = 4 << 30  # of a table
 _LONGEST = 1 << 17  # characters of a cell: the csv module's own limit
 _LONGEST_LINE = 1 << 24  # characters
 
@@ -29,8 +29,8 @@ def read_delimited(location: Location, key: str, wanted: tuple[str, ...]) -> Tab
     where = location.shown
     try:
         size = os.path.getsize(location.source)
-        if size > _MOST_BYTES:
-            raise SourceError(f"{where}: found {size} bytes, expected at most {_MOST_BYTES}")
+        if size > _MAX_BYTES:
+            raise SourceError(f"{where}: found {size} bytes, expected at most {_MAX_BYTES}")
         with open(location.source, encoding="utf-8-sig", newline="") as text:
             return _read(text, where, key, wanted)
     except UnicodeDecodeError as error:
@@ -52,8 +52,8 @@ def _read(text: io.TextIOWrapper, where: str, key: str, wanted: tuple[str, ...])
         raise SourceError(f"{where}: found no header, expected names of columns in the first line")
     mark = max("\t,;", key=first.count)
     header = next(csv.reader([first], delimiter=mark))
-    if len(header) > MOST_NAMES:
-        raise SourceError(f"{where}: found {len(header)} columns, expected at most {MOST_NAMES}")
+    if len(header) > MAX_NAMES:
+        raise SourceError(f"{where}: found {len(header)} columns, expected at most {MAX_NAMES}")
     names = named(header)
     require_once(where, names)
     chosen_key = choose_key(where, names, key)
@@ -84,8 +84,8 @@ def _lines(text: io.TextIOWrapper, where: str) -> Iterator[str]:
 
 def _rows(text: io.TextIOWrapper, mark: str, where: str, width: int) -> Iterator[list[str]]:
     for number, row in enumerate(csv.reader(_lines(text, where), delimiter=mark), start=2):
-        if number > MOST_ROWS:
-            raise SourceError(f"{where}: found more than {MOST_ROWS} rows, expected at most those")
+        if number > MAX_ROWS:
+            raise SourceError(f"{where}: found more than {MAX_ROWS} rows, expected at most those")
         if not row:
             continue
         if len(row) != width:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from stereocell.model.errors import SourceError
 from stereocell.read import extras
 from stereocell.read.tables.table import (
-    MOST_NAMES,
-    MOST_ROWS,
+    MAX_NAMES,
+    MAX_ROWS,
     Table,
     TableColumn,
     choose_columns,
@@ -28,7 +28,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _BATCH = 1 << 16  # rows
-_MOST_BYTES = 1 << 28  # of a column in a group of rows
+_MAX_BYTES = 1 << 28  # of a column in a group of rows
 _INDEX = "__index_level_"  # how pandas calls an index without a name
 
 
@@ -48,10 +48,10 @@ def _read(parquet: Any, source: BinaryIO, where: str, key: str, wanted: tuple[st
     file = parquet.ParquetFile(source)
     stated, schema = file.metadata, file.schema_arrow
     rows = int(stated.num_rows)
-    if len(schema) > MOST_NAMES or not 0 <= rows <= MOST_ROWS:
+    if len(schema) > MAX_NAMES or not 0 <= rows <= MAX_ROWS:
         raise SourceError(
-            f"{where}: found {rows} rows of {len(schema)} columns, expected at most {MOST_ROWS} "
-            f"of {MOST_NAMES}"
+            f"{where}: found {rows} rows of {len(schema)} columns, expected at most {MAX_ROWS} "
+            f"of {MAX_NAMES}"
         )
     require_once(where, schema.names)
     kinds = {field.name: _kind(field.type) for field in schema}
@@ -101,10 +101,10 @@ def _require_small(stated: Any, where: str, names: set[str]) -> None:
         for place in range(parts.num_columns):
             part = parts.column(place)
             size = int(part.total_uncompressed_size)
-            if part.path_in_schema in names and not 0 <= size <= _MOST_BYTES:
+            if part.path_in_schema in names and not 0 <= size <= _MAX_BYTES:
                 raise SourceError(
                     f"{where}: column {clean(part.path_in_schema)!r:.60}: found {size} bytes in "
-                    f"{parts.num_rows} rows, expected at most {_MOST_BYTES}"
+                    f"{parts.num_rows} rows, expected at most {_MAX_BYTES}"
                 )
 
 

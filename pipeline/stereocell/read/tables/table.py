@@ -12,12 +12,12 @@ from stereocell.model.errors import SourceError
 
 # Columns of objects' numbers, as MCMICRO, scikit-image, Cellpose, Xenium, SpatialData call them
 KEYS = ("CellID", "label", "cell_id", "instance_id", "object_id", "ObjectNumber", "id")
-MOST_COLUMNS = 128  # that are taken without being named
-MOST_NAMES = 100_000  # columns of a file
-MOST_ROWS = 1 << 24
+MAX_COLUMNS = 128  # that are taken without being named
+MAX_NAMES = 100_000  # columns of a file
+MAX_ROWS = 1 << 24
 _LONGEST = 200  # characters of a category
 _SHOWN = 8  # names that a message lists
-_MOST_DIGITS = 20  # of a number of 64 bits
+_MAX_DIGITS = 20  # of a number of 64 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ def choose_columns(
     if wanted:
         return list(wanted), 0
     others = [name for name in names if name != key]
-    return others[:MOST_COLUMNS], max(0, len(others) - MOST_COLUMNS)
+    return others[:MAX_COLUMNS], max(0, len(others) - MAX_COLUMNS)
 
 
 def keys_of(
@@ -159,7 +159,7 @@ def _whole_of(text: str) -> int:
         value = Decimal(text)
     except InvalidOperation:
         raise ValueError from None
-    if not value.is_finite() or value.adjusted() > _MOST_DIGITS or value != value // 1:
+    if not value.is_finite() or value.adjusted() > _MAX_DIGITS or value != value // 1:
         raise ValueError
     return int(value)
 

@@ -31,7 +31,7 @@ from stereocell.storage.location import Location, require_own
 
 _UNKNOWN = "qio"  # tifffile's axes of pages that are sequence, image, other
 _PLACES = {"r": "positions", "p": "positions", "m": "mosaic tiles", "v": "views"}
-_MOST_CHANNELS = 10  # of two unknown axes the one this short may be channels
+_MAX_CHANNELS = 10  # of two unknown axes the one this short may be channels
 _INDEX, _MAX_INDEX = "NDTiff.index", 64 << 20  # of Micro-Manager's NDTiff: file, its most bytes
 _EXPECTED = "a TIFF of planes of one size"
 
@@ -203,7 +203,7 @@ def _meant(axes: Sequence[str], lengths: list[int]) -> str | None:
     if len(lengths) > 2 or "z" in axes or "c" in axes:
         return None
     first, second = lengths
-    if min(first, second) > _MOST_CHANNELS or first == second:
+    if min(first, second) > _MAX_CHANNELS or first == second:
         return None
     return "cz" if first < second else "zc"
 

@@ -2,7 +2,7 @@
 // brick by brick is unbiased whatever the bricks' size: Woodcock et al. 1965; local majorants:
 // Szirmay-Kalos et al., Computer Graphics Forum 2010. `from` and `to` are lengths along the ray, um;
 // `dir` is a unit vector, none of its parts 0. Bricks are gone through as by Amanatides & Woo 1987.
-const int MOST_EVENTS = 8192;  // no path ends here; it keeps a fault from hanging the page
+const int MAX_EVENTS = 8192;  // no path ends here; it keeps a fault from hanging the page
 
 struct Bricks {
   vec3 pace;  // bricks per um
@@ -52,7 +52,7 @@ float track(vec3 origin, vec3 dir, float from, float to, out vec4 medium) {
   Bricks b = enterBricks(origin, dir, from);
   float t = from;
   float depth = -log(1.0 - random());  // optical depth of the majorants to the next event
-  for (int i = 0; i < MOST_EVENTS; i++) {
+  for (int i = 0; i < MAX_EVENTS; i++) {
     float end = brickEnd(b, to);
     float majorant = majorantOf(b);
     float inBrick = majorant * max(end - t, 0.0);
@@ -77,7 +77,7 @@ float transmittance(vec3 origin, vec3 dir, float from, float to) {
   float t = from;
   float share = 1.0;
   float depth = -log(1.0 - random());
-  for (int i = 0; i < MOST_EVENTS; i++) {
+  for (int i = 0; i < MAX_EVENTS; i++) {
     float end = brickEnd(b, to);
     float majorant = majorantOf(b);
     float inBrick = majorant * max(end - t, 0.0);

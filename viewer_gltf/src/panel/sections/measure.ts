@@ -9,7 +9,7 @@ import type { Control } from "../controls";
 
 const POINT_NAMES = ["First point", "Second point", "Third point"] as const;
 /** So many finished ones have a row; the file has all. */
-const MOST_LISTED = 12;
+const MAX_LISTED = 12;
 
 /** `12.3 µm`, or what is missing to it. */
 export function measuredText({ tool, measured, measuredAs, measureKind }: ViewerState): string {
@@ -59,8 +59,8 @@ export function measureItems(
       refusal: clearMeasured(state) === null ? "Nothing is measured." : "",
       to: () => clearMeasured(state) ?? { type: "measure", points: [] },
     },
-    ...measurements.slice(-MOST_LISTED).flatMap((each, i) => {
-      const index = Math.max(0, measurements.length - MOST_LISTED) + i;
+    ...measurements.slice(-MAX_LISTED).flatMap((each, i) => {
+      const index = Math.max(0, measurements.length - MAX_LISTED) + i;
       return listed(each, index, measurements);
     }),
     {

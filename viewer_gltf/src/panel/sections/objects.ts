@@ -39,7 +39,7 @@ const PALETTE_NAMES: Readonly<Record<PaletteName, string>> = {
   diverging: "Blue–red",
 };
 /** Most results of a search that have a row. */
-const MOST_FOUND = 6;
+const MAX_FOUND = 6;
 /** Least way of a lasso from one corner to the next, shares of the plot. */
 const LASSO_STEP = 0.012;
 /** The gap's slider: so much of a cell of this kind of table. */
@@ -328,7 +328,7 @@ class Layout {
 
   private searchItems(): readonly Control[] {
     const { table, view } = this;
-    const found = table.find(view.search, MOST_FOUND);
+    const found = table.find(view.search, MAX_FOUND);
     return [
       {
         kind: "search",
@@ -385,10 +385,10 @@ class Layout {
   }
 
   private valueText(column: ObjectColumn, row: number): string {
-    const values = this.table.exact(column.id);
-    if (values === null) return "…";
-    if (column.kind === "category") return column.categories?.[values[row]] ?? "none";
-    const text = numberText(values[row]);
+    const value = this.table.value(column.id, row);
+    if (value === null) return "…";
+    if (column.kind === "category") return column.categories?.[value] ?? "none";
+    const text = numberText(value);
     return text === "" ? "none" : `${text} ${unitText(column.unit)}`.trim();
   }
 

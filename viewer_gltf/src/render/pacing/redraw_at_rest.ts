@@ -7,7 +7,7 @@ import type { FencedContext } from "./samples_per_frame";
 /** Time of a quick picture, ms: it keeps nothing waiting. */
 const LITTLE_MS = 50;
 /** Longest time that a picture counts, ms: a page that slept did not draw for as long. */
-const MOST_MS = 1000;
+const MAX_MS = 1000;
 const SYNC_GPU_COMMANDS_COMPLETE = 0x9117;
 const SYNC_STATUS = 0x9114;
 const SIGNALED = 0x9119;
@@ -26,7 +26,7 @@ export class RestPace {
       gl.deleteSync(fence);
       this.fence = null;
       const spent_ms = now_ms - this.began_ms;
-      this.due_ms = now_ms + (spent_ms > LITTLE_MS ? Math.min(MOST_MS, spent_ms) : 0);
+      this.due_ms = now_ms + (spent_ms > LITTLE_MS ? Math.min(MAX_MS, spent_ms) : 0);
     }
     return this.fence === null && now_ms >= this.due_ms;
   }

@@ -5,8 +5,8 @@
 
 /** Longest frame at rest, ms: the page still answers at once. */
 const FRAME_MS = 60;
-const MOST = 16;
-const LEAST = 1 / 64;
+const MAX_SAMPLES = 16;
+const MIN_SAMPLES = 1 / 64;
 
 /** The part of WebGL 2 in use, so that tests need none. */
 export type FencedContext = Pick<
@@ -33,8 +33,8 @@ export class GatherPace {
     gl.deleteSync(fence);
     this.fence = null;
     const spent_ms = now_ms - this.began_ms;
-    if (spent_ms < FRAME_MS / 2) this.passes = Math.min(MOST, 2 * this.passes);
-    else if (spent_ms > FRAME_MS) this.passes = Math.max(LEAST, this.passes / 2);
+    if (spent_ms < FRAME_MS / 2) this.passes = Math.min(MAX_SAMPLES, 2 * this.passes);
+    else if (spent_ms > FRAME_MS) this.passes = Math.max(MIN_SAMPLES, this.passes / 2);
     return true;
   }
 

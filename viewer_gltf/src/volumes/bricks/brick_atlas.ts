@@ -18,7 +18,7 @@ import type { Brick, BrickLink, Taker } from "./client";
 import { drawnNodes, NOTHING, rangesOf, STORED, STORED_BYTES, type Table } from "./tree";
 
 /** Most slots along an edge of an atlas: one byte holds a slot's coordinate. */
-const MOST_SLOTS = 254;
+const MAX_SLOTS = 254;
 /** Pause between updates with new bricks, ms: each update makes the tables of skips anew. */
 const SHOW_EVERY_MS = 250;
 /** A cell that is the same throughout. */
@@ -150,7 +150,7 @@ export class BrickTile {
 
   private makeAtlas(tables: readonly Table[]): void {
     const most = Math.floor(this.limits.bytes / STORED_BYTES);
-    const longest = Math.min(MOST_SLOTS, Math.floor(this.limits.side / STORED));
+    const longest = Math.min(MAX_SLOTS, Math.floor(this.limits.side / STORED));
     const countFrom = (level: number) =>
       tables.reduce(
         (sum, { nodes }) => sum + nodes.filter((n) => !n.isEmpty && n.level >= level).length,

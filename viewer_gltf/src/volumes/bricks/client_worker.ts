@@ -11,7 +11,7 @@ import { haveBits, hexOf, parseTable, STORED_BYTES, type Table } from "./tree";
 /** Bricks in one write to the cache. */
 const BATCH = 64;
 /** Most volumes that one message may name. */
-const MOST_AT_ONCE = 64;
+const MAX_AT_ONCE = 64;
 const RETRY_MS = [500, 1000, 2000, 5000, 10_000];
 
 type Tree = {
@@ -228,8 +228,8 @@ async function open(wanted: readonly Volume[]): Promise<void> {
       return { tile, channel, ...(kept === null ? {} : { table: kept.hash }) };
     }),
   );
-  for (let from = 0; from < asked.length; from += MOST_AT_ONCE) {
-    say({ type: "open", volumes: asked.slice(from, from + MOST_AT_ONCE) });
+  for (let from = 0; from < asked.length; from += MAX_AT_ONCE) {
+    say({ type: "open", volumes: asked.slice(from, from + MAX_AT_ONCE) });
   }
 }
 

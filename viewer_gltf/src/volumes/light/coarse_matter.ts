@@ -2,7 +2,7 @@
  * How much of the light goes through each cell of a coarse grid round all volumes, under the present
  * transfer functions: what shades is made from it. Pure arrays.
  *
- * Cells are cubes of the world, at most MOST_CELLS, x fastest. Each is looked at in eight places.
+ * Cells are cubes of the world, at most MAX_CELLS, x fastest. Each is looked at in eight places.
  */
 
 import type { Size3 } from "../../bundle/ktx2";
@@ -10,13 +10,13 @@ import type { Box } from "../../math/box";
 import type { Vec3 } from "../../math/vec3";
 
 /** Of the grid: at a byte each for what is open and what is lit, 512 KiB of the GPU's memory. */
-export const MOST_CELLS = 64 ** 3;
+export const MAX_CELLS = 64 ** 3;
 /** Cells beyond the volumes' box, so that a sample at its face looks up what lies before it. */
 const MARGIN = 1;
 /** Where a cell is looked at, in its edges from its middle. */
 const ASIDE = [-0.25, 0.25] as const;
 /** The most of a voxel's light that the march takes. */
-const MOST_OPACITY = 0.999;
+const MAX_OPACITY = 0.999;
 
 export type Grid = Readonly<{
   /** The low corner, um, world. */
@@ -55,7 +55,7 @@ export type Cut = Readonly<{
 type Plane = readonly [number, number, number, number];
 
 /** The finest grid round a box that has no more cells than there may be. */
-export function gridRound({ min, max }: Box, most = MOST_CELLS): Grid {
+export function gridRound({ min, max }: Box, most = MAX_CELLS): Grid {
   const sides = min.map((v, i) => Math.max(max[i] - v, 1e-6));
   const cellsAt = (edge: number) => sides.map((side) => Math.ceil(side / edge - 1e-6) + 2 * MARGIN);
   const count = (edge: number) => cellsAt(edge).reduce((all, n) => all * n, 1);
@@ -88,7 +88,7 @@ function addTile(through: Float32Array, grid: Grid, tile: TileMatter): void {
   const tables = tile.channels.map(({ opacities }) =>
     Float32Array.from(
       opacities,
-      (a) => (1 - Math.min(a / 255, MOST_OPACITY)) ** (edge / tile.voxel_um),
+      (a) => (1 - Math.min(a / 255, MAX_OPACITY)) ** (edge / tile.voxel_um),
     ),
   );
   const texels = tile.channels.map((each) => each.texels);

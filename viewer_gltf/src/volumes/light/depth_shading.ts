@@ -27,7 +27,7 @@ import type { CoarseTexels } from "./coarse_texels";
 import { type Shading, ShadingClient } from "./shading_client";
 
 /** Of the coarse levels of all volumes together. */
-const MOST_TEXELS = 2 ** 23;
+const MAX_TEXELS = 2 ** 23;
 /** As far as the meshes' occlusion looks: so many of the coarsest voxel spacing. */
 const REACH_VOXELS = 8;
 /** Steps of the lamp's direction from the middle of a cube's face to its edge: 2 degrees. */
@@ -108,7 +108,7 @@ export class DepthShading {
       const { low, high } = textureCorners(volume);
       const sources = packed.channels.flatMap((id) => resident.texture.kept.get(id) ?? []);
       const isStreamed = packed.index !== null;
-      const level = isStreamed ? null : levelFor(sources, edge, MOST_TEXELS / count);
+      const level = isStreamed ? null : levelFor(sources, edge, MAX_TEXELS / count);
       const channels = packed.channels.map((_, c) => {
         const alphas = march.opacitiesOf(c);
         if (level === null) return { texels: middles(packed, c), opacities: alphas };

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { Size3 } from "../../bundle/ktx2";
 import type { Vec3 } from "../../math/vec3";
-import { gridRound, MOST_CELLS, type TileMatter, throughCells } from "./coarse_matter";
+import { gridRound, MAX_CELLS, type TileMatter, throughCells } from "./coarse_matter";
 import { asTexels, lampLight, openness } from "./shading";
 
 const SIDE = 24;
@@ -110,8 +110,8 @@ describe("the grid of cells", () => {
     ] as Vec3[]) {
       const { size, edge, low } = gridRound({ min: [0, 0, 0], max });
       const count = size[0] * size[1] * size[2];
-      expect(count).toBeLessThanOrEqual(MOST_CELLS);
-      expect(count).toBeGreaterThan(0.5 * MOST_CELLS);
+      expect(count).toBeLessThanOrEqual(MAX_CELLS);
+      expect(count).toBeGreaterThan(0.5 * MAX_CELLS);
       size.forEach((n, i) => {
         expect(low[i]).toBeLessThan(0);
         expect(low[i] + n * edge).toBeGreaterThan(max[i]);

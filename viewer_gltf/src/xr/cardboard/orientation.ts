@@ -70,7 +70,7 @@ const REPORTS_MS = [4, 100] as const;
 /** No head turns faster, radians a millisecond: a sensor that jumps does. */
 const FASTEST = (600 * Math.PI) / 180 / 1000;
 /** Farthest that is predicted, ms. */
-const MOST_AHEAD_MS = 50;
+const MAX_AHEAD_MS = 50;
 
 /** The head's turn a little later than the last report, as fast as between the last two. */
 export function predictTurn(
@@ -86,7 +86,7 @@ export function predictTurn(
   if (between_ms < REPORTS_MS[0] || between_ms > REPORTS_MS[1]) return out;
   const angle = before.head.angleTo(last.head);
   if (angle === 0 || angle / between_ms > FASTEST) return out;
-  const share = Math.min(MOST_AHEAD_MS, Math.max(0, ahead_ms)) / between_ms;
+  const share = Math.min(MAX_AHEAD_MS, Math.max(0, ahead_ms)) / between_ms;
   // slerp goes on beyond its end at the same speed
   return out.slerpQuaternions(before.head, last.head, 1 + share);
 }

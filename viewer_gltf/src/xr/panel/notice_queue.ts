@@ -6,7 +6,7 @@ import { type Mark, type Rect, TEXT, text } from "../../panel/canvas/draw_list";
 
 /** Time for the oldest notice, s: then it goes, and the next one has as long. */
 export const ANNOUNCED_S = 5;
-const MOST = 3;
+const MAX_NOTICES = 3;
 
 export type Announcements = Readonly<{
   texts: readonly string[];
@@ -17,7 +17,7 @@ export const NO_ANNOUNCEMENTS: Announcements = { texts: [], elapsed_s: 0 };
 
 /** A repeated text becomes the newest again. */
 export function announce({ texts, elapsed_s }: Announcements, newest: string): Announcements {
-  const others = texts.filter((each) => each !== newest).slice(1 - MOST);
+  const others = texts.filter((each) => each !== newest).slice(1 - MAX_NOTICES);
   return { texts: [...others, newest], elapsed_s: others[0] === texts[0] ? elapsed_s : 0 };
 }
 
@@ -35,8 +35,8 @@ export const NOTICE_WIDTH = 1040;
 const PAD = 16;
 /** Letters as large as all texts have room for, px: on a phone's half of a screen small ones can't be read. */
 const SIZES = [80, 56, 40, TEXT] as const;
-const MOST_LINES = 4;
-export const NOTICE_HEIGHT = MOST * (MOST_LINES * pitchOf(TEXT) + 3 * PAD);
+const MAX_LINES = 4;
+export const NOTICE_HEIGHT = MAX_NOTICES * (MAX_LINES * pitchOf(TEXT) + 3 * PAD);
 
 function pitchOf(size: number): number {
   return Math.ceil(1.15 * size);
@@ -52,7 +52,7 @@ function sizeFor(texts: readonly string[]): number {
   const fits = (size: number) => {
     const lines = texts.map((words) => linesOf(words, size));
     const height = lines.reduce((sum, each) => sum + each * pitchOf(size) + 3 * PAD, 0);
-    return height <= NOTICE_HEIGHT && Math.max(...lines) <= MOST_LINES;
+    return height <= NOTICE_HEIGHT && Math.max(...lines) <= MAX_LINES;
   };
   return SIZES.find(fits) ?? TEXT;
 }
@@ -62,7 +62,7 @@ export function noticeMarks(texts: readonly string[]): readonly Mark[] {
   const size = sizeFor(texts);
   let y = 0;
   return texts.flatMap((words): Mark[] => {
-    const lines = Math.min(MOST_LINES, linesOf(words, size));
+    const lines = Math.min(MAX_LINES, linesOf(words, size));
     const height = lines * pitchOf(size) + 2 * PAD;
     const rect: Rect = { x: 0, y, width: NOTICE_WIDTH, height };
     y += rect.height + PAD;
