@@ -12,7 +12,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.channel import OpacityPoints, SurfaceLevel
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
-from stereocell.transfer.opacity import FARTHEST, NAMES, evaluate, make_transfer_functions
+from stereocell.transfer.opacity import MAX_SHIFT, NAMES, evaluate, make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from support import phantoms
 
@@ -195,7 +195,7 @@ def test_noise_that_goes_on_above_the_surface_is_no_dust_before_it() -> None:
     )
     opacity = evaluate(functions["default"])
     assert air[opacity > 0].sum() < 0.3 * air[level + 1 :].sum()
-    assert (opacity[int(FARTHEST * level) + 4 :] > 0.12).all()  # what is brighter shows as before
+    assert (opacity[int(MAX_SHIFT * level) + 4 :] > 0.12).all()  # what is brighter shows as before
 
 
 def test_the_even_counts_of_an_edge_are_no_noise_above_the_surface() -> None:

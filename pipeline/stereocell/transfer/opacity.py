@@ -17,7 +17,7 @@ RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
 NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them
 FAINT = 1e-2  # of the peak's count: noise that is rarer is left, dim materials are there, too
-FARTHEST = 1.5  # x the level, to which noise may push the start of the opacity
+MAX_SHIFT = 1.5  # x the level, to which noise may push the start of the opacity
 
 
 def make_transfer_functions(
@@ -55,7 +55,7 @@ def make_transfer_functions(
         floor = max(floor, min(_end_of_noise(below) / bins, FOOT * level))
         beyond = level + _noise_beyond(below) / bins
         if beyond > level:
-            floor = min(beyond, FARTHEST * level, FOOT * (level + bright) / 2)
+            floor = min(beyond, MAX_SHIFT * level, FOOT * (level + bright) / 2)
     top = max(level, floor / FOOT)
     at_top = 0.12 + (0.45 - 0.12) * (top - level) / (bright - level)
     functions = {

@@ -37,7 +37,7 @@ const UM_PER_METRE = 1e6;
 /** The root holds no content; below it lie the tiles' coarsest LODs. */
 const DEPTH_OF_COARSEST = 1;
 /** Most vertices of a mesh that are looked at for where it ends. */
-const MOST_POINTS = 2000;
+const MAX_POINTS = 2000;
 /** Share of a full cache that stays after hidden surfaces were dropped. */
 const KEPT_SHARE = 0.75;
 
@@ -282,7 +282,7 @@ function somePoints(scene: Object3D, matrix: Matrix4): readonly Vec3[] {
   scene.traverse((object) => {
     if (!(object instanceof Mesh)) return;
     const { position } = object.geometry.attributes;
-    const step = Math.ceil(position.count / MOST_POINTS);
+    const step = Math.ceil(position.count / MAX_POINTS);
     for (let i = 0; i < position.count; i += step) {
       const at = new Vector3().fromBufferAttribute(position, i);
       found.push(at.applyMatrix4(object.matrixWorld).applyMatrix4(matrix).toArray());

@@ -8,9 +8,9 @@ export type Coarser = Readonly<{ factor: number; leftOut: number }>;
 
 const FACTORS = [1, Math.SQRT2, 2, 2 * Math.SQRT2, 4] as const;
 /** More than tiles have levels. */
-const MOST_LEVELS = 8;
+const MAX_LEVELS = 8;
 /** Finest first; the first asks for nothing coarser. */
-const ALL: readonly Coarser[] = Array.from({ length: MOST_LEVELS }, (_, leftOut) =>
+const ALL: readonly Coarser[] = Array.from({ length: MAX_LEVELS }, (_, leftOut) =>
   FACTORS.map((factor) => ({ factor, leftOut })),
 ).flat();
 export const [FINEST] = ALL;
