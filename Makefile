@@ -56,7 +56,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -281,6 +281,9 @@ bench-scale: setup ## Units a second, memory and bytes read by 4 to 32 units; th
 
 bench-scene: setup ## The paper's scene whole, 5 x 2 tiles of 194 x 512 x 512 x 3, by 1 and 2 workers and a cluster
 	$(BIN)/python tests/bench/scene.py out/bench-scene
+
+bench-breadth: setup ## Many small units whole: up to 22 x 11 tiles of 64^3 x 4
+	$(BIN)/python tests/bench/breadth.py out/bench-breadth
 
 bench-iso: setup ## Levels for a surface over the corpus, and peers; volumes of nothing
 	$(BIN)/python tests/bench/iso.py

@@ -6,78 +6,34 @@ GRID: columns x rows (5x2), TILE: z,y,x voxels (194,512,512), WAYS: of 1, 2 and 
 commas between (all). The sample is made once (300 MB) and stays in FOLDER, as the last build does.
 
 Prints seconds and CPU seconds of each phase, the most memory of the command and of a worker, what
-the build takes on disk, by kind and level of detail, and what a viewer reads before the first
-picture. Ends with 1 where two ways have not the same bytes.
+the build takes on disk, by kind and level of detail, what a viewer reads before the first picture,
+and what it has on screen and on the GPU while the gaze walks over all tiles. Ends with 1 where two
+ways have not the same bytes, or the gaze has missed a tile.
 """
 
+import shutil
 import subprocess
 import sys
 import time
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from commands import STEREOCELL, make_sample
+from commands import make_sample
+from phases import MB, OFTEN_S, Cost, run_phases
 
 from stereocell.formats.vdb import MEASURED_NAME
 from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.storage.json_files import read_json
 from support.digests import digests_of
-from support.worker_processes import workers_of
 
 GRID, TILE = (5, 2), (194, 512, 512)
 WAYS = ("1", "2", "cluster")
 CLUSTER_WORKERS = 2
-PHASES = ("plan", "units", "stage", "bundle", "report", "check")
 COMPARED = ("stage", "bundle")
-OFTEN_S = 0.2  # from one look at the processes to the next
-MB = 1e6
-
-
-@dataclass
-class Cost:
-    """What a command took: seconds, those of CPU, and the most bytes of a process by its role."""
-
-    seconds: float = 0.0
-    cpu: float = 0.0
-    peaks: dict[str, int] = field(default_factory=lambda: defaultdict(int))
-
-
-def watch(arguments: list[str], others: list[psutil.Process]) -> Cost:
-    """Run a command to its end and look at its processes; `others` work for it."""
-    cost, start = Cost(), time.perf_counter()
-    before = sum(_cpu_of(other) for other in others)
-    command = subprocess.Popen(
-        [*STEREOCELL, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
-    parent, spent = psutil.Process(command.pid), dict[int, float]()
-    while command.poll() is None:
-        try:
-            for process, role in [
-                (parent, "command"),
-                *((worker, "worker") for worker in (*workers_of(parent), *others)),
-            ]:
-                cost.peaks[role] = max(cost.peaks[role], process.memory_info().rss)
-                if process not in others:
-                    spent[process.pid] = _cpu_of(process)
-        except psutil.Error:
-            pass  # it ended while it was looked at
-        time.sleep(OFTEN_S)
-    if command.returncode and command.stderr is not None:
-        raise SystemExit(f"{' '.join(arguments)}: {command.stderr.read()[-2000:]}")
-    cost.seconds = time.perf_counter() - start
-    cost.cpu = sum(spent.values()) + sum(_cpu_of(other) for other in others) - before
-    return cost
-
-
-def _cpu_of(process: psutil.Process) -> float:
-    times = process.cpu_times()
-    return float(times.user + times.system)
 
 
 @contextmanager
@@ -107,35 +63,12 @@ def _start(kind: str, *told: str) -> subprocess.Popen[bytes]:
 
 def build(source: Path, out: Path, grid: tuple[int, int], way: str) -> dict[str, Cost]:
     """Build OUT in one of the ways; return what each phase took."""
+    columns, rows = grid
+    plan = [str(source), "--preset", "cycif", "--level", "0", "--grid", f"{columns}x{rows}"]
     if way == "cluster":
         with cluster(out.parent) as (file, workers):
-            return _run(source, out, grid, ["--scheduler", str(file)], workers)
-    return _run(source, out, grid, ["--workers", way], [])
-
-
-def _run(
-    source: Path,
-    out: Path,
-    grid: tuple[int, int],
-    how: list[str],
-    workers: list[psutil.Process],
-) -> dict[str, Cost]:
-    columns, rows = grid
-    costs = {}
-    for phase in PHASES:
-        arguments = [phase, str(out)]
-        if phase == "plan":
-            settled = ["--preset", "cycif", "--level", "0", "--grid", f"{columns}x{rows}"]
-            arguments = ["plan", str(source), "-o", str(out), *settled]
-        elif phase == "check":
-            arguments += ["--deep", *how]
-        elif phase != "report":
-            arguments += how
-        cost = costs[phase] = watch(arguments, workers)
-        peaks = ", ".join(f"{role} {most / MB:.0f}" for role, most in cost.peaks.items())
-        print(f"  {phase:7}{cost.seconds:8.1f} s {cost.cpu:8.1f} s of CPU   peak, MB: {peaks}",
-              flush=True)  # fmt: skip
-    return costs
+            return run_phases(out, plan, ["--scheduler", str(file)], workers)
+    return run_phases(out, plan, ["--workers", way], [])
 
 
 def print_sizes(out: Path) -> None:
@@ -160,6 +93,16 @@ def print_sizes(out: Path) -> None:
         print(f"  {one['name']}: triangles by level {told}")
 
 
+def walk_over(bundle: Path) -> bool:
+    """Print what the viewer holds while the gaze walks; return whether it came to all tiles."""
+    if shutil.which("npm") is None:
+        print("  no walk: no node and npm")
+        return True
+    command = ["npm", "run", "--silent", "bench-walk", "--", str(bundle.resolve())]
+    viewer = Path(__file__).parents[2] / "viewer_gltf"
+    return subprocess.run(command, cwd=viewer, check=False).returncode == 0
+
+
 def _bytes(*files: Path) -> int:
     return sum(file.stat().st_size for file in files if file.is_file())
 
@@ -171,14 +114,10 @@ def main(
     source, out = make_sample(folder, grid, tile), folder / "scene"
     digests: dict[str, dict[str, str]] = {}
     for way in ways:
-        subprocess.run(["rm", "-rf", str(out)], check=True)
+        shutil.rmtree(out, ignore_errors=True)
         name = f"{way} on this machine" if way != "cluster" else f"a cluster of {CLUSTER_WORKERS}"
         print(f"{grid[0]} x {grid[1]} tiles of {' x '.join(map(str, tile))}, workers: {name}")
-        costs = build(source, out, grid, way)
-        total = sum(cost.seconds for cost in costs.values())
-        print(
-            f"  in all {total / 60:.1f} minutes, {sum(c.cpu for c in costs.values()):.0f} s of CPU"
-        )
+        build(source, out, grid, way)
         digests[way] = {
             f"{part}/{path}": digest
             for part in COMPARED
@@ -187,8 +126,8 @@ def main(
     print_sizes(out)
     first, *others = digests.values()
     are_same = all(first == other for other in others)
-    print(f"Same bytes by {', '.join(digests)}: {'yes' if are_same else 'NO'}")
-    return 0 if are_same else 1
+    print(f"Same bytes by {', '.join(digests)}: {'yes' if are_same else 'NO'}", flush=True)
+    return 0 if walk_over(out / "bundle") and are_same else 1
 
 
 if __name__ == "__main__":

@@ -1,6 +1,9 @@
 """The two rounds over the units, from file to unit: iso-values, places in the world, distances."""
 
+import gc
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,8 +12,11 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.tasks import evidence
+from stereocell.building.tasks.evidence import evidence_from_json
 from stereocell.building.unit_files import load_lods
 from stereocell.cli.__main__ import main
+from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.volume import zyx_to_xyz
 from support import phantoms
@@ -35,6 +41,27 @@ def _lods(out_folder: OutFolder) -> dict[str, tuple[Lod, ...]]:
 
 
 # --- iso-values
+
+
+def test_command_holds_the_evidence_of_one_channel_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It takes .4 MB a unit, and a dataset has thousands of them."""
+    shape = (16, 32, 32)
+    field = phantoms.blurred_ball(shape, SPACING, (7.5, 15.5, 15.5), 6.0, 1.0)
+    counts = phantoms.as_counts(np.tile(field, (1, 2, 2)), 100, 1100, noise=5.0)
+    source = phantoms.write_ome_zarr(tmp_path / "six.ome.zarr", [np.stack(6 * [counts])], "czyx")
+    held = []
+
+    def count(content: Mapping[str, Any]) -> TileEvidence:
+        found = evidence_from_json(content)
+        held.append(sum(type(each) is TileEvidence for each in gc.get_objects()))
+        return found
+
+    monkeypatch.setattr(evidence, "evidence_from_json", count)
+    _units(source, tmp_path / "out", "--tile-size", "16,32,32")
+    assert len(held) >= 6 * 4
+    assert max(held) <= 2 * 4
 
 
 def test_each_tile_s_body_is_cut_at_its_own_brightness_where_asked(

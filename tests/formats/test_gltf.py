@@ -1,3 +1,4 @@
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -91,8 +92,22 @@ def test_color_and_extras_are_written():
     assert factor["baseColorFactor"] == [1.0, 0.25, 0.0, 1.0]
     assert (factor["metallicFactor"], factor["roughnessFactor"]) == (0, 0.75)
     assert document["materials"][0]["doubleSided"]
-    assert document["nodes"][0]["extras"] == document["scenes"][0]["extras"] == EXTRAS
+    assert document["nodes"][0]["extras"] == EXTRAS
+    assert document["nodes"][0]["name"] == "mesh"
     assert "KHR_texture_basisu" not in document["extensionsUsed"]
+
+
+def test_json_of_a_small_level_says_nothing_twice():
+    """It would weigh as much as the level's triangles do."""
+    names = {"tile": "r10_c10", "channel": "MART1"}
+    data = encode_glb(
+        patch(0, 10), choose_step(20), material=RED, name="MART1_r10_c10", extras=names
+    ).data
+    document, _ = read(data)
+    text = json.dumps(document)
+    assert [text.count(f'"{each}"') for each in ("MART1_r10_c10", "r10_c10", "extras")] == [1, 1, 1]
+    assert '"byteOffset": 0,' not in text
+    assert int.from_bytes(data[12:16], "little") < 1800
 
 
 def test_normals_and_tangents_are_kept_to_about_a_degree():

@@ -1,5 +1,6 @@
 """Volumes that simplification takes are given back."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from stereocell.meshes.keep_volume import FineVolumes
 from stereocell.meshes.simplify_valid import simplify_without_defects
 from stereocell.meshes.validity import Defects, border, find_defects
 from stereocell.model.mesh import Mesh
-from support.meshes import ball, enclosed_volume, joined, kinds, moved, turned
+from support.meshes import ball, crowd, enclosed_volume, joined, kinds, moved, turned
 
 ERROR = 0.6
 
@@ -18,9 +19,9 @@ ERROR = 0.6
 def kept(fine: Mesh, planes: tuple[tuple[int, float], ...] = ()) -> tuple[Mesh, Mesh]:
     """Return the simplified mesh, and the same with its volumes."""
     simple = simplify_without_defects(fine, planes, max_error_um=ERROR)
-    mesh, defects = FineVolumes(fine).keep(simple.mesh, simple.vertices, planes, max_move_um=ERROR)
-    assert defects.counts == find_defects(mesh, planes).counts
-    return simple.mesh, mesh
+    found = FineVolumes(fine, planes).keep(simple.mesh, simple.vertices, max_move_um=ERROR)
+    assert found.defects.counts == find_defects(found.mesh, planes).counts
+    return simple.mesh, found.mesh
 
 
 @pytest.mark.parametrize("fine", [ball(5.0, 60), joined(ball(5.0, 60), turned(ball(3.0, 40)))])
@@ -31,7 +32,8 @@ def test_bodies_and_cavities_have_their_volume(fine: Mesh) -> None:
     assert np.linalg.norm(mesh.positions - simple.positions, axis=1).max() <= ERROR + 1e-6
 
 
-def test_cut_stays_bit_by_bit_and_nothing_passes_it() -> None:
+def half_ball() -> tuple[Mesh, tuple[tuple[int, float], ...]]:
+    """Return the upper half of a ball, open on a plane, and that plane."""
     sphere = ball(5.0, 60)
     flat = np.float32([[1, 1, 1]]) * sphere.positions
     flat[:, 2] = np.where(np.abs(flat[:, 2]) < 1e-3, 0, flat[:, 2])
@@ -39,6 +41,11 @@ def test_cut_stays_bit_by_bit_and_nothing_passes_it() -> None:
     half = Mesh(flat, sphere.triangles[upper], sphere.normals)
     planes = ((2, float(flat[np.unique(border(half.triangles)), 2].min())),)
     assert kinds(find_defects(half, planes)) == set()
+    return half, planes
+
+
+def test_cut_stays_bit_by_bit_and_nothing_passes_it() -> None:
+    half, planes = half_ball()
     simple, mesh = kept(half, planes)
     rim = np.unique(border(simple.triangles))
     np.testing.assert_array_equal(mesh.positions[rim], simple.positions[rim])
@@ -52,9 +59,10 @@ def test_no_vertex_leaves_the_tile_s_box_or_the_fine_mesh_s() -> None:
     fine = ball(5.0, 60)
     simple = simplify_without_defects(fine, (), max_error_um=ERROR)
     box = np.array([-9.0, -9.0, -4.0]), np.array([9.0, 4.0, 9.0])
-    volumes = FineVolumes(fine, box)
-    mesh, _ = volumes.keep(simple.mesh, simple.vertices, (), max_move_um=ERROR)
-    free, _ = FineVolumes(fine).keep(simple.mesh, simple.vertices, (), max_move_um=ERROR)
+    bound, unbound = FineVolumes(fine, (), box), FineVolumes(fine, ())
+    mesh, free = (
+        each.keep(simple.mesh, simple.vertices, max_move_um=ERROR).mesh for each in (bound, unbound)
+    )
     low, high = fine.positions.min(axis=0), fine.positions.max(axis=0)
     assert free.positions[:, 2].min() < low[2] - 0.05
     assert free.positions[:, 1].max() > high[1] + 0.05
@@ -83,10 +91,29 @@ def test_where_very_many_would_cross_the_bodies_stay_at_once(
     assert len(checks) == 2
 
 
-def test_bodies_that_would_cross_stay_apart() -> None:
-    """Two boxes of coarse balls, nearly in touch: whole moves would make them cross."""
-    one = ball(5.0, 60)
-    pair = joined(one, moved(one, (10.02, 0.0, 0.0)))
-    _, mesh = kept(pair)
+def test_bodies_that_would_cross_stay_apart_and_move_elsewhere() -> None:
+    fine = crowd()
+    simple, mesh = kept(fine)
     assert kinds(find_defects(mesh)) == set()
-    assert enclosed_volume(mesh) > 0.9 * enclosed_volume(pair)
+    assert enclosed_volume(simple) < 0.82 * enclosed_volume(fine)
+    assert enclosed_volume(mesh) > 0.995 * enclosed_volume(fine)
+
+
+def test_body_that_lacks_volume_is_named_by_its_own_volume_whether_a_cut_opens_it_or_not() -> None:
+    half, planes = half_ball()
+    fine = joined(half, moved(ball(5.0, 60), (12.0, 0.0, 8.0)))
+    simple = simplify_without_defects(fine, planes, max_error_um=ERROR)
+    volumes, told = FineVolumes(fine, planes), []
+    for move in (0.01, 0.05, 0.1, 0.2, ERROR):
+        found = volumes.keep(simple.mesh, simple.vertices, max_move_um=move)
+        for is_half, whole in ((True, 250 / 3 * np.pi), (False, 500 / 3 * np.pi)):
+            before, after = (
+                enclosed_volume(replace(mesh, triangles=mesh.triangles[
+                    (mesh.positions[mesh.triangles[:, 0], 0] < 6) == is_half
+                ])) for mesh in (fine, found.mesh)
+            )  # fmt: skip
+            told.append(abs(after - before) > 0.03 * whole)
+            own = (found.mesh.positions[:, 0] < 6) == is_half
+            assert (found.lacks[own] == told[-1]).all()
+    assert told[:2] == [True, True]
+    assert told[-2:] == [False, False]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from stereocell.kernels.crossings import find_spread
+from stereocell.meshes import self_intersections
 from stereocell.meshes.self_intersections import are_collinear, find_crossings, orient_2d, orient_3d
 
 CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
@@ -157,6 +158,25 @@ def test_side_of_a_plane_is_as_in_exact_arithmetic(kind: str, scale: float) -> N
             for i in range(3)
         )
         assert found == (volume > 0) - (volume < 0)
+
+
+@pytest.mark.parametrize("axes", [[0, 1, 2], [1, 2, 0], [2, 0, 1]])
+def test_floats_alone_part_triangles_of_one_plane(
+    axes: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Walls of what is cut by the volume's end are such: exact tests of all pairs would be slow."""
+    asked = []
+    monkeypatch.setattr(
+        self_intersections, "_apart", lambda at, triangles, pairs: asked.append(pairs) or pairs
+    )
+    y, x = np.mgrid[:12, :12].reshape(2, -1).astype(float)
+    positions = np.stack([x, y, np.full_like(x, 3)], axis=1)[:, axes]
+    start = np.flatnonzero((x < 11) & (y < 11))
+    triangles = np.concatenate(
+        [start[:, None] + [0, 1, 13], start[:, None] + [0, 13, 12]]
+    ).astype(np.int64)  # fmt: skip
+    assert len(find_crossings(positions, triangles)) == 0
+    assert [len(pairs) for pairs in asked] == [0]
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -338,6 +338,17 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     ]
 
 
+def test_distances_are_called_as_in_stage_and_bundle(built: Path) -> None:
+    """Both of them, wherever the page goes by one."""
+    text = (built / "report" / "index.html").read_text(encoding="utf-8")
+    notes = re.findall(r'<p class="note">(.*?)</p>', text, re.DOTALL)
+    for start in ("µm off: ", "Likeness: "):
+        [note] = [note for note in notes if note.startswith(start)]
+        for word in ("stereocell:distance", "p99_um", "stereocell:largestDistance", "largest_um"):
+            assert word in note
+        assert "geometricError" in note
+
+
 def test_names_of_data_are_text_and_never_markup(built: Path) -> None:
     html, parsed = _write(built)
     assert "<i>f" not in html

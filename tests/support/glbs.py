@@ -26,7 +26,8 @@ def read(data):
         view = document["bufferViews"][accessor["bufferView"]]["extensions"][
             "EXT_meshopt_compression"
         ]
-        stored = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+        start = view.get("byteOffset", 0)
+        stored = binary[start : start + view["byteLength"]]
         dtype = types[accessor["componentType"]]
         if view["mode"] == "TRIANGLES":
             assert stored[0] == 0xE1

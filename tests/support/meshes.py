@@ -39,6 +39,12 @@ def moved(mesh: Mesh, by: tuple[float, float, float]) -> Mesh:
     return replace(mesh, positions=mesh.positions + np.float32(by))
 
 
+def crowd() -> Mesh:
+    """A ball between six others, nearly in touch: whole moves would make them cross."""
+    one, ways = ball(5.0, 60), 10.01 * np.concatenate([np.eye(3), -np.eye(3)])
+    return joined(one, *(moved(one, tuple(way)) for way in ways))
+
+
 def kinds(defects: Defects) -> set[str]:
     return {kind for kind, count in defects.counts.items() if count}
 

@@ -21,11 +21,12 @@ from stereocell.model.lattice import Lattice, Plane
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
+from stereocell.textures import lod_chain
 from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels, sharpest_angle
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.texture_lod import Texturer, VertexValues
-from support.meshes import ball, enclosed_volume, joined, kinds, moved, to_mesh
+from support.meshes import ball, crowd, enclosed_volume, joined, kinds, moved, to_mesh
 
 SPACING = (1.0, 1.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
@@ -72,13 +73,13 @@ def test_simplification_alone_makes_defects_here(sponge: Mesh) -> None:
 
 
 def test_every_level_is_sound_and_keeps_its_border(sponge: Mesh) -> None:
-    lod_chain = list(_chain(sponge))
-    for level in lod_chain:
+    levels = list(_chain(sponge))
+    for level in levels:
         assert kinds(find_defects(level.mesh, PLANES)) == set()
         assert _rim(level.mesh) == _rim(sponge)
         assert level.fallbacks == 0
-    assert any(level.simplified_again for level in lod_chain)
-    counts = [len(sponge.triangles), *(len(level.mesh.triangles) for level in lod_chain)]
+    assert any(level.simplified_again for level in levels)
+    counts = [len(sponge.triangles), *(len(level.mesh.triangles) for level in levels)]
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] < 0.15 * counts[0]
 
@@ -156,6 +157,26 @@ def test_each_level_has_the_fine_volume(sponge: Mesh) -> None:
         for lod in _levels(fine, planes, settings):
             assert abs(enclosed_volume(lod.mesh) - whole) < 0.005 * solid
             assert _rim(lod.mesh) == _rim(fine)
+
+
+def test_bodies_without_room_for_their_volume_are_simplified_less(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fine, settings = crowd(), _settings((0.1, 0.35, 1.1, 4.0))
+    volumes, faces = [], []
+    for tries in (lod_chain.FINER, ()):
+        monkeypatch.setattr(lod_chain, "FINER", tries)
+        lods = _levels(fine, (), settings)
+        volumes.append([enclosed_volume(lod.mesh) / enclosed_volume(fine) for lod in lods])
+        faces.append([len(lod.mesh.triangles) for lod in lods])
+        assert {kind for lod in lods for kind in kinds(find_defects(lod.mesh))} == set()
+    assert min(volumes[0]) > 0.99
+    assert min(volumes[1]) < 0.97
+    assert faces[0][:2] == faces[1][:2]  # where all have room nothing changes
+    assert faces[0][2] > faces[1][2]
+    monkeypatch.setattr(lod_chain, "FINER", (0.0,))  # as heavy as the level before
+    heavy = [len(lod.mesh.triangles) for lod in _levels(fine, (), settings)]
+    assert max(a / b for a, b in zip(heavy, faces[1], strict=True)) <= lod_chain.MAX_HEAVIER
 
 
 def test_small_bodies_go_as_a_whole_from_the_level_that_would_make_them_thin() -> None:

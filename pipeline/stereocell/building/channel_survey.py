@@ -48,7 +48,7 @@ from stereocell.building.survey_file import (
 from stereocell.building.tasks import evidence as evidence_maker
 from stereocell.building.tasks import solids as solids_maker
 from stereocell.building.tasks import window as window_maker
-from stereocell.building.tasks.evidence import EvidenceTask, evidence_from_json, write_evidence
+from stereocell.building.tasks.evidence import EvidenceFiles, EvidenceTask, write_evidence
 from stereocell.building.tasks.solids import SolidsTask, write_solids
 from stereocell.building.tasks.window import (
     StatisticsTask,
@@ -73,10 +73,14 @@ KEPT_OF_MASK = 0.9  # share of a mask's voxels: what loses more to smoothing is 
 
 @dataclass(frozen=True, slots=True)
 class _Result:
-    """What a pass leaves: its content, and its file relative to OUT."""
+    """What a pass leaves: a file of OUT with a schema, and its path relative to OUT."""
 
-    content: Mapping[str, Any]
+    path: Path
+    schema: str
     file: str
+
+    def read(self) -> Mapping[str, Any]:
+        return read_sealed(self.path, self.schema, AGAIN)
 
 
 def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey:
@@ -97,11 +101,13 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             plan,
             channel,
             windows[channel.id],
-            {
-                tile.id: evidence_from_json(evidence[tile.id, channel.id].content)
-                for tile in plan.tiles
-                if (tile.id, channel.id) in evidence
-            },
+            EvidenceFiles(
+                {
+                    tile.id: evidence[tile.id, channel.id].read
+                    for tile in plan.tiles
+                    if (tile.id, channel.id) in evidence
+                }
+            ),
         )
         for channel in plan.channels
     }
@@ -112,7 +118,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for channel in plan.channels:
         one = found[channel.id]
         of_rungs = [
-            {tile.id: rung[tile.id, channel.id].content["solids"] for tile in plan.tiles}
+            {tile.id: rung[tile.id, channel.id].read()["solids"] for tile in plan.tiles}
             for rung in solids[: len(one.rungs)]
         ]
         chosen = choose_rung(of_rungs) if len(of_rungs) > 1 else 0
@@ -379,6 +385,6 @@ def _by_tile(
                 tasks[file] = (f"{tile.id}/{channel.base or channel.name}", (task, file))
     run_on_input(plan, engine, name, write, list(tasks.values()))
     return {
-        unit: _Result(read_sealed(file, schema, AGAIN), file.relative_to(out_folder.out).as_posix())
+        unit: _Result(file, schema, file.relative_to(out_folder.out).as_posix())
         for unit, file in files.items()
     }

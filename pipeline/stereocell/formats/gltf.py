@@ -11,6 +11,9 @@ node has scale = step and translation = origin * step. Every factor is then a dy
 a viewer's float32 `scale * q + translation` is exact while a coordinate is below 2^24 steps (for
 tiles of 72 um: a step of 7.5 nm, specimens up to 125 mm from the world's origin). All levels of
 detail share it: a tile fits its neighbour at any pair of levels.
+
+A small tile's coarsest level is a few kB, and half of that would be JSON: names and extras stand
+once, on the node, and nothing is written that is its default.
 """
 
 import json
@@ -92,7 +95,7 @@ def encode_glb(
 
     mesh      positions float32 (n, 3) in um (x, y, z), triangles uint32 (m, 3), normals
     step_m    step of the lattice in metres, see `choose_step`
-    extras    written on the scene and on its one node
+    extras    written on the one node
     textures  UVs are written only with a map, tangents only with a normal map
     features  what is known of the objects of a mesh that has some, by their number in the tile
 
@@ -161,7 +164,7 @@ def encode_glb(
         "extensionsUsed": extensions,
         "extensionsRequired": extensions,
         "scene": 0,
-        "scenes": [{"name": name, "nodes": [0], "extras": extras}],
+        "scenes": [{"nodes": [0]}],
         "nodes": [
             {
                 "name": name,
@@ -171,7 +174,7 @@ def encode_glb(
                 "extras": extras,
             }
         ],
-        "meshes": [{"name": name, "primitives": [primitive]}],
+        "meshes": [{"primitives": [primitive]}],
         "materials": [drawn],
     }
     if maps:

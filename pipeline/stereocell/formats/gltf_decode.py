@@ -119,7 +119,8 @@ def _decode(document: dict[str, Any], binary: bytes, index: int) -> NDArray[Any]
     """Return the rows of an accessor (n, components)."""
     accessor = document["accessors"][index]
     view = document["bufferViews"][accessor["bufferView"]]["extensions"]["EXT_meshopt_compression"]
-    stored = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+    start = view.get("byteOffset", 0)
+    stored = binary[start : start + view["byteLength"]]
     dtype = np.dtype(_TYPES[accessor["componentType"]])
     if view["mode"] == "TRIANGLES":
         # the package decodes into 32-bit indices for both sizes of index

@@ -50,7 +50,7 @@ class CompressedBuffers:
     def add(self, data: bytes, *, alignment: int = 4) -> int:
         """Store bytes as they are, at a multiple of `alignment`; return the bufferView's index."""
         start = self._align(alignment)
-        self._views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data)})
+        self._views.append({"buffer": 0, **_offset(start), "byteLength": len(data)})
         self._data += data
         return len(self._views) - 1
 
@@ -114,12 +114,12 @@ class CompressedBuffers:
     def _add_view(self, encoded: bytes, mode: str, count: int, stride: int) -> dict[str, Any]:
         view: dict[str, Any] = {
             "buffer": 1,
-            "byteOffset": self._decoded,
+            **_offset(self._decoded),
             "byteLength": count * stride,
             "extensions": {
                 "EXT_meshopt_compression": {
                     "buffer": 0,
-                    "byteOffset": self._align(),
+                    **_offset(self._align()),
                     "byteLength": len(encoded),
                     "byteStride": stride,
                     "count": count,
@@ -139,6 +139,11 @@ class CompressedBuffers:
     def _align(self, alignment: int = 4) -> int:
         self._data += bytes(-len(self._data) % alignment)
         return len(self._data)
+
+
+def _offset(start: int) -> dict[str, int]:
+    """Return a bufferView's offset; 0 is its default."""
+    return {"byteOffset": start} if start else {}
 
 
 def _octahedral(directions: NDArray[np.float64]) -> NDArray[np.int8]:

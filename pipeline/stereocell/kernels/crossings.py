@@ -75,6 +75,39 @@ def _may_pierce(at: Points, p: int, q: int, u: int, v: int, w: int) -> bool:
 
 
 @part
+def _turn(at: Points, a: int, b: int, c: int, j: int, k: int) -> int:
+    """Return the sign of the area of a, b, c as seen along an axis, on j and k; or UNSURE."""
+    p = (at[a, j] - at[c, j]) * (at[b, k] - at[c, k])
+    q = (at[a, k] - at[c, k]) * (at[b, j] - at[c, j])
+    if abs(p - q) <= ERROR_2D * (abs(p) + abs(q)):
+        return UNSURE
+    return 1 if p > q else -1
+
+
+@part
+def _is_beyond(at: Points, a: int, b: int, c: int, d: int, e: int, f: int, j: int, k: int) -> bool:
+    """Return whether, as seen along an axis, d, e, f surely lie beyond a side of a, b, c."""
+    for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
+        own = _turn(at, p, q, r, j, k)
+        if own != UNSURE and (
+            _turn(at, p, q, d, j, k) == -own
+            and _turn(at, p, q, e, j, k) == -own
+            and _turn(at, p, q, f, j, k) == -own
+        ):
+            return True
+    return False
+
+
+@part
+def _are_seen_apart(at: Points, a: int, b: int, c: int, d: int, e: int, f: int) -> bool:
+    """Return whether two triangles surely lie apart as seen along an axis, of one plane too."""
+    for j, k in ((0, 1), (1, 2), (2, 0)):
+        if _is_beyond(at, a, b, c, d, e, f, j, k) or _is_beyond(at, d, e, f, a, b, c, j, k):
+            return True
+    return False
+
+
+@part
 def _may_meet_apart(at: Points, triangles: Ints, i: int, j: int) -> bool:
     """Return whether two triangles without a common corner may meet."""
     a, b, c = triangles[i]
@@ -88,7 +121,7 @@ def _may_meet_apart(at: Points, triangles: Ints, i: int, j: int) -> bool:
         or _may_pierce(at, d, e, a, b, c)
         or _may_pierce(at, e, f, a, b, c)
         or _may_pierce(at, f, d, a, b, c)
-    )
+    ) and not _are_seen_apart(at, a, b, c, d, e, f)
 
 
 @part
@@ -283,13 +316,6 @@ def find_doubtful(
     return found[:count]
 
 
-@part
-def _has_area(at: Points, a: int, b: int, c: int, j: int, k: int) -> bool:
-    p = (at[a, j] - at[c, j]) * (at[b, k] - at[c, k])
-    q = (at[a, k] - at[c, k]) * (at[b, j] - at[c, j])
-    return abs(p - q) > ERROR_2D * (abs(p) + abs(q))
-
-
 @kernel
 def find_maybe_flat(at: Points, triangles: Ints) -> NDArray[np.bool_]:
     """Return whether the corners of each triangle may lie on a line, bool (m,)."""
@@ -297,8 +323,8 @@ def find_maybe_flat(at: Points, triangles: Ints) -> NDArray[np.bool_]:
     for t in range(len(triangles)):
         a, b, c = triangles[t]
         maybe[t] = not (
-            _has_area(at, a, b, c, 0, 1)
-            or _has_area(at, a, b, c, 1, 2)
-            or _has_area(at, a, b, c, 0, 2)
+            _turn(at, a, b, c, 0, 1) != UNSURE
+            or _turn(at, a, b, c, 1, 2) != UNSURE
+            or _turn(at, a, b, c, 0, 2) != UNSURE
         )
     return maybe

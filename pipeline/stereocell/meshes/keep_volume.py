@@ -6,26 +6,37 @@ all vertices of a body move outward by one distance, until its volume is the fin
 distance is at its bound. Towards a cut the move fades out, so that vertices of the cut stay bit by
 bit and no other reaches it. No vertex leaves the tile's box, or the fine mesh's where the caps of
 the data's end lie outside of that. Where bodies come to cross each other or themselves, the
-vertices there stay, and the others move farther for it, unless these are FEW; if that doesn't help,
-the whole body moves half as far, and at last not at all. Where MANY cross, as in noise, of which
-walls are nearer than the move is long, these bodies stay at once: tries would cost more than all
-the rest of a level.
+vertices there move half as far with every try, at last not at all, and the body's others farther
+for it, unless these are FEW; a body that still crosses after all TRIES stays. Where MANY cross, as
+in noise, of which walls are nearer than the move is long, these bodies stay at once: tries would
+cost more than all the rest of a level.
+
+Between near walls a body may have no room: it LACKS volume, and whoever makes the level simplifies
+it less (textures/lod_chain.py).
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.half_edges import label_bodies, measure_volumes, sum_gains, sum_normals
-from stereocell.meshes.validity import Defects, border, find_defects, find_topology
+from stereocell.kernels.half_edges import measure_volumes, sum_gains, sum_normals
+from stereocell.meshes.validity import (
+    Defects,
+    border,
+    find_defects,
+    find_topology,
+    measure_sizes,
+)
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
 STEPS = 4  # Newton's; volume is a cubic function of the distance
 FADE = 1.25  # moves are whole from this many largest moves from a cut on
-CALMED = 3  # tries in which the vertices of defects stay, and more around them with each
-HALVINGS = 3  # tries with half the move after that, before a body with defects stays
+TRIES = 12  # in which vertices of defects move less far, before a body with defects stays
+EASED = 0.5  # what is left of the way of such vertices with each try
+LEAST = 0.05  # share of the way under which they stay
+LACKS = 0.03  # of a body's volume, more of which it may not miss
 
 FEW = 0.02  # share of a body's vertices that may stay without others moving farther for them
 MANY = 0.05  # share of a level's vertices in defects of its first try, and their number
@@ -35,22 +46,40 @@ Points = NDArray[np.float64]
 Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
 
 
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A level that has got its volumes back, as far as that goes.
+
+    defects  those that are left
+    lacks    bool (n,), vertices of bodies that are still off by more than LACKS of their volume;
+             none is named where MANY cross
+    """
+
+    mesh: Mesh
+    defects: Defects
+    lacks: NDArray[np.bool_]
+
+
 class FineVolumes:
     """The volumes of a fine mesh's bodies, for levels of which each vertex is one of it.
 
-    box  of the tile; None: vertices may move anywhere
+    planes  the cut planes
+    box     of the tile; None: vertices may move anywhere
     """
 
-    def __init__(self, mesh: Mesh, box: Box | None = None) -> None:
-        self._label, count = label_bodies(
-            np.ascontiguousarray(mesh.triangles, np.int32), len(mesh.positions)
-        )
+    def __init__(self, mesh: Mesh, planes: tuple[Plane, ...], box: Box | None = None) -> None:
+        topology = find_topology(mesh.triangles, len(mesh.positions))
+        self._label, count = topology.bodies
+        self._planes = planes
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         self._origin = (low.astype(np.float64) + high) / 2
         self._low, self._high = np.full(3, -np.inf), np.full(3, np.inf)
         if box is not None:
             self._low, self._high = np.minimum(low, box[0]), np.maximum(high, box[1])
         self._volume = self._measure(mesh.positions, mesh.triangles, self._label, count)
+        sizes = measure_sizes(mesh, planes, topology)
+        boxes = (sizes.high - sizes.low).prod(axis=1)
+        self._solid = np.where(sizes.are_known, np.abs(sizes.volumes), boxes)
 
     def _measure(
         self,
@@ -66,33 +95,30 @@ class FineVolumes:
         self,
         mesh: Mesh,
         vertices: NDArray[np.int64],
-        planes: tuple[Plane, ...],
         *,
         max_move_um: float,
-    ) -> tuple[Mesh, Defects]:
-        """Return a level with the fine bodies' volumes, and the defects that are left.
+    ) -> Kept:
+        """Return a level with the fine bodies' volumes.
 
         vertices     int64 (n,), the number that each vertex has in the fine mesh
-        planes       the cut planes
         max_move_um  largest distance of a move
         """
+        planes = self._planes
         triangles = np.ascontiguousarray(mesh.triangles, np.int32)
         topology = find_topology(triangles, len(mesh.positions))
         label, count = topology.bodies
-        first = np.unique(label, return_index=True)[1]
-        wanted = self._volume[self._label[vertices[first]]]
+        of_fine = self._label[vertices[np.unique(label, return_index=True)[1]]]
+        wanted = self._volume[of_fine]
         start = mesh.positions.astype(np.float64)
-        share = _fade(mesh, planes, FADE * max_move_um)
-        part = np.ones(count)
+        whole = _fade(mesh, planes, FADE * max_move_um)
+        share, size = whole.copy(), np.bincount(label, minlength=count)
         fresh = np.ones(len(triangles), bool)
-        at = self._move(start, triangles, (label, count), wanted, share, max_move_um)
+        moves = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
         placed: Mesh | None = None
-        faulty = np.zeros(0, np.int64)
-        for number in range(CALMED + HALVINGS + 2):
-            moves = (at - start) * part[label][:, None]
-            positions = (start + moves).astype(np.float32)
-            # bit by bit: a sum would lose the sign of a zero
-            positions = np.where(moves == 0, mesh.positions, positions)
+        faulty, are_many = np.zeros(0, np.int64), False
+        for number in range(TRIES + 2):
+            # bit by bit where nothing moves: a sum would lose the sign of a zero
+            positions = np.where(moves == 0, mesh.positions, (start + moves).astype(np.float32))
             if placed is not None:
                 # pairs that stand where they were found sound need not be looked at again
                 other = (positions != placed.positions).any(axis=1)
@@ -101,24 +127,31 @@ class FineVolumes:
             placed = replace(mesh, positions=positions)
             defects = find_defects(placed, planes, fresh, topology)
             faulty = defects.vertices(mesh.triangles)
-            worst = np.unique(label[faulty])
-            worst = worst[part[worst] > 0]
-            if not len(worst):
+            worst = np.zeros(count, bool)
+            worst[label[faulty]] = True
+            worst &= np.bincount(label, share, count) > 0
+            if not worst.any():
                 break
-            if number == 0 and len(faulty) > max(MANY * len(start), COSTLY):
-                part[worst] = 0.0
-            elif number < CALMED:
-                share[_grow(faulty, mesh.triangles, len(start), number)] = 0.0
-                stay = np.bincount(label[share == 0], minlength=count)
-                few = (stay < FEW * np.bincount(label, minlength=count))[label][:, None]
-                moved = self._move(start, triangles, (label, count), wanted, share, max_move_um)
-                at = np.where(few, np.where(share[:, None] == 0, start, at), moved)
+            before = share.copy()
+            are_many |= number == 0 and len(faulty) > max(MANY * len(start), COSTLY)
+            if are_many or number == TRIES:
+                share[worst[label]] = 0.0
             else:
-                part[worst] *= 0.5 if number < CALMED + HALVINGS else 0.0
+                share[faulty] *= np.where(share[faulty] > LEAST * whole[faulty], EASED, 0.0)
+            eased = np.divide(share, before, out=np.zeros_like(share), where=before > 0)[:, None]
+            few = np.bincount(label, whole - share, count) < FEW * size
+            moved = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
+            moves = np.where(few[label][:, None], moves * eased, moved)
         assert placed is not None
-        return placed, defects
+        missing = wanted - self._measure(start + moves, triangles, label, count)
+        lacks = (np.abs(missing) > LACKS * self._solid[of_fine]) & (not are_many)
+        return Kept(placed, defects, lacks[label])
 
-    def _move(
+    def find_bodies(self, chosen: NDArray[np.int64], among: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which fine vertices `among` (n,) are of a body that `chosen` (k,) are of."""
+        return np.isin(self._label[among], self._label[chosen])
+
+    def _find_moves(
         self,
         start: Points,
         triangles: NDArray[np.int32],
@@ -127,7 +160,7 @@ class FineVolumes:
         share: Points,
         max_move_um: float,
     ) -> Points:
-        """Return where vertices go, (n, 3), so that each body gets its volume.
+        """Return how vertices move, (n, 3), so that each body gets its volume.
 
         bodies  of each vertex, and their number
         wanted  volumes
@@ -143,18 +176,7 @@ class FineVolumes:
             step = np.clip(moved + step, -max_move_um, max_move_um) - moved
             moved += step
             at = np.clip(at + ways * step[label][:, None], self._low, self._high)
-        return at
-
-
-def _grow(
-    chosen: NDArray[np.int64], triangles: NDArray[np.uint32], count: int, rings: int
-) -> NDArray[np.bool_]:
-    """Return the chosen vertices and `rings` rings of neighbours, bool (count,)."""
-    found = np.zeros(count, bool)
-    found[chosen] = True
-    for _ in range(rings):
-        found[triangles[found[triangles].any(axis=1)]] = True
-    return found
+        return at - start
 
 
 def _fade(mesh: Mesh, planes: tuple[Plane, ...], reach_um: float) -> Points:

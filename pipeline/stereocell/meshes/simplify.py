@@ -46,13 +46,16 @@ def simplify(mesh: Mesh, max_error_um: float, planes: tuple[Plane, ...] = ()) ->
     return compact(mesh, left)
 
 
-def find_errors(mesh: Mesh, max_error_um: float) -> NDArray[np.float64]:
-    """Return the error that each vertex may have (n,), um: less on bodies that are small for it."""
+def find_errors(mesh: Mesh, max_error_um: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the error that each vertex may have (n,), um: less on bodies that are small for it.
+
+    max_error_um  of all, or of each (n,)
+    """
     triangles = np.ascontiguousarray(mesh.triangles, np.int32)
     labels, bodies = label_bodies(triangles, len(mesh.positions))
     sides = measure_boxes(mesh.positions.astype(np.float64), labels, bodies)
     own = np.minimum(OF_DIAGONAL * np.linalg.norm(sides, axis=1), OF_SIDE * sides.min(axis=1))
-    return np.minimum(max_error_um, own)[labels]
+    return np.minimum(max_error_um, own[labels])
 
 
 def simplify_part(

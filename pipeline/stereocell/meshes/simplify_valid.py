@@ -42,13 +42,13 @@ class Simplified:
 
 
 def simplify_without_defects(
-    mesh: Mesh, planes: tuple[Plane, ...], *, max_error_um: float
+    mesh: Mesh, planes: tuple[Plane, ...], *, max_error_um: float | NDArray[np.float64]
 ) -> Simplified:
     """Return the mesh simplified and without defects; its boundary edges stay.
 
     mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)
     planes        the cut planes, where the mesh may be open
-    max_error_um  see `simplify`
+    max_error_um  see `simplify`; of all vertices, or of each (n,), alike in a body
 
     A mesh that has defects itself keeps the bodies with defects.
     """

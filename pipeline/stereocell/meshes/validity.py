@@ -141,7 +141,7 @@ def find_defects(
         open=rim[~_on_planes(mesh.positions, rim, planes)],
         non_manifold_edges=np.unique(np.sort(topology.crowded, axis=1), axis=0),
         non_manifold_vertices=topology.non_manifold_vertices,
-        inside_out=_inside_out(mesh, positions, topology, planes),
+        inside_out=_inside_out(mesh, topology, planes),
         crossings=used[crossings],
         walls=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
     )
@@ -183,13 +183,27 @@ def _ends_of(triangles: Indices, half_edges: NDArray[np.integer]) -> Indices:
     return np.stack([triangles[triangle, corner], triangles[triangle, (corner + 1) % 3]], axis=1)
 
 
-def _inside_out(
-    mesh: Mesh, positions: NDArray[np.float64], topology: Topology, planes: tuple[Plane, ...]
-) -> Indices:
-    """Return one triangle of each body that is wound inwards."""
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """What bodies enclose with the planes that cut them; `measure_sizes` makes it.
+
+    volumes    (b,), um^3, of a cavity negative; where it is not known a number with its sign
+    are_known  bool (b,): not of a body that reaches from plane to plane along all three axes
+    low, high  (b, 3), the corners of each body's box
+    first      int64 (b,), a triangle of each body, or -1: it has none
+    """
+
+    volumes: NDArray[np.float64]
+    are_known: NDArray[np.bool_]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    first: Indices
+
+
+def measure_sizes(mesh: Mesh, planes: tuple[Plane, ...], topology: Topology) -> Sizes:
+    """Return the volumes of a mesh's bodies; it has triangles, and may be open on the planes."""
     triangles, rim, (labels, bodies) = topology.corners, topology.rim, topology.bodies
-    if not len(triangles):
-        return np.zeros(0, np.int64)
+    positions = mesh.positions.astype(np.float64)
     first = find_first(triangles, labels, bodies).astype(np.int64)
     zero, cuts = positions[triangles[first, 0]], np.zeros((bodies, 3), int)
     for column, value in planes:
@@ -197,7 +211,6 @@ def _inside_out(
         touched = np.unique(labels[rim[on, 0]])
         zero[touched, column] = value
         cuts[touched, column] += 1
-    # by its normals, for a body that reaches from plane to plane along all three axes
     size, volumes, low, high = measure_windings(
         positions, np.ascontiguousarray(mesh.normals, np.float32), triangles, labels, zero
     )
@@ -205,8 +218,17 @@ def _inside_out(
     for axis in range(3):
         # Gauss: the integral of x n_x. Caps across other axes add nothing, nor does one at x = 0
         fits = (cuts[:, axis] <= 1) & ~known
-        size[fits] = volumes[fits, axis]
+        size[fits] = volumes[fits, axis] / 6  # doubled areas, and sums of three heights
         known |= fits
+    return Sizes(size, known, low, high, first)
+
+
+def _inside_out(mesh: Mesh, topology: Topology, planes: tuple[Plane, ...]) -> Indices:
+    """Return one triangle of each body that is wound inwards."""
+    if not len(topology.corners):
+        return np.zeros(0, np.int64)
+    found = measure_sizes(mesh, planes, topology)
+    size, low, high, first = found.volumes, found.low, found.high, found.first
     wrong, solid = (first >= 0) & (size <= 0), (first >= 0) & (size > 0)
     for hollow in np.flatnonzero(wrong & (size < 0)).tolist():
         around = (low[solid] <= low[hollow]).all(axis=1) & (high[solid] >= high[hollow]).all(axis=1)

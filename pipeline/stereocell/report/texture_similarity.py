@@ -5,8 +5,9 @@ projection, one light beside the viewer's eye, and ambient light that occlusion 
 pixel, by the normal map in the frame of the interpolated tangents, as in glTF and USD renderers;
 without maps by the interpolated normals.
 
-A picture is as large as the surface in the viewer at the distance at which the viewer switches to
-the next finer level: there the level's distance from the iso-surface spans ERROR_PX.
+A picture is so large that the level's distance from the iso-surface, the 99th percentile
+(`stereocell:distance`), spans ERROR_PX, within bounds. A viewer at rest switches to the next finer
+level where the largest (`stereocell:largestDistance`, `geometricError` of tilesets) spans as many.
 
 SSIM is the mean over the picture, by scikit-image.
 
@@ -27,7 +28,7 @@ from stereocell.textures.rasterize import find_pixels
 
 # directions of the viewer, x right, y up, z towards the viewer: in front, then around
 VIEWS = ((0.0, 0.0, 1.0), (0.9, 0.3, 0.5), (-0.9, 0.3, 0.5), (0.1, 0.9, 0.4), (0.1, -0.9, 0.4))
-ERROR_PX = 2.0  # pixels, the viewer's target error
+ERROR_PX = 2.0  # pixels, the viewer's target error, of its largest distance
 MIN_PX, MAX_PX = 48, 256  # pixels, smallest and largest edge of a picture
 CLOSE_PX = 512  # pixels, edge of the close picture, equal for every level
 _FINE = 2  # factor by which a picture is drawn larger, then averaged down

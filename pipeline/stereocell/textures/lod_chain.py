@@ -1,7 +1,9 @@
 """Make all levels of detail of one unit from its fine surface; each is validated and measured.
 
 Each level is simplified from the one before, so that its vertices are some of that one's, and then
-gets back the volume that this took (meshes/keep_volume.py). Rims stay as they are.
+gets back the volume that this took (meshes/keep_volume.py). Bodies that have no room for it between
+near walls are simplified less, at last not at all, as long as the level hardly gets heavier by it.
+Rims stay as they are.
 Small bodies go as a whole where they would be thinner than the error (meshes/small_bodies.py).
 """
 
@@ -11,15 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
-from stereocell.meshes.keep_volume import Box, FineVolumes
+from stereocell.meshes.keep_volume import Box, FineVolumes, Kept
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
-from stereocell.meshes.simplify_valid import simplify_without_defects
+from stereocell.meshes.simplify_valid import Simplified, simplify_without_defects
 from stereocell.meshes.small_bodies import SmallBodies
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh, Quality
 from stereocell.model.timing import Clock
 from stereocell.textures.texture_lod import Texturer
+
+# shares of the error for bodies that lack volume, one try after another
+FINER = (0.5, 0.25, 0.0)
+# of the first try's triangles that another may have: a wide membrane that lacks 3 % of its volume
+# would stay as heavy as the level before
+MAX_HEAVIER = 1.5
 
 # returns what gives values to levels, by the finest level that is made and by the numbers that its
 # vertices have in the fine surface
@@ -53,7 +61,7 @@ def make_levels(
     texturer: Texturer | None = None
     place = np.zeros(0, np.int64)  # of a fine vertex in the finest level that is made
     with clock("volume kept"):
-        volumes, bodies = FineVolumes(fine, box), SmallBodies(fine)
+        volumes, bodies = FineVolumes(fine, planes, box), SmallBodies(fine)
     with clock("measure"):
         to_fine = Nearest(fine, lod.samples)
     gone = np.zeros(len(fine.positions), bool)
@@ -63,13 +71,11 @@ def make_levels(
             small = bodies.find(length)
             if (small > gone).any():
                 gone = small
-                kept = ~gone[number[mesh.triangles[:, 0]]]
-                used = np.unique(mesh.triangles[kept])
-                mesh, number = compact(mesh, mesh.triangles[kept]), number[used]
-            simplified = simplify_without_defects(mesh, planes, max_error_um=length)
-            mesh, number = simplified.mesh, number[simplified.vertices]
-        with clock("volume kept"):
-            shown, defects = volumes.keep(mesh, number, planes, max_move_um=length)
+                stay = ~gone[number[mesh.triangles[:, 0]]]
+                used = np.unique(mesh.triangles[stay])
+                mesh, number = compact(mesh, mesh.triangles[stay]), number[used]
+        simplified, kept = _simplify(mesh, number, planes, volumes, length, clock)
+        mesh, number, shown = simplified.mesh, number[simplified.vertices], kept.mesh
         with clock("measure"):
             if gone.any():
                 left = fine.triangles[~gone[fine.triangles[:, 0]]]
@@ -84,7 +90,7 @@ def make_levels(
                 samples=lod.samples,
                 mended=simplified.simplified_again,
                 fallbacks=simplified.fallbacks,
-                faults=defects.total,
+                faults=kept.defects.total,
                 angle_deg=sharpest_angle(shown),
                 enclosed=measure_enclosure(to_fine, to_mesh),
             )
@@ -97,6 +103,40 @@ def make_levels(
             made = texturer.texture(made, level, place[number])
         lods.append(made)
     return tuple(lods)
+
+
+def _simplify(
+    mesh: Mesh,
+    number: NDArray[np.int64],
+    planes: tuple[Plane, ...],
+    volumes: FineVolumes,
+    error_um: float,
+    clock: Clock,
+) -> tuple[Simplified, Kept]:
+    """Return a level simplified, and the same with its volumes.
+
+    mesh    the level before
+    number  of each of its vertices in the fine mesh
+    """
+    errors = np.full(len(mesh.positions), error_um)
+    best: tuple[Simplified, Kept] | None = None
+    most = np.inf  # triangles
+    for finer in (*FINER, None):
+        with clock("simplify"):
+            simplified = simplify_without_defects(mesh, planes, max_error_um=errors)
+        count = len(simplified.mesh.triangles)
+        if best is not None and count > most:
+            break
+        most = min(most, MAX_HEAVIER * count)
+        with clock("volume kept"):
+            own = number[simplified.vertices]
+            kept = volumes.keep(simplified.mesh, own, max_move_um=error_um)
+        best = simplified, kept
+        if finer is None or not kept.lacks.any():
+            break
+        errors[volumes.find_bodies(own[kept.lacks], number)] = finer * error_um
+    assert best is not None
+    return best
 
 
 def sharpest_angle(mesh: Mesh) -> float:

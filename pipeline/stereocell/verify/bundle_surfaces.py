@@ -30,7 +30,7 @@ from stereocell.verify.bundle_files import COLOR_STEP
 _UM_PER_METRE = 1e6
 _MAP_DIFFERENCE = 1.0  # largest mean difference of texels, 0..255: encoders differ
 _ODD_SHARE = 0.01  # share of a surface's area that may face away (slivers)
-_ALONG = math.cos(math.radians(3))  # smallest cosine: octahedral normals of 8 bits, twofold
+_TURNED = math.radians(3)  # largest difference of normals: octahedral ones of 8 bits, twofold
 _UV_STEP = 1e-4  # share of a map's edge; the step of 16 bits is a sixth of it
 _ROUNDED = 1.001  # factor: four digits, rounded up
 _BOX_M = 2e-9  # m: whole nm, rounded outwards
@@ -188,8 +188,8 @@ def _compare_faces(
     if odd > _ODD_SHARE * whole:
         yield f"{odd / whole:.0%} of its area faces the other way"
     here_of = drawn.triangles[np.asarray(twins)]
-    along = (_means(mesh.normals, triangles) * _means(drawn.normals, here_of)).sum(axis=1)
-    odd = float(areas[along < _ALONG].sum())
+    off = np.linalg.norm(_means(mesh.normals, triangles) - _means(drawn.normals, here_of), axis=1)
+    odd = float(areas[off > _TURNED].sum())
     if odd > _ODD_SHARE * whole:
         yield f"{odd / whole:.0%} of its area is shaded by other normals"
     dimmed = _dimmed(mesh)
@@ -215,9 +215,14 @@ def _compare_faces(
 
 
 def _means(normals: NDArray[Any], triangles: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the mean direction (m, 3) of each triangle's three normals, unit length."""
-    means = normals.astype(np.float64)[triangles].sum(axis=1)
-    return np.asarray(means / np.maximum(np.linalg.norm(means, axis=1, keepdims=True), 1e-12))
+    """Return the mean (m, 3) of each triangle's three unit normals.
+
+    It is as long as they agree: of a triangle over a sharp edge hardly at all, and its direction
+    would be that of their rounding.
+    """
+    units = normals.astype(np.float64)
+    units /= np.maximum(np.linalg.norm(units, axis=1, keepdims=True), 1e-12)
+    return np.asarray(units[triangles].mean(axis=1))
 
 
 def _dimmed(mesh: Mesh) -> NDArray[np.float64] | None:

@@ -1,0 +1,95 @@
+"""The phases of a build, one after another as commands, and what each takes."""
+
+import subprocess
+import tempfile
+import time
+from collections import defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import psutil
+from commands import STEREOCELL
+
+from support.worker_processes import workers_of
+
+PHASES = ("units", "stage", "bundle", "report", "check")  # after the plan
+OFTEN_S = 0.2  # from one look at the processes to the next
+MB = 1e6
+
+
+@dataclass
+class Cost:
+    """What a command took: seconds, those of CPU, and the most bytes of a process by its role."""
+
+    seconds: float = 0.0
+    cpu: float = 0.0
+    peaks: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+
+
+def watch(arguments: list[str], others: list[psutil.Process]) -> Cost:
+    """Run a command to its end and look at its processes; `others` work for it."""
+    cost, start = Cost(), time.perf_counter()
+    before = sum(_cpu_of(other) for other in others)
+    # not a pipe: nobody reads it meanwhile, so it would fill and stop the command
+    with tempfile.TemporaryFile("w+") as told:
+        command = subprocess.Popen(
+            [*STEREOCELL, *arguments], stdout=subprocess.DEVNULL, stderr=told
+        )
+        parent, spent = psutil.Process(command.pid), dict[int, float]()
+        while command.poll() is None:
+            _look(parent, others, cost, spent)
+            time.sleep(OFTEN_S)
+        if command.returncode:
+            told.seek(0)
+            raise SystemExit(f"{' '.join(arguments)}: {told.read()[-2000:]}")
+    cost.seconds = time.perf_counter() - start
+    cost.cpu = sum(spent.values()) + sum(_cpu_of(other) for other in others) - before
+    return cost
+
+
+def _look(
+    parent: psutil.Process, others: list[psutil.Process], cost: Cost, spent: dict[int, float]
+) -> None:
+    """Note the memory of all processes, and the seconds of CPU of each of the command's own."""
+    try:
+        for process, role in [
+            (parent, "command"),
+            *((worker, "worker") for worker in (*workers_of(parent), *others)),
+        ]:
+            cost.peaks[role] = max(cost.peaks[role], process.memory_info().rss)
+            if process not in others:
+                spent[process.pid] = _cpu_of(process)
+    except psutil.Error:
+        pass  # it ended while it was looked at
+
+
+def _cpu_of(process: psutil.Process) -> float:
+    times = process.cpu_times()
+    return float(times.user + times.system)
+
+
+def run_phases(
+    out: Path, plan: list[str], how: list[str], others: list[psutil.Process]
+) -> dict[str, Cost]:
+    """Run all phases, print what each takes, and return it.
+
+    plan    arguments of `stereocell plan`
+    how     arguments that say where units are built
+    others  processes that work for the commands
+    """
+    costs = {}
+    for phase in ("plan", *PHASES):
+        arguments = [phase, str(out)]
+        if phase == "plan":
+            arguments = ["plan", "-o", str(out), *plan]
+        elif phase == "check":
+            arguments += ["--deep", *how]
+        elif phase != "report":
+            arguments += how
+        cost = costs[phase] = watch(arguments, others)
+        peaks = ", ".join(f"{role} {most / MB:.0f}" for role, most in cost.peaks.items())
+        print(f"  {phase:7}{cost.seconds:8.1f} s {cost.cpu:8.1f} s of CPU   peak, MB: {peaks}",
+              flush=True)  # fmt: skip
+    total = sum(cost.seconds for cost in costs.values())
+    print(f"  in all {total / 60:.1f} minutes, {sum(c.cpu for c in costs.values()):.0f} s of CPU")
+    return costs

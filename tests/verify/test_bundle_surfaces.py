@@ -1,0 +1,51 @@
+"""Normals of a bundle's surface against those of the stage: as near as 8 bits let them be."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stereocell.formats.gltf import Material, choose_step, encode_glb
+from stereocell.formats.gltf_decode import read_glb
+from stereocell.model.mesh import Mesh
+from stereocell.verify.bundle_surfaces import _compare_faces
+
+
+@pytest.fixture
+def fins() -> Mesh:
+    """Triangles over sharp edges, whose three normals nearly cancel out."""
+    rng = np.random.default_rng(0)
+    corners = rng.normal(size=(200, 3, 3)).astype(np.float32)
+    corners += 10 * np.arange(200, dtype=np.float32)[:, None, None]
+    x, y = np.linalg.qr(rng.normal(size=(200, 3, 2)))[0].transpose(2, 0, 1)
+    angles = 2 / 3 * np.pi * np.arange(3)[:, None, None] + rng.normal(0, 0.03, (3, 200, 1))
+    normals = (np.cos(angles) * x + np.sin(angles) * y).transpose(1, 0, 2).reshape(-1, 3)
+    triangles = np.arange(600, dtype=np.uint32).reshape(-1, 3)
+    return Mesh(corners.reshape(-1, 3), triangles, normals.astype(np.float32))
+
+
+def _faults(stage: Mesh, bundle: Mesh, tmp_path: Path) -> list[str]:
+    file = tmp_path / "fins.glb"
+    grey = Material((0.5, 0.5, 0.5))
+    file.write_bytes(
+        encode_glb(bundle, choose_step(2100), material=grey, name="fins", extras={}).data
+    )
+    drawn = read_glb(file)
+    there = stage.positions[stage.triangles].astype(np.float64) / 1e6
+    here = drawn.positions_m.astype(np.float64)[drawn.triangles]
+    return list(_compare_faces(there, here, stage.triangles, drawn, stage))
+
+
+def test_rounded_normals_that_nearly_cancel_out_are_no_fault(fins: Mesh, tmp_path: Path) -> None:
+    assert _faults(fins, fins, tmp_path) == []
+
+
+def test_normals_turned_by_five_degrees_are(fins: Mesh, tmp_path: Path) -> None:
+    alike = replace(fins, normals=np.repeat(fins.normals[::3], 3, axis=0))
+    turned = alike.normals + np.float32(np.tan(np.radians(5))) * np.cross(
+        alike.normals, [0.6, 0.0, 0.8]
+    ).astype(np.float32)
+    assert _faults(alike, alike, tmp_path) == []
+    [told] = _faults(alike, replace(alike, normals=turned), tmp_path)
+    assert told.endswith("% of its area is shaded by other normals")

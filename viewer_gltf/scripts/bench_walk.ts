@@ -1,0 +1,132 @@
+/**
+ * What is on screen and on the GPU while the gaze walks over all tiles of a bundle, row by row.
+ *
+ *   npm run build && npm run bench-walk -- BUNDLE [--size 412x780]     CSS pixels
+ *
+ * The page is driven by its keys in headless Chromium; nothing is drawn, which alters no count.
+ * Prints the triangles on screen, the volumes' bytes on the GPU and how many tiles have some, at
+ * rest on each tile and the most on the way. Ends with 1 where the gaze has missed a tile.
+ */
+import { readFile } from "node:fs/promises";
+import { join, resolve } from "node:path";
+import { parseArgs } from "node:util";
+import type { Snapshot } from "../src/app/automation_api";
+import type { Manifest } from "../src/bundle/generated/bundle";
+import { enter, serveChromium } from "../test/support/browser/chromium";
+import { Host } from "../test/support/browser/host";
+import { ViewerPage } from "../test/support/browser/page";
+
+/** Key presses after which a walk that meets no end is given up. */
+const MAX_STEPS = 400;
+
+class Walk {
+  /** At rest, by the tile that is gazed at. */
+  private readonly met = new Map<string, Snapshot>();
+  private readonly seen: Snapshot[] = [];
+  private steps = 0;
+
+  constructor(private readonly viewer: ViewerPage) {}
+
+  /** Open the page, from the front and so near that a tile fills the picture. */
+  async begin(address: string): Promise<void> {
+    await this.viewer.open(address);
+    await this.viewer.settled();
+    this.say("the whole specimen", await this.viewer.snapshot());
+    await this.viewer.page.keyboard.press("z");
+    for (let i = 0; i < 4; i++) await this.viewer.page.keyboard.press("+");
+    await this.viewer.settled();
+  }
+
+  /** Row by row, to and fro, from one corner to the one across. */
+  async all(): Promise<void> {
+    await this.toTheEnd("Shift+ArrowLeft");
+    await this.toTheEnd("Shift+ArrowUp");
+    for (let way = "Shift+ArrowRight"; ; ) {
+      await this.toTheEnd(way);
+      way = way === "Shift+ArrowRight" ? "Shift+ArrowLeft" : "Shift+ArrowRight";
+      const before = await this.gazed();
+      let isAtEnd = false;
+      while (!isAtEnd && (await this.gazed()) === before) {
+        isAtEnd = !(await this.step("Shift+ArrowDown"));
+      }
+      if (isAtEnd) return;
+    }
+  }
+
+  /** Print the most and the least; 1 where a tile was not gazed at. */
+  tell(tiles: readonly string[]): number {
+    for (const [tile, snapshot] of this.met) this.say(tile, snapshot);
+    const most = (of: (each: Snapshot) => number) => Math.max(...this.seen.map(of));
+    process.stdout.write(
+      `  the most on the way: ${most(({ triangles }) => triangles)} triangles, ` +
+        `${megabytes(most(({ volumeBytes }) => volumeBytes))} MB of volumes\n`,
+    );
+    const missed = tiles.filter((tile) => !this.met.has(tile));
+    if (missed.length > 0) process.stdout.write(`  not gazed at: ${missed.join(", ")}\n`);
+    return missed.length > 0 ? 1 : 0;
+  }
+
+  private say(where: string, { triangles, volumeBytes, volumes }: Snapshot): void {
+    const held = new Set(volumes.map(({ tile }) => tile)).size;
+    process.stdout.write(
+      `  ${where}: ${triangles} triangles, ${megabytes(volumeBytes)} MB of volumes, tiles: ${held}\n`,
+    );
+  }
+
+  private async gazed(): Promise<string | null> {
+    return (await this.viewer.snapshot()).gazed;
+  }
+
+  private async toTheEnd(key: string): Promise<void> {
+    while (await this.step(key));
+  }
+
+  /** Press a key; false where that has moved nothing. */
+  private async step(key: string): Promise<boolean> {
+    if (++this.steps > MAX_STEPS) throw new Error("the walk meets no end");
+    const before = (await this.viewer.snapshot()).look;
+    await this.viewer.page.keyboard.press(key);
+    await this.viewer.still();
+    const after = await this.viewer.snapshot();
+    this.seen.push(after);
+    if (after.gazed !== null) this.met.set(after.gazed, after);
+    return after.look.target.some((v, i) => Math.abs(v - before.target[i]) > 1e-4);
+  }
+}
+
+function megabytes(bytes: number): string {
+  return (bytes / 1e6).toFixed(1);
+}
+
+const { values, positionals } = parseArgs({
+  allowPositionals: true,
+  options: { size: { type: "string", default: "412x780" } },
+});
+if (positionals.length !== 1) {
+  process.stderr.write("usage: npm run bench-walk -- BUNDLE [options]\n");
+  process.exit(2);
+}
+const bundle = resolve(positionals[0]);
+const manifest: Manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
+const [width, height] = values.size.split("x").map(Number);
+
+const host = await Host.start({
+  "/": new URL("../dist/", import.meta.url).pathname,
+  "/bundle/": bundle,
+});
+const server = await serveChromium();
+const browser = await enter(server.wsEndpoint(), { viewport: { width, height }, isBlind: true });
+try {
+  // tsx names functions by a helper of its own, those that run in the page too
+  await browser.context.addInitScript("globalThis.__name = (each) => each");
+  const page = await browser.context.newPage();
+  page.on("pageerror", (error) => process.stderr.write(`page: ${error.message}\n`));
+  const walk = new Walk(new ViewerPage(page));
+  await walk.begin(`${host.address}/?bundle=bundle/&mode=disc&switch=9`);
+  await walk.all();
+  process.exitCode = walk.tell(manifest.tiles.map(({ id }) => id));
+} finally {
+  await browser.close();
+  await server.close();
+  await host.stop();
+}
