@@ -104,7 +104,7 @@ def test_walls_lie_where_the_truth_has_them() -> None:
 
 
 @pytest.mark.parametrize(
-    ("spacing_um", "most_deg"), [((0.5, 0.5, 0.5), 5.0), ((1.0, 0.5, 0.5), 8.0)]
+    ("spacing_um", "most_deg"), [((0.5, 0.5, 0.5), 6.0), ((1.0, 0.5, 0.5), 10.0)]
 )
 def test_a_ball_is_round_where_its_slices_end(
     spacing_um: tuple[float, float, float], most_deg: float
