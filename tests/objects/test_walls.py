@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from corpus.real import data_folder
 from stereocell.meshes.validity import find_defects, label_components
+from stereocell.model.volume import zyx_to_xyz
 from stereocell.objects import simplify_walls as simplifying
 from stereocell.objects.simplify_walls import keep_volumes, simplify_walls
 from stereocell.objects.walls import Walls, extract_walls, find_faults, measure_volumes, surfaces_of
@@ -100,6 +101,31 @@ def test_walls_lie_where_the_truth_has_them() -> None:
         planes = (to_first**2 - to_second**2) / (2 * np.maximum(between, 1e-9))
         distance = np.abs(np.where(first > 0, planes, to_second - RADIUS_UM))
         assert np.average(distance, weights=area) < most_um
+
+
+@pytest.mark.parametrize(
+    ("spacing_um", "most_deg"), [((0.5, 0.5, 0.5), 6.0), ((1.0, 0.5, 0.5), 10.0)]
+)
+def test_a_ball_is_round_where_its_slices_end(
+    spacing_um: tuple[float, float, float], most_deg: float
+) -> None:
+    radius_um, middle = 8.0, np.array([0.13, -0.21, 0.17])  # (z, y, x), off the voxels' centres
+    axes = [(np.arange(n) - n // 2) * s for n, s in zip((44, 44, 44), spacing_um, strict=True)]
+    grid = np.meshgrid(*(axis - at for axis, at in zip(axes, middle, strict=True)), indexing="ij")
+    inside = (np.linalg.norm(grid, axis=0) < radius_um).astype(np.int32)
+    origin_um = tuple(float(axis[0]) for axis in axes)
+    walls = extract_walls(inside, spacing_um, STEP_UM, origin_um)
+    at = walls.positions - zyx_to_xyz(middle)
+    assert np.abs(np.linalg.norm(at, axis=1) - radius_um).mean() < 0.1 * max(spacing_um)
+    corners = at[walls.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    outward = corners.mean(axis=1)
+    cosine = (normals * outward).sum(axis=1) / areas / np.linalg.norm(outward, axis=1)
+    off_deg = np.degrees(np.arccos(np.clip(np.abs(cosine), 0, 1)))
+    order = np.argsort(off_deg)
+    share = np.cumsum(areas[order]) / areas.sum()
+    assert off_deg[order][np.searchsorted(share, 0.95)] < most_deg
 
 
 def test_vertices_lie_on_the_lattice() -> None:

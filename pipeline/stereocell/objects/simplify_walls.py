@@ -73,7 +73,8 @@ def simplify_walls(
         at_fault = find_faults(fewer, (triangles != walls.triangles).any(axis=1)[~gone])
         if not len(at_fault):
             fewer, used = _compact(fewer)
-            most_um = STRAY * max_error_um
+            # twice: what smoothing took of objects of a few voxels comes back, too
+            most_um = 2 * STRAY * max_error_um
             return keep_volumes(fewer, fixed[used], most_um, volumes_um3, step_um)
         around = np.zeros(len(stays), bool)
         around[at_fault] = True
