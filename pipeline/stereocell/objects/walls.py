@@ -25,8 +25,8 @@ from stereocell.model.volume import zyx_to_xyz
 
 # The last slices of a ball end in plates as wide as many voxels, which a filter keeps that passes
 # what 9 vertices are a wave of, as 40 turns of .5 and -.53 do: a ball of 8 um in voxels of 1 x .5 x
-# .5 um was faceted by 17 degrees (95 % of its area) and .067 um off on average; these: 9, and .042.
-# Still longer waves make boxes pillows
+# .5 um was faceted by 17 degrees (95 % of its area) and .067 um off on average; so: 8, and .041.
+# Still more turns make pillows of boxes
 SMOOTHINGS = 70
 _INWARD, _OUTWARD = 0.64, -0.65  # shares of the way to the mean of the neighbours, by turns
 _ROUNDS = 12  # of putting vertices back
