@@ -208,7 +208,7 @@ def meshopt_positions(path: Path, found: dict, node: dict, primitive: dict) -> n
     data = path.read_bytes()
     accessor = found["accessors"][primitive["attributes"]["POSITION"]]
     packed = found["bufferViews"][accessor["bufferView"]]["extensions"]["EXT_meshopt_compression"]
-    start = len(data) - -(-found["buffers"][0]["byteLength"] // 4) * 4 + packed["byteOffset"]
+    start = len(data) - -(-found["buffers"][0]["byteLength"] // 4) * 4 + packed.get("byteOffset", 0)
     stream = data[start : start + packed["byteLength"]]
     rows = meshoptimizer.decode_vertex_buffer(packed["count"], packed["byteStride"], stream)
     steps = np.frombuffer(np.ascontiguousarray(rows), "<u2").reshape(-1, 4)[:, :3]
