@@ -71,6 +71,14 @@ def test_each_tile_is_sound(sponge: Field) -> None:
         assert kinds(find_defects(mesh, lattice.cut_planes())) == set()
 
 
+@pytest.mark.parametrize("seed", [4, 6])
+def test_no_triangle_comes_to_lie_in_the_other_plane_where_two_meet(seed: int) -> None:
+    noise = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=SHAPE), 0.8)
+    field = np.clip(noise / noise.std() * 0.4, -0.56, 0.56).astype(np.float32)
+    for mesh, lattice in _tiles(field, 0.1):
+        assert not len(find_defects(mesh, lattice.cut_planes()).walls)
+
+
 def test_no_vertex_of_the_fine_rim_is_farther_than_the_error(sponge: Field) -> None:
     for (fine, _), (thin, _) in zip(_tiles(sponge, 0.0), _tiles(sponge, ERROR), strict=True):
         away = Nearest(thin, 10).distances(fine.positions.astype(np.float64))

@@ -78,7 +78,7 @@ def compile_of_meshes() -> None:
     bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)
     left = collapse(at, triangles, flags, bits, errors, 3.0, 0.9)
     flip_edges(at, left, flags, bits, errors, 0.9)
-    thin_rim(at, triangles, np.zeros(4, np.int8), flags, 0.1, 0.9)
+    thin_rim(at, triangles, np.zeros(4, np.int8), np.zeros(4, np.uint8), flags, 0.1, 0.9)
 
 
 def compile_others() -> None:

@@ -70,6 +70,7 @@ def thin_rim(
     at: Points,
     triangles: Ints,
     sides: NDArray[np.int8],
+    planes: NDArray[np.uint8],
     locked: NDArray[np.bool_],
     error: float,
     sharpest: float,
@@ -79,6 +80,7 @@ def thin_rim(
     at         float64 (n, 3)
     triangles  int32 (m, 3); vertices of borders stay
     sides      int8 (n,): -1 or 1 beside the plane, 0 in it
+    planes     uint8 (n,), a bit for each cut plane that a vertex lies in, this one and others
     locked     bool (n,), vertices that stay
     error      largest distance of a vertex from the curve that is left
     sharpest   cosine of the smallest angle that a triangle may get, unless those around are sharper
@@ -88,9 +90,7 @@ def thin_rim(
     twins = match_twins(triangles, n)
     leaving, valence = count_fans(triangles, twins, n)
     stays = find_fixed(locked, corner, twins, valence)
-    planes = np.zeros(n, np.uint8)
     for v in range(n):
-        planes[v] = sides[v] == 0
         stays[v] |= sides[v] != 0
     curves = np.full((n, 2), -1, np.int32)
     for h in range(len(corner)):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from stereocell.isosurface.extract import extract_surface
 from stereocell.kernels.rims import thin_rim
 from stereocell.meshes.self_intersections import find_crossings
-from stereocell.meshes.simplify import compact
+from stereocell.meshes.simplify import compact, find_planes
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
@@ -45,7 +45,8 @@ def thin_rims(
         if not len(layers.triangles):
             continue
         value = np.float32(_plane_um(lattice, axis, place))
-        moved, onto = _decide(layers, 2 - axis, value, error_um)
+        planes = find_planes(layers.positions, lattice.cut_planes())
+        moved, onto = _decide(layers, 2 - axis, value, planes, error_um)
         own = np.flatnonzero(mesh.positions[:, 2 - axis] == value)
         known = _keys(mesh.positions[own])
         order = np.argsort(known)
@@ -64,16 +65,20 @@ def _plane_um(lattice: Lattice, axis: int, place: int) -> float:
 
 
 def _decide(
-    layers: Mesh, axis: int, value: np.float32, error_um: float
+    layers: Mesh, axis: int, value: np.float32, planes: NDArray[np.uint8], error_um: float
 ) -> tuple[NDArray[np.void], NDArray[np.void]]:
-    """Return the keys of vertices that move, and of those onto which, (k,) each."""
+    """Return the keys of vertices that move, and of those onto which, (k,) each.
+
+    planes  uint8 (n,), a bit for each cut plane that a vertex lies in: where two planes meet, a
+            triangle would come to lie in the other one
+    """
     at = layers.positions.astype(np.float64)
     triangles = np.ascontiguousarray(layers.triangles, np.int32)
     sides = np.sign(layers.positions[:, axis] - value).astype(np.int8)
     sharpest = float(np.cos(np.radians(SHARPEST_DEG)))
     stays = np.zeros(len(at), bool)
     for number in range(TRIES + 1):
-        target = thin_rim(at, triangles, sides, stays, error_um, sharpest)
+        target = thin_rim(at, triangles, sides, planes, stays, error_um, sharpest)
         changed = target[triangles]
         is_left = (changed != np.roll(changed, 1, axis=1)).all(axis=1)
         crossings = find_crossings(at, changed[is_left].astype(np.int64))

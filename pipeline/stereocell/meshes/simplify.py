@@ -77,7 +77,7 @@ def simplify_part(
         return triangles
     at = mesh.positions[used].astype(np.float64)
     at -= (at.min(axis=0) + at.max(axis=0)) / 2
-    bits = _find_planes(mesh.positions[used], planes)
+    bits = find_planes(mesh.positions[used], planes)
     sharpest, sharp = np.cos(np.radians([SHARPEST_DEG, FLIP_DEG])).tolist()
     left = collapse(
         at,
@@ -92,7 +92,7 @@ def simplify_part(
     return used[left].astype(np.uint32)
 
 
-def _find_planes(positions: NDArray[np.float32], planes: tuple[Plane, ...]) -> NDArray[np.uint8]:
+def find_planes(positions: NDArray[np.float32], planes: tuple[Plane, ...]) -> NDArray[np.uint8]:
     """Return a bit for each plane that a vertex lies in, uint8 (n,)."""
     bits = np.zeros(len(positions), np.uint8)
     for bit, (column, value) in enumerate(planes):
