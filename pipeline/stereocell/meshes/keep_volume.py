@@ -35,7 +35,7 @@ STEPS = 4  # Newton's; volume is a cubic function of the distance
 FADE = 1.25  # moves are whole from this many largest moves from a cut on
 TRIES = 12  # in which vertices of defects move less far, before a body with defects stays
 EASED = 0.5  # what is left of the way of such vertices with each try
-LEAST = 0.05  # share of the way under which they stay
+MIN_WAY = 0.05  # share of the way under which they stay
 LACKS = 0.03  # of a body's volume, more of which it may not miss
 
 FEW = 0.02  # share of a body's vertices that may stay without others moving farther for them
@@ -137,7 +137,7 @@ class FineVolumes:
             if are_many or number == TRIES:
                 share[worst[label]] = 0.0
             else:
-                share[faulty] *= np.where(share[faulty] > LEAST * whole[faulty], EASED, 0.0)
+                share[faulty] *= np.where(share[faulty] > MIN_WAY * whole[faulty], EASED, 0.0)
             eased = np.divide(share, before, out=np.zeros_like(share), where=before > 0)[:, None]
             few = np.bincount(label, whole - share, count) < FEW * size
             moved = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)

@@ -28,6 +28,8 @@ FINER = (0.5, 0.25, 0.0)
 # of the first try's triangles that another may have: a wide membrane that lacks 3 % of its volume
 # would stay as heavy as the level before
 MAX_HEAVIER = 1.5
+# triangles that it may have more in any case: small levels weigh little
+MAX_MORE = 1000
 
 # returns what gives values to levels, by the finest level that is made and by the numbers that its
 # vertices have in the fine surface
@@ -127,7 +129,7 @@ def _simplify(
         count = len(simplified.mesh.triangles)
         if best is not None and count > most:
             break
-        most = min(most, MAX_HEAVIER * count)
+        most = min(most, max(MAX_HEAVIER * count, count + MAX_MORE))
         with clock("volume kept"):
             own = number[simplified.vertices]
             kept = volumes.keep(simplified.mesh, own, max_move_um=error_um)
