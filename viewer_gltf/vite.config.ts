@@ -2,8 +2,8 @@ import { fileURLToPath } from "node:url";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 import { finishBuild } from "./scripts/finish_build.ts";
-import { LongestFirst } from "./scripts/longest_first.ts";
 import { oneChunk } from "./scripts/one_chunk.ts";
+import { OneLast } from "./scripts/one_last.ts";
 
 const SERVICE_WORKER = "sw.js";
 const PAGE = fileURLToPath(new URL("index.html", import.meta.url));
@@ -110,6 +110,30 @@ function stripSchemas(): Plugin {
   };
 }
 
+const BUILT = "test/**/*.built.test.ts";
+
+/** Tests that open pages. */
+function ofBrowser(name: string, files: { include: string[]; exclude?: string[] }) {
+  return {
+    extends: true as const,
+    test: {
+      name,
+      ...files,
+      environment: "node",
+      globalSetup: "test/support/browser/shared_fixture.ts",
+      testTimeout: 180_000,
+      hookTimeout: 180_000,
+      expect: { poll: { timeout: 90_000 } }, // its usual second is short for a busy machine
+      // one software-rendering page at a time: of two, a first visit keeps too little in its 40 s
+      fileParallelism: false,
+      isolate: false,
+      sequence: { groupOrder: 1 }, // not beside the unit tests
+      // where others have the cores a browser may miss a moment; what is wrong is wrong each time
+      retry: process.env.CI === undefined ? 0 : 2,
+    },
+  };
+}
+
 export default defineConfig({
   // Relative addresses: the page works from any folder of any static host.
   base: "./",
@@ -141,7 +165,7 @@ export default defineConfig({
     },
   },
   test: {
-    sequence: { sequencer: LongestFirst },
+    sequence: { sequencer: OneLast },
     projects: [
       {
         extends: true,
@@ -153,24 +177,9 @@ export default defineConfig({
           testTimeout: 30_000, // on a busy machine the longest takes ten times its second
         },
       },
-      {
-        extends: true,
-        test: {
-          name: "browser",
-          include: ["test/**/*.test.ts"],
-          environment: "node",
-          globalSetup: "test/support/browser/shared_fixture.ts",
-          testTimeout: 180_000,
-          hookTimeout: 180_000,
-          expect: { poll: { timeout: 90_000 } }, // its usual second is short for a busy machine
-          // one software-rendering page at a time: of two, a first visit keeps too little in its 40 s
-          fileParallelism: false,
-          isolate: false,
-          sequence: { groupOrder: 1 }, // not beside the other project's
-          // where others have the cores a browser may miss a moment; what is wrong is wrong each time
-          retry: process.env.CI === undefined ? 0 : 2,
-        },
-      },
+      ofBrowser("browser", { include: ["test/**/*.test.ts"], exclude: [BUILT] }),
+      // what looks at bundles that `make test` builds while it runs the others
+      ofBrowser("built", { include: [BUILT] }),
     ],
   },
 });

@@ -17,7 +17,7 @@ describeInChromium("the benchmark", () => {
       .evaluate(async (link) => (await fetch((link as HTMLAnchorElement).href)).text());
     const report: Report = JSON.parse(saved);
     expect(report.format).toBe("stereocell-fps");
-    expect(report.device.renderer).toMatch(/SwiftShader/);
+    expect(report.device.renderer).toMatch(/llvmpipe|SwiftShader/);
     expect(report.tiles).toBe(stand.manifest.tiles.length);
     expect(JSON.stringify(report)).not.toContain(stand.manifest.specimen.name);
     const made = report.runs.map(({ mode, eyes }) => `${mode} ${eyes}`);

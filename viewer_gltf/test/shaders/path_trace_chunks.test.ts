@@ -31,35 +31,36 @@ describeInChromium("the path tracer's chunks", () => {
     head: string,
     body: string,
     textures: Readonly<Record<string, Texture>> = {},
+    pixels = 1,
   ) {
     const samplers = Object.entries(textures)
       .map(([name, { size }]) => `uniform sampler${size.length}D ${name};`)
       .join("\n");
-    return bare.run(names, `precision highp int;\n${samplers}\n${head}`, body, textures);
+    return bare.run(names, `${samplers}\n${head}`, body, textures, pixels);
   }
 
-  /** Means of the four numbers that `body` adds to `sum`, over so many turns of a loop. */
-  const meanOf = (count: number, body: string) =>
-    `vec4 whole = vec4(0.0);
-     for (int j = 0; j < ${count / 256}; j++) {
-       vec4 sum = vec4(0.0);  // of few, so that floats are exact enough
-       for (int k = 0; k < 256; k++) { int i = 256 * j + k; ${body} }
-       whole += sum / ${count.toFixed(1)};
-     }
-     oColor = whole;`;
-  const COUNT = 65_536;
+  /** A pixel's turns: few, so that floats are exact enough. */
+  const TURNS = 256;
+  const PIXEL = "int(gl_FragCoord.x)";
+  /** Means of the four numbers that `body` adds to `sum` in a pixel's turns, the `i`th of all. */
+  const meanOf = (body: string) =>
+    `vec4 sum = vec4(0.0);
+     for (int k = 0; k < ${TURNS}; k++) { int i = ${TURNS} * ${PIXEL} + k; ${body} }
+     oColor = sum / ${TURNS}.0;`;
+  const PIXELS = 256;
+  const COUNT = PIXELS * TURNS;
   /** Of a mean of so many numbers of unit variance: 4 standard errors. */
   const SLACK = 4 / Math.sqrt(COUNT);
 
   describe("draw numbers", () => {
     it("evenly between 0 and 1, each for itself", async () => {
       const body = meanOf(
-        COUNT,
         `float a = random(); float b = random();
          if (a < 0.0 || a >= 1.0) sum += 1e6;
          sum += vec4(a, a * a, (a - 0.5) * (b - 0.5) * 12.0, a < 0.1 ? 1.0 : 0.0);`,
       );
-      const found = await run(["random"], "", `seedRandom(uvec3(3u, 5u, 7u));\n${body}`);
+      const start = `seedRandom(uvec3(${PIXEL}, 5u, 7u));`;
+      const found = await run(["random"], "", `${start}\n${body}`, {}, PIXELS);
       expect(Math.abs(found[0] - 1 / 2)).toBeLessThan(SLACK * Math.sqrt(1 / 12));
       expect(Math.abs(found[1] - 1 / 3)).toBeLessThan(SLACK * Math.sqrt(4 / 45));
       expect(Math.abs(found[2])).toBeLessThan(SLACK);
@@ -71,7 +72,6 @@ describeInChromium("the path tracer's chunks", () => {
       const at = (x: string, y: string, n: string) =>
         `seedRandom(uvec3(uint(${x}), uint(${y}), uint(${n}))); float `;
       const body = meanOf(
-        COUNT,
         `int x = i % 256; int y = i / 256;
          ${at("x", "y", "1")} here = random() - 0.5;
          ${at("x + 1", "y", "1")} beside = random() - 0.5;
@@ -79,7 +79,8 @@ describeInChromium("the path tracer's chunks", () => {
          ${at("x", "y", "2")} later = random() - 0.5;
          sum += 12.0 * here * vec4(beside, above, later, 1.0 / sqrt(12.0));`,
       );
-      for (const v of await run(["random"], "", body)) expect(Math.abs(v)).toBeLessThan(SLACK);
+      const found = await run(["random"], "", body, {}, PIXELS);
+      for (const v of found) expect(Math.abs(v)).toBeLessThan(SLACK);
     });
   });
 
@@ -104,38 +105,38 @@ describeInChromium("the path tracer's chunks", () => {
     const head = (g: number) =>
       `const float uAnisotropy = ${number(g)}; const float uGloss = ${number(GLOSS)};`;
     const scatter = (way: string, mirrored: readonly number[]) =>
-      `seedRandom(uvec3(11u, 2u, 3u)); vec3 from = ${vec(...FROM)};
+      `seedRandom(uvec3(${PIXEL}, 2u, 3u)); vec3 from = ${vec(...FROM)};
        Scatter s = Scatter(${way}, ${vec(...NORMAL)}, ${vec(...mirrored)});`;
     /** Density integrated over the sphere, and with it the mean of `value`. */
     const integrated = (value: string) =>
-      `vec4 whole = vec4(0.0);
-       for (int j = 0; j < 512; j++) {
-         vec4 sum = vec4(0.0);
-         float z = (float(j) + 0.5) / 256.0 - 1.0;
-         for (int k = 0; k < 256; k++) {
-           float phi = (float(k) + 0.5) / 128.0 * PI;
-           vec3 to = vec3(sqrt(1.0 - z * z) * vec2(cos(phi), sin(phi)), z);
-           sum += scatterDensity(s, from, to) * ${value};
-         }
-         whole += sum * PI / 128.0 / 256.0;
+      `vec4 sum = vec4(0.0);
+       float z = gl_FragCoord.x / 256.0 - 1.0;
+       for (int k = 0; k < 256; k++) {
+         float phi = (float(k) + 0.5) / 128.0 * PI;
+         vec3 to = vec3(sqrt(1.0 - z * z) * vec2(cos(phi), sin(phi)), z);
+         sum += scatterDensity(s, from, to) * ${value};
        }
-       oColor = whole;`;
+       oColor = sum * PI / 64.0;`;
+    const PLANES = 512;
 
     for (const [name, way, g, mirrored] of cases) {
       it(`${name}: the density is one, and what is drawn follows it`, async () => {
         const start = scatter(way, mirrored);
         const names = ["random", "phase_function"];
-        const direction = await run(names, head(g), start + integrated("vec4(to, 1.0)"));
+        const whole = (value: string) => run(names, head(g), start + integrated(value), {}, PLANES);
+        const direction = await whole("vec4(to, 1.0)");
         // a high power is none too exact on a GPU
         const grid = way === "GLOSSY" ? 0.012 : 0.002;
         expect(Math.abs(direction[3] - 1)).toBeLessThan(grid);
         const square = "vec4(to * to, to.x * to.y)";
-        const squares = await run(names, head(g), start + integrated(square));
+        const squares = await whole(square);
         const drawn = (value: string) =>
           run(
             names,
             head(g),
-            start + meanOf(COUNT, `vec3 to = sampleScatter(s, from); sum += ${value};`),
+            start + meanOf(`vec3 to = sampleScatter(s, from); sum += ${value};`),
+            {},
+            PIXELS,
           );
         const found = await drawn("vec4(to, length(to))");
         expect(Math.abs(found[3] - 1)).toBeLessThan(1e-4);
@@ -163,7 +164,8 @@ describeInChromium("the path tracer's chunks", () => {
           sum += vec4(dot(to, s.normal) < -1e-5 ? 1.0 : 0.0,
             scatterDensity(s, from, to - 2.0 * dot(to, s.normal) * s.normal), 0.0, 0.0);`;
         const start = scatter(way, GRAZING);
-        const found = await run(["random", "phase_function"], head(0), start + meanOf(4096, body));
+        const names = ["random", "phase_function"];
+        const found = await run(names, head(0), start + meanOf(body), {}, 16);
         expect(found.slice(0, 2)).toEqual([0, 0]);
       }
     });
@@ -199,7 +201,8 @@ describeInChromium("the path tracer's chunks", () => {
       uEnvironment: floats([width, height], [...tables.light]),
       uAliases: floats([width, height], pairs),
     };
-    const look = (body: string) => run(["random", "environment"], "", body, textures);
+    const look = (body: string, pixels = 1) =>
+      run(["random", "environment"], "", body, textures, pixels);
     const texel = (column: number, row: number) =>
       [...rgb].slice(3 * (row * width + column), 3 * (row * width + column) + 3);
     const luminance = ([r, g, b]: readonly number[]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
@@ -250,7 +253,8 @@ describeInChromium("the path tracer's chunks", () => {
           ivec2 texel = environmentTexel(to);
           bool isThere = texel == ivec2(${i % width}, ${Math.floor(i / width)});
           sum += vec4(isThere, light != environmentAt(to), length(to), 0.0);`;
-        const found = await look(`seedRandom(uvec3(1u, 2u, ${i}u));\n${meanOf(COUNT, body)}`);
+        const start = `seedRandom(uvec3(${PIXEL}, 2u, ${i}u));`;
+        const found = await look(`${start}\n${meanOf(body)}`, PIXELS);
         const error = Math.sqrt(Math.max(share * (1 - share), 1e-9));
         expect(Math.abs(found[0] - share), `texel ${i}`).toBeLessThan(SLACK * error + 1e-4);
         // at a texel's very edge a float may fall on the other side
@@ -359,14 +363,14 @@ describeInChromium("the path tracer's chunks", () => {
         const vec3 uTexels = vec3(${number(SIZE)});
         const vec3 uBrick = vec3(${brick.toFixed(1)});
         vec4 mediumAt(vec3 p) { return vec4(1.0, 1.0, 1.0, ${extinction}); }`;
-      const start = `seedRandom(uvec3(9u, 8u, 7u));
+      const start = `seedRandom(uvec3(${PIXEL}, 8u, 7u));
         vec3 from = ${vec(...FROM)}; vec3 dir = ${vec(...DIR)};`;
       const textures = {
         uVolume: { size: [SIZE, SIZE, SIZE], channels: 1, texels: new Array(SIZE ** 3).fill(0) },
         uMajorants: floats([n, n, n], majorants),
       } as const;
-      const program = `${start}\n${meanOf(COUNT, body)}`;
-      return run(["random", "delta_tracking"], head, program, textures);
+      const program = `${start}\n${meanOf(body)}`;
+      return run(["random", "delta_tracking"], head, program, textures, PIXELS);
     }
 
     const flight = `vec4 medium; float t = track(from, dir, 0.0, ${number(LENGTH)}, medium);

@@ -119,9 +119,12 @@ describeInChromium("the ray-march", () => {
   it("averages pictures of a view at rest", async () => {
     const reds = Array.from({ length: 64 }, (_, i) => 0.5 + 0.25 * Math.sin(2.4 * i));
     const means = await bare.call("meansOf", reds);
+    // halves that blending leaves are rounded, or cut off, as by Mesa's software: up to a step of them a picture
+    const [stored] = await bare.call("meansOf", [0.7]);
+    const step = stored < 0.7 ? 2 ** -11 : 0;
     for (const count of [1, 2, 9, 64]) {
       const expected = reds.slice(0, count).reduce((sum, red) => sum + red, 0) / count;
-      expect(Math.abs(means[count - 1] - expected)).toBeLessThan(0.5 / 255);
+      expect(Math.abs(means[count - 1] - expected)).toBeLessThan(0.5 / 255 + (step * count) / 2);
     }
   });
 

@@ -21,6 +21,7 @@ export type BarePage<H extends Calls> = Readonly<{
     head: string,
     body: string,
     uniforms?: Parameters<typeof runProgram>[4],
+    pixels?: number,
   ) => Promise<readonly number[]>;
 }>;
 
@@ -59,9 +60,10 @@ export function prepareBarePage<H extends Calls>(harness?: URL): BarePage<H> {
       if (answer === undefined) throw new Error(`the page has no harness with ${name}`);
       return JSON.parse(answer) as ReturnType<H[typeof name]>;
     },
-    async run(names, head, body, textures = {}) {
+    async run(names, head, body, textures = {}, pixels = 1) {
       const includes = names.map((name) => `#include <chunks/${name}>`).join("\n");
-      return runProgram(page, await readChunks(...names), `${head}\n${includes}`, body, textures);
+      const chunks = await readChunks(...names);
+      return runProgram(page, chunks, `${head}\n${includes}`, body, textures, pixels);
     },
   };
 }

@@ -1,8 +1,12 @@
-/** Run a shader chunk as a small program: a fragment shader of one pixel that outputs numbers. */
+/** Run a shader chunk as a small program: a fragment shader of few pixels that outputs numbers. */
 import { readFile } from "node:fs/promises";
 import type { Page } from "playwright-core";
 import { includeChunks } from "../../../src/gpu/glsl_include";
 
+/** As three puts it before each shader of the page: what is said of no sampler has few bits otherwise. */
+const PRECISION = ["float", "int", "sampler2D", "sampler3D", "sampler2DArray", "usampler3D"]
+  .map((type) => `precision highp ${type};\n`)
+  .join("");
 const CHUNKS = new URL("../../../src/gpu/chunks/", import.meta.url);
 
 export async function readChunks(...names: string[]): Promise<Record<string, string>> {
@@ -21,11 +25,12 @@ export type Texture = Readonly<{
 }>;
 
 /**
- * What `oColor` is after the program.
+ * What `oColor` is after the program, of several pixels its mean.
  *
  * @param head declarations, with `#include <chunks/...>` lines
  * @param body of main()
  * @param uniforms textures, and vectors of four numbers
+ * @param pixels in a row, where one would take more turns of loops than some GPUs allow it (Mesa's software: 65 535)
  */
 export async function runProgram(
   page: Page,
@@ -33,17 +38,21 @@ export async function runProgram(
   head: string,
   body: string,
   uniforms: Readonly<Record<string, Texture | readonly number[]>> = {},
+  pixels = 1,
 ): Promise<readonly number[]> {
-  const precision = "precision highp float;\nprecision highp sampler3D;\n";
-  const source = `#version 300 es\n${precision}out vec4 oColor;\n${head}\nvoid main() {\n${body}\n}`;
+  const source = `#version 300 es\n${PRECISION}out vec4 oColor;\n${head}\nvoid main() {\n${body}\n}`;
   return page.evaluate(
-    ({ fragment, uniforms }) => {
+    ({ fragment, uniforms, pixels }) => {
       const gl = document.createElement("canvas").getContext("webgl2");
       if (gl === null) throw new Error("no WebGL 2");
       if (gl.getExtension("EXT_color_buffer_float") === null) throw new Error("no float target");
       const program = gl.createProgram();
-      const vertex =
-        "#version 300 es\nvoid main() { gl_Position = vec4(0, 0, 0, 1); gl_PointSize = 1.0; }";
+      const vertex = `#version 300 es
+        void main() {
+          float x = (2.0 * float(gl_VertexID) + 1.0) / ${pixels}.0 - 1.0;
+          gl_Position = vec4(x, 0, 0, 1);
+          gl_PointSize = 1.0;
+        }`;
       for (const [type, text] of [
         [gl.VERTEX_SHADER, vertex],
         [gl.FRAGMENT_SHADER, fragment],
@@ -92,15 +101,19 @@ export async function runProgram(
       });
       bind(15, gl.TEXTURE_2D);
       const target = gl.getParameter(gl.TEXTURE_BINDING_2D) as WebGLTexture;
-      gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, 1, 1);
+      gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, pixels, 1);
       gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
       gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
-      gl.viewport(0, 0, 1, 1);
-      gl.drawArrays(gl.POINTS, 0, 1);
-      const numbers = new Float32Array(4);
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.FLOAT, numbers);
-      return [...numbers];
+      gl.viewport(0, 0, pixels, 1);
+      gl.drawArrays(gl.POINTS, 0, pixels);
+      const numbers = new Float32Array(4 * pixels);
+      gl.readPixels(0, 0, pixels, 1, gl.RGBA, gl.FLOAT, numbers);
+      const mean = [0, 0, 0, 0];
+      numbers.forEach((v, i) => {
+        mean[i % 4] += v / pixels;
+      });
+      return mean;
     },
-    { fragment: includeChunks(source, chunks), uniforms },
+    { fragment: includeChunks(source, chunks), uniforms, pixels },
   );
 }
