@@ -103,3 +103,21 @@ def test_a_damaged_or_missing_or_other_file_is_one_clear_line(tmp_path: Path) ->
     OpenEXR.File(header, {"Y": np.zeros((40, 60), dtype=np.float16)}).write(str(path))
     with pytest.raises(StageError, match=r"2 x 2 slices of 30 x 20, 9 of them used"):
         read_atlas(path)
+
+
+@pytest.mark.parametrize("number", [np.float16, np.float32])
+def test_an_atlas_of_another_program_is_rounded_and_kept_within_its_ends(
+    tmp_path: Path, number: type[np.floating]
+) -> None:
+    image = np.array([[-0.5, 0.0, 0.4, 0.5], [1.0, 1.5, np.inf, np.nan]], number)
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "columns": 2,
+        "rows": 1,
+        "atlasSize": np.array([2, 2, 2], np.int32),
+    }
+    path = tmp_path / "atlas.exr"
+    OpenEXR.File(header, {"Y": image}).write(str(path))
+    expected = [[[0, 0], [255, 255]], [[102, 128], [255, 0]]]
+    np.testing.assert_array_equal(read_atlas(path), expected)

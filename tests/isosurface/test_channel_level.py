@@ -165,6 +165,16 @@ def test_padding_is_runs_of_the_darkest_and_not_a_noisy_dark_end() -> None:
     assert not found[:, 25:].any()
 
 
+def test_padding_at_an_end_is_a_run_half_as_long() -> None:
+    voxels = np.ones((1, 12, 30))
+    voxels[0, :, :4] = 0  # of nine, the five behind the end repeat the first one
+    assert not find_padding(voxels, 0.0, (2, 4, 4)).any()
+    voxels[0, :, 4] = 0
+    assert find_padding(voxels, 0.0, (2, 4, 4))[0, :, :9].all()
+    narrow = np.zeros((1, 12, 6))  # narrower than the run that is asked for
+    assert find_padding(narrow, 0.0, (2, 4, 4)).all()
+
+
 def test_held_out_cases_are_not_all_easy_and_none_is_named_twice() -> None:
     names = [case.name for case in all_cases()]
     assert len(names) == len(set(names))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stereocell.model.lattice_field import make_iso_field
+from stereocell.model.lattice_field import LatticeField, make_iso_field
 from stereocell.model.tiling import Box, cut
 
 REGION = Box((0, 0, 0), (10, 40, 100))
@@ -74,3 +74,14 @@ def test_tile_without_a_value_takes_the_others_mean() -> None:
 
 def test_channel_without_any_value_has_no_field() -> None:
     assert make_iso_field(TILES, {tile.id: None for tile in TILES}) is None
+
+
+def test_a_value_is_the_same_from_a_box_that_is_blended_in_parts() -> None:
+    rng = np.random.default_rng(1)
+    field = LatticeField(
+        ((0.0, 3.0), (5.0, 400.0), (9.5, 100.0, 300.5)), rng.normal(size=(2, 2, 3))
+    )
+    whole = field.at(Box((0, 0, 0), (4, 300, 400)))
+    for x in (0, 9, 10, 99, 100, 101, 300, 399):  # before, at and beyond the centres
+        one = field.at(Box((1, 120, x), (3, 125, x + 1)))
+        np.testing.assert_array_equal(np.broadcast_to(one, (2, 5, 1)), whole[1:3, 120:125, x, None])

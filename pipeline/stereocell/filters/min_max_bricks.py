@@ -77,11 +77,14 @@ def _halve(
 
 
 def _reduce(ufunc: np.ufunc, values: NDArray[np.uint8], axis: int) -> NDArray[np.uint8]:
-    n = values.shape[axis]
-    reduced: NDArray[np.uint8] = ufunc.reduceat(values, np.arange(0, n, SKIP_BRICK), axis=axis)
-    moved, source = np.moveaxis(reduced, axis, 0), np.moveaxis(values, axis, 0)
+    source = np.moveaxis(values, axis, 0)
+    n = len(source)
+    reduced = source[0:n:SKIP_BRICK].copy()
+    for k in range(1, SKIP_BRICK):
+        part = source[k:n:SKIP_BRICK]
+        ufunc(reduced[: len(part)], part, out=reduced[: len(part)])
     after = source[SKIP_BRICK::SKIP_BRICK]  # the first voxel of the next brick
-    ufunc(moved[: len(after)], after, out=moved[: len(after)])
+    ufunc(reduced[: len(after)], after, out=reduced[: len(after)])
     before = source[SKIP_BRICK - 1 : n - 1 : SKIP_BRICK]  # the last voxel of the brick before
-    ufunc(moved[1:], before, out=moved[1:])
-    return reduced
+    ufunc(reduced[1:], before, out=reduced[1:])
+    return np.moveaxis(reduced, 0, axis)

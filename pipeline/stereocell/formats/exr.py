@@ -9,6 +9,7 @@ Compression, 196 x 514 x 514 noisy voxels on 2 cores: PIZ 0.5 s and 31 MB; ZIP 1
 """
 
 import struct
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -75,9 +76,25 @@ def read_atlas(path: Path) -> NDArray[np.uint8]:
             f"{path}: {image.shape[1]} x {image.shape[0]} pixels don't hold "
             f"{columns} x {rows} slices of {width} x {height}, {depth} of them used"
         )
-    sheet = np.rint(image.astype(np.float32) * 255).clip(0, 255).astype(np.uint8)
+    if image.dtype == np.float16:
+        sheet = _bytes_of_halves()[image.view(np.uint16)]
+    else:  # another program's
+        sheet = _to_bytes(image)
     slices = sheet.reshape(rows, height, columns, width).transpose(0, 2, 1, 3)
     return np.ascontiguousarray(slices.reshape(-1, height, width)[:depth])
+
+
+@cache
+def _bytes_of_halves() -> NDArray[np.uint8]:
+    """Return the byte of each half float, by its bits: arithmetic takes four times as long."""
+    return _to_bytes(np.arange(1 << 16, dtype=np.uint16).view(np.float16))
+
+
+def _to_bytes(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Return 0..1 as 0..255; what is beyond, or no number, as its nearest end, or 0."""
+    with np.errstate(invalid="ignore"):  # of a half that is no number
+        known = np.nan_to_num(shares.astype(np.float32))
+    return np.asarray(np.rint(known.clip(0, 1) * 255).astype(np.uint8))
 
 
 def check_exr(path: Path) -> None:

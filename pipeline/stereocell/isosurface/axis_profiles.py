@@ -38,9 +38,13 @@ class Profiles:
         cls, field: NDArray[np.float32], kept: NDArray[np.bool_], start: tuple[int, int, int]
     ) -> "Profiles":
         """Return the profiles of a tile's field (z, y, x) where `kept`, bool of the same shape."""
-        values = np.where(kept, field, np.float32(0))
+        are_all = bool(kept.all())
+        values = np.ascontiguousarray(field) if are_all else np.where(kept, field, np.float32(0))
         sz, sy, sx = (values.sum(axis=axes, dtype=np.float64) for axes in _ACROSS)
-        nz, ny, nx = (kept.sum(axis=axes, dtype=np.int64) for axes in _ACROSS)
+        nz, ny, nx = (
+            np.full(n, kept.size // max(n, 1)) if are_all else kept.sum(axis=axes, dtype=np.int64)
+            for n, axes in zip(kept.shape, _ACROSS, strict=True)
+        )
         return cls(start, (sz, sy, sx), (nz, ny, nx))
 
 

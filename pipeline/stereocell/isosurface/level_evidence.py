@@ -18,12 +18,14 @@ from stereocell.isosurface.edge_criteria import EdgeSums, gather_edges
 from stereocell.isosurface.level_histogram import BINS, Scale
 from stereocell.isosurface.neighbours import Neighbours
 from stereocell.isosurface.options import Criterion
+from stereocell.kernels.level_sums import count_differences, sum_by_value
 
 MAX_PADDING = 0.8  # share of the voxels: padding that covers more is the ground, without noise
 LAG = 4  # voxels along x between the two values whose difference is noise: beyond the denoising
 HALO = (1, 1, LAG)  # voxels (z, y, x) around a tile that its evidence reads
 NOISE_BINS = 1024
 _PLANES = 16  # planes counted at once
+_FINITE = 255 << 6  # upper 15 bits of the first float32 that is no finite number
 Slices = tuple[slice, slice, slice]
 _NOISE_LEAST = 1e-6  # share of the scale's range: the first bin of differences
 
@@ -118,12 +120,23 @@ def find_padding(
     if not dark.any():
         return dark
     size = (1, *(min(2 * r + 1, n) for r, n in zip(reach[1:], voxels.shape[1:], strict=True)))
+    if not _has_run(dark, (size[2] + 1) // 2):  # at an end of a row half of the size is enough
+        return np.zeros(voxels.shape, bool)
     flat = ndimage.minimum_filter(dark.view(np.uint8), size, mode="nearest")
     if not flat.any():
         return flat.view(bool)
     # back to the run's own ends, and on to where it is mixed with what lies beside it
     wide = tuple(4 * r + 1 if axis else 2 * r + 1 for axis, r in enumerate(reach))
     return ndimage.maximum_filter(flat, wide, mode="nearest").view(bool)
+
+
+def _has_run(flags: NDArray[np.bool_], length: int) -> bool:
+    """Return whether so many flags stand side by side along x."""
+    known = 1
+    while known < length and flags.any():
+        onward = min(known, length - known)
+        flags, known = flags[..., :-onward] & flags[..., onward:], known + onward
+    return bool(flags.any())
 
 
 def gather_evidence(
@@ -192,20 +205,12 @@ def _gather(
     counting: Counting,
     background: NDArray[np.float32] | None,
 ) -> TileEvidence:
-    kept = ~padding[own]
     above = None
     if background is not None and counting.scale_above is not None:
         raised = field - background
-        slopes = gradient_magnitude(raised, spacing_um)[own]
-        above = _binned(raised[own][kept], slopes[kept], counting.scale_above)
-    slopes = gradient_magnitude(field, spacing_um)[own]
-    inner = field[own]
-    return TileEvidence(
-        _binned(inner[kept], slopes[kept], counting.scale),
-        _binned(inner[~kept], slopes[~kept], counting.scale),
-        above,
-        _differences(field, padding, own, counting.scale),
-    )
+        above, _ = _binned(raised, padding, own, spacing_um, counting.scale_above)
+    plain, out = _binned(field, padding, own, spacing_um, counting.scale)
+    return TileEvidence(plain, out, above, _differences(field, padding, own, counting.scale))
 
 
 def _edges(
@@ -221,25 +226,46 @@ def _edges(
     return gather_edges(field[own][kept], slopes[kept], scale=scale, criterion=criterion)
 
 
-def _binned(field: NDArray[np.float32], slopes: NDArray[np.float32], scale: Scale) -> Sums:
-    bins = scale.bins_of(field)
-    counts = np.bincount(bins, minlength=BINS).astype(np.int64)
-    summed = np.bincount(bins, weights=slopes, minlength=BINS).astype(np.float64)
-    shares = slopes / np.float32(scale.high - scale.low)  # squares of large values overflow float32
-    squares = np.bincount(bins, weights=shares * shares, minlength=BINS).astype(np.float64)
-    return Sums(counts, summed, squares)
+def _binned(
+    field: NDArray[np.float32],
+    padding: NDArray[np.bool_],
+    own: Slices,
+    spacing_um: tuple[float, float, float],
+    scale: Scale,
+) -> tuple[Sums, Sums]:
+    """Return the sums over the voxels that are no padding, and over padding."""
+    table, step = scale.table()
+    span = np.float32(scale.high - scale.low)  # squares of large values overflow float32
+    kept, out = sum_by_value(
+        field,
+        padding,
+        _box_of(own),
+        np.array(spacing_um, np.float64),
+        table,
+        np.float32(scale.low),
+        np.float32(step),
+        span,
+        BINS,
+    )
+    return _to_sums(kept), _to_sums(out)
+
+
+def _to_sums(sums: NDArray[np.float64]) -> Sums:
+    return Sums(sums[:, 0].astype(np.int64), sums[:, 1].copy(), sums[:, 2].copy())
 
 
 def _differences(
     field: NDArray[np.float32], padding: NDArray[np.bool_], own: Slices, scale: Scale
 ) -> NDArray[np.int64]:
-    start, stop = own[2].start, min(own[2].stop, field.shape[2] - LAG)
-    if stop <= start:
-        return np.zeros(NOISE_BINS, np.int64)
-    here, there = (*own[:2], slice(start, stop)), (*own[:2], slice(start + LAG, stop + LAG))
-    size = np.abs(field[there] - field[here])[~(padding[there] | padding[here])]
     edges = noise_edges(scale)
-    return np.asarray(np.histogram(np.clip(size, edges[0], edges[-1]), edges)[0], np.int64)
+    least = (np.arange(_FINITE, dtype=np.uint32) << 17).view(np.float32).astype(np.float64)
+    first = np.full(1 << 15, NOISE_BINS - 1, np.int16)
+    first[:_FINITE] = np.clip(np.searchsorted(edges, least, "right") - 1, 0, NOISE_BINS - 1)
+    return count_differences(field, padding, _box_of(own), LAG, first, edges)
+
+
+def _box_of(own: Slices) -> NDArray[np.int64]:
+    return np.array([[part.start, part.stop] for part in own], np.int64)
 
 
 def noise_edges(scale: Scale) -> NDArray[np.float64]:

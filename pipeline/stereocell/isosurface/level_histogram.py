@@ -74,13 +74,18 @@ class Scale:
 
     def bins_of(self, values: NDArray[np.float32]) -> NDArray[np.int16]:
         """Return each value's bin, int16 of the same shape; a value beyond an end counts there."""
-        step = (self.high - self.low) / _FINE
-        fine = self.low + (np.arange(_FINE) + 0.5) * step
-        table = np.clip(np.searchsorted(self.edges(), fine, "right") - 1, 0, BINS - 1)
+        table, step = self.table()
         place = values - np.float32(self.low)
         place /= np.float32(step)
         np.clip(place, 0, _FINE - 1, out=place)
-        return table.astype(np.int16)[place.astype(np.uint16)]
+        return table[place.astype(np.uint16)]
+
+    def table(self) -> tuple[NDArray[np.int16], float]:
+        """Return the bin of each even step from `low` on, int16, and the step, voxel values."""
+        step = (self.high - self.low) / _FINE
+        fine = self.low + (np.arange(_FINE) + 0.5) * step
+        table = np.clip(np.searchsorted(self.edges(), fine, "right") - 1, 0, BINS - 1)
+        return table.astype(np.int16), step
 
 
 @dataclass(frozen=True, slots=True)

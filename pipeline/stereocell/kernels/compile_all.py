@@ -31,6 +31,7 @@ from stereocell.kernels.half_edges import (
     sum_gains,
     sum_normals,
 )
+from stereocell.kernels.level_sums import count_differences, sum_by_value
 from stereocell.kernels.nearest import find_nearest, find_sides
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
@@ -117,9 +118,12 @@ def compile_others() -> None:
     smooth_in_place(voxels, weights, weights, weights, True)
     measure_slopes(voxels, steps)
     divide_by_slopes(voxels, steps, 1e-6, 2.0)
+    mask, own, one_bin = voxels > 0, np.array([[0, 3]] * 3), np.zeros(1 << 15, np.int16)
+    small = np.float32(0.1)
+    sum_by_value(voxels, mask, own, steps, one_bin, small, small, small, 1)
+    count_differences(voxels, mask, own, 1, one_bin, steps)
     move_off_zero(voxels, np.float32(0.01))
     close_gaps(voxels, steps, 1.0, 1.0)
-    mask = voxels > 0
     first_run, start, stop = find_runs(mask)
     components, touching, count = join_runs(first_run, start, stop, 3, True)
     measure_components(first_run, start, stop, components, touching, count, (3, 3, 3))

@@ -10,7 +10,7 @@ Row = NDArray[np.float64]
 
 
 @part
-def _square_slopes(
+def square_slopes(
     before: Field, plane: Field, behind: Field, y: int, factors: Row, ends: Row, squares: Row
 ) -> None:
     """Write the squared slope at each pixel of a row of a plane.
@@ -48,7 +48,7 @@ def measure_slopes(field: Field, steps: Row) -> Field:
         before, behind = field[max(z - 1, 0)], field[min(z + 1, depth - 1)]
         factors[0] = 0.5 * ends[0] if 0 < z < depth - 1 else ends[0]
         for y in range(height):
-            _square_slopes(before, field[z], behind, y, factors, ends, squares)
+            square_slopes(before, field[z], behind, y, factors, ends, squares)
             row = slopes[z, y]
             for x in range(width):
                 row[x] = np.sqrt(squares[x])
@@ -65,7 +65,7 @@ def divide_by_slopes(field: Field, steps: Row, least: float, limit: float) -> No
         behind = field[z + 1] if z + 1 < depth else plane
         factors[0] = 0.5 * ends[0] if 0 < z < depth - 1 else ends[0]
         for y in range(height):
-            _square_slopes(before, plane, behind, y, factors, ends, squares)
+            square_slopes(before, plane, behind, y, factors, ends, squares)
             row, values = field[z, y], plane[y]
             for x in range(width):
                 far = np.float64(values[x]) / (np.sqrt(squares[x]) + least)

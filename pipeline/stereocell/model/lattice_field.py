@@ -7,12 +7,15 @@ the last one. The background that is subtracted from f is such a field too, on i
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.tiling import Box, Tile
+
+_AT_ONCE = 1 << 16  # voxels: as float64 they stay in a processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +43,14 @@ class LatticeField:
         ]
         columns = _blend(_blend(near.values, 0, weights[0]), 1, weights[1])
         field = np.empty((*columns.shape[:2], len(weights[2].share)), np.float32)
-        for plane, column in zip(field, columns, strict=True):  # the whole in float64 takes GBs
-            plane[...] = _blend(column, 1, weights[2])
+        low, high, share = weights[2].low, weights[2].high, weights[2].share
+        cuts = [0, *(np.flatnonzero(np.diff(low + high)) + 1).tolist(), len(share)]
+        many = max(1, _AT_ONCE // max(1, field[:1].size))  # the whole in float64 takes GBs
+        for z in range(0, len(field), many):
+            some = columns[z : z + many]
+            for x, end in pairwise(cuts):  # between two centres
+                a, b = some[..., low[x], None], some[..., high[x], None]
+                field[z : z + many, :, x:end] = a + (b - a) * share[x:end]
         return field
 
     def around(self, window: Box) -> "LatticeField":

@@ -1,0 +1,47 @@
+"""The sums that a level is found on, beside the same by numpy."""
+
+import numpy as np
+
+from stereocell.isosurface.distance_field import gradient_magnitude
+from stereocell.isosurface.level_evidence import (
+    LAG,
+    NOISE_BINS,
+    Counting,
+    gather_evidence,
+    noise_edges,
+)
+from stereocell.isosurface.level_histogram import BINS, Scale
+
+OWN = (slice(1, 20), slice(1, 23), slice(4, 36))
+SPACING = (0.5, 0.2, 0.2)
+
+
+def test_sums_and_differences_are_numpy_s() -> None:
+    rng = np.random.default_rng(3)
+    field = rng.gamma(2, 50, (21, 24, 40)).astype(np.float32)
+    field[3, 4:9], field[5, 5, 5] = field[3, 4, 0], 1e6  # differences of 0, and beyond all bins
+    padding = np.zeros(field.shape, bool)
+    padding[:, 18:, :9] = True
+    scale = Scale(-20.0, 600.0, 90.0)
+    found = gather_evidence(
+        field,
+        padding,
+        OWN,
+        voxels=field,
+        spacing_um=SPACING,
+        counting=Counting(scale, None, None),
+    )
+    slopes, values = gradient_magnitude(field, SPACING)[OWN].astype(np.float64), field[OWN]
+    for sums, flags in ((found.plain, ~padding[OWN]), (found.padding, padding[OWN])):
+        bins, steep = scale.bins_of(values[flags]), slopes[flags]
+        np.testing.assert_array_equal(sums.counts, np.bincount(bins, minlength=BINS))
+        np.testing.assert_allclose(sums.slopes, np.bincount(bins, steep, BINS), rtol=1e-12)
+        squares = np.bincount(bins, (steep / 620) ** 2, BINS)
+        np.testing.assert_allclose(sums.squares, squares, rtol=1e-6)
+
+    ahead = (*OWN[:2], slice(4 + LAG, 36 + LAG))
+    size = np.abs(field[ahead] - values)[~(padding[OWN] | padding[ahead])]
+    edges = noise_edges(scale)
+    counts, _ = np.histogram(np.clip(size, 0, edges[-1]), edges)
+    assert len(counts) == NOISE_BINS
+    np.testing.assert_array_equal(found.differences, counts)
