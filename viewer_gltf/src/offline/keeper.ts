@@ -21,6 +21,8 @@ export type Later = (work: Promise<unknown>) => void;
 export class Keeper {
   /** The files of each bundle, as the manifest that was last seen has them; null: unknown. */
   private readonly listed = new Map<string, Promise<Listed | null>>();
+  /** Answered while a bundle's files were unknown, as just after this worker took the page over. */
+  private readonly unlisted: Asked[] = [];
 
   constructor(
     private readonly store: Store,
@@ -86,7 +88,7 @@ export class Keeper {
       this.listed.set(base, listed);
       await listed;
     }
-    for (const { url, range } of asked) {
+    for (const { url, range } of [...asked, ...this.unlisted.splice(0)]) {
       const plan = this.plan(url, page);
       if (plan.kind !== "file") continue;
       const headers: HeadersInit = range === null ? {} : { Range: range };
@@ -155,10 +157,14 @@ export class Keeper {
     request: Request,
     later: Later,
   ): Promise<Response> {
-    const listed = (await this.listedOf(base)) ?? {};
+    const range = request.headers.get("Range");
+    const listed = await this.listedOf(base);
+    if (listed === null) {
+      this.unlisted.push({ url: request.url, range });
+      return fetch(request);
+    }
     const ref = Object.hasOwn(listed, path) ? listed[path] : undefined;
     if (ref === undefined || !isKept({ path, ...ref })) return fetch(request);
-    const range = request.headers.get("Range");
     const isAskedAnew = request.cache === "reload"; // what was kept has the wrong hash
     const part =
       range === null ? null : await this.store.get(this.keys.file(base, ref.sha256, range));
