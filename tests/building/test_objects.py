@@ -32,7 +32,6 @@ from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
 from support.dicom_series import sample as scene_on
 from support.digests import digests_of
-from support.exhaustive import sweep
 from support.phantoms import write_ome_tiff
 
 SHAPE = (24, 72, 96)
@@ -259,7 +258,8 @@ def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
     assert not (shown[ids == 1] == (0, 0, 1)).all()
 
 
-@pytest.mark.parametrize("workers", sweep([1, 2], kept=[2]))
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("workers", [1, 2])
 def test_the_same_bytes_with_any_workers(out: Path, tmp_path: Path, workers: int) -> None:
     labels = make_tissue(SHAPE, 3).labels.astype(np.uint16)
     source = tmp_path / "mask.ome.tif"

@@ -1,6 +1,6 @@
 """The two rounds over the units, from file to unit: iso-values, places in the world, distances."""
 
-import gc
+import weakref
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -51,11 +51,13 @@ def test_command_holds_the_evidence_of_one_channel_at_a_time(
     field = phantoms.blurred_ball(shape, SPACING, (7.5, 15.5, 15.5), 6.0, 1.0)
     counts = phantoms.as_counts(np.tile(field, (1, 2, 2)), 100, 1100, noise=5.0)
     source = phantoms.write_ome_zarr(tmp_path / "six.ome.zarr", [np.stack(6 * [counts])], "czyx")
+    made: list[weakref.ref[TileEvidence]] = []
     held = []
 
     def count(content: Mapping[str, Any]) -> TileEvidence:
         found = evidence_from_json(content)
-        held.append(sum(type(each) is TileEvidence for each in gc.get_objects()))
+        made.append(weakref.ref(found))
+        held.append(sum(each() is not None for each in made))
         return found
 
     monkeypatch.setattr(evidence, "evidence_from_json", count)

@@ -166,6 +166,7 @@ def test_coarse_lod_has_the_baked_normal_map_and_the_coarsest_is_bare(bundle):
         assert "TEXCOORD_0" not in bare["meshes"][0]["primitives"][0]["attributes"]
 
 
+@pytest.mark.exhaustive  # whole builds are compared by every run: tests/system/test_build.py
 def test_two_exports_are_equal_whatever_the_workers(stage, bundle, tmp_path):
     with closing(Engine(2)) as engine:
         write_bundle(stage, tmp_path / "again", None, run=engine.run)

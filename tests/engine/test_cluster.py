@@ -109,7 +109,7 @@ def test_a_cluster_builds_the_same_bytes_as_one_process(
     assert results(tmp_path / "out") == alone
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_cluster_reads_from_and_writes_to_an_object_store(
     cluster: Cluster, volume: Path, alone: dict[str, str]
 ) -> None:

@@ -207,7 +207,7 @@ def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_
     assert of_parts(marks(store, out)) == before
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_killed_while_it_puts_objects_there_a_build_goes_on_to_the_same_bytes(
     store: ObjectStore, volume: Path, local: dict[str, str]
 ) -> None:

@@ -85,7 +85,7 @@ def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
     assert assets(asset_digests(out)) == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_source_that_vanishes_under_workers_is_named_and_their_units_are_made_when_it_is_back(
     volume: Path, tmp_path: Path
 ) -> None:
