@@ -51,12 +51,12 @@ def test_command_holds_the_evidence_of_one_channel_at_a_time(
     field = phantoms.blurred_ball(shape, SPACING, (7.5, 15.5, 15.5), 6.0, 1.0)
     counts = phantoms.as_counts(np.tile(field, (1, 2, 2)), 100, 1100, noise=5.0)
     source = phantoms.write_ome_zarr(tmp_path / "six.ome.zarr", [np.stack(6 * [counts])], "czyx")
-    made: list[weakref.ref[TileEvidence]] = []
+    made: list[weakref.ref[NDArray[np.int64]]] = []
     held = []
 
     def count(content: Mapping[str, Any]) -> TileEvidence:
         found = evidence_from_json(content)
-        made.append(weakref.ref(found))
+        made.append(weakref.ref(found.differences))
         held.append(sum(each() is not None for each in made))
         return found
 
