@@ -91,10 +91,11 @@ $(VIEWER_DIST): $(VIEWER_READY) $(VIEWER_SOURCES)
 	cd $(VIEWER) && npm run --silent build
 	@touch $@
 
-browser: ## Install Debian's chromium for the browser tests, if it is missing and we may
+browser: ## Install Debian's chromium and Mesa's drawing by software for the browser tests, if chromium is missing and we may
 	@if [ -n "$$CHROMIUM" ]; then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
-	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
+	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+	    chromium libegl-mesa0 libgl1-mesa-dri >/dev/null; \
 	elif [ -n "$$CI" ]; then echo "browser: no chromium, and CI needs one: apt-get install chromium" >&2; exit 1; \
 	else echo "browser: no chromium, so the browser tests are skipped; get it by: sudo apt-get install chromium"; fi
 

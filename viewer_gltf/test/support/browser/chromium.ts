@@ -26,19 +26,17 @@ const FLAGS = [
   "--disable-sync",
   "--ignore-gpu-blocklist",
 ];
-/** Mesa's software, which draws in two thirds of the time of Chromium's own: that draws where Mesa isn't. */
+/** Where the vendors of EGL are listed, Mesa is this one. */
 const MESA = "/usr/share/glvnd/egl_vendor.d/50_mesa.json";
-const HAS_MESA = existsSync(MESA) && !IS_EXHAUSTIVE; // so that both draw, now and then
+const BY_MESA = ["--use-angle=gl-egl"];
+const BY_SWIFTSHADER = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const SOFTWARE = [
-  ...(HAS_MESA
-    ? ["--use-angle=gl-egl"]
-    : ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]),
   // what is round the canvas is drawn without the software GPU, which takes most of it otherwise
   "--disable-gpu-compositing",
   "--disable-gpu-rasterization",
 ];
-/** No graphics card, though one be there. */
-const SOFTWARE_ALONE = { __EGL_VENDOR_LIBRARY_FILENAMES: MESA, LIBGL_ALWAYS_SOFTWARE: "1" };
+/** Mesa alone, and no graphics card, though one be there. */
+const ENVIRONMENT = { __EGL_VENDOR_LIBRARY_FILENAMES: MESA, LIBGL_ALWAYS_SOFTWARE: "1" };
 
 export function hasChromium(): boolean {
   return existsSync(CHROMIUM);
@@ -58,18 +56,40 @@ export type Surroundings = Readonly<{
 }>;
 
 /**
- * Start the browser, in a profile that goes when it closes. Software draws, unless STEREOCELL_GPU_FLAGS
- * holds Chromium's flags for a GPU.
+ * Start the browser, in a profile that goes when it closes. STEREOCELL_GPU_FLAGS holds Chromium's flags for
+ * a GPU; without them Mesa's software draws, in two thirds of the time of Chromium's own, SwiftShader. That
+ * draws where Mesa can't, and in exhaustive runs: so both are tried now and then.
  */
-export function serveChromium(): Promise<BrowserServer> {
+export async function serveChromium(): Promise<BrowserServer> {
   if (!hasChromium()) throw new Error(HOW_TO_GET);
   const ofGpu = process.env.STEREOCELL_GPU_FLAGS?.split(" ");
+  if (ofGpu !== undefined) return launch(ofGpu);
+  if (existsSync(MESA) && !IS_EXHAUSTIVE) {
+    const server = await launch([...BY_MESA, ...SOFTWARE], ENVIRONMENT);
+    if (await draws(server)) return server;
+    await server.close();
+  }
+  return launch([...BY_SWIFTSHADER, ...SOFTWARE]);
+}
+
+function launch(flags: readonly string[], environment = {}): Promise<BrowserServer> {
   return chromium.launchServer({
     executablePath: CHROMIUM,
     headless: false, // playwright's own switch is the old mode; the flag below is the new one
-    args: ["--headless=new", ...FLAGS, ...(ofGpu ?? SOFTWARE)],
-    env: { ...process.env, ...(ofGpu ? {} : SOFTWARE_ALONE) },
+    args: ["--headless=new", ...FLAGS, ...flags],
+    env: { ...process.env, ...environment },
   });
+}
+
+/** Whether pages have WebGL. */
+async function draws(server: BrowserServer): Promise<boolean> {
+  const browser = await chromium.connect(server.wsEndpoint());
+  const page = await browser.newPage();
+  const isThere = await page.evaluate(
+    () => document.createElement("canvas").getContext("webgl2") !== null,
+  );
+  await browser.close();
+  return isThere;
 }
 
 /** Pages of their own in the browser at an address: nothing is kept of others, or for them. */
