@@ -6,6 +6,7 @@ import { beforeEach, expect, it } from "vitest";
 import { difference, isBackground, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
+import { IS_EXHAUSTIVE } from "../support/exhaustive";
 
 /** Of the little axes in the corner, which are 76 pixels wide: half a degree is a quarter. */
 const UNTURNED_PX = 0.25;
@@ -83,7 +84,7 @@ describeInChromium("a view that is moved and zoomed", () => {
     await devtools.detach();
   }
 
-  it("is not turned by two fingers either", async () => {
+  it.runIf(IS_EXHAUSTIVE)("is not turned by two fingers either", async () => {
     const before = await axes();
     const start = await takePicture(page());
     for (let i = 0; i < 5; i++) {
