@@ -93,7 +93,7 @@ def simplify_without_defects(
         faulty = np.zeros(len(mesh.positions), bool)
         faulty[used[defects.vertices(own)]] = True
         # what was found sound in the draft before, and is there still, need not be looked at again
-        fresh = faulty[triangles].any(axis=1)
+        fresh = np.asarray(faulty[triangles].any(axis=1))
         fresh[len(rest) :] |= ~_are_among(part, before)
     used, own = renumber(triangles, len(mesh.positions))
     return Simplified(compact(mesh, triangles), used, len(redone - kept), len(kept))
