@@ -9,11 +9,13 @@ from stereocell.kernels.half_edges import (
     count_fans,
     find_first,
     label_bodies,
+    lie_within,
     match_twins,
     measure_areas,
     measure_boxes,
     measure_volumes,
     measure_windings,
+    renumber_corners,
     sum_gains,
     sum_normals,
 )
@@ -97,3 +99,20 @@ def test_windings_are_six_volumes_whichever_axis_and_zero_and_boxes() -> None:
     assert along[0] > 0 > along[1]
     np.testing.assert_allclose(low, [at[label == body].min(axis=0) for body in range(2)])
     np.testing.assert_allclose(high, [at[label == body].max(axis=0) for body in range(2)])
+
+
+def test_a_box_lies_within_another_only_along_all_axes() -> None:
+    low = np.array([[0, 0, 0], [1, 1, 1], [1, 1, -1], [0, 0, 0]], np.float64)
+    high = np.array([[4, 4, 4], [2, 2, 2], [2, 2, 2], [4, 4, 4]], np.float64)
+    asked = np.array([1, 2, 3])
+    assert lie_within(low, high, asked, np.array([0])).tolist() == [True, False, True]
+    assert lie_within(low, high, asked, np.zeros(0, np.int64)).tolist() == [False] * 3
+
+
+def test_renumbered_triangles_have_the_same_corners_in_order() -> None:
+    triangles = np.array([[9, 2, 5], [2, 7, 9]], np.uint32)
+    used, own = renumber_corners(triangles, 12)
+    assert used.tolist() == [2, 5, 7, 9]
+    np.testing.assert_array_equal(used[own], triangles)
+    used, own = renumber_corners(triangles[:0], 12)
+    assert (len(used), own.shape) == (0, (0, 3))

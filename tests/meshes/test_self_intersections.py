@@ -196,6 +196,21 @@ def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:
         np.testing.assert_array_equal(found, everything[fresh[everything].any(axis=1)])
 
 
+def test_few_fresh_triangles_among_many_are_found_in_all_their_pairs() -> None:
+    """Where they are few, only what lies around them is looked at: also far across cells."""
+    rng = np.random.default_rng(9)
+    centres = rng.random((4000, 1, 3)) * [100, 90, 2]
+    positions = (centres + rng.normal(size=(4000, 3, 3))).reshape(-1, 3)
+    positions[:3] = [[0, 0, 1], [100, 90, 1], [100, 80, 1]]  # through the whole crowd
+    triangles = np.arange(12_000).reshape(-1, 3)
+    everything = find_crossings(positions, triangles)
+    fresh = np.zeros(4000, bool)
+    fresh[[0, 17, 3999]] = True
+    expected = everything[fresh[everything].any(axis=1)]
+    assert len(expected) > 50
+    np.testing.assert_array_equal(find_crossings(positions, triangles, fresh=fresh), expected)
+
+
 @pytest.mark.parametrize("kind", ["a star", "round twice", "anyhow", "in a plane", "on edge"])
 def test_triangles_round_a_vertex_against_each_pair_of_them(kind: str) -> None:
     """All at once, where most pairs need no look, find what each pair by itself does."""

@@ -209,18 +209,15 @@ class _Shading:
 def cut_voxels(voxels: NDArray[Any], given: UnitInput) -> NDArray[Any]:
     """Return the lattice's voxels and an apron (z, y, x); the region's ends repeat."""
     lattice = given.lattice
-    index = [
-        np.clip(np.arange(a - APRON, b + APRON), low, high - 1) - w
-        for a, b, low, high, w in zip(
-            lattice.own.start,
-            lattice.own.stop,
-            lattice.region.start,
-            lattice.region.stop,
-            lattice.window.start,
-            strict=True,
-        )
-    ]
-    return voxels[np.ix_(*index)]
+    own, region, start = lattice.own, lattice.region, lattice.window.start
+    inside, beyond = [], []
+    for a, b, low, high, w in zip(
+        own.start, own.stop, region.start, region.stop, start, strict=True
+    ):
+        first, end = max(a - APRON, low), min(b + APRON, high)
+        inside.append(slice(first - w, end - w))
+        beyond.append((first - (a - APRON), b + APRON - end))
+    return np.pad(voxels[tuple(inside)], beyond, mode="edge")
 
 
 def find_measured(kept: NDArray[Any], given: UnitInput) -> NDArray[Any] | None:

@@ -17,17 +17,21 @@ from stereocell.kernels.crossings import find_doubtful, find_maybe_flat, find_sp
 from stereocell.kernels.depth_buffer import find_visible
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
-from stereocell.kernels.grid import bound_boxes, count_entries, list_by_cell
+from stereocell.kernels.grid import bound_all, bound_boxes, count_entries, find_near, list_by_cell
 from stereocell.kernels.half_edges import (
     count_fans,
     find_first,
     label_bodies,
+    lie_within,
     match_twins,
     measure_areas,
     measure_boxes,
+    measure_sharpest,
+    measure_sides,
     measure_triangles,
     measure_volumes,
     measure_windings,
+    renumber_corners,
     sum_gains,
     sum_normals,
 )
@@ -75,6 +79,10 @@ def compile_of_meshes() -> None:
     find_first(triangles, labels, bodies)
     measure_windings(at, at.astype(np.float32), triangles, labels, np.zeros((bodies, 3)))
     measure_triangles(at, triangles)
+    measure_sharpest(at, triangles)
+    measure_sides(at, triangles)
+    lie_within(at, at, np.arange(2), np.arange(2))
+    renumber_corners(triangles.astype(np.uint32), 4)
     sum_gains(at, triangles, labels, bodies, sum_normals(at, triangles))
     bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)
     left = collapse(at, triangles, flags, bits, errors, 3.0, 0.9)
@@ -89,6 +97,8 @@ def compile_others() -> None:
     low, high = bound_boxes(at, triangles)
     origin, edge, shape = low.min(axis=0), 0.5, np.array([3, 3, 3])
     count_entries(low, high, origin, edge)
+    bound_all(low, high)
+    find_near(low, high, flags, origin, edge, shape)
     first, listed = list_by_cell(low, high, origin, edge, shape)
     find_maybe_flat(at, triangles)
     orders, nothing = find_orders(triangles, 4), np.zeros((0, 2), np.int32)
@@ -118,10 +128,10 @@ def compile_others() -> None:
     smooth_in_place(voxels, weights, weights, weights, True)
     measure_slopes(voxels, steps)
     divide_by_slopes(voxels, steps, 1e-6, 2.0)
-    mask, own, one_bin = voxels > 0, np.array([[0, 3]] * 3), np.zeros(1 << 15, np.int16)
-    small = np.float32(0.1)
-    sum_by_value(voxels, mask, own, steps, one_bin, small, small, small, 1)
-    count_differences(voxels, mask, own, 1, one_bin, steps)
+    mask, every = voxels > 0, np.array([[0, 3]] * 3, np.int64)
+    one_bin, small = np.zeros(1 << 15, np.int16), np.float32(0.1)
+    sum_by_value(voxels, mask, every, steps, one_bin, small, small, small, 1)
+    count_differences(voxels, mask, every, 1, one_bin, steps)
     move_off_zero(voxels, np.float32(0.01))
     close_gaps(voxels, steps, 1.0, 1.0)
     first_run, start, stop = find_runs(mask)

@@ -20,6 +20,45 @@ def bound_boxes(at: Points, triangles: Ints) -> tuple[Points, Points]:
 
 
 @kernel
+def bound_all(low: Points, high: Points) -> tuple[Points, Points]:
+    """Return the least and the largest corner of all boxes together, float64 (3,) each."""
+    least, most = np.full(3, np.inf), np.full(3, -np.inf)
+    for t in range(len(low)):
+        for k in range(3):
+            least[k], most[k] = min(least[k], low[t, k]), max(most[k], high[t, k])
+    return least, most
+
+
+@kernel
+def find_near(
+    low: Points,
+    high: Points,
+    chosen: NDArray[np.bool_],
+    origin: Points,
+    edge: float,
+    shape: NDArray[np.int64],
+) -> NDArray[np.bool_]:
+    """Return which boxes touch a cell that a chosen one touches; see `list_by_cell`."""
+    cells = np.zeros((shape[0], shape[1], shape[2]), np.bool_)
+    near = chosen.copy()
+    for is_asking in (False, True):
+        for t in range(len(low)):
+            if chosen[t] == is_asking:
+                continue
+            x0, x1 = int((low[t, 0] - origin[0]) / edge), int((high[t, 0] - origin[0]) / edge)
+            y0, y1 = int((low[t, 1] - origin[1]) / edge), int((high[t, 1] - origin[1]) / edge)
+            z0, z1 = int((low[t, 2] - origin[2]) / edge), int((high[t, 2] - origin[2]) / edge)
+            for x in range(x0, x1 + 1):
+                for y in range(y0, y1 + 1):
+                    for z in range(z0, z1 + 1):
+                        if is_asking:
+                            near[t] |= cells[x, y, z]
+                        else:
+                            cells[x, y, z] = True
+    return near
+
+
+@kernel
 def list_by_cell(
     low: Points, high: Points, origin: Points, edge: float, shape: NDArray[np.int64]
 ) -> tuple[Ints, Ints]:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import kernel, part
-from stereocell.kernels.triangles import Points, doubled_area
+from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_cosine
 
 Ints = NDArray[np.int32]
 BORDER, CROWDED = -1, -2  # no twin: none is there; several are, or one that is wound alike
@@ -198,6 +198,27 @@ def measure_triangles(at: Points, triangles: Ints) -> Points:
 
 
 @kernel
+def measure_sides(at: Points, triangles: Ints) -> Points:
+    """Return the lengths of all triangles' sides (3 m,)."""
+    sides = np.empty(3 * len(triangles))
+    for t in range(len(triangles)):
+        for k in range(3):
+            a, b = triangles[t, k], triangles[t, (k + 1) % 3]
+            x, y, z = at[b, 0] - at[a, 0], at[b, 1] - at[a, 1], at[b, 2] - at[a, 2]
+            sides[3 * t + k] = np.sqrt(x * x + y * y + z * z)
+    return sides
+
+
+@kernel
+def measure_sharpest(at: Points, triangles: Ints) -> Points:
+    """Return the cosine of the smallest angle of each triangle (m,), 1 where it has no area."""
+    cosines = np.empty(len(triangles))
+    for t in range(len(triangles)):
+        cosines[t] = smallest_angle_cosine(at, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+    return cosines
+
+
+@kernel
 def measure_areas(
     at: Points, triangles: Ints, twins: Ints, labels: Ints, bodies: int
 ) -> tuple[Points, NDArray[np.bool_]]:
@@ -222,6 +243,51 @@ def measure_boxes(at: Points, labels: Ints, bodies: int) -> Points:
             low[body, k] = min(low[body, k], at[v, k])
             high[body, k] = max(high[body, k], at[v, k])
     return high - low
+
+
+@kernel
+def lie_within(
+    low: Points, high: Points, asked: NDArray[np.int64], outer: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Return which of the boxes that are asked for lie in one of the outer boxes, bool (k,).
+
+    low, high     (b, 3), corners of all boxes
+    asked, outer  their numbers
+    """
+    within = np.zeros(len(asked), np.bool_)
+    for i in range(len(asked)):
+        a = asked[i]
+        for b in outer:
+            holds = True
+            for k in range(3):
+                holds &= low[b, k] <= low[a, k] and high[b, k] >= high[a, k]
+            if holds:
+                within[i] = True
+                break
+    return within
+
+
+@kernel
+def renumber_corners(
+    triangles: NDArray[np.uint32], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+    """Return the vertices that triangles use, in order (k,), and the triangles by their places."""
+    place = np.zeros(count, np.uint32)
+    for t in range(len(triangles)):
+        for k in range(3):
+            place[triangles[t, k]] = 1
+    left = 0
+    for v in range(count):
+        left += place[v]
+    used, own, left = np.empty(left, np.int64), np.empty_like(triangles), 0
+    for v in range(count):
+        if place[v] > 0:
+            place[v], used[left] = left, v
+            left += 1
+    for t in range(len(triangles)):
+        for k in range(3):
+            own[t, k] = place[triangles[t, k]]
+    return used, own
 
 
 @kernel

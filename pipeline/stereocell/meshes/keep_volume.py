@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from stereocell.kernels.half_edges import measure_volumes, sum_gains, sum_normals
 from stereocell.meshes.validity import (
     Defects,
+    Topology,
     border,
     find_defects,
     find_topology,
@@ -63,12 +64,19 @@ class Kept:
 class FineVolumes:
     """The volumes of a fine mesh's bodies, for levels of which each vertex is one of it.
 
-    planes  the cut planes
-    box     of the tile; None: vertices may move anywhere
+    planes    the cut planes
+    box       of the tile; None: vertices may move anywhere
+    topology  of the mesh; None: it is found
     """
 
-    def __init__(self, mesh: Mesh, planes: tuple[Plane, ...], box: Box | None = None) -> None:
-        topology = find_topology(mesh.triangles, len(mesh.positions))
+    def __init__(
+        self,
+        mesh: Mesh,
+        planes: tuple[Plane, ...],
+        box: Box | None = None,
+        topology: Topology | None = None,
+    ) -> None:
+        topology = topology or find_topology(mesh.triangles, len(mesh.positions))
         self._label, count = topology.bodies
         self._planes = planes
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)

@@ -18,7 +18,9 @@ from igl import predicates
 from numpy.typing import NDArray
 
 from stereocell.kernels.crossings import ERROR_3D, find_doubtful, find_maybe_flat, find_spread
-from stereocell.meshes.triangle_grid import make_grid
+from stereocell.meshes.triangle_grid import find_around, make_grid
+
+FEW = 20  # share of fresh triangles, one in this, under which only those around them are looked at
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -39,6 +41,13 @@ def find_crossings(
     if not fresh.any():
         return np.zeros((0, 2), np.int64)
     positions = np.ascontiguousarray(positions)
+    if fresh.sum() * FEW < len(triangles):
+        part = find_around(positions, np.ascontiguousarray(triangles, np.int32), fresh)
+        return part[_find_crossings(positions, triangles[part], fresh[part])]
+    return _find_crossings(positions, triangles, fresh)
+
+
+def _find_crossings(positions: Points, triangles: Indices, fresh: NDArray[np.bool_]) -> Indices:
     corners = np.ascontiguousarray(triangles, np.int32)
     grid = make_grid(positions, corners)
     pairs = find_doubtful(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.collapse import collapse
 from stereocell.kernels.flips import flip_edges
-from stereocell.kernels.half_edges import label_bodies, measure_boxes
+from stereocell.kernels.half_edges import label_bodies, measure_boxes, renumber_corners
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
@@ -108,10 +108,7 @@ def renumber(
     triangles  uint32 (m, 3)
     vertices   number of vertices
     """
-    used = np.zeros(vertices, bool)
-    used[triangles.ravel()] = True
-    place = (np.cumsum(used) - 1).astype(np.uint32)
-    return np.flatnonzero(used), place[triangles]
+    return renumber_corners(np.ascontiguousarray(triangles, np.uint32), vertices)
 
 
 def compact(mesh: Mesh, triangles: NDArray[np.uint32]) -> Mesh:

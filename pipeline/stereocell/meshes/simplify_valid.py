@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from stereocell.kernels.half_edges import measure_sides
 from stereocell.meshes.simplify import compact, find_errors, renumber, simplify_part
 from stereocell.meshes.validity import Defects, find_defects, label_components
 from stereocell.model.lattice import Plane
@@ -54,6 +55,7 @@ def simplify_without_defects(
     """
     body = label_components(mesh.triangles, len(mesh.positions))
     tries = np.zeros(len(mesh.positions), np.int64)  # a vertex that was locked once stays
+    body_of = body[mesh.triangles[:, 0]]
     tree: cKDTree | None = None
 
     errors = find_errors(mesh, max_error_um)
@@ -74,24 +76,36 @@ def simplify_without_defects(
             break
         chosen = np.zeros(int(body.max()) + 1, bool)
         chosen[sorted(worst)] = True
-        part = mesh.triangles[chosen[body[mesh.triangles[:, 0]]]]
+        part = mesh.triangles[chosen[body_of]]
         if number < ROUNDS:
             redone |= worst
-            tree = tree or cKDTree(mesh.positions)
+            # few places are asked for: a balanced tree takes three times as long to make
+            tree = tree or cKDTree(mesh.positions, balanced_tree=False, compact_nodes=False)
             tries[_around(tree, draft, defects, tries)] += 1
-            for one in body[used[own[defects.inside_out, 0]]].tolist():
-                tries[np.flatnonzero(body == one)[:: max(1, APART >> number)]] += 1
+            turned = body[used[own[defects.inside_out, 0]]]
+            tries[_some_of(body, turned, max(1, APART >> number))] += 1
             part = again(part)
         else:
             kept |= worst
-        rest = triangles[~chosen[body[triangles[:, 0]]]]
-        before, triangles = triangles, np.concatenate([rest, part])
+        stays = ~chosen[body[triangles[:, 0]]]
+        rest, before = triangles[stays], triangles[~stays]
+        triangles = np.concatenate([rest, part])
         faulty = np.zeros(len(mesh.positions), bool)
         faulty[used[defects.vertices(own)]] = True
         # what was found sound in the draft before, and is there still, need not be looked at again
-        fresh = ~_are_among(triangles, before) | faulty[triangles].any(axis=1)
+        fresh = np.asarray(faulty[triangles].any(axis=1))
+        fresh[len(rest) :] |= ~_are_among(part, before)
     used, own = renumber(triangles, len(mesh.positions))
     return Simplified(compact(mesh, triangles), used, len(redone - kept), len(kept))
+
+
+def _some_of(body: NDArray[np.int32], chosen: NDArray[np.int32], every: int) -> NDArray[np.int64]:
+    """Return every so manieth vertex of each of the chosen bodies."""
+    vertices = np.flatnonzero(np.isin(body, chosen))
+    vertices = vertices[np.argsort(body[vertices], kind="stable")]
+    first = np.flatnonzero(np.diff(body[vertices], prepend=-1))
+    place = np.arange(len(vertices)) - np.repeat(first, np.diff(first, append=len(vertices)))
+    return vertices[place % every == 0]
 
 
 def _are_among(triangles: Triangles, others: Triangles) -> NDArray[np.bool_]:
@@ -131,9 +145,8 @@ def _around(
     start, end = np.concatenate(lows), np.concatenate(highs)
     if not len(start):
         return np.zeros(0, np.int64)
-    a, b, c = at[draft.triangles.T]
-    sides = np.concatenate([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))])
-    size = np.maximum(np.linalg.norm(end - start, axis=1) / 2, float(np.median(sides)) / 4)
+    side = np.median(measure_sides(at, np.ascontiguousarray(draft.triangles, np.int32)))
+    size = np.maximum(np.linalg.norm(end - start, axis=1) / 2, float(side) / 4)
     away, nearest = tree.query((start + end) / 2)
     # at least one vertex, or the next try would equal this one
     radius = np.maximum(size * GROWTH ** tries[nearest], (1 + HAIR) * away)

@@ -9,12 +9,8 @@ would have to decide alike.
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.half_edges import (
-    label_bodies,
-    match_twins,
-    measure_areas,
-    measure_boxes,
-)
+from stereocell.kernels.half_edges import measure_areas, measure_boxes
+from stereocell.meshes.validity import Topology, find_topology
 from stereocell.model.mesh import Mesh
 
 SMALL = 4.0  # errors; at the default errors only lod3's is larger than fragments that stay
@@ -24,12 +20,14 @@ SHARE = 0.02  # of the area
 class SmallBodies:
     """The bodies of a fine surface by their sizes."""
 
-    def __init__(self, mesh: Mesh) -> None:
-        count = len(mesh.positions)
-        triangles = np.ascontiguousarray(mesh.triangles, np.int32)
-        self._label, bodies = label_bodies(triangles, count)
-        twins, at = match_twins(triangles, count), mesh.positions.astype(np.float64)
-        self._areas, self._is_open = measure_areas(at, triangles, twins, self._label, bodies)
+    def __init__(self, mesh: Mesh, topology: Topology | None = None) -> None:
+        """`topology`: the mesh's; None: it is found."""
+        topology = topology or find_topology(mesh.triangles, len(mesh.positions))
+        self._label, bodies = topology.bodies
+        at = mesh.positions.astype(np.float64)
+        self._areas, self._is_open = measure_areas(
+            at, topology.corners, topology.twins, self._label, bodies
+        )
         self._diagonals = np.linalg.norm(measure_boxes(at, self._label, bodies), axis=1)
 
     def find(self, error_um: float) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from stereocell.kernels.half_edges import (
     count_fans,
     find_first,
     label_bodies,
+    lie_within,
     match_twins,
     measure_windings,
 )
@@ -78,12 +79,14 @@ class Topology:
     """The parts of the check that don't depend on where vertices are; `find_topology` makes it.
 
     corners                int32 (m, 3), the triangles
+    twins                  int32 (3 m,), see `match_twins`
     rim, crowded           directed edges (n, 2) without a triangle beyond, and with several
     non_manifold_vertices  (n,)
     bodies                 the number of each vertex's body, and how many there are
     """
 
     corners: NDArray[np.int32]
+    twins: NDArray[np.int32]
     rim: Indices
     crowded: Indices
     non_manifold_vertices: Indices
@@ -96,6 +99,7 @@ def find_topology(triangles: NDArray[np.integer], vertices: int) -> Topology:
     twins = match_twins(corners, vertices)
     return Topology(
         corners,
+        twins,
         _ends_of(corners.astype(np.int64), np.flatnonzero(twins == BORDER)),
         _ends_of(corners.astype(np.int64), np.flatnonzero(twins == CROWDED)),
         np.flatnonzero(count_fans(corners, twins, vertices)[1] < 0),
@@ -230,7 +234,6 @@ def _inside_out(mesh: Mesh, topology: Topology, planes: tuple[Plane, ...]) -> In
     found = measure_sizes(mesh, planes, topology)
     size, low, high, first = found.volumes, found.low, found.high, found.first
     wrong, solid = (first >= 0) & (size <= 0), (first >= 0) & (size > 0)
-    for hollow in np.flatnonzero(wrong & (size < 0)).tolist():
-        around = (low[solid] <= low[hollow]).all(axis=1) & (high[solid] >= high[hollow]).all(axis=1)
-        wrong[hollow] = not around.any()
+    hollow = np.flatnonzero(wrong & (size < 0))
+    wrong[hollow] = ~lie_within(low, high, hollow, np.flatnonzero(solid))
     return first[wrong]

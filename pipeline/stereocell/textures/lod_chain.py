@@ -12,12 +12,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.kernels.half_edges import measure_sharpest
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.keep_volume import Box, FineVolumes, Kept
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.simplify_valid import Simplified, simplify_without_defects
 from stereocell.meshes.small_bodies import SmallBodies
+from stereocell.meshes.validity import find_topology
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh, Quality
 from stereocell.model.timing import Clock
@@ -63,7 +65,10 @@ def make_levels(
     texturer: Texturer | None = None
     place = np.zeros(0, np.int64)  # of a fine vertex in the finest level that is made
     with clock("volume kept"):
-        volumes, bodies = FineVolumes(fine, planes, box), SmallBodies(fine)
+        topology = find_topology(fine.triangles, len(fine.positions))
+        volumes = FineVolumes(fine, planes, box, topology)
+        bodies = SmallBodies(fine, topology)
+        del topology  # it takes as much memory as the surface
     with clock("measure"):
         to_fine = Nearest(fine, lod.samples)
     gone = np.zeros(len(fine.positions), bool)
@@ -143,9 +148,6 @@ def _simplify(
 
 def sharpest_angle(mesh: Mesh) -> float:
     """Return the 1st percentile, in degrees, of the triangles' smallest angles."""
-    corners = mesh.positions[mesh.triangles].astype(np.float64)
-    sides = np.sort(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), axis=1)
-    a, b, c = sides.T  # the smallest angle is opposite the shortest side
-    cosine = (b**2 + c**2 - a**2) / np.maximum(2 * b * c, 1e-30)
-    smallest = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-    return float(np.percentile(smallest, 1))
+    triangles = np.ascontiguousarray(mesh.triangles, np.int32)
+    cosines = measure_sharpest(mesh.positions.astype(np.float64), triangles)
+    return float(np.percentile(np.degrees(np.arccos(np.clip(cosines, -1, 1))), 1))

@@ -66,9 +66,11 @@ def find_pixels(
     triangle_of = np.full(size, -1)
     weights_of = np.zeros((height, width, 3))
     low, high = _boxes(corners, size, 0.0)
-    frames, is_flat = _frames(corners)
-    drawn = np.flatnonzero(~is_flat)
-    kept = np.ascontiguousarray(frames.T[drawn])
+    # of a fine surface most lie between the centres of pixels
+    drawn = np.flatnonzero((low[:, 0] <= high[:, 0]) & (low[:, 1] <= high[:, 1]))
+    frames, is_flat = _frames(corners[drawn])
+    drawn = drawn[~is_flat]
+    kept = np.ascontiguousarray(frames.T[~is_flat])
     find_visible(kept, depth[drawn], low[drawn], high[drawn], nearest, triangle_of, weights_of)
     found = np.flatnonzero(triangle_of >= 0)
     return found, drawn[triangle_of.ravel()[found]], weights_of.reshape(-1, 3)[found]
@@ -112,8 +114,10 @@ def _boxes(
     """Return the first and last pixel (x, y) near each triangle: (m, 2)."""
     height, width = size
     last = np.array([width - 1, height - 1])
-    low = np.clip(np.ceil(corners.min(axis=1) - 0.5 - beyond - 1e-6), 0, last + 1)
-    high = np.clip(np.floor(corners.max(axis=1) - 0.5 + beyond + 1e-6), -1, last)
+    a, b, c = corners.transpose(1, 0, 2)  # numpy is slow along an axis of three
+    least, most = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    low = np.clip(np.ceil(least - 0.5 - beyond - 1e-6), 0, last + 1)
+    high = np.clip(np.floor(most - 0.5 + beyond + 1e-6), -1, last)
     return low.astype(np.int64), high.astype(np.int64)
 
 
