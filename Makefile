@@ -217,6 +217,7 @@ test-exhaustive: setup browser ## All tests, and the sweeps that `make test` tak
 # the demo's bundle, or of half its tiles
 ifdef STEREOCELL_EXHAUSTIVE
 SHOWN := demo
+DEEP := --deep
 else
 SHOWN := half
 endif
@@ -241,11 +242,11 @@ ifdef STEREOCELL_EXHAUSTIVE
 else
 	test -e out/samples/half.ome.zarr || $(RUN) sample cycif out/samples/half.ome.zarr --grid 5x1
 	$(RUN) build out/samples/half.ome.zarr --out out/$(SHOWN) --workers="$$WORKERS" --preset cycif --grid 5x1
-	$(RUN) check out/$(SHOWN) --deep --workers="$$WORKERS"
+	$(RUN) check out/$(SHOWN) --workers="$$WORKERS"
 endif
 	test -e out/samples/brain-cells.ome.tif || $(RUN) sample brain-cells out/samples/brain-cells.ome.tif
 	$(RUN) build out/samples/brain-cells.ome.tif --out out/brain-cells --workers="$$WORKERS" --preset lightsheet --grid 2x2 --maps
-	$(RUN) check out/brain-cells --deep --workers="$$WORKERS"
+	$(RUN) check out/brain-cells $(DEEP) --workers="$$WORKERS"
 	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
 	rm -rf out/f && $(SUPPORT).phantoms out/f
 	$(SUPPORT).validators $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))

@@ -107,6 +107,7 @@ def test_a_copy_reads_its_own_classes_wherever_it_lies(planned: Path, tmp_path: 
     assert copy.save_plan(there) is False
 
 
+@pytest.mark.exhaustive
 def test_classes_take_the_place_of_earlier_ones(planned: Path, tmp_path: Path) -> None:
     add(planned, "--classes", "3")
     assert [c.name for c in add(planned, "--classes", "2").plan().channels] == [

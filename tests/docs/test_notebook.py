@@ -55,7 +55,7 @@ def test_the_viewer_s_notebook_is_stored_with_its_pictures_and_no_more() -> None
     assert len(text) < 400_000
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.skipif(viewer_dist() is None, reason="the viewer is not built")
 def test_the_viewer_s_notebook_gives_what_it_is_stored_with(tmp_path: Path) -> None:
     """It is stored by `make notebook`."""

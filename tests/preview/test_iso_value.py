@@ -207,6 +207,7 @@ def test_a_level_for_each_tile_is_the_build_s(tmp_path: Path) -> None:
     assert levels[0] < 0.9 * levels[1]
 
 
+@pytest.mark.exhaustive
 def test_same_input_same_bytes(source: Path, tmp_path: Path) -> None:
     for name in ("a.png", "b.png"):
         flags = ("--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / name))

@@ -121,6 +121,7 @@ def test_images_of_a_tilted_gantry_lie_where_the_json_says(
         assert np.abs(shown - expected).max() <= 1 + interpolation_bound(2.2) * 255 / (high - low)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
 def test_a_real_ct_of_28_uneven_tilted_slices_gives_28_pictures(tmp_path: Path) -> None:
     folder = data_folder()

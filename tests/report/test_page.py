@@ -357,6 +357,7 @@ def test_names_of_data_are_text_and_never_markup(built: Path) -> None:
     assert NASTY in parsed.texts
 
 
+@pytest.mark.exhaustive
 def test_same_results_give_the_same_page(built: Path) -> None:
     assert _write(built)[0] == _write(built)[0]
 

@@ -84,6 +84,7 @@ def marks(store: ObjectStore, prefix: str) -> dict[str, str]:
     }
 
 
+@pytest.mark.exhaustive
 def test_exports_from_there_are_those_from_a_folder(
     store: ObjectStore, there: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -128,7 +129,7 @@ def test_objects_are_the_files_of_a_folder(
     assert marks(store, "bucket/there") == marked
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_what_is_lost_or_half_made_there_is_made_again(
     store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -154,7 +155,7 @@ def test_what_is_lost_or_half_made_there_is_made_again(
     fs.pipe_file("bucket/there/bundle/manifest.json", manifest)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_flipped_bits_there_are_named_and_get_no_further(
     store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -160,7 +160,7 @@ IN_THE_MIDDLE_OF = (sys.executable, "-c", IN_THE_MIDDLE)
 BOUND = ("setpriv", "--bounding-set=-dac_override") if os.geteuid() == 0 else ()
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.skipif(bool(BOUND) and which(BOUND[0]) is None, reason="root without setpriv")
 def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goes_on(
     volume: Path, undisturbed: dict[str, str], tmp_path: Path
@@ -212,7 +212,7 @@ def test_tiles_that_stage_and_bundle_had_finished_are_not_made_again(
     assert assets(asset_digests(out)) == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_finished_tile_that_is_damaged_or_of_other_settings_is_made_again(
     volume: Path, undisturbed: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -255,7 +255,7 @@ def kept(store: ObjectStore, out: str, folder: Path) -> dict[str, str]:
     return assets(asset_digests(folder))
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_store_that_fails_now_and_then_is_asked_again(
     store: Fixture, undisturbed: dict[str, str], tmp_path: Path
 ) -> None:

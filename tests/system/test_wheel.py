@@ -143,6 +143,7 @@ def test_a_wheel_alone_builds_and_has_the_viewer(tmp_path: Path) -> None:
             assert all(not file["problems"] for file in found)
 
 
+@pytest.mark.exhaustive
 def test_an_sdist_makes_the_same_wheel_without_node(tmp_path: Path) -> None:
     if viewer_dist() is None:
         pytest.skip("the viewer is not built: `make setup`")

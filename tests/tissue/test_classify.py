@@ -109,6 +109,7 @@ def test_the_mask_is_the_brain_with_its_fluid_and_no_scalp(
     assert dice(tissue.mask, np.isin(head.labels, (CSF, GREY, WHITE))) > 0.95
 
 
+@pytest.mark.exhaustive
 def test_the_same_voxels_give_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(brain_hull, "ITERATIONS", 60)
     head = make_head((56, 48, 48), bias=0.4, seed=5)

@@ -13,6 +13,7 @@ import pytest
 
 from support.bundle_picture import read_blocks
 from support.bundles import load
+from support.exhaustive import sweep
 from support.reference_raymarch import Block, Camera, Values, encoded, psnr, render
 from support.unity_import import UM
 from support.unity_shader import STAGES, chromium, compile_stage, cross, draw, has_compiler, view_of
@@ -124,7 +125,7 @@ needs_browser = pytest.mark.skipif(
 
 @pytest.mark.slow
 @needs_browser
-@pytest.mark.parametrize("shading", [0.0, 1.0])
+@pytest.mark.parametrize("shading", sweep([0.0, 1.0], kept=[1.0]))
 def test_an_imported_specimen_is_drawn_as_the_reference_draws_it(
     tmp_path: Path, scene: Callable[..., Scene], shading: float
 ) -> None:
