@@ -20,6 +20,7 @@ import { STEREOCELL, serve } from "../support/browser/served";
 import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
+import { IS_EXHAUSTIVE } from "../support/exhaustive";
 import { writeFixture } from "../support/fixture/bundle";
 
 const VIEWPORT = { width: 240, height: 160 }; // small: software draws it
@@ -116,41 +117,44 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
       await second.page.close();
     });
 
-    it("draw what files draw by value and gradient, marched and traced", async () => {
-      // above the value at which the authored function begins: bricks leave out what lies below
-      const slope: Shape = {
-        ...makeShape("rectangle", { value: 0.7, gradient: 0.55 }),
-        values: [0.4, 1],
-        gradients: [0.1, 1],
-      };
-      const link = `#v=1&depth=0&c=Balls&only=r0_c1&l=Balls:sown_${writeShapes([slope])}:town&light=many:false`;
-      for (const mode of ["all", "traced"]) {
-        const drawn = async (address: string) => {
-          const { page, viewer, counted } = await open(
-            `${address}?mode=${mode}&quality=low&view=front${link}`,
-          );
-          const samples = async () => (await viewer.snapshot()).traced.samples;
-          if (mode === "traced") {
-            await expect.poll(samples, { timeout: 90_000 }).toBeGreaterThanOrEqual(3);
-          }
-          const picture = await takePicture(page);
-          const { state, volumes: standIn } = await viewer.snapshot();
-          await page.close();
-          return { picture, counted, state, standIn };
+    it.runIf(IS_EXHAUSTIVE)(
+      "draw what files draw by value and gradient, marched and traced",
+      async () => {
+        // above the value at which the authored function begins: bricks leave out what lies below
+        const slope: Shape = {
+          ...makeShape("rectangle", { value: 0.7, gradient: 0.55 }),
+          values: [0.4, 1],
+          gradients: [0.1, 1],
         };
-        const files = await drawn(`${host.address}/`);
-        const bricks = await drawn(server.address);
-        expect(bricks.state.notices).toEqual([]);
-        // the march that stands in for what is traced has files: bricks of a tile go to one place
-        if (mode === "all") expect(bricks.counted.files).toEqual([]);
-        else expect(bricks.standIn.every(({ level }) => level !== null)).toBe(true);
-        expect(bricks.standIn.length).toBeGreaterThan(0);
-        expect(bricks.counted.sockets).toBeGreaterThan(0);
-        const isBlue = ([r, , b]: Pixel) => b > r + 40;
-        expect(files.picture.count(isBlue)).toBeGreaterThan(600);
-        expect(apart(bricks.picture, files.picture), mode).toBeLessThan(mode === "all" ? 0.5 : 2);
-      }
-    });
+        const link = `#v=1&depth=0&c=Balls&only=r0_c1&l=Balls:sown_${writeShapes([slope])}:town&light=many:false`;
+        for (const mode of ["all", "traced"]) {
+          const drawn = async (address: string) => {
+            const { page, viewer, counted } = await open(
+              `${address}?mode=${mode}&quality=low&view=front${link}`,
+            );
+            const samples = async () => (await viewer.snapshot()).traced.samples;
+            if (mode === "traced") {
+              await expect.poll(samples, { timeout: 90_000 }).toBeGreaterThanOrEqual(3);
+            }
+            const picture = await takePicture(page);
+            const { state, volumes: standIn } = await viewer.snapshot();
+            await page.close();
+            return { picture, counted, state, standIn };
+          };
+          const files = await drawn(`${host.address}/`);
+          const bricks = await drawn(server.address);
+          expect(bricks.state.notices).toEqual([]);
+          // the march that stands in for what is traced has files: bricks of a tile go to one place
+          if (mode === "all") expect(bricks.counted.files).toEqual([]);
+          else expect(bricks.standIn.every(({ level }) => level !== null)).toBe(true);
+          expect(bricks.standIn.length).toBeGreaterThan(0);
+          expect(bricks.counted.sockets).toBeGreaterThan(0);
+          const isBlue = ([r, , b]: Pixel) => b > r + 40;
+          expect(files.picture.count(isBlue)).toBeGreaterThan(600);
+          expect(apart(bricks.picture, files.picture), mode).toBeLessThan(mode === "all" ? 0.5 : 2);
+        }
+      },
+    );
 
     it("give way to files where a function shows what they leave out", async () => {
       const link = "#v=1&l=Balls:w0_0.02,Block:w0_0.02,F_x20_body:w0_0.02";
