@@ -186,6 +186,9 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     const front = await open();
     const picture = front.cell.locator(".stereocell img");
     expect(await picture.getAttribute("src")).toBe(`data:image/png;base64,${png}`);
+    // what is covered wholly is hardly drawn: the viewer took ten seconds longer to come
+    const opacity = await picture.evaluate((each) => Number(getComputedStyle(each).opacity));
+    expect(opacity).toBeLessThan(1);
     expect(await front.cell.locator(".stereocell p").textContent()).toContain("until the kernel");
     await front.viewer();
     await front.stop();
