@@ -116,7 +116,8 @@ def _split(
     first = np.where(short[:, None], quads[:, [0, 1, 2]], quads[:, [0, 1, 3]])
     second = np.where(short[:, None], quads[:, [0, 2, 3]], quads[:, [1, 2, 3]])
     triangles = np.stack([first, second], axis=1).reshape(-1, 3)
-    return triangles.astype(np.int32), np.repeat(sides, 2, axis=0)
+    # as kernels are compiled for: of another order they would be compiled anew
+    return triangles.astype(np.int32, order="C"), np.repeat(sides, 2, axis=0)
 
 
 def _faces(
