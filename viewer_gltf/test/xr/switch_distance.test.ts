@@ -1,5 +1,6 @@
 /** Walking through the switch distance in stereo: surfaces from afar, volumes near by, and back. */
 import { expect, it } from "vitest";
+import { NAME_S } from "../../src/annotations/hover_name";
 import { difference, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -44,7 +45,7 @@ describeInChromium("nearer and farther on the split screen", () => {
       const pictures = [];
       for (const mode of ["disc", "off", "disc"]) {
         await page.locator(`[data-mode="${mode}"]`).dispatchEvent("click");
-        await page.waitForTimeout(300);
+        await page.waitForTimeout(3 * NAME_S * 1000); // all pictures have the name of what is looked at
         await stand.viewer.settled();
         pictures.push(await takePicture(page, { x: 0, y: 0, width: 320, height: 160 }));
       }
