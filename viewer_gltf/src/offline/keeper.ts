@@ -22,7 +22,7 @@ export class Keeper {
   /** The files of each bundle, as the manifest that was last seen has them; null: unknown. */
   private readonly listed = new Map<string, Promise<Listed | null>>();
   /** Answered while a bundle's files were unknown, as just after this worker took the page over. */
-  private readonly unlisted: Asked[] = [];
+  private readonly unlisted = new Map<string, Asked>();
 
   constructor(
     private readonly store: Store,
@@ -88,7 +88,9 @@ export class Keeper {
       this.listed.set(base, listed);
       await listed;
     }
-    for (const { url, range } of [...asked, ...this.unlisted.splice(0)]) {
+    const missed = [...this.unlisted.values()];
+    this.unlisted.clear();
+    for (const { url, range } of [...asked, ...missed]) {
       const plan = this.plan(url, page);
       if (plan.kind !== "file") continue;
       const headers: HeadersInit = range === null ? {} : { Range: range };
@@ -160,7 +162,7 @@ export class Keeper {
     const range = request.headers.get("Range");
     const listed = await this.listedOf(base);
     if (listed === null) {
-      this.unlisted.push({ url: request.url, range });
+      this.unlisted.set(`${request.url} ${range}`, { url: request.url, range });
       return fetch(request);
     }
     const ref = Object.hasOwn(listed, path) ? listed[path] : undefined;
