@@ -1,14 +1,22 @@
-"""Run one step of test_blender.py inside Blender's Python: session.py STEP ARGUMENTS.JSON.
+"""Run steps of test_blender.py inside Blender's Python, each in a process of its own.
 
-The step's findings go to the file that the arguments name as `result`, as JSON: Blender writes
-lines of its own to standard output.
+Each line of standard input names a step, by a file of arguments: {"step", "arguments"}. The step's
+findings go to the file that the arguments name as `result`, as JSON, what it writes to that file
+with `.txt` behind its name; a line of standard output has its exit code. Blender is read once for
+all of them, which takes longer than most steps do.
 """
 
 import json
+import os
 import sys
+import traceback
 from pathlib import Path
 
-import bpy
+# Blender writes lines of its own to standard output
+ANSWERS = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)
+
+import bpy  # noqa: E402
 
 # Blender's own pxr: an application has it on its path, the wheel does not
 LOCAL = Path(bpy.utils.resource_path("LOCAL"))
@@ -386,14 +394,40 @@ def step_gltf(arguments):
     }
 
 
-def main():
-    step, file = sys.argv[1:]
-    arguments = json.loads(Path(file).read_text())
+def run(step, arguments):
+    """Run a step in a Blender that nothing has been done in."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     stereocell_import.register()
     result = globals()[f"step_{step}"](arguments)
     stereocell_import.unregister()
     Path(arguments["result"]).write_text(json.dumps(result))
+
+
+def run_forked(step, arguments):
+    """Run a step in a copy of this process, which ends with it; return its exit code."""
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    code = 1
+    try:
+        said = os.open(arguments["result"] + ".txt", os.O_WRONLY | os.O_CREAT)
+        os.dup2(said, 1)
+        os.dup2(said, 2)
+        run(step, arguments)
+        code = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def main():
+    for line in sys.stdin:
+        asked = json.loads(line)
+        code = run_forked(asked["step"], json.loads(Path(asked["arguments"]).read_text()))
+        print(code, file=ANSWERS, flush=True)
 
 
 main()

@@ -4,13 +4,16 @@
 STEREOCELL_BLENDER. See blender/session.py for what happens there.
 """
 
+import atexit
 import csv
 import json
 import os
 import re
 import subprocess
+from functools import cache
 from itertools import count
 from pathlib import Path
+from select import select
 from typing import Any
 
 import numpy as np
@@ -45,17 +48,32 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_whole(tmp_path_factory.mktemp("stage"))
 
 
+@cache
+def blender() -> subprocess.Popen[str]:
+    """Start Blender, which runs step after step until this process ends."""
+    process = subprocess.Popen(
+        [PYTHON, str(SESSION)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    atexit.register(process.communicate)
+    return process
+
+
 def run(step: str, folder: Path, **arguments: Any) -> Any:
-    """Run one step in a Blender of its own and return what it found."""
+    """Run one step in a Blender that nothing has been done in and return what it found."""
     turn = next(_turns)
     result, file = folder / f"result{turn}.json", folder / f"arguments{turn}.json"
     file.write_text(json.dumps({**arguments, "result": str(result)}, default=str))
-    command = [PYTHON, str(SESSION), step, str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr[-3000:]
+    process = blender()
+    assert process.stdin is not None
+    assert process.stdout is not None
+    print(json.dumps({"step": step, "arguments": str(file)}), file=process.stdin, flush=True)
+    assert select([process.stdout], [], [], 300)[0], f"{step}: no end after 300 s"
+    code = process.stdout.readline().strip()
+    said = Path(f"{result}.txt").read_text()
+    assert code == "0", said[-3000:]
     found = json.loads(result.read_text())
     # how an operator's report reaches a terminal
-    told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", done.stdout, re.MULTILINE)
+    told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", said, re.MULTILINE)
     return {**found, "told": told} if step.startswith("edit") else found
 
 
