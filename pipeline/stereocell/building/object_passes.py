@@ -37,7 +37,6 @@ from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted
 from stereocell.model.object_notes import ObjectNotes
-from stereocell.read.dicom import read_free_labels
 from stereocell.read.open_dataset import reader_of
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
@@ -80,6 +79,9 @@ def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
         return
     notes = labels.open().notes
     if _has_free_names(plan, labels):
+        # pydicom takes a third of a second to import: every command and worker would wait for it
+        from stereocell.read.dicom import read_free_labels
+
         own = read_free_labels(Location.of(labels.ref.source))
         notes = replace(notes, names=notes.names | own)
     write_sealed(file, {"notes": _notes().dump_python(notes, mode="json")})

@@ -55,8 +55,6 @@ def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tup
     counts  int64 (rows, columns), voxels by gradient and value
     noise   float64 (columns,), as `find_noise` returns it
     """
-    from scipy import signal  # takes a second to import: every command and worker would wait for it
-
     rows, columns = counts.shape
     is_flat = np.arange(rows)[:, np.newaxis] <= noise * (rows - 1)
     flat = np.where(is_flat, counts, 0).sum(axis=0).astype(np.float64)
@@ -66,18 +64,48 @@ def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tup
     sigma = max(2.0, column_gap(counts))
     pad = int(4 * sigma) + 2  # a peak may stand at an end of the window
     smooth = ndimage.gaussian_filter1d(np.pad(flat, pad), sigma, mode="constant")
-    peaks, found = signal.find_peaks(smooth, prominence=0, height=0)
-    is_own = found["prominences"] >= MIN_PROMINENCE * found["peak_heights"]
     candidates = []
-    for peak, left, right in zip(
-        peaks[is_own], found["left_bases"][is_own], found["right_bases"][is_own], strict=True
-    ):
-        low, high = _foot(smooth, int(peak), int(left), int(right))
+    for peak in find_peaks(smooth):
+        left, right = bases_of(smooth, peak)
+        prominence = smooth[peak] - max(smooth[left], smooth[right])
+        if prominence < MIN_PROMINENCE * smooth[peak]:
+            continue
+        low, high = _foot(smooth, peak, left, right)
         mass = smooth[low : high + 1].sum()
         if mass >= MIN_SHARE * flat.sum():
-            candidates.append((float(mass), _centre(smooth, int(peak), low, high) - pad))
+            candidates.append((float(mass), _centre(smooth, peak, low, high) - pad))
     heaviest = sorted(candidates, reverse=True)[:MAX_MATERIALS]
     return tuple(sorted(float(np.clip(place / (columns - 1), 0, 1)) for _, place in heaviest))
+
+
+def find_peaks(curve: NDArray[np.float64]) -> list[int]:
+    """Return where a curve is higher than on both sides; of a plateau its middle.
+
+    curve  float64 (columns,)
+
+    As `scipy.signal.find_peaks`, whose import takes a second: every command and worker of a build
+    would wait for it.
+    """
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(curve) != 0]))
+    ends = np.append(starts[1:], len(curve)) - 1
+    heights = curve[starts]
+    is_peak = np.zeros(len(starts), bool)
+    is_peak[1:-1] = (heights[1:-1] > heights[:-2]) & (heights[1:-1] > heights[2:])
+    return [int(middle) for middle in (starts[is_peak] + ends[is_peak]) // 2]
+
+
+def bases_of(curve: NDArray[np.float64], peak: int) -> tuple[int, int]:
+    """Return the lowest places beside a peak, before the curve is higher than it, on either side.
+
+    curve  float64 (columns,)
+
+    The nearest of equally low ones, as `scipy.signal.peak_prominences`.
+    """
+    higher = np.flatnonzero(curve > curve[peak])
+    start = higher[higher < peak].max(initial=-1) + 1
+    end = higher[higher > peak].min(initial=len(curve))
+    left = peak - int(curve[start : peak + 1][::-1].argmin())
+    return left, peak + int(curve[peak:end].argmin())
 
 
 def column_gap(counts: NDArray[np.int64]) -> float:

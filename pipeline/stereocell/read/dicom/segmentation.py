@@ -12,14 +12,15 @@ PS3.16 (codes).
 from collections import Counter
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pydicom.sr.codedict import codes
-from pydicom.sr.coding import Code
 from pydicom.uid import SegmentationStorage
 
 from stereocell.model.color import linear_color_of_lab
 from stereocell.model.object_notes import ObjectNotes
+
+if TYPE_CHECKING:
+    from pydicom.sr.coding import Code
 
 BINARY, FRACTIONAL, LABELMAP = "BINARY", "FRACTIONAL", "LABELMAP"
 _LONGEST = 64  # characters of a segment's label: as many as DICOM allows
@@ -118,20 +119,26 @@ def _meaning(coded: Any) -> str:
 @cache
 def _of_before_2020(value: str) -> str:
     """Return the words for one of SNOMED's former codes; pydicom says which code is the same."""
+    from pydicom.sr.coding import Code  # all codes are slow to import, and few files have such
+
     former = Code(value, "SRT", "")
     same = (one for (_, one), code in _codes().items() if code == former)
     return _meanings().get(("SCT", next(same, "")), "")
 
 
 @cache
-def _codes() -> dict[tuple[str, str], Code]:
+def _codes() -> dict[tuple[str, str], "Code"]:
     """Return SNOMED's codes, each once."""
+    from pydicom.sr.codedict import codes
+
     return {(code.scheme_designator, code.value): code for code in codes.SCT.concepts.values()}
 
 
 @cache
 def _meanings() -> dict[tuple[str, str], str]:
     """Return the shortest words, as `Liver` of `Liver structure (body structure)`, by code."""
+    from pydicom.sr.codedict import codes
+
     listed = [code for name in codes.schemes() for code in getattr(codes, name).concepts.values()]
     listed.sort(key=lambda code: (-len(code.meaning), code.meaning))
     return {(code.scheme_designator, code.value): code.meaning for code in listed}

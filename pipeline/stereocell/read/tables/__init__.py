@@ -6,7 +6,6 @@ from stereocell.model.errors import SourceError
 from stereocell.read.file_kind import require_kind
 from stereocell.read.tables.delimited import read_delimited
 from stereocell.read.tables.parquet import read_parquet
-from stereocell.read.tables.stores import read_anndata_zarr, read_h5ad
 from stereocell.read.tables.table import KEYS, Table, TableColumn
 from stereocell.storage.first_bytes import identify, pointer_words
 from stereocell.storage.location import Location, first_bytes
@@ -34,6 +33,9 @@ def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Ta
         raise SourceError(f"{location.shown}: is not on this machine, expected a file that is")
     if name.endswith(".parquet"):
         return read_parquet(location, key, wanted)
+    # h5py is slow to import: every command and worker would wait for it
+    from stereocell.read.tables.stores import read_anndata_zarr, read_h5ad
+
     if name.endswith(".h5ad"):
         return read_h5ad(location, key, wanted, labels)
     if any(part.endswith(".zarr") for part in location.parts):
