@@ -17,6 +17,7 @@ from stereocell.objects import simplify_walls as simplifying
 from stereocell.objects.simplify_walls import keep_volumes, simplify_walls
 from stereocell.objects.walls import Walls, extract_walls, find_faults, measure_volumes, surfaces_of
 from stereocell.objects.well_composed import make_well_composed
+from support.exhaustive import sweep
 from support.touching_cells import RADIUS_UM, touching_cells
 
 SPACING_UM = (1.0, 0.5, 0.5)
@@ -189,7 +190,7 @@ def _mask(name: str) -> NDArray[np.integer]:
 
 
 @pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
-@pytest.mark.parametrize("name", ["ovule", "nuclei"])
+@pytest.mark.parametrize("name", sweep(["ovule", "nuclei"], kept=["nuclei"]))
 def test_masks_of_real_cells(name: str) -> None:
     mask = _mask(name)
     ids, numbered = np.unique(mask, return_inverse=True)
