@@ -239,22 +239,9 @@ test-pages: setup browser
 test-bundles: setup
 ifdef STEREOCELL_EXHAUSTIVE
 	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/$(SHOWN)
-else
-	test -e out/samples/half.ome.zarr || $(RUN) sample cycif out/samples/half.ome.zarr --grid 5x1
-	$(RUN) build out/samples/half.ome.zarr --out out/$(SHOWN) --workers="$$WORKERS" --preset cycif --grid 5x1
-	$(RUN) check out/$(SHOWN) --workers="$$WORKERS"
 endif
-	test -e out/samples/brain-cells.ome.tif || $(RUN) sample brain-cells out/samples/brain-cells.ome.tif
-	$(RUN) build out/samples/brain-cells.ome.tif --out out/brain-cells --workers="$$WORKERS" --preset lightsheet --grid 2x2 --maps
-	$(RUN) check out/brain-cells $(DEEP) --workers="$$WORKERS"
+	$(SUPPORT).viewer_bundles out $(DEEP)
 	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
-	rm -rf out/f && $(SUPPORT).phantoms out/f
-	$(SUPPORT).validators $(foreach f,f.ome.tif f.ome.zarr f.nii.gz dicom,out/f/$(f) out/f/of-$(f))
-	rm -rf out/edit && $(SUPPORT).stage_edits volume out/edit
-	$(MAKE) --no-print-directory bundle INPUT=out/edit/balls.ome.tif OUT=out/edit/built ARGS="--grid 3x2" WORKERS=0
-	cp -r out/edit/built/bundle out/edit/before
-	$(SUPPORT).stage_edits layer out/edit
-	$(RUN) bundle out/edit/built --stage out/edit/my_edit.usda --workers 0
 
 # Blender's Python can't share .venv: it wants Python 3.11 and numpy 1
 BLENDER := $(VENV)/blender

@@ -3,7 +3,6 @@
 None of this uses stereocell: it is what the readers are tested against.
 """
 
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -210,7 +209,3 @@ def write_f_everywhere(folder: Path) -> None:
     write_ome_zarr(folder / "f.ome.zarr", [f_phantom()], scales=[scale], channels=[{"label": "F"}])
     write_f_dicom(folder / "dicom", f_phantom(), spacing)
     write_f_nifti(folder / "f.nii.gz", f_phantom(), spacing)
-
-
-if __name__ == "__main__":
-    write_f_everywhere(Path(sys.argv[1]))

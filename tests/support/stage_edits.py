@@ -6,7 +6,6 @@ it into the gap, chooses another transfer function for the sheet and edits the s
 to be drawn as its volume, one as surface and volume, one at its coarsest level of detail at most.
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -73,11 +72,3 @@ def write_layer(path: Path, stage: Path) -> None:
     with slab.GetVariantSet("transferFunction").GetVariantEditContext():
         slab.GetAttribute("stereocell:opacityPoints").Set([Gf.Vec2f(*p) for p in OPACITY_POINTS])
     layer.Save()
-
-
-if __name__ == "__main__":
-    what, folder = sys.argv[1], Path(sys.argv[2])
-    if what == "volume":
-        write_volume(folder)
-    else:
-        write_layer(folder / "my_edit.usda", Path("built/stage/stage.usda"))

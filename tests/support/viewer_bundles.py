@@ -1,0 +1,78 @@
+"""The bundles that the viewer's tests open: `python -m support.viewer_bundles FOLDER [--deep]`.
+
+One process makes them all, since each command would wait for the same imports and kernels, and no
+report, which nobody looks at here. What `make demo` makes is not among them.
+"""
+
+import shutil
+import sys
+from pathlib import Path
+
+from stereocell.cli.__main__ import main
+from support.exhaustive import IS_EXHAUSTIVE
+from support.phantoms import write_f_everywhere
+from support.stage_edits import write_layer, write_volume
+from support.validators import make_assets
+
+ALONE = ("--workers", "0")
+
+
+def run(*arguments: Path | str) -> None:
+    """Run a command. Ends the process where it fails."""
+    if code := main([str(one) for one in arguments]):
+        sys.exit(code)
+
+
+def make(source: Path, out: Path, grid: str, *plan: str) -> None:
+    """Make a bundle. Ends the process where it fails."""
+    if code := make_assets(source, out, grid, *ALONE, plan=plan):
+        sys.exit(code)
+
+
+def make_sample(name: str, file: Path, *flags: str) -> Path:
+    """Write a sample, if it isn't there, and return its place."""
+    if not file.exists():
+        run("sample", name, file, *flags)
+    return file
+
+
+def make_half(folder: Path) -> None:
+    """Half of the demo's tiles."""
+    file = make_sample("cycif", folder / "samples" / "half.ome.zarr", "--grid", "5x1")
+    make(file, folder / "half", "5x1", "--preset", "cycif")
+    run("check", folder / "half", *ALONE)
+
+
+def make_brain_cells(folder: Path, *deep: str) -> None:
+    """Real cells, with baked maps."""
+    file = make_sample("brain-cells", folder / "samples" / "brain-cells.ome.tif")
+    make(file, folder / "brain-cells", "2x2", "--preset", "lightsheet", "--maps")
+    run("check", folder / "brain-cells", *deep, *ALONE)
+
+
+def make_letters(folder: Path) -> None:
+    """The same letter from each kind of source."""
+    shutil.rmtree(folder, ignore_errors=True)
+    write_f_everywhere(folder)
+    for name in ("f.ome.tif", "f.ome.zarr", "f.nii.gz", "dicom"):
+        make(folder / name, folder / f"of-{name}", "1x1")
+
+
+def make_edited(folder: Path) -> None:
+    """A bundle before and after an artist's edits of its stage."""
+    shutil.rmtree(folder, ignore_errors=True)
+    write_volume(folder)
+    make(folder / "balls.ome.tif", folder / "built", "3x2")
+    shutil.copytree(folder / "built" / "bundle", folder / "before")
+    write_layer(folder / "my_edit.usda", Path("built/stage/stage.usda"))
+    run("bundle", folder / "built", "--stage", folder / "my_edit.usda", *ALONE)
+
+
+if __name__ == "__main__":
+    place = Path(sys.argv[1])
+    (place / "samples").mkdir(parents=True, exist_ok=True)
+    if not IS_EXHAUSTIVE:  # which has the whole demo's
+        make_half(place)
+    make_brain_cells(place, *sys.argv[2:])
+    make_letters(place / "f")
+    make_edited(place / "edit")
