@@ -14,6 +14,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,6 +26,7 @@ import tifffile
 import yaml
 
 import stereocell
+from stereocell import samples
 from stereocell.cli import __main__ as cli
 from stereocell.model.errors import UsageError
 from stereocell.read import open_dataset
@@ -131,6 +133,8 @@ def test_commands_run(
             drawn.append(out)
 
     monkeypatch.setattr(drawing, "run_report", draw)
+    of_few = partial(samples.write_cells, shape=(24, 60, 60))  # all 1500 take seconds
+    monkeypatch.setattr(samples, "write_cells", of_few)
     ran = []
     for page in PAGES:
         for command in commands(page, "stereocell"):
