@@ -1,4 +1,4 @@
-"""Sample, build, check, report, export, publish and serve take nothing that Windows lacks.
+"""Sample, build with its report, check, export, publish and serve take nothing that Windows lacks.
 
 A stand-in for that system, which no test of ours runs on: support/without_posix says what it hides.
 """
@@ -52,7 +52,6 @@ def test_all_runs_on_what_windows_has(tmp_path: Path) -> None:
         tmp_path,
         ["sample", "cycif", "s.ome.zarr", "--grid", "1x1", "--tile-size", "8,16,16"],
         ["build", "two.ome.tif", "-o", "out", "--spacing-um", "1,1,1", "--workers", "0"],
-        ["report", "out"],
         ["check", "out"],
         *(["export", "out", f"a.{ending}"] for ending in ("glb", "3mf", "usdc", "nii.gz", "png")),
         ["export", "out", "a.precomputed"],

@@ -11,7 +11,7 @@ import { mkdir, writeFile } from "node:fs/promises";
 import { basename, dirname, join, resolve } from "node:path";
 import { parseArgs } from "node:util";
 import type { Report } from "../src/bench/report";
-import { enter, serveChromium } from "../test/support/browser/chromium";
+import { enter, startChromium } from "../test/support/browser/chromium";
 import { Host } from "../test/support/browser/host";
 
 const { values, positionals } = parseArgs({
@@ -29,11 +29,11 @@ if (out === undefined || bundles.length === 0) {
 const [width, height] = values.size.split("x").map(Number);
 const dist = new URL("../dist/", import.meta.url).pathname;
 await mkdir(out, { recursive: true });
-const server = await serveChromium();
+const chromium = await startChromium();
 try {
   for (const bundle of bundles) await measure(resolve(bundle), nameOf(resolve(bundle)));
 } finally {
-  await server.close();
+  await chromium.close();
 }
 
 /** A build's own name, where a bundle lies in one. */
@@ -43,7 +43,7 @@ function nameOf(bundle: string): string {
 
 async function measure(bundle: string, name: string): Promise<void> {
   const host = await Host.start({ "/": dist, "/bundle/": bundle });
-  const browser = await enter(server.wsEndpoint(), { viewport: { width, height } });
+  const browser = await enter(chromium, { viewport: { width, height } });
   try {
     const page = await browser.context.newPage();
     page.on("pageerror", (error) => process.stderr.write(`page: ${error.message}\n`));

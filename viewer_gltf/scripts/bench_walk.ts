@@ -12,7 +12,7 @@ import { join, resolve } from "node:path";
 import { parseArgs } from "node:util";
 import type { Snapshot } from "../src/app/automation_api";
 import type { Manifest } from "../src/bundle/generated/bundle";
-import { enter, serveChromium } from "../test/support/browser/chromium";
+import { enter, startChromium } from "../test/support/browser/chromium";
 import { Host } from "../test/support/browser/host";
 import { ViewerPage } from "../test/support/browser/page";
 
@@ -114,8 +114,8 @@ const host = await Host.start({
   "/": new URL("../dist/", import.meta.url).pathname,
   "/bundle/": bundle,
 });
-const server = await serveChromium();
-const browser = await enter(server.wsEndpoint(), { viewport: { width, height }, isBlind: true });
+const chromium = await startChromium();
+const browser = await enter(chromium, { viewport: { width, height }, isBlind: true });
 try {
   // tsx names functions by a helper of its own, those that run in the page too
   await browser.context.addInitScript("globalThis.__name = (each) => each");
@@ -127,6 +127,6 @@ try {
   process.exitCode = walk.tell(manifest.tiles.map(({ id }) => id));
 } finally {
   await browser.close();
-  await server.close();
+  await chromium.close();
   await host.stop();
 }

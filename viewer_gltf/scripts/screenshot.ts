@@ -15,7 +15,7 @@
  *     --page                 the bundle's own index.html instead of dist/
  */
 import { parseArgs } from "node:util";
-import { addHeadset, enter, serveChromium } from "../test/support/browser/chromium";
+import { addHeadset, enter, startChromium } from "../test/support/browser/chromium";
 import { Host } from "../test/support/browser/host";
 import { ViewerPage } from "../test/support/browser/page";
 
@@ -44,8 +44,8 @@ if (bundle === undefined || out === undefined) {
 const [width, height] = values.phone ? [390, 780] : values.size.split("x").map(Number);
 const dist = new URL("../dist/", import.meta.url).pathname;
 const host = await Host.start({ "/": values.page ? bundle : dist, "/bundle/": bundle });
-const server = await serveChromium();
-const browser = await enter(server.wsEndpoint(), {
+const chromium = await startChromium();
+const browser = await enter(chromium, {
   viewport: { width, height },
   hasTouch: values.phone,
 });
@@ -87,6 +87,6 @@ try {
   );
 } finally {
   await browser.close();
-  await server.close();
+  await chromium.close();
   await host.stop();
 }

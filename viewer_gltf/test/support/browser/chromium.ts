@@ -1,7 +1,7 @@
 /** Headless Chromium, with software WebGL or a GPU's. */
 import { existsSync } from "node:fs";
 import { readFile } from "node:fs/promises";
-import { type BrowserContext, type BrowserServer, chromium, type Page } from "playwright-core";
+import { type BrowserContext, chromium, type Page, type Browser as Process } from "playwright-core";
 import { IS_EXHAUSTIVE } from "../exhaustive";
 
 export const CHROMIUM = process.env.CHROMIUM || "/usr/bin/chromium";
@@ -60,20 +60,20 @@ export type Surroundings = Readonly<{
  * a GPU; without them Mesa's software draws, in two thirds of the time of Chromium's own, SwiftShader. That
  * draws where Mesa can't, and in exhaustive runs: so both are tried now and then.
  */
-export async function serveChromium(): Promise<BrowserServer> {
+export async function startChromium(): Promise<Process> {
   if (!hasChromium()) throw new Error(HOW_TO_GET);
   const ofGpu = process.env.STEREOCELL_GPU_FLAGS?.split(" ");
   if (ofGpu !== undefined) return launch(ofGpu);
   if (existsSync(MESA) && !IS_EXHAUSTIVE) {
-    const server = await launch([...BY_MESA, ...SOFTWARE], ENVIRONMENT);
-    if (await draws(server)) return server;
-    await server.close();
+    const started = await launch([...BY_MESA, ...SOFTWARE], ENVIRONMENT);
+    if (await draws(started)) return started;
+    await started.close();
   }
   return launch([...BY_SWIFTSHADER, ...SOFTWARE]);
 }
 
-function launch(flags: readonly string[], environment = {}): Promise<BrowserServer> {
-  return chromium.launchServer({
+function launch(flags: readonly string[], environment = {}): Promise<Process> {
+  return chromium.launch({
     executablePath: CHROMIUM,
     headless: false, // playwright's own switch is the old mode; the flag below is the new one
     args: ["--headless=new", ...FLAGS, ...flags],
@@ -82,19 +82,18 @@ function launch(flags: readonly string[], environment = {}): Promise<BrowserServ
 }
 
 /** Whether pages have WebGL. */
-async function draws(server: BrowserServer): Promise<boolean> {
-  const browser = await chromium.connect(server.wsEndpoint());
+async function draws(browser: Process): Promise<boolean> {
   const page = await browser.newPage();
   const isThere = await page.evaluate(
     () => document.createElement("canvas").getContext("webgl2") !== null,
   );
-  await browser.close();
+  await page.context().close();
   return isThere;
 }
 
-/** Pages of their own in the browser at an address: nothing is kept of others, or for them. */
+/** Pages of their own in a browser: nothing is kept of others, or for them. */
 export async function enter(
-  endpoint: string,
+  browser: Process,
   {
     viewport,
     pixelRatio = 1,
@@ -103,7 +102,6 @@ export async function enter(
     serviceWorkers = "allow",
   }: Surroundings,
 ): Promise<Browser> {
-  const browser = await chromium.connect(endpoint);
   const context = await browser.newContext({
     viewport,
     deviceScaleFactor: pixelRatio,
@@ -127,7 +125,7 @@ export async function enter(
       for (const name of undrawn) Object.assign(prototype, { [name]: () => undefined });
     });
   }
-  return { context, close: () => browser.close() };
+  return { context, close: () => context.close() };
 }
 
 /**
