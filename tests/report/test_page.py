@@ -282,8 +282,14 @@ def _write(out: Path) -> tuple[str, _Page]:
     return html, _Page(html)
 
 
-def test_page_holds_its_pictures(built: Path) -> None:
-    html, parsed = _write(built)
+@pytest.fixture(scope="module")
+def written(built: Path) -> tuple[str, _Page]:
+    """The page of it, as text and taken apart."""
+    return _write(built)
+
+
+def test_page_holds_its_pictures(written: tuple[str, _Page]) -> None:
+    html, parsed = written
     inside = [a for a in parsed.addresses if a.startswith(("data:image/webp;base64,", "#"))]
     assert inside == parsed.addresses
     assert "url(" not in html
@@ -292,8 +298,8 @@ def test_page_holds_its_pictures(built: Path) -> None:
     assert drawn == ["All surfaces of <i>f", "Surfaces of tile r0_c0", "Surfaces of tile r0_c1"]
 
 
-def test_page_tells_of_each_unit(built: Path) -> None:
-    html, parsed = _write(built)
+def test_page_tells_of_each_unit(written: tuple[str, _Page]) -> None:
+    html, parsed = written
     for channel in (NASTY, "twin", "empty"):
         for tile in ("r0_c0", "r0_c1"):
             assert f"Slices of {channel} in tile {tile}" in parsed.alts
@@ -338,9 +344,9 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     ]
 
 
-def test_distances_are_called_as_in_stage_and_bundle(built: Path) -> None:
+def test_distances_are_called_as_in_stage_and_bundle(written: tuple[str, _Page]) -> None:
     """Both of them, wherever the page goes by one."""
-    text = (built / "report" / "index.html").read_text(encoding="utf-8")
+    text, _ = written
     notes = re.findall(r'<p class="note">(.*?)</p>', text, re.DOTALL)
     for start in ("µm off: ", "Likeness: "):
         [note] = [note for note in notes if note.startswith(start)]
@@ -349,8 +355,8 @@ def test_distances_are_called_as_in_stage_and_bundle(built: Path) -> None:
         assert "geometricError" in note
 
 
-def test_names_of_data_are_text_and_never_markup(built: Path) -> None:
-    html, parsed = _write(built)
+def test_names_of_data_are_text_and_never_markup(written: tuple[str, _Page]) -> None:
+    html, parsed = written
     assert "<i>f" not in html
     assert "F <b>" not in html
     assert "script" not in parsed.tags
@@ -440,12 +446,9 @@ def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
     assert not find_remarks(replace(facts, units=units[:1]))
 
 
-def test_each_unit_s_slowest_step_is_named(built: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    shutil.copytree(built, out)
-    _write(out)
-    text = (out / "report" / "index.html").read_text()
-    units = gather(OutFolder(out)).units
+def test_each_unit_s_slowest_step_is_named(built: Path, written: tuple[str, _Page]) -> None:
+    text, _ = written
+    units = gather(OutFolder(built)).units
     assert units
     for unit in units:
         step = max(unit.seconds, key=lambda name: unit.seconds[name])
