@@ -113,7 +113,8 @@ def compile_others() -> None:
     find_critical(np.zeros((3, 3, 3), np.int32), 1)
     spread = find_spread(at, triangles)
     find_doubtful(at, triangles, flags, spread, low, high, first, listed, origin, edge, shape)
-    _, nearest, parts = find_nearest(at, at, triangles, first, listed, origin, edge, shape)
+    cells = first, listed, origin, edge, shape
+    _, nearest, parts = find_nearest(at, at, triangles, *cells, np.full(4, -1, np.int32), 0)
     find_sides(at, nearest, parts, at, triangles, twins)
 
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
