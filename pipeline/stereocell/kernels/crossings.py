@@ -110,8 +110,8 @@ def _are_seen_apart(at: Points, a: int, b: int, c: int, d: int, e: int, f: int) 
 @part
 def _may_meet_apart(at: Points, triangles: Ints, i: int, j: int) -> bool:
     """Return whether two triangles without a common corner may meet."""
-    a, b, c = triangles[i]
-    d, e, f = triangles[j]
+    a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
+    d, e, f = triangles[j, 0], triangles[j, 1], triangles[j, 2]
     if _one_side(at, a, b, c, d, e, f) or _one_side(at, d, e, f, a, b, c):
         return False
     return (
@@ -231,13 +231,13 @@ def find_spread(at: Points, triangles: Ints) -> NDArray[np.bool_]:
             continue
         nx, ny, nz, is_ring = 0.0, 0.0, 0.0, True
         for e in range(low, high):
-            a, b = ends[e]
+            a, b = ends[e, 0], ends[e, 1]
             x, y, z = doubled_area(at, v, a, b)
             nx, ny, nz = nx + x, ny + y, nz + z
             is_ring = is_ring and stamp[a] != v
             stamp[a], onward[a] = v, b
         if is_ring:
-            a, b = ends[low]
+            a, b = ends[low, 0], ends[low, 1]
             rx = 0.7 * (at[a, 0] - at[v, 0]) + 0.3 * (at[b, 0] - at[v, 0])
             ry = 0.7 * (at[a, 1] - at[v, 1]) + 0.3 * (at[b, 1] - at[v, 1])
             rz = 0.7 * (at[a, 2] - at[v, 2]) + 0.3 * (at[b, 2] - at[v, 2])
@@ -289,8 +289,10 @@ def find_doubtful(
             starts[p] |= (int((low[i, 2] - origin[2]) / edge) == cz) << 2
             due[p] = fresh[i]
         for p in range(size):
-            x0, y0, z0, x1, y1, z1 = boxes[p]
-            a, b, d = corners[p]
+            x0, y0, z0, x1, y1, z1 = (
+                boxes[p, 0], boxes[p, 1], boxes[p, 2], boxes[p, 3], boxes[p, 4], boxes[p, 5],
+            )  # fmt: skip
+            a, b, d = corners[p, 0], corners[p, 1], corners[p, 2]
             for q in range(p + 1, size):
                 # only in the cell that holds the least corner of the common box
                 if (starts[p] | starts[q]) != 7 or not (due[p] or due[q]):
@@ -321,7 +323,7 @@ def find_maybe_flat(at: Points, triangles: Ints) -> NDArray[np.bool_]:
     """Return whether the corners of each triangle may lie on a line, bool (m,)."""
     maybe = np.empty(len(triangles), np.bool_)
     for t in range(len(triangles)):
-        a, b, c = triangles[t]
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         maybe[t] = not (
             _turn(at, a, b, c, 0, 1) != UNSURE
             or _turn(at, a, b, c, 1, 2) != UNSURE
