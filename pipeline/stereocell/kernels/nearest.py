@@ -35,8 +35,8 @@ def find_nearest(
     distance, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
     parts = np.empty(len(points), np.int8)
     centre, inside = np.empty(3, np.int64), np.empty(3)
-    _, ny, nz = shape
-    largest = max(shape[0], max(ny, nz))
+    nx, ny, nz = shape
+    largest = max(nx, max(ny, nz))
     for i in range(len(points)):
         beyond = 0.0  # squared distance from the grid
         for k in range(3):
@@ -53,7 +53,7 @@ def find_nearest(
                     for z in range(centre[2] - reach, centre[2] + reach + 1, step):
                         if not 0 <= z < nz:
                             continue
-                        cell = (x * ny + y) * nz + z
+                        cell = (z * ny + y) * nx + x
                         for place in range(first[cell], first[cell + 1]):
                             t = listed[place]
                             if seen[t] >= tick + i:
