@@ -14,7 +14,7 @@ from stereocell.building.closed_copy import close_tile
 from stereocell.building.unit_files import find_closed, load_record, save_unit
 from stereocell.formats.stl import write_stl
 from stereocell.meshes.simplify_valid import Simplified
-from stereocell.meshes.validity import find_defects
+from stereocell.meshes.validity import find_defects, find_topology
 from stereocell.model.lattice import Lattice, Plane
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, cut
@@ -94,7 +94,8 @@ def test_a_copy_that_simplification_spoilt_stays_unsimplified(
 ) -> None:
     def spoil(mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float) -> Simplified:
         spoilt = Mesh(mesh.positions, mesh.triangles[1:], mesh.normals)
-        return Simplified(spoilt, np.arange(len(mesh.positions)), 0, 0)
+        topology = find_topology(spoilt.triangles, len(spoilt.positions))
+        return Simplified(spoilt, topology, np.arange(len(mesh.positions)), 0, 0)
 
     simple = close(distance, REGION)
     monkeypatch.setattr(closed_copy, "simplify_without_defects", spoil)

@@ -44,3 +44,17 @@ def test_sides_are_libigl_s() -> None:
         sign_type=igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
     )
     np.testing.assert_array_equal(Nearest(mesh, 10).holds(points), signed <= 1e-6)
+
+
+def test_a_part_is_measured_by_the_whole_s_grid() -> None:
+    mesh = joined(ball(5.0, 30), moved(ball(2.0, 7), (9.0, 0.0, 0.0)))
+    alone, gone = ball(5.0, 30), np.zeros(len(mesh.positions), bool)
+    gone[len(alone.positions) :] = True
+    part, same = Nearest(mesh, 50).without(gone), Nearest(alone, 50)
+    points = np.random.default_rng(0).uniform(-12, 12, (2000, 3))
+    for _ in range(2):  # what was seen before is not left out
+        np.testing.assert_array_equal(part.distances(points), same.distances(points))
+    np.testing.assert_array_equal(part.points, same.points)
+    np.testing.assert_array_equal(part.vertices, same.vertices)
+    part._tick = np.iinfo(np.int32).max - 1000
+    np.testing.assert_array_equal(part.distances(points), same.distances(points))

@@ -3,7 +3,13 @@
 A collapse costs the quadric error of its target (Garland & Heckbert), a mean squared distance from
 the planes of all triangles that have gone into the vertex, as a share of what its body may have.
 Cheap collapses come first, in a few classes of cost rather than by a queue. A collapse is made only
-where the result is sound by itself:
+where the result is sound by itself (below).
+
+A mesh is worked on block by block, each of some thousand vertices near one another, and at last as
+a whole, for what became possible at the blocks' seams. What takes the time is waiting for memory:
+passes over the whole mesh, in the order of its planes, take nearly twice as long.
+
+Sound is:
 
 - the two ends have two common neighbours (the link condition): topology stays
 - each triangle turns by less than 60 degrees, or was a sliver and faces as its surroundings do
@@ -17,18 +23,23 @@ doi:10.1145/258734.258849
 H. Hoppe, "Progressive meshes", SIGGRAPH 1996. doi:10.1145/237170.237216
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import kernel, part
-from stereocell.kernels.half_edges import (
-    Ints,
-    count_fans,
-    find_fixed,
-    following,
-    match_twins,
-    preceding,
+from stereocell.kernels.edge_records import (
+    RECORD,
+    TWIN,
+    ahead,
+    behind,
+    count_common,
+    fill_records,
+    join,
 )
+from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_twins
+from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.triangles import Points, closest, doubled_area, smallest_angle_cosine
 
 CLASSES = 6  # of cost
@@ -40,62 +51,77 @@ TURN = 0.25  # squared cosine of the largest turn of a triangle: 60 degrees
 SLIVER = 0.9945  # cosine of 6 degrees: the normal of a sharper triangle says little
 SHARPER = 0.36  # of the sharpest angle around .6 is allowed: 1 - cos goes with its square
 VALENCE = 24  # most neighbours of two ends together
+SURE = 1 - 1e-9  # of a class's bound: a price below that is of no higher class, rounded as it is
+BLOCK = 4096  # vertices that are worked on together
+LINE = 64  # bytes of the cache
 
 
 @part
 def price_of(quadrics: Points, u: int, at: Points, v: int) -> float:
     """Return the mean squared distance of v from u's planes, in squared errors."""
-    x, y, z = at[v]
-    q = quadrics[u]
-    square = q[0] * x * x + q[1] * y * y + q[2] * z * z + q[9]
-    square += 2 * (q[3] * x * y + q[4] * x * z + q[5] * y * z + q[6] * x + q[7] * y + q[8] * z)
-    return max(square, 0.0) / q[10] if q[10] > 0 else 0.0
+    # by numbers, here and below: a view of a row is counted, by operations that are atomic
+    x, y, z = at[v, 0], at[v, 1], at[v, 2]
+    square = quadrics[u, 0] * x * x + quadrics[u, 1] * y * y + quadrics[u, 2] * z * z
+    square += quadrics[u, 9]
+    square += 2 * (
+        quadrics[u, 3] * x * y
+        + quadrics[u, 4] * x * z
+        + quadrics[u, 5] * y * z
+        + quadrics[u, 6] * x
+        + quadrics[u, 7] * y
+        + quadrics[u, 8] * z
+    )
+    return max(square, 0.0) / quadrics[u, 10] if quadrics[u, 10] > 0 else 0.0
 
 
 @part
-def sum_planes(at: Points, corner: Ints, errors: Points, quadrics: Points) -> None:
-    """Add each triangle's plane, weighted by its doubled area, to its corners' quadrics.
+def add_plane(at: Points, a: int, b: int, c: int, errors: Points, quadrics: Points) -> None:
+    """Add a triangle's plane, weighted by its doubled area, to its corners' quadrics.
 
     at        float64 (n, 3)
-    corner    int32 (3 m,), three a triangle
     errors    float64 (n,), largest allowed distance of each vertex from its planes
     quadrics  float64 (n, 11), written
     Source: Garland & Heckbert, "Surface simplification using quadric error metrics",
     SIGGRAPH 1997. doi:10.1145/258734.258849
     """
+    x, y, z = doubled_area(at, a, b, c)
+    w = np.sqrt(x * x + y * y + z * z)
+    if w <= 0:
+        return
+    x, y, z = x / w, y / w, z / w
+    d = -(x * at[a, 0] + y * at[a, 1] + z * at[a, 2])
+    for v in (a, b, c):
+        quadrics[v, 0] += w * x * x
+        quadrics[v, 1] += w * y * y
+        quadrics[v, 2] += w * z * z
+        quadrics[v, 3] += w * x * y
+        quadrics[v, 4] += w * x * z
+        quadrics[v, 5] += w * y * z
+        quadrics[v, 6] += w * x * d
+        quadrics[v, 7] += w * y * d
+        quadrics[v, 8] += w * z * d
+        quadrics[v, 9] += w * d * d
+        quadrics[v, 10] += w * errors[v] * errors[v]
+
+
+@part
+def sum_planes(at: Points, corner: Ints, errors: Points, quadrics: Points) -> None:
+    """Add the planes of all triangles; corner int32 (3 m,), three each. See `add_plane`."""
     for t in range(len(corner) // 3):
-        a, b, c = corner[3 * t], corner[3 * t + 1], corner[3 * t + 2]
-        x, y, z = doubled_area(at, a, b, c)
-        w = np.sqrt(x * x + y * y + z * z)
-        if w <= 0:
-            continue
-        x, y, z = x / w, y / w, z / w
-        d = -(x * at[a, 0] + y * at[a, 1] + z * at[a, 2])
-        for v in (a, b, c):
-            q = quadrics[v]
-            q[0] += w * x * x
-            q[1] += w * y * y
-            q[2] += w * z * z
-            q[3] += w * x * y
-            q[4] += w * x * z
-            q[5] += w * y * z
-            q[6] += w * x * d
-            q[7] += w * y * d
-            q[8] += w * z * d
-            q[9] += w * d * d
-            q[10] += w * errors[v] * errors[v]
+        add_plane(at, corner[3 * t], corner[3 * t + 1], corner[3 * t + 2], errors, quadrics)
 
 
 @part
 def _cheapest(
-    quadrics: Points, u: int, at: Points, leaving: Ints, twins: Ints, corner: Ints
+    quadrics: Points, u: int, at: Points, leaving: Ints, edges: Ints, enough: float
 ) -> float:
-    """Return the least price of u's collapses; u is no vertex of a border."""
-    best, h = np.inf, leaving[u]
+    """Return the least price of u's collapses, or one below `enough`; u is no border's vertex."""
+    start = leaving[u]
+    best, h = np.inf, start
     while True:
-        best = min(best, price_of(quadrics, u, at, corner[following(h)]))
-        h = twins[preceding(h)]
-        if h == leaving[u]:
+        best = min(best, price_of(quadrics, u, at, edges[ahead(h)]))
+        h = edges[behind(h) + TWIN]
+        if h == start or best < enough:
             return best
 
 
@@ -106,53 +132,26 @@ def class_of(price: float) -> int:
 
 
 @part
-def count_common(h: int, twins: Ints, corner: Ints, stamp: Ints, tick: int) -> tuple[int, int]:
-    """Return how many neighbours of the target carry the stamp, and how many it has.
-
-    h  the half-edge to the target
-    """
-    common, valence = 0, 0
-    start = twins[h]
-    g = start
-    while True:
-        valence += 1
-        if stamp[corner[following(g)]] == tick:
-            common += 1
-        onward = twins[preceding(g)]
-        if onward < 0:  # the border: its other end, and then the other way round
-            valence += 1
-            if stamp[corner[preceding(g)]] == tick:
-                common += 1
-            g = start
-            while twins[g] >= 0:
-                g = following(twins[g])
-                valence += 1
-                if stamp[corner[following(g)]] == tick:
-                    common += 1
-            return common, valence
-        g = onward
-        if g == start:
-            return common, valence
-
-
-@part
 def keeps_form(
     at: Points,
-    corner: Ints,
     u: int,
     v: int,
     ring: Ints,
-    out: Ints,
+    onward: Ints,
     size: int,
     mean: tuple[float, float, float],
     allowed: float,
     planes: NDArray[np.uint8],
 ) -> bool:
-    """Return whether the triangles around u may have v in its place."""
+    """Return whether the triangles around u may have v in its place.
+
+    ring, onward  of each triangle the two other corners, and the number of triangles
+    mean          sum of their doubled areas
+    """
     bx, by, bz = mean
     length = bx * bx + by * by + bz * bz
     for k in range(size):
-        x, y = ring[k], corner[preceding(out[k])]
+        x, y = ring[k], onward[k]
         if x == v or y == v:
             continue
         if planes[v] & planes[x] & planes[y]:
@@ -173,38 +172,143 @@ def keeps_form(
 
 
 @part
-def _distance_after(
-    at: Points, corner: Ints, u: int, v: int, ring: Ints, out: Ints, size: int
-) -> float:
+def _distance_after(at: Points, u: int, v: int, ring: Ints, onward: Ints, size: int) -> float:
     """Return the distance of u from the triangles that take the place of its own."""
     least = np.inf
     for k in range(size):
-        x, y = ring[k], corner[preceding(out[k])]
+        x, y = ring[k], onward[k]
         if x != v and y != v:
             square, _ = closest(at[u, 0], at[u, 1], at[u, 2], at, v, x, y)
             least = min(least, square)
     return np.sqrt(least)
 
 
-@part
-def join(h: int, v: int, out: Ints, size: int, twins: Ints, corner: Ints, leaving: Ints) -> None:
-    """Move the start of half-edge h onto its end, v, and take its two triangles out."""
-    g = twins[h]
-    a, b = corner[preceding(h)], corner[preceding(g)]
-    for k in range(size):
-        corner[out[k]] = v
-    left, right = twins[following(h)], twins[preceding(h)]
-    if left >= 0:
-        twins[left] = right
-    twins[right] = left
-    ahead, behind = twins[following(g)], twins[preceding(g)]
-    twins[ahead] = behind
-    if behind >= 0:
-        twins[behind] = ahead
-    leaving[v], leaving[a], leaving[b] = right, following(right), ahead
-
-
 @kernel
+def collapse_in_place(
+    given: Points,
+    triangles: Ints,
+    locked: NDArray[np.bool_],
+    planes: NDArray[np.uint8],
+    errors: Points,
+    stray: float,
+    sharpest: float,
+    block: int,
+    at: Points,
+    quadrics: Points,
+    edges: Ints,
+) -> NDArray[np.bool_]:
+    """Return which triangles are left, bool (m,); their corners are in `edges` then.
+
+    block         vertices that are done with, all classes, before the next ones; then come all
+    at            float64 (n, 4), written: where vertices are, and how far what went into them is
+    quadrics      float64 (n, 12), of zeros
+    edges         int32 (8 m,), written: kernels/edge_records.py
+
+    Others are those of `collapse`. The last three are made by numpy, which asks for large pages.
+    """
+    n, m = len(given), len(triangles)
+    twins = match_twins(triangles, n)
+    leaving, valence = count_fans(triangles, twins, n)
+    stays = find_fixed(locked, triangles.ravel(), twins, valence)
+    fill_records(triangles, twins, leaving, edges)
+    for v in range(n):
+        at[v, 0], at[v, 1], at[v, 2], at[v, 3] = given[v, 0], given[v, 1], given[v, 2], 0.0
+    for t in range(0, RECORD * m, RECORD):
+        add_plane(at, edges[t], edges[t + 1], edges[t + 2], errors, quadrics)
+    cost, is_left = np.full(n, NEVER, np.int16), np.ones(m, np.bool_)
+    for u in range(n):
+        if not stays[u]:
+            enough = SURE / CLASSES**2
+            cost[u] = class_of(_cheapest(quadrics, u, at, leaving, edges, enough))
+    stamp, tick = np.zeros(n, np.int32), 0
+    touched, turn = np.zeros(n, np.int32), 0
+    ring, onward = np.empty(MAX_NEIGHBOURS, np.int32), np.empty(MAX_NEIGHBOURS, np.int32)
+    out, price = np.empty(MAX_NEIGHBOURS, np.int32), np.empty(MAX_NEIGHBOURS)
+    waiting = np.empty(n + 1, np.int32)
+    blocks = -(-n // block) if n > block else 0
+    for number in range(blocks + 1):
+        is_last = number == blocks
+        low, high = (0, n) if is_last else (number * block, min((number + 1) * block, n))
+        for step in range(CLASSES * PASSES + LAST):
+            k = min(step // PASSES, CLASSES)
+            if step % PASSES == 0 and step <= CLASSES * PASSES:
+                is_done = False
+            if is_done:
+                continue
+            count, turn, done = 0, turn + 1, 0
+            for u in range(low, high):
+                waiting[count] = u
+                count += cost[u] <= k
+            enough = SURE * min(1.0, ((k + 1) / CLASSES) ** 2)
+            for i in range(count):
+                u = waiting[i]
+                if touched[u] == turn or cost[u] > k:
+                    continue
+                size, start, best, o = 0, leaving[u], np.inf, -1
+                h = start
+                while size < MAX_NEIGHBOURS:
+                    v, last = edges[ahead(h)], edges[behind(h)]
+                    ring[size], onward[size], out[size] = v, last, h
+                    price[size] = price_of(quadrics, u, at, v)
+                    if price[size] < best:
+                        best, o = price[size], size
+                    size += 1
+                    h = edges[behind(h) + TWIN]
+                    if h == start:
+                        break
+                if h != start:
+                    cost[u] = NEVER
+                    continue
+                cost[u] = class_of(best)
+                if cost[u] > k:
+                    continue
+                worst, bx, by, bz = 0.0, 0.0, 0.0, 0.0
+                tick += 1
+                for j in range(size):
+                    v, last = ring[j], onward[j]
+                    stamp[v] = tick
+                    worst = max(worst, smallest_angle_cosine(at, u, v, last))
+                    x, y, z = doubled_area(at, u, v, last)
+                    bx, by, bz = bx + x, by + y, bz + z
+                allowed = sharpest
+                if worst > sharpest:
+                    allowed = max(sharpest, 1 - SHARPER * (1 - worst))
+                while cost[u] <= k:  # the next neighbour, in order of price
+                    v, h, strayed = ring[o], out[o], np.inf
+                    if keeps_form(at, u, v, ring, onward, size, (bx, by, bz), allowed, planes):
+                        common, others = count_common(h, edges, stamp, tick)
+                        if common == 2 and 7 <= others + size <= VALENCE:
+                            strayed = at[u, 3] + _distance_after(at, u, v, ring, onward, size)
+                    if strayed > stray * errors[u]:
+                        price[o], best = np.inf, np.inf
+                        for j in range(size):
+                            if price[j] < best:
+                                best, o = price[j], j
+                        cost[u] = class_of(best)
+                        continue
+                    at[v, 3] = max(at[v, 3], strayed)
+                    is_left[h // RECORD] = is_left[edges[h + TWIN] // RECORD] = False
+                    join(h, v, out, size, edges, leaving)
+                    for p in range(11):
+                        quadrics[v, p] += quadrics[u, p]
+                    cost[u], leaving[u] = NEVER, -1
+                    if not stays[v]:
+                        cost[v] = class_of(_cheapest(quadrics, v, at, leaving, edges, enough))
+                    for p in range(size):
+                        w = ring[p]
+                        touched[w] = turn
+                        if w == v or stays[w] or cost[w] <= k:
+                            continue
+                        c = max(class_of(price_of(quadrics, w, at, v)), k)
+                        cost[w] = min(cost[w], c)
+                        if cost[w] == NEVER:  # what was refused may be allowed now
+                            cost[w] = min(k + 1, CLASSES)
+                    done += 1
+            few = done * 200 < count or (is_last and done < 50)
+            is_done = done == 0 or (k < CLASSES and few)
+    return is_left
+
+
 def collapse(
     at: Points,
     triangles: Ints,
@@ -227,108 +331,27 @@ def collapse(
     sharpest   cosine of the smallest angle that a triangle may get
     """
     n, m = len(at), len(triangles)
-    result = triangles.copy()
-    corner = result.ravel()
-    twins = match_twins(triangles, n)
-    leaving, valence = count_fans(triangles, twins, n)
-    stays = find_fixed(locked, corner, twins, valence)
-    quadrics = np.zeros((n, 11))
-    sum_planes(at, corner, errors, quadrics)
-    cost, gone = np.full(n, NEVER, np.int16), np.zeros(m, np.bool_)
-    for u in range(n):
-        if not stays[u]:
-            cost[u] = class_of(_cheapest(quadrics, u, at, leaving, twins, corner))
-    away, stamp, tick = np.zeros(n), np.zeros(n, np.int32), 0
-    touched, turn = np.zeros(n, np.int32), 0
-    ring, out = np.empty(MAX_NEIGHBOURS, np.int32), np.empty(MAX_NEIGHBOURS, np.int32)
-    price, order = np.empty(MAX_NEIGHBOURS), np.empty(MAX_NEIGHBOURS, np.int32)
-    waiting = np.empty(n, np.int32)
-    for k in range(CLASSES + 1):
-        for _ in range(PASSES if k < CLASSES else LAST):
-            count, turn, done = 0, turn + 1, 0
-            for u in range(n):
-                if cost[u] <= k:
-                    waiting[count] = u
-                    count += 1
-            for i in range(count):
-                u = waiting[i]
-                if touched[u] == turn or cost[u] > k:
-                    continue
-                # the neighbours, in order of price
-                size, h, worst = 0, leaving[u], 0.0
-                bx, by, bz = 0.0, 0.0, 0.0
-                while size < MAX_NEIGHBOURS:
-                    v = corner[following(h)]
-                    ring[size], out[size] = v, h
-                    price[size] = price_of(quadrics, u, at, v)
-                    last = corner[preceding(h)]
-                    worst = max(worst, smallest_angle_cosine(at, u, v, last))
-                    x, y, z = doubled_area(at, u, v, last)
-                    bx, by, bz = bx + x, by + y, bz + z
-                    j = size
-                    while j > 0 and price[order[j - 1]] > price[size]:
-                        order[j] = order[j - 1]
-                        j -= 1
-                    order[j] = size
-                    size += 1
-                    h = twins[preceding(h)]
-                    if h == leaving[u]:
-                        break
-                if h != leaving[u]:
-                    cost[u] = NEVER
-                    continue
-                allowed = sharpest
-                if worst > sharpest:
-                    allowed = max(sharpest, 1 - SHARPER * (1 - worst))
-                tick += 1
-                for j in range(size):
-                    stamp[ring[j]] = tick
-                later = NEVER
-                for j in range(size):
-                    o = order[j]
-                    c = class_of(price[o])
-                    if c > k:
-                        later = c
-                        break
-                    v, h = ring[o], out[o]
-                    common, others = count_common(h, twins, corner, stamp, tick)
-                    if common != 2 or not 7 <= others + size <= VALENCE:
-                        continue
-                    if not keeps_form(
-                        at, corner, u, v, ring, out, size, (bx, by, bz), allowed, planes
-                    ):
-                        continue
-                    strayed = away[u] + _distance_after(at, corner, u, v, ring, out, size)
-                    if strayed > stray * errors[u]:
-                        continue
-                    away[v] = max(away[v], strayed)
-                    gone[h // 3] = gone[twins[h] // 3] = True
-                    join(h, v, out, size, twins, corner, leaving)
-                    quadrics[v] += quadrics[u]
-                    later = NEVER
-                    leaving[u] = -1
-                    if not stays[v]:
-                        cost[v] = class_of(_cheapest(quadrics, v, at, leaving, twins, corner))
-                    for p in range(size):
-                        w = ring[p]
-                        touched[w] = turn
-                        if w == v or stays[w]:
-                            continue
-                        c = max(class_of(price_of(quadrics, w, at, v)), k)
-                        cost[w] = min(cost[w], c)
-                        if cost[w] == NEVER:  # what was refused may be allowed now
-                            cost[w] = min(k + 1, CLASSES)
-                    done += 1
-                    break
-                cost[u] = later
-            if done == 0 or (k < CLASSES and (done * 200 < count or done < 50)):
-                break
-    left = 0
-    for t in range(m):
-        left += not gone[t]
-    kept, j = np.empty((left, 3), np.int32), 0
-    for t in range(m):
-        if not gone[t]:
-            kept[j] = result[t]
-            j += 1
-    return kept
+    room = _zeros(4 * n, np.float64).reshape(n, 4), _zeros(12 * n, np.float64).reshape(n, 12)
+    edges = _zeros(RECORD * m, np.int32)
+    if n <= BLOCK:
+        given = at, triangles, locked, planes, errors
+        left = collapse_in_place(*given, stray, sharpest, BLOCK, *room, edges)
+        return np.ascontiguousarray(edges.reshape(m, RECORD)[left, :3])
+    order = order_vertices(at)
+    place = np.empty(n, np.int32)
+    place[order] = np.arange(n, dtype=np.int32)
+    turns = order_triangles(triangles, place)
+    given = at[order], place[triangles[turns]], locked[order], planes[order], errors[order]
+    left = collapse_in_place(*given, stray, sharpest, BLOCK, *room, edges)
+    result, is_left = np.empty((m, 3), np.int32), np.empty(m, bool)
+    is_left[turns] = left
+    result[turns[left]] = order[edges.reshape(m, RECORD)[left, :3]]
+    return result[is_left]
+
+
+def _zeros(size: int, kind: type[np.float64 | np.int32]) -> NDArray[Any]:
+    """Return zeros that start where a line of the cache does."""
+    numbers = LINE // np.dtype(kind).itemsize
+    room = np.zeros(size + numbers, kind)
+    start = -room.ctypes.data % LINE // room.itemsize
+    return room[start : start + size]

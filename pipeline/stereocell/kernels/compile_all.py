@@ -36,6 +36,7 @@ from stereocell.kernels.half_edges import (
     sum_normals,
 )
 from stereocell.kernels.level_sums import count_differences, sum_by_value
+from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.nearest import find_nearest, find_sides
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
@@ -85,6 +86,7 @@ def compile_of_meshes() -> None:
     renumber_corners(triangles.astype(np.uint32), 4)
     sum_gains(at, triangles, labels, bodies, sum_normals(at, triangles))
     bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)
+    order_triangles(triangles, order_vertices(at))
     left = collapse(at, triangles, flags, bits, errors, 3.0, 0.9)
     flip_edges(at, left, flags, bits, errors, 0.9)
     thin_rim(at, triangles, np.zeros(4, np.int8), np.zeros(4, np.uint8), flags, 0.1, 0.9)
@@ -113,7 +115,8 @@ def compile_others() -> None:
     find_critical(np.zeros((3, 3, 3), np.int32), 1)
     spread = find_spread(at, triangles)
     find_doubtful(at, triangles, flags, spread, low, high, first, listed, origin, edge, shape)
-    _, nearest, parts = find_nearest(at, at, triangles, first, listed, origin, edge, shape)
+    cells = first, listed, origin, edge, shape
+    _, nearest, parts = find_nearest(at, at, triangles, *cells, np.full(4, -1, np.int32), 0)
     find_sides(at, nearest, parts, at, triangles, twins)
 
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)

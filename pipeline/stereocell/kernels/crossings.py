@@ -110,8 +110,8 @@ def _are_seen_apart(at: Points, a: int, b: int, c: int, d: int, e: int, f: int) 
 @part
 def _may_meet_apart(at: Points, triangles: Ints, i: int, j: int) -> bool:
     """Return whether two triangles without a common corner may meet."""
-    a, b, c = triangles[i]
-    d, e, f = triangles[j]
+    a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
+    d, e, f = triangles[j, 0], triangles[j, 1], triangles[j, 2]
     if _one_side(at, a, b, c, d, e, f) or _one_side(at, d, e, f, a, b, c):
         return False
     return (
@@ -231,13 +231,13 @@ def find_spread(at: Points, triangles: Ints) -> NDArray[np.bool_]:
             continue
         nx, ny, nz, is_ring = 0.0, 0.0, 0.0, True
         for e in range(low, high):
-            a, b = ends[e]
+            a, b = ends[e, 0], ends[e, 1]
             x, y, z = doubled_area(at, v, a, b)
             nx, ny, nz = nx + x, ny + y, nz + z
             is_ring = is_ring and stamp[a] != v
             stamp[a], onward[a] = v, b
         if is_ring:
-            a, b = ends[low]
+            a, b = ends[low, 0], ends[low, 1]
             rx = 0.7 * (at[a, 0] - at[v, 0]) + 0.3 * (at[b, 0] - at[v, 0])
             ry = 0.7 * (at[a, 1] - at[v, 1]) + 0.3 * (at[b, 1] - at[v, 1])
             rz = 0.7 * (at[a, 2] - at[v, 2]) + 0.3 * (at[b, 2] - at[v, 2])
@@ -266,46 +266,49 @@ def find_doubtful(
     low, high                           corners of the triangles' boxes
     first, listed, origin, edge, shape  of their grid: kernels/grid.py
     """
-    _, ny, nz = shape
+    nx, ny, _ = shape
     found, count = np.empty((1024, 2), np.int64), 0
     most = 1
     for c in range(len(first) - 1):
         most = max(most, first[c + 1] - first[c])
     # a cell's own, side by side: their boxes, corners, and along which axes they start in the cell
     boxes, corners = np.empty((most, 6)), np.empty((most, 3), np.int32)
+    round_corners = np.empty((most, 3), np.int32)  # -1 where triangles may meet elsewhere
     starts, due = np.empty(most, np.int8), np.empty(most, np.bool_)
     for c in range(len(first) - 1):
         size = first[c + 1] - first[c]
         if size < 2:
             continue
-        cx, cy, cz = c // (ny * nz), (c // nz) % ny, c % nz
+        cx, cy, cz = c % nx, (c // nx) % ny, c // (nx * ny)
         for p in range(size):
             i = listed[first[c] + p]
             for k in range(3):
                 boxes[p, k], boxes[p, 3 + k] = low[i, k], high[i, k]
                 corners[p, k] = triangles[i, k]
+                round_corners[p, k] = triangles[i, k] if spread[triangles[i, k]] else -1
             starts[p] = int((low[i, 0] - origin[0]) / edge) == cx
             starts[p] |= (int((low[i, 1] - origin[1]) / edge) == cy) << 1
             starts[p] |= (int((low[i, 2] - origin[2]) / edge) == cz) << 2
             due[p] = fresh[i]
         for p in range(size):
-            x0, y0, z0, x1, y1, z1 = boxes[p]
-            a, b, d = corners[p]
+            x0, y0, z0, x1, y1, z1 = (
+                boxes[p, 0], boxes[p, 1], boxes[p, 2], boxes[p, 3], boxes[p, 4], boxes[p, 5],
+            )  # fmt: skip
+            a, b, d = corners[p, 0], corners[p, 1], corners[p, 2]
             for q in range(p + 1, size):
-                # only in the cell that holds the least corner of the common box
-                if (starts[p] | starts[q]) != 7 or not (due[p] or due[q]):
+                # only in the cell that holds the least corner of the common box; all at once, since
+                # a processor guesses wrong at every other of these
+                is_near = ((starts[p] | starts[q]) == 7) & (due[p] | due[q])
+                is_near &= (boxes[q, 0] <= x1) & (boxes[q, 1] <= y1) & (boxes[q, 2] <= z1)
+                is_near &= (boxes[q, 3] >= x0) & (boxes[q, 4] >= y0) & (boxes[q, 5] >= z0)
+                u, v, w = round_corners[q, 0], round_corners[q, 1], round_corners[q, 2]
+                is_near &= (u != a) & (u != b) & (u != d)
+                is_near &= (v != a) & (v != b) & (v != d)
+                is_near &= (w != a) & (w != b) & (w != d)
+                if not is_near:
                     continue
-                if boxes[q, 0] > x1 or boxes[q, 1] > y1 or boxes[q, 2] > z1:
-                    continue
-                if boxes[q, 3] < x0 or boxes[q, 4] < y0 or boxes[q, 5] < z0:
-                    continue
-                is_beside = False
-                for k in range(3):
-                    v = corners[q, k]
-                    if v in (a, b, d) and spread[v]:
-                        is_beside = True
                 i, j = listed[first[c] + p], listed[first[c] + q]
-                if is_beside or not _may_meet(at, triangles, i, j):
+                if not _may_meet(at, triangles, i, j):
                     continue
                 if count == len(found):
                     larger = np.empty((2 * count, 2), np.int64)
@@ -321,7 +324,7 @@ def find_maybe_flat(at: Points, triangles: Ints) -> NDArray[np.bool_]:
     """Return whether the corners of each triangle may lie on a line, bool (m,)."""
     maybe = np.empty(len(triangles), np.bool_)
     for t in range(len(triangles)):
-        a, b, c = triangles[t]
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         maybe[t] = not (
             _turn(at, a, b, c, 0, 1) != UNSURE
             or _turn(at, a, b, c, 1, 2) != UNSURE

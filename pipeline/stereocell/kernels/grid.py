@@ -1,4 +1,8 @@
-"""A uniform grid of boxes: which triangles lie in a cell of space."""
+"""A uniform grid of boxes: which triangles lie in a cell of space.
+
+Cells are numbered along x first and z last, as surfaces of voxels (z, y, x) come: cells that follow
+one another have triangles that do.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,10 +87,10 @@ def list_by_cell(
             x0, x1 = int((low[t, 0] - origin[0]) / edge), int((high[t, 0] - origin[0]) / edge)
             y0, y1 = int((low[t, 1] - origin[1]) / edge), int((high[t, 1] - origin[1]) / edge)
             z0, z1 = int((low[t, 2] - origin[2]) / edge), int((high[t, 2] - origin[2]) / edge)
-            for x in range(x0, x1 + 1):
+            for z in range(z0, z1 + 1):
                 for y in range(y0, y1 + 1):
-                    for z in range(z0, z1 + 1):
-                        c = (x * ny + y) * nz + z
+                    for x in range(x0, x1 + 1):
+                        c = (z * ny + y) * nx + x
                         if is_filling:
                             listed[place[c]] = t
                             place[c] += 1

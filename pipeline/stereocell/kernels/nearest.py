@@ -18,21 +18,25 @@ def find_nearest(
     origin: Points,
     edge: float,
     shape: NDArray[np.int64],
+    seen: Ints,
+    tick: int,
 ) -> tuple[Points, NDArray[np.int64], NDArray[np.int8]]:
     """Return the distance of each point (n,), the nearest triangle, and its part (see `closest`).
 
     first, listed        of the grid: kernels/grid.py
     origin, edge, shape  of the grid; it holds all triangles
+    seen                 int32 (m,), of each triangle the number of the last point that looked at it
+    tick                 the first point's number: larger than all in `seen`, but for triangles that
+                         are left out, whose numbers no point reaches
 
     Cells are searched in shells around the point, until nothing beyond can be nearer. Of triangles
     at one distance the first that is met is returned.
     """
     distance, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
     parts = np.empty(len(points), np.int8)
-    seen = np.full(len(triangles), -1, np.int32)
     centre, inside = np.empty(3, np.int64), np.empty(3)
-    _, ny, nz = shape
-    largest = max(shape[0], max(ny, nz))
+    nx, ny, nz = shape
+    largest = max(nx, max(ny, nz))
     for i in range(len(points)):
         beyond = 0.0  # squared distance from the grid
         for k in range(3):
@@ -49,12 +53,12 @@ def find_nearest(
                     for z in range(centre[2] - reach, centre[2] + reach + 1, step):
                         if not 0 <= z < nz:
                             continue
-                        cell = (x * ny + y) * nz + z
+                        cell = (z * ny + y) * nx + x
                         for place in range(first[cell], first[cell + 1]):
                             t = listed[place]
-                            if seen[t] == i:
+                            if seen[t] >= tick + i:
                                 continue
-                            seen[t] = i
+                            seen[t] = tick + i
                             square, side = closest(
                                 points[i, 0], points[i, 1], points[i, 2],
                                 at, triangles[t, 0], triangles[t, 1], triangles[t, 2],

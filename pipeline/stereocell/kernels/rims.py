@@ -7,16 +7,18 @@ along the curve in which the plane cuts the surface: each side by itself is as s
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.collapse import MAX_NEIGHBOURS, VALENCE, count_common, join, keeps_form
+from stereocell.kernels.collapse import MAX_NEIGHBOURS, VALENCE, keeps_form
 from stereocell.kernels.compiled import kernel, part
-from stereocell.kernels.half_edges import (
-    Ints,
-    count_fans,
-    find_fixed,
-    following,
-    match_twins,
-    preceding,
+from stereocell.kernels.edge_records import (
+    RECORD,
+    TWIN,
+    ahead,
+    behind,
+    count_common,
+    fill_records,
+    join,
 )
+from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_twins
 from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_cosine
 
 STEPS = 4  # in which the error grows up to its bound: flat parts go first
@@ -40,12 +42,12 @@ def _way_to(at: Points, u: int, p: int, n: int) -> float:
 
 
 @part
-def _is_on_curve(h: int, twins: Ints, corner: Ints, sides: NDArray[np.int8]) -> bool:
+def _is_on_curve(h: int, edges: Ints, sides: NDArray[np.int8]) -> bool:
     """Return whether a half-edge that starts in the plane runs along the curve."""
-    g = twins[h]
-    if g < 0 or sides[corner[following(h)]] != 0:
+    g = edges[h + TWIN]
+    if g < 0 or sides[edges[ahead(h)]] != 0:
         return False
-    return sides[corner[preceding(h)]] * sides[corner[preceding(g)]] < 0
+    return sides[edges[behind(h)]] * sides[edges[behind(g)]] < 0
 
 
 @part
@@ -86,23 +88,26 @@ def thin_rim(
     sharpest   cosine of the smallest angle that a triangle may get, unless those around are sharper
     """
     n = len(at)
-    corner = triangles.copy().ravel()
     twins = match_twins(triangles, n)
     leaving, valence = count_fans(triangles, twins, n)
-    stays = find_fixed(locked, corner, twins, valence)
+    stays = find_fixed(locked, triangles.ravel(), twins, valence)
+    edges = np.empty(RECORD * len(triangles), np.int32)
+    fill_records(triangles, twins, leaving, edges)
     for v in range(n):
         stays[v] |= sides[v] != 0
     curves = np.full((n, 2), -1, np.int32)
-    for h in range(len(corner)):
-        u = corner[h]
-        if sides[u] == 0 and _is_on_curve(h, twins, corner, sides):
-            if curves[u, 0] >= 0 and curves[u, 1] >= 0:
-                stays[u] = True  # several curves meet
-            curves[u, 1], curves[u, 0] = curves[u, 0], corner[following(h)]
+    for t in range(len(triangles)):
+        for h in range(RECORD * t, RECORD * t + 3):
+            u = edges[h]
+            if sides[u] == 0 and _is_on_curve(h, edges, sides):
+                if curves[u, 0] >= 0 and curves[u, 1] >= 0:
+                    stays[u] = True  # several curves meet
+                curves[u, 1], curves[u, 0] = curves[u, 0], edges[ahead(h)]
     target = np.arange(n).astype(np.int32)
     touched, turn = np.zeros(n, np.int32), 0
     stamp, tick = np.zeros(n, np.int32), 0
     ring, out = np.empty(MAX_NEIGHBOURS, np.int32), np.empty(MAX_NEIGHBOURS, np.int32)
+    onward = np.empty(MAX_NEIGHBOURS, np.int32)
     for step in range(1, STEPS + 1):
         bound = error * step / STEPS
         for _ in range(PASSES):
@@ -114,21 +119,21 @@ def thin_rim(
                 bx, by, bz = 0.0, 0.0, 0.0
                 first, second = -1, -1  # half-edges along the curve
                 while size < MAX_NEIGHBOURS:
-                    v, last = corner[following(h)], corner[preceding(h)]
-                    ring[size], out[size] = v, h
+                    v, last = edges[ahead(h)], edges[behind(h)]
+                    ring[size], onward[size], out[size] = v, last, h
                     worst = max(worst, smallest_angle_cosine(at, u, v, last))
                     x, y, z = doubled_area(at, u, v, last)
                     bx, by, bz = bx + x, by + y, bz + z
-                    if _is_on_curve(h, twins, corner, sides):
+                    if _is_on_curve(h, edges, sides):
                         curve += 1
                         first, second = h, first
                     size += 1
-                    h = twins[preceding(h)]
+                    h = edges[behind(h) + TWIN]
                     if h == leaving[u]:
                         break
                 if h != leaving[u] or curve != 2:
                     continue
-                p, q = corner[following(first)], corner[following(second)]
+                p, q = edges[ahead(first)], edges[ahead(second)]
                 if _farthest(at, u, p, q, curves, leaving) > bound:
                     continue
                 allowed = max(sharpest, 1 - SHARPER * (1 - worst))
@@ -136,16 +141,14 @@ def thin_rim(
                 for j in range(size):
                     stamp[ring[j]] = tick
                 for h in (first, second):
-                    v = corner[following(h)]
-                    common, others = count_common(h, twins, corner, stamp, tick)
+                    v = edges[ahead(h)]
+                    common, others = count_common(h, edges, stamp, tick)
                     if common != 2 or not 7 <= others + size <= VALENCE:
                         continue
-                    if not keeps_form(
-                        at, corner, u, v, ring, out, size, (bx, by, bz), allowed, planes
-                    ):
+                    if not keeps_form(at, u, v, ring, onward, size, (bx, by, bz), allowed, planes):
                         continue
                     touched[p] = touched[q] = turn
-                    join(h, v, out, size, twins, corner, leaving)
+                    join(h, v, out, size, edges, leaving)
                     leaving[u], target[u] = -1, v
                     done += 1
                     break

@@ -1,5 +1,7 @@
 """Distances between two meshes, measured both ways."""
 
+from copy import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from stereocell.model.mesh import Mesh, Spread
 
 PERCENTILE = 99.0  # percent; a sliver that vanishes, less than 1 % of the area, does not count
 VERTICES = 50_000  # of a mesh, at most, that are asked for the largest distance
+NEVER = np.int32(np.iinfo(np.int32).max)  # more than all points of a mesh's lifetime
 ON_UM = 1e-6  # um; points this close count as on the surface: float32 rounds
 
 
@@ -19,15 +22,30 @@ class Nearest:
     points     float64 (samples, 3), um, spread evenly over the mesh's area
     vertices   float64 (n, 3), um
     triangles  int32 (m, 3)
+    twins      of its half-edges, int32 (3 m,), see `match_twins`; None: found when needed
     """
 
-    def __init__(self, mesh: Mesh, samples: int) -> None:
-        self.points = spread_points(mesh, samples)
-        self.vertices = mesh.positions.astype(np.float64)
+    def __init__(self, mesh: Mesh, samples: int, twins: NDArray[np.int32] | None = None) -> None:
+        self.points = spread_points(mesh.positions.astype(np.float64), mesh.triangles, samples)
+        self.vertices = self._at = mesh.positions.astype(np.float64)
         self.triangles = np.ascontiguousarray(mesh.triangles, np.int32)
-        grid = make_grid(self.vertices, self.triangles)
+        self._twins = twins
+        grid = make_grid(self._at, self.triangles)
         # the triangles' boxes would take a third of a large unit's memory
         self._cells = grid.first, grid.listed, grid.origin, grid.edge, grid.shape
+        self._seen, self._tick = np.full(len(self.triangles), -1, np.int32), 0
+
+    def without(self, gone: NDArray[np.bool_]) -> "Nearest":
+        """Return the same of a part of the mesh, by the same grid.
+
+        gone  bool (n,), the vertices of whole bodies that are left out, not of all
+        """
+        part = copy(self)
+        is_gone = gone[self.triangles[:, 0]]
+        part.points = spread_points(self._at, self.triangles[~is_gone], len(self.points))
+        part.vertices = self._at[~gone]
+        part._seen, part._tick = np.where(is_gone, NEVER, np.int32(-1)), 0
+        return part
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance in um from each of the points, float64 (n,); points (n, 3) in um."""
@@ -40,15 +58,19 @@ class Nearest:
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which points (n, 3) lie inside the mesh, or within ON_UM of it."""
         distance, nearest, parts = self._find(points)
-        twins = match_twins(self.triangles, len(self.vertices))
-        inside = find_sides(points, nearest, parts, self.vertices, self.triangles, twins)
+        if self._twins is None:
+            self._twins = match_twins(self.triangles, len(self._at))
+        inside = find_sides(points, nearest, parts, self._at, self.triangles, self._twins)
         return inside | (distance <= ON_UM)
 
     def _find(
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int8]]:
         at = np.ascontiguousarray(points, np.float64)
-        return find_nearest(at, self.vertices, self.triangles, *self._cells)
+        if self._tick + len(at) >= NEVER:
+            self._seen[self._seen < NEVER], self._tick = -1, 0
+        first, self._tick = self._tick, self._tick + len(at)
+        return find_nearest(at, self._at, self.triangles, *self._cells, self._seen, first)
 
 
 def measure_enclosure(source: Nearest, target: Nearest) -> float:
@@ -77,13 +99,17 @@ def measure_spread(source: Nearest, target: Nearest) -> Spread:
     return Spread(float(sampled.mean()), p95, p99, largest)
 
 
-def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
-    """Return points spread evenly over the mesh's area, float64 (count, 3), um.
+def spread_points(
+    at: NDArray[np.float64], triangles: NDArray[np.integer], count: int
+) -> NDArray[np.float64]:
+    """Return points spread evenly over the triangles' area, float64 (count, 3), um.
+
+    at         float64 (n, 3), um
+    triangles  (m, 3)
 
     The same mesh gives the same points.
     """
-    at = mesh.positions.astype(np.float64)
-    areas = measure_triangles(at, np.ascontiguousarray(mesh.triangles, np.int32))
+    areas = measure_triangles(at, np.ascontiguousarray(triangles, np.int32))
     along = np.cumsum(areas)
     place = np.arange(count)
     chosen = np.searchsorted(along, (place + 0.5) / count * along[-1], side="right")
@@ -91,6 +117,6 @@ def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
     # quasirandom sequences", 2018), folded over the diagonal
     u, v = (0.5 + place * 0.7548776662466927) % 1, (0.5 + place * 0.5698402909980532) % 1
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    corners = mesh.triangles[np.minimum(chosen, len(mesh.triangles) - 1)]
+    corners = triangles[np.minimum(chosen, len(triangles) - 1)]
     a, b, c = at[corners].transpose(1, 0, 2)
     return a + u[:, None] * (b - a) + v[:, None] * (c - a)

@@ -24,7 +24,6 @@ from stereocell.kernels.half_edges import measure_volumes, sum_gains, sum_normal
 from stereocell.meshes.validity import (
     Defects,
     Topology,
-    border,
     find_defects,
     find_topology,
     measure_sizes,
@@ -105,20 +104,21 @@ class FineVolumes:
         vertices: NDArray[np.int64],
         *,
         max_move_um: float,
+        topology: Topology | None = None,
     ) -> Kept:
         """Return a level with the fine bodies' volumes.
 
         vertices     int64 (n,), the number that each vertex has in the fine mesh
         max_move_um  largest distance of a move
+        topology     of the level; None: it is found
         """
         planes = self._planes
-        triangles = np.ascontiguousarray(mesh.triangles, np.int32)
-        topology = find_topology(triangles, len(mesh.positions))
-        label, count = topology.bodies
+        topology = topology or find_topology(mesh.triangles, len(mesh.positions))
+        triangles, (label, count) = topology.corners, topology.bodies
         of_fine = self._label[vertices[np.unique(label, return_index=True)[1]]]
         wanted = self._volume[of_fine]
         start = mesh.positions.astype(np.float64)
-        whole = _fade(mesh, planes, FADE * max_move_um)
+        whole = _fade(mesh, topology, planes, FADE * max_move_um)
         share, size = whole.copy(), np.bincount(label, minlength=count)
         fresh = np.ones(len(triangles), bool)
         moves = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
@@ -187,11 +187,11 @@ class FineVolumes:
         return at - start
 
 
-def _fade(mesh: Mesh, planes: tuple[Plane, ...], reach_um: float) -> Points:
+def _fade(mesh: Mesh, topology: Topology, planes: tuple[Plane, ...], reach_um: float) -> Points:
     """Return the share of the move that each vertex makes (n,): 0 in a cut, 1 far from it."""
     share = np.ones(len(mesh.positions))
     for column, value in planes:
         away = np.abs(mesh.positions[:, column].astype(np.float64) - value)
         share = np.minimum(share, away / reach_um)
-    share[border(mesh.triangles)] = 0.0
+    share[topology.rim] = share[topology.crowded] = 0.0
     return share

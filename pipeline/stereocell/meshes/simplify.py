@@ -41,19 +41,22 @@ def simplify(mesh: Mesh, max_error_um: float, planes: tuple[Plane, ...] = ()) ->
     (32, 16)
     """
     locked = np.zeros(len(mesh.positions), bool)
-    errors = find_errors(mesh, max_error_um)
+    bodies = label_bodies(np.ascontiguousarray(mesh.triangles, np.int32), len(mesh.positions))
+    errors = find_errors(mesh, max_error_um, bodies)
     left = simplify_part(mesh, mesh.triangles, errors, locked=locked, planes=planes)
     return compact(mesh, left)
 
 
-def find_errors(mesh: Mesh, max_error_um: float | NDArray[np.float64]) -> NDArray[np.float64]:
+def find_errors(
+    mesh: Mesh, max_error_um: float | NDArray[np.float64], bodies: tuple[NDArray[np.int32], int]
+) -> NDArray[np.float64]:
     """Return the error that each vertex may have (n,), um: less on bodies that are small for it.
 
     max_error_um  of all, or of each (n,)
+    bodies        of each vertex, and their number: see `label_bodies`
     """
-    triangles = np.ascontiguousarray(mesh.triangles, np.int32)
-    labels, bodies = label_bodies(triangles, len(mesh.positions))
-    sides = measure_boxes(mesh.positions.astype(np.float64), labels, bodies)
+    labels, count = bodies
+    sides = measure_boxes(mesh.positions.astype(np.float64), labels, count)
     own = np.minimum(OF_DIAGONAL * np.linalg.norm(sides, axis=1), OF_SIDE * sides.min(axis=1))
     return np.minimum(max_error_um, own[labels])
 

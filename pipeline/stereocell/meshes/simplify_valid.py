@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from stereocell.kernels.half_edges import measure_sides
-from stereocell.meshes.simplify import compact, find_errors, renumber, simplify_part
-from stereocell.meshes.validity import Defects, find_defects, label_components
+from stereocell.meshes.simplify import find_errors, renumber, simplify_part
+from stereocell.meshes.validity import Defects, Topology, find_defects, find_topology
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
@@ -31,34 +31,42 @@ Triangles = NDArray[np.uint32]
 class Simplified:
     """The result.
 
+    topology          of the mesh
     vertices          int64 (k,), the number that each vertex has in the given mesh
     simplified_again  bodies
     fallbacks         bodies that stayed as they were
     """
 
     mesh: Mesh
+    topology: Topology
     vertices: NDArray[np.int64]
     simplified_again: int
     fallbacks: int
 
 
 def simplify_without_defects(
-    mesh: Mesh, planes: tuple[Plane, ...], *, max_error_um: float | NDArray[np.float64]
+    mesh: Mesh,
+    planes: tuple[Plane, ...],
+    *,
+    max_error_um: float | NDArray[np.float64],
+    topology: Topology | None = None,
 ) -> Simplified:
     """Return the mesh simplified and without defects; its boundary edges stay.
 
     mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)
     planes        the cut planes, where the mesh may be open
     max_error_um  see `simplify`; of all vertices, or of each (n,), alike in a body
+    topology      of the mesh; None: it is found
 
     A mesh that has defects itself keeps the bodies with defects.
     """
-    body = label_components(mesh.triangles, len(mesh.positions))
+    topology = topology or find_topology(mesh.triangles, len(mesh.positions))
+    body = topology.bodies[0]
     tries = np.zeros(len(mesh.positions), np.int64)  # a vertex that was locked once stays
     body_of = body[mesh.triangles[:, 0]]
     tree: cKDTree | None = None
 
-    errors = find_errors(mesh, max_error_um)
+    errors = find_errors(mesh, max_error_um, topology.bodies)
 
     def again(triangles: Triangles) -> Triangles:
         return simplify_part(mesh, triangles, errors, locked=tries > 0, planes=planes)
@@ -70,7 +78,8 @@ def simplify_without_defects(
     for number in count():
         used, own = renumber(triangles, len(mesh.positions))
         draft = Mesh(mesh.positions[used], own, mesh.normals[used])
-        defects = find_defects(draft, planes, fresh)
+        found = find_topology(own, len(used))
+        defects = find_defects(draft, planes, fresh, found)
         worst = set(body[used[defects.vertices(own)]].tolist()) - kept
         if not worst:
             break
@@ -95,8 +104,7 @@ def simplify_without_defects(
         # what was found sound in the draft before, and is there still, need not be looked at again
         fresh = np.asarray(faulty[triangles].any(axis=1))
         fresh[len(rest) :] |= ~_are_among(part, before)
-    used, own = renumber(triangles, len(mesh.positions))
-    return Simplified(compact(mesh, triangles), used, len(redone - kept), len(kept))
+    return Simplified(draft, found, used, len(redone - kept), len(kept))
 
 
 def _some_of(body: NDArray[np.int32], chosen: NDArray[np.int32], every: int) -> NDArray[np.int64]:

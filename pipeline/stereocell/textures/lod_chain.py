@@ -19,7 +19,7 @@ from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.simplify_valid import Simplified, simplify_without_defects
 from stereocell.meshes.small_bodies import SmallBodies
-from stereocell.meshes.validity import find_topology
+from stereocell.meshes.validity import Topology, find_topology
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh, Quality
 from stereocell.model.timing import Clock
@@ -65,12 +65,11 @@ def make_levels(
     texturer: Texturer | None = None
     place = np.zeros(0, np.int64)  # of a fine vertex in the finest level that is made
     with clock("volume kept"):
-        topology = find_topology(fine.triangles, len(fine.positions))
+        topology: Topology | None = find_topology(fine.triangles, len(fine.positions))
         volumes = FineVolumes(fine, planes, box, topology)
         bodies = SmallBodies(fine, topology)
-        del topology  # it takes as much memory as the surface
     with clock("measure"):
-        to_fine = Nearest(fine, lod.samples)
+        to_fine = of_all = Nearest(fine, lod.samples)
     gone = np.zeros(len(fine.positions), bool)
     for level, error in list(enumerate(lod.errors))[first:]:
         length = error * min(spacing_um)
@@ -81,13 +80,15 @@ def make_levels(
                 stay = ~gone[number[mesh.triangles[:, 0]]]
                 used = np.unique(mesh.triangles[stay])
                 mesh, number = compact(mesh, mesh.triangles[stay]), number[used]
-        simplified, kept = _simplify(mesh, number, planes, volumes, length, clock)
-        mesh, number, shown = simplified.mesh, number[simplified.vertices], kept.mesh
+                topology = None
+            topology = topology or find_topology(mesh.triangles, len(mesh.positions))
+        simplified, kept = _simplify(mesh, topology, number, planes, volumes, length, clock)
+        mesh, topology = simplified.mesh, simplified.topology  # the past ones take much memory
+        number, shown = number[simplified.vertices], kept.mesh
         with clock("measure"):
             if gone.any():
-                left = fine.triangles[~gone[fine.triangles[:, 0]]]
-                to_fine = Nearest(compact(fine, left), lod.samples)
-            to_mesh = Nearest(shown, lod.samples)
+                to_fine = of_all.without(gone)
+            to_mesh = Nearest(shown, lod.samples, simplified.topology.twins)
             away, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
             # a coarser level is no more accurate: sampling errors must not break the viewers' order
             distance = max(away.p99, back.p99, lods[-1].distance_um if lods else 0.0)
@@ -114,6 +115,7 @@ def make_levels(
 
 def _simplify(
     mesh: Mesh,
+    topology: Topology,
     number: NDArray[np.int64],
     planes: tuple[Plane, ...],
     volumes: FineVolumes,
@@ -122,22 +124,27 @@ def _simplify(
 ) -> tuple[Simplified, Kept]:
     """Return a level simplified, and the same with its volumes.
 
-    mesh    the level before
-    number  of each of its vertices in the fine mesh
+    mesh      the level before
+    topology  of that
+    number    of each of its vertices in the fine mesh
     """
     errors = np.full(len(mesh.positions), error_um)
     best: tuple[Simplified, Kept] | None = None
     most = np.inf  # triangles
     for finer in (*FINER, None):
         with clock("simplify"):
-            simplified = simplify_without_defects(mesh, planes, max_error_um=errors)
+            simplified = simplify_without_defects(
+                mesh, planes, max_error_um=errors, topology=topology
+            )
         count = len(simplified.mesh.triangles)
         if best is not None and count > most:
             break
         most = min(most, max(MAX_HEAVIER * count, count + MAX_MORE))
         with clock("volume kept"):
             own = number[simplified.vertices]
-            kept = volumes.keep(simplified.mesh, own, max_move_um=error_um)
+            kept = volumes.keep(
+                simplified.mesh, own, max_move_um=error_um, topology=simplified.topology
+            )
         best = simplified, kept
         if finer is None or not kept.lacks.any():
             break

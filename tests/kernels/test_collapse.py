@@ -1,0 +1,82 @@
+"""Collapses block by block: as sound, and as few triangles, as of the whole at once."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell.kernels import collapse as collapses
+from stereocell.kernels.near_order import order_triangles, order_vertices
+from stereocell.meshes.distance import Nearest
+from stereocell.meshes.simplify import STRAY, simplify
+from stereocell.meshes.validity import find_defects
+from stereocell.model.mesh import Mesh
+from support.meshes import ball, joined, moved
+
+ERROR_UM = 0.03
+
+
+@pytest.fixture
+def bodies() -> Mesh:
+    """Two balls of several blocks each, so that there are seams."""
+    mesh = joined(ball(5.0, 120), moved(ball(3.0, 80), (9.0, 0.0, 0.0)))
+    assert len(mesh.positions) > 4 * collapses.BLOCK
+    return mesh
+
+
+def test_blocks_are_as_good_as_the_whole(bodies: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    by_blocks = simplify(bodies, ERROR_UM)
+    monkeypatch.setattr(collapses, "BLOCK", len(bodies.positions))
+    at_once = simplify(bodies, ERROR_UM)
+    assert find_defects(by_blocks).total == 0
+    assert len(by_blocks.triangles) < 1.02 * len(at_once.triangles)
+    fine = bodies.positions.astype(np.float64)
+    far, before = (Nearest(each, 10).distances(fine) for each in (by_blocks, at_once))
+    assert far.mean() < 1.1 * before.mean()
+    assert far.max() < STRAY * ERROR_UM
+
+
+def test_triangles_keep_their_order(bodies: Mesh) -> None:
+    at, triangles = bodies.positions.astype(np.float64), bodies.triangles.astype(np.int32)
+    count = len(at)
+    left = collapses.collapse(
+        at,
+        triangles,
+        np.ones(count, bool),
+        np.zeros(count, np.uint8),
+        np.full(count, ERROR_UM),
+        3.0,
+        0.978,
+    )
+    np.testing.assert_array_equal(left, triangles)
+
+
+def neighbours_apart(triangles: NDArray[np.int32], place: NDArray[np.int64]) -> float:
+    return float(np.abs(place[triangles[:, 0]] - place[triangles[:, 1]]).mean())
+
+
+def test_near_vertices_stand_together() -> None:
+    rng = np.random.default_rng(0)
+    mesh = ball(5.0, 100)
+    count = len(mesh.positions)
+    mixed = rng.permutation(count)
+    number = np.empty(count, np.int64)
+    number[mixed] = np.arange(count)
+    at, triangles = (
+        mesh.positions[mixed].astype(np.float64),
+        number[mesh.triangles].astype(np.int32),
+    )
+    order = order_vertices(at)
+    np.testing.assert_array_equal(np.sort(order), np.arange(count))
+    np.testing.assert_array_equal(order, order_vertices(at))
+    place = np.empty(count, np.int64)
+    place[order] = np.arange(count)
+    assert neighbours_apart(triangles, place) < 0.1 * neighbours_apart(triangles, np.arange(count))
+    turns = order_triangles(triangles, place.astype(np.int32))
+    first = place[triangles[turns]].min(axis=1)
+    assert (np.diff(first) >= 0).all()
+    np.testing.assert_array_equal(np.sort(turns), np.arange(len(triangles)))
+
+
+def test_points_alone_have_an_order() -> None:
+    np.testing.assert_array_equal(order_vertices(np.zeros((3, 3))), [0, 1, 2])
+    assert len(order_vertices(np.zeros((0, 3)))) == 0
