@@ -4,6 +4,7 @@ import { project } from "../support/browser/camera";
 import { difference, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
+import { sweep } from "../support/exhaustive";
 
 /** Of the picture's pixels: the specimen fills a good part of it. */
 const TURNED = 0.02;
@@ -116,10 +117,8 @@ describeInChromium("hands on the picture", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeGreaterThan(TURNED);
   });
 
-  it.each([
-    "off", // no volume is drawn
-    "all",
-  ] as const)(
+  // also where no volume is drawn
+  it.each(sweep(["off", "all"] as const, (mode) => mode === "off"))(
     "measure, and read the channels' values there (%s) in the panel too",
     async (mode) => {
       await stand.viewer.chooseMode(mode);
