@@ -59,7 +59,9 @@ def lods() -> tuple[Lod, ...]:
 def test_level_with_maps_looks_like_the_finest(
     lods: tuple[Lod, ...], level: int, least: float
 ) -> None:
-    """The mean over five views is .95 or more; of a single one it is at lod2 .946 here."""
+    """The mean over five views is .95 or more, of a single one at lod2 .953 here; maps take a fifth
+    or more of what is unlike.
+    """
     coarse = lods[level]
     assert len(coarse.mesh.triangles) < 0.6 * len(lods[0].mesh.triangles)
     found = find_likeness(lods[0], coarse)
@@ -67,7 +69,7 @@ def test_level_with_maps_looks_like_the_finest(
     assert len(found) == len(VIEWS) == 5
     assert np.mean(found) >= 0.95
     assert min(found) >= least
-    assert np.mean(found) > np.mean(bare) + 0.005
+    assert 1 - np.mean(found) < 0.8 * (1 - np.mean(bare))
 
 
 @pytest.mark.parametrize("stain", sweep(range(len(STAINS)), kept=[1]))

@@ -8,7 +8,7 @@ import { prepareStand } from "../support/browser/stand";
 const SWITCH_M = 0.75;
 
 describeInChromium("nearer and farther on the split screen", () => {
-  const stand = prepareStand({ viewport: { width: 320, height: 160 } });
+  const stand = prepareStand({ viewport: { width: 320, height: 160 }, hasRests: true });
 
   it("goes from surfaces to volumes, and back", async () => {
     const { page } = stand.viewer;

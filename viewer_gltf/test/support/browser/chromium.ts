@@ -52,6 +52,8 @@ export type Surroundings = Readonly<{
   hasTouch?: boolean;
   /** Nothing is drawn: where no picture is looked at, software's drawing is most of the time. */
   isBlind?: boolean;
+  /** Between frames as much time passes as the last one took: of stereo, which draws frame after frame. */
+  hasRests?: boolean;
   serviceWorkers?: "allow" | "block";
 }>;
 
@@ -99,6 +101,7 @@ export async function enter(
     pixelRatio = 1,
     hasTouch = false,
     isBlind = false,
+    hasRests = false,
     serviceWorkers = "allow",
   }: Surroundings,
 ): Promise<Browser> {
@@ -125,6 +128,7 @@ export async function enter(
       for (const name of undrawn) Object.assign(prototype, { [name]: () => undefined });
     });
   }
+  if (hasRests) await restBetweenFrames(context);
   return { context, close: () => context.close() };
 }
 
@@ -152,8 +156,12 @@ export async function addHeadset(page: Page, needsFrames = false): Promise<void>
       document.adoptedStyleSheets.push(sheet);
     });
   });
-  if (needsFrames) return;
-  await page.addInitScript(() => {
+  if (!needsFrames) await restBetweenFrames(page);
+}
+
+/** Leave half of the time, or more, to what goes on beside. */
+async function restBetweenFrames(pages: Page | BrowserContext): Promise<void> {
+  await pages.addInitScript(() => {
     const next = window.requestAnimationFrame.bind(window);
     const cancelled = new Set<number>();
     let handles = 0;

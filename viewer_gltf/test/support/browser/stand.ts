@@ -41,6 +41,8 @@ export type StandOptions = Readonly<{
   hasTouch?: boolean;
   /** Nothing is drawn. */
   isBlind?: boolean;
+  /** Between frames as much time passes as the last one took. */
+  hasRests?: boolean;
   /** The page stays open from test to test of the `describe`, none of which disturbs another. */
   sharesPage?: boolean;
   /** Served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
@@ -49,8 +51,8 @@ export type StandOptions = Readonly<{
 
 /** Set up and cleared away around the tests of one `describe`; to be used inside them. */
 export function prepareStand(options: StandOptions): Stand {
-  const { bundle: given, fixture, viewport, pixelRatio, hasTouch, isBlind, mounts } = options;
-  const { sharesPage = false } = options;
+  const { bundle: given, fixture, viewport, pixelRatio, hasTouch, mounts } = options;
+  const { isBlind, hasRests, sharesPage = false } = options;
   let folder: string | undefined;
   let bundle: string;
   let manifest: Manifest;
@@ -68,7 +70,7 @@ export function prepareStand(options: StandOptions): Stand {
     host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });
     // its own requests would be counted with the page's
     browser = await openBrowser({
-      ...{ viewport, pixelRatio, hasTouch, isBlind },
+      ...{ viewport, pixelRatio, hasTouch, isBlind, hasRests },
       serviceWorkers: "block",
     });
     await openPage();
