@@ -67,7 +67,10 @@ def run(step: str, folder: Path, **arguments: Any) -> Any:
     assert process.stdin is not None
     assert process.stdout is not None
     print(json.dumps({"step": step, "arguments": str(file)}), file=process.stdin, flush=True)
-    assert select([process.stdout], [], [], 300)[0], f"{step}: no end after 300 s"
+    if not select([process.stdout], [], [], 300)[0]:
+        process.kill()
+        blender.cache_clear()  # the next step has another one
+        pytest.fail(f"{step}: no end after 300 s")
     code = process.stdout.readline().strip()
     said = Path(f"{result}.txt").read_text()
     assert code == "0", said[-3000:]
