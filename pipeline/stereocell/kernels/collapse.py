@@ -3,13 +3,13 @@
 A collapse costs the quadric error of its target (Garland & Heckbert), a mean squared distance from
 the planes of all triangles that have gone into the vertex, as a share of what its body may have.
 Cheap collapses come first, in a few classes of cost rather than by a queue. A collapse is made only
-where the result is sound by itself (below).
+where the result is sound by itself, as said below.
 
 A mesh is worked on block by block, each of some thousand vertices near one another, and at last as
 a whole, for what became possible at the blocks' seams. What takes the time is waiting for memory:
 passes over the whole mesh, in the order of its planes, take nearly twice as long.
 
-Sound is:
+The result is sound where:
 
 - the two ends have two common neighbours (the link condition): topology stays
 - each triangle turns by less than 60 degrees, or was a sliver and faces as its surroundings do
