@@ -10,6 +10,7 @@ import json
 import os
 import re
 import subprocess
+import tempfile
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -51,8 +52,14 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @cache
 def blender() -> subprocess.Popen[str]:
     """Start Blender, which runs step after step until this process ends."""
+    folder = tempfile.TemporaryDirectory()  # each step leaves one of Blender's own in it
+    atexit.register(folder.cleanup)
     process = subprocess.Popen(
-        [PYTHON, str(SESSION)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [PYTHON, str(SESSION)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TMPDIR": folder.name},
     )
     atexit.register(process.communicate)
     return process
