@@ -56,7 +56,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-bundles test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -222,19 +222,21 @@ else
 SHOWN := half
 endif
 
-# What needs no bundle of a build runs while those are built
+# What needs no bundle of a build runs beside what does, and beside their building
 test-viewer: setup browser
 	$(VITEST) --project unit
-	$(MAKE) --no-print-directory -j2 test-pages test-bundles
+	$(MAKE) --no-print-directory -j2 test-pages test-built
+
+test-pages: setup browser
+	$(VITEST) --project browser
+
+test-built: test-bundles browser
 	out="$$PWD/out" && cd $(VIEWER) && STEREOCELL_TEST_BUNDLE="$$out/$(SHOWN)/bundle" \
 	  STEREOCELL_REAL_BUNDLE="$$out/brain-cells/bundle" \
 	  STEREOCELL_HEAD_BUNDLE="$$out/mri/bundle" \
 	  STEREOCELL_F_BUNDLES="$$out/f/of-f.ome.tif/bundle:$$out/f/of-f.ome.zarr/bundle:$$out/f/of-f.nii.gz/bundle:$$out/f/of-dicom/bundle" \
 	  STEREOCELL_EDIT_BUNDLES="$$out/edit/before:$$out/edit/built/bundle" \
 	  npm exec --silent -- vitest run --project built
-
-test-pages: setup browser
-	$(VITEST) --project browser
 
 test-bundles: setup
 ifdef STEREOCELL_EXHAUSTIVE

@@ -124,7 +124,7 @@ function ofBrowser(name: string, files: { include: string[]; exclude?: string[] 
       testTimeout: 180_000,
       hookTimeout: 180_000,
       expect: { poll: { timeout: 90_000 } }, // its usual second is short for a busy machine
-      // one software-rendering page at a time: of two, a first visit keeps too little in its 40 s
+      // software draws: two pages at a time, one of each project, are enough for two cores
       fileParallelism: false,
       isolate: false,
       sequence: { groupOrder: 1 }, // not beside the unit tests
