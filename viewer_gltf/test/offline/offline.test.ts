@@ -3,7 +3,7 @@ import { cp, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Page } from "playwright-core";
-import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
+import { afterAll, afterEach, beforeAll, beforeEach, expect, inject, it } from "vitest";
 import type { Browser } from "../support/browser/chromium";
 import { Host } from "../support/browser/host";
 import { ViewerPage } from "../support/browser/page";
@@ -11,7 +11,6 @@ import { difference, isBackground, takePicture } from "../support/browser/pictur
 import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
-import { writeFixture } from "../support/fixture/bundle";
 import { sha256, swapSurface } from "../support/fixture/swap";
 import { Gate } from "../support/offline/gate";
 
@@ -45,7 +44,7 @@ describeInChromium("without a network", () => {
 
   beforeAll(async () => {
     root = await mkdtemp(join(tmpdir(), "stereocell-offline-"));
-    await writeFixture(root);
+    await cp(inject("fixture"), root, { recursive: true });
     await cp(DIST, root, { recursive: true }); // the bundle holds its viewer, as on any host
     host = await Host.start({ [FOLDER]: root, "/other/": root });
     gate = await Gate.before(host.address);

@@ -8,7 +8,7 @@ import { describe, expect, it } from "vitest";
 import { SKIP_BRICK } from "../../src/bundle/generated/constants";
 import { prepareBarePage } from "../support/browser/bare_page";
 import { describeInChromium } from "../support/browser/skip";
-import { sweep } from "../support/exhaustive";
+import { IS_EXHAUSTIVE, sweep } from "../support/exhaustive";
 import type { Gathered, Harness, Run } from "../support/pathtrace/harness";
 import { BASE, opacityRamp, SIZE } from "../support/pathtrace/phantom";
 import { askPython, hasPython } from "../support/python";
@@ -311,7 +311,7 @@ describeInChromium("the path tracer", () => {
       }
     });
 
-    it("while it sways slowly, up to a limit", async () => {
+    it.runIf(IS_EXHAUSTIVE)("while it sways slowly, up to a limit", async () => {
       const sway = Array.from({ length: 64 }, (_, i) => [0.1 * Math.min(i, 63 - i), 0, 0]);
       const fresh = await gather(still);
       const swayed = await gather({ ...still, asides: sway });
