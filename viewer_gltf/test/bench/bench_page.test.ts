@@ -5,7 +5,7 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 
 describeInChromium("the benchmark", () => {
-  const stand = prepareStand({ viewport: { width: 240, height: 160 }, pixelRatio: 0.5 });
+  const stand = prepareStand({ viewport: { width: 240, height: 160 } });
 
   it("times each mode and volume size, in stereo and in one picture, and saves what it found", async () => {
     await stand.open("&bench=0.05");

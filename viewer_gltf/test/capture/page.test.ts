@@ -10,7 +10,11 @@ import { prepareStand } from "../support/browser/stand";
 const SHOTS = process.env.STEREOCELL_SHOTS;
 
 describeInChromium("what the page saves", () => {
-  const stand = prepareStand({ viewport: { width: 560, height: 240 }, sharesPage: true });
+  const stand = prepareStand({
+    viewport: { width: 560, height: 240 },
+    pixelRatio: 1,
+    sharesPage: true,
+  });
   const page = () => stand.viewer.page;
   const saved = async (key: string): Promise<Download> => {
     const [download] = await Promise.all([
@@ -137,7 +141,7 @@ describeInChromium("what the page saves", () => {
 });
 
 describeInChromium("a traced picture that the page saves", () => {
-  const stand = prepareStand({ viewport: { width: 120, height: 96 }, pixelRatio: 0.5 });
+  const stand = prepareStand({ viewport: { width: 120, height: 96 } });
   const page = () => stand.viewer.page;
   const said = () => page().locator("[data-said]").textContent();
 

@@ -22,7 +22,7 @@ function viewOf({ bounds_um: { min, max } }: Manifest["specimen"]): View {
 }
 
 describeInChromium("CesiumJS", () => {
-  const options = { viewport: VIEWPORT, mounts: () => ({ "/cesium/": CESIUM }) };
+  const options = { viewport: VIEWPORT, pixelRatio: 1, mounts: () => ({ "/cesium/": CESIUM }) };
 
   describe("with the synthetic bundle", () => {
     const stand = prepareStand(options);

@@ -32,7 +32,11 @@ describe("the policy", () => {
 
 describe.skipIf(!MAPS_BUNDLE)("surfaces with baked maps", () => {
   describeInChromium("under the page's policy", () => {
-    const stand = prepareStand({ bundle: MAPS_BUNDLE, viewport: { width: 480, height: 270 } });
+    const stand = prepareStand({
+      bundle: MAPS_BUNDLE,
+      viewport: { width: 480, height: 270 },
+      pixelRatio: 1,
+    });
 
     it("are drawn, their images transcoded", async () => {
       const told: string[] = [];

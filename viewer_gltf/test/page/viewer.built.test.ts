@@ -51,6 +51,7 @@ describeInChromium("the demo", () => {
 describeInChromium("the viewer", () => {
   const stand = prepareStand({
     viewport: VIEWPORT,
+    pixelRatio: 1,
     mounts: (bundle) => ({
       "/some/folder/": bundle,
       "/some/folder/assets/": join(DIST, "assets"),

@@ -267,7 +267,7 @@ describeInChromium("a cut", () => {
 
 describeInChromium("a cut in stereo", () => {
   const VIEWPORT = { width: 360, height: 180 };
-  const stand = prepareStand({ viewport: VIEWPORT });
+  const stand = prepareStand({ viewport: VIEWPORT, pixelRatio: 1 });
   const page = () => stand.viewer.page;
 
   /** What the left and the right eye see. */

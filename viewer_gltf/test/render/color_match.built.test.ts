@@ -42,7 +42,7 @@ const CASES: readonly Case[] = [
 for (const { name, bundle, channels } of sweep(CASES, ({ name }) => name !== "real cells")) {
   describe.skipIf(!bundle)(name, () => {
     describeInChromium("in the disc", () => {
-      const stand = prepareStand({ bundle, viewport: VIEWPORT });
+      const stand = prepareStand({ bundle, viewport: VIEWPORT, pixelRatio: 1 });
 
       for (const channel of sweep(channels, (each) => each === channels[0])) {
         it(`${channel} has the surface's colour`, async () => {

@@ -54,7 +54,7 @@ describeInChromium("a channel without a surface", () => {
 });
 
 describeInChromium("surface or volume", () => {
-  const stand = prepareStand({ viewport: VIEWPORT });
+  const stand = prepareStand({ viewport: VIEWPORT, pixelRatio: 1 });
 
   async function pictureOf(query: string): Promise<Picture> {
     await stand.open(query);

@@ -47,7 +47,6 @@ describeInChromium("changing tiles", () => {
   const stand = prepareStand({
     bundle: DEMO_BUNDLE,
     viewport: { width: 320, height: 240 },
-    pixelRatio: 0.5,
   });
 
   it("leaks neither GPU objects nor memory", async () => {

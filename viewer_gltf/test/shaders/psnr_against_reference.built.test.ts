@@ -11,7 +11,7 @@ import { framingDistance, place } from "../../src/render/placement";
 import { withoutMarks } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand, type Stand } from "../support/browser/stand";
-import { sweep } from "../support/exhaustive";
+import { IS_EXHAUSTIVE } from "../support/exhaustive";
 import { askPython, hasPython } from "../support/python";
 
 const REAL = process.env.STEREOCELL_REAL_BUNDLE;
@@ -46,20 +46,24 @@ async function hold(stand: Stand, channels: readonly string[]) {
 
 describe.skipIf(!hasPython)("against the float64 reference", () => {
   describeInChromium("the picture of the fixture", () => {
-    const stand = prepareStand({ viewport: VIEWPORT });
+    const stand = prepareStand({ viewport: VIEWPORT, pixelRatio: 1 });
     const all = ["F_x20_body", "Balls", "Block"];
-    for (const channels of sweep([["Balls"], ["Block"], all], (each) => each === all)) {
-      it(`is as near as 40 dB: ${channels.join(", ")}`, async () => {
-        const { psnr, drawn } = await hold(stand, channels);
-        expect(drawn).toBeGreaterThan(280);
-        expect(psnr).toBeGreaterThan(MIN_DB);
-      });
+    for (const channels of [["Balls"], ["Block"], all]) {
+      // once, of real data where there are any
+      it.runIf(IS_EXHAUSTIVE || (REAL === undefined && channels === all))(
+        `is as near as 40 dB: ${channels.join(", ")}`,
+        async () => {
+          const { psnr, drawn } = await hold(stand, channels);
+          expect(drawn).toBeGreaterThan(280);
+          expect(psnr).toBeGreaterThan(MIN_DB);
+        },
+      );
     }
   });
 
   describe.skipIf(REAL === undefined)("of a real stack", () => {
     describeInChromium("the picture", () => {
-      const stand = prepareStand({ bundle: REAL, viewport: VIEWPORT });
+      const stand = prepareStand({ bundle: REAL, viewport: VIEWPORT, pixelRatio: 1 });
       it("is as near as 40 dB", async () => {
         const { psnr, drawn } = await hold(stand, [stand.manifest.channels[0].id]);
         expect(drawn).toBeGreaterThan(280);

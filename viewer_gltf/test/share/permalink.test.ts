@@ -13,7 +13,7 @@ const SAME = 0.002;
 const SAME_IN_HEADSET = 0.008;
 
 describeInChromium("the share link", () => {
-  const stand = prepareStand({ viewport: { width: 480, height: 270 }, pixelRatio: 0.5 });
+  const stand = prepareStand({ viewport: { width: 480, height: 270 } });
   const page = () => stand.viewer.page;
   const hash = () => page().evaluate(() => location.hash);
   const said = () => page().locator("[data-said]").textContent();

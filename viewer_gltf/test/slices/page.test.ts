@@ -11,7 +11,6 @@ const SHOTS = process.env.STEREOCELL_SHOTS;
 describeInChromium("slices", () => {
   const stand = prepareStand({
     viewport: { width: 720, height: 420 },
-    pixelRatio: 0.5,
     sharesPage: true,
   });
   const page = () => stand.viewer.page;
@@ -180,7 +179,7 @@ describeInChromium("planes in the specimen", () => {
 });
 
 describeInChromium("planes whose voxels are on their way", () => {
-  const stand = prepareStand({ viewport: { width: 480, height: 320 }, pixelRatio: 0.5 });
+  const stand = prepareStand({ viewport: { width: 480, height: 320 } });
 
   it("hide nothing until there is something to see", async () => {
     const { page } = stand.viewer;
@@ -207,7 +206,7 @@ describeInChromium("planes whose voxels are on their way", () => {
 });
 
 describeInChromium("slices whose code does not come", () => {
-  const stand = prepareStand({ viewport: { width: 480, height: 320 }, pixelRatio: 0.5 });
+  const stand = prepareStand({ viewport: { width: 480, height: 320 } });
 
   it("are asked for again, after a notice", async () => {
     const { page } = stand.viewer;
@@ -228,7 +227,7 @@ describeInChromium("slices whose code does not come", () => {
 });
 
 describeInChromium("slices of a CT", () => {
-  const stand = prepareStand({ viewport: { width: 640, height: 420 }, pixelRatio: 0.5 });
+  const stand = prepareStand({ viewport: { width: 640, height: 420 } });
 
   it("have the patient's sides, and values and windows in Hounsfield units", async () => {
     const { manifest, host, viewer } = stand;

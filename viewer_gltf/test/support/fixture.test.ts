@@ -14,7 +14,7 @@ import { expectLetter } from "./letter";
 const F = "F_x20_body";
 
 describeInChromium("the picture of the fixture", () => {
-  const stand = prepareStand({ viewport: { width: 480, height: 272 } });
+  const stand = prepareStand({ viewport: { width: 480, height: 272 }, pixelRatio: 1 });
 
   beforeEach(async () => {
     await stand.open();

@@ -78,7 +78,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
       await cp(DIST, bundle, { recursive: true });
       server = await serve(out);
       host = await Host.start({ "/": bundle });
-      browser = await openBrowser({ viewport: VIEWPORT, serviceWorkers: "block" });
+      browser = await openBrowser({ viewport: VIEWPORT, pixelRatio: 1, serviceWorkers: "block" });
     });
     afterAll(async () => {
       await browser?.close();

@@ -8,7 +8,7 @@ const SIZE = { width: 640, height: 300 };
 type Finger = Readonly<{ x: number; y: number; id: number }>;
 
 describeInChromium("a Cardboard's phone with a notch", () => {
-  const stand = prepareStand({ viewport: SIZE, pixelRatio: 0.5, hasTouch: true, hasRests: true });
+  const stand = prepareStand({ viewport: SIZE, hasTouch: true, hasRests: true });
 
   it("shows both eyes as much, about the middle of the screen", async () => {
     await stand.open("&mode=off");
@@ -24,7 +24,7 @@ describeInChromium("a Cardboard's phone with a notch", () => {
 });
 
 describeInChromium("fingers in a Cardboard", () => {
-  const stand = prepareStand({ viewport: SIZE, pixelRatio: 0.5, hasTouch: true, hasRests: true });
+  const stand = prepareStand({ viewport: SIZE, hasTouch: true, hasRests: true });
 
   it("turn, bring nearer and choose, and choose nothing on the way", async () => {
     await stand.open("&mode=off");

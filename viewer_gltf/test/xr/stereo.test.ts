@@ -143,7 +143,7 @@ describeInChromium("hands in stereo", () => {
 });
 
 describeInChromium("the gaze in stereo", () => {
-  const hands = prepareHands();
+  const hands = prepareHands(undefined, 1);
 
   it("chooses at 1.5 s and not at 1.4, once, and its ring fills", async () => {
     await hands().gazeOnly();

@@ -47,12 +47,12 @@ export type Browser = Readonly<{ context: BrowserContext; close: () => Promise<v
 /** What a page finds: CSS pixels, small ones, since software draws them; and what a device has. */
 export type Surroundings = Readonly<{
   viewport: { width: number; height: number };
-  /** Of the device to one of CSS. */
+  /** Of the device to one of CSS: half of one, but where a picture's detail is looked at. */
   pixelRatio?: number;
   hasTouch?: boolean;
   /** Nothing is drawn: where no picture is looked at, software's drawing is most of the time. */
   isBlind?: boolean;
-  /** Between frames as much time passes as the last one took: of stereo, which draws frame after frame. */
+  /** Between frames thrice the time passes that the last one took: of stereo, which draws frame after frame. */
   hasRests?: boolean;
   serviceWorkers?: "allow" | "block";
 }>;
@@ -98,7 +98,7 @@ export async function enter(
   browser: Process,
   {
     viewport,
-    pixelRatio = 1,
+    pixelRatio = 0.5,
     hasTouch = false,
     isBlind = false,
     hasRests = false,
@@ -135,7 +135,7 @@ export async function enter(
 /**
  * Give the page an emulated headset (iwer, `window.headset`), before its own scripts run.
  *
- * It draws frame after frame; unless a test needs many, half of the time is left to what goes on
+ * It draws frame after frame; unless a test needs many, most of the time is left to what goes on
  * beside.
  */
 export async function addHeadset(page: Page, needsFrames = false): Promise<void> {
@@ -159,9 +159,12 @@ export async function addHeadset(page: Page, needsFrames = false): Promise<void>
   if (!needsFrames) await restBetweenFrames(page);
 }
 
-/** Leave half of the time, or more, to what goes on beside. */
+/** Time between frames, to that of a frame. */
+const REST = 3;
+
+/** Leave most of the time to what goes on beside. */
 async function restBetweenFrames(pages: Page | BrowserContext): Promise<void> {
-  await pages.addInitScript(() => {
+  await pages.addInitScript((rest) => {
     const next = window.requestAnimationFrame.bind(window);
     const cancelled = new Set<number>();
     let handles = 0;
@@ -170,10 +173,10 @@ async function restBetweenFrames(pages: Page | BrowserContext): Promise<void> {
       const start = performance.now();
       next(() => {
         const took_ms = performance.now() - start; // of the frame that was drawn before
-        setTimeout(() => next((time) => cancelled.delete(handle) || draw(time)), took_ms);
+        setTimeout(() => next((time) => cancelled.delete(handle) || draw(time)), rest * took_ms);
       });
       return handle;
     };
     window.cancelAnimationFrame = (handle) => cancelled.add(handle);
-  });
+  }, REST);
 }

@@ -36,12 +36,12 @@ export type StandOptions = Readonly<{
   fixture?: FixtureOptions;
   /** CSS pixels; small ones, since software draws them. */
   viewport: { width: number; height: number };
-  /** Of the device to one of CSS; less where no picture is looked at. */
+  /** Of the device to one of CSS: half of one, but where a picture's detail is looked at. */
   pixelRatio?: number;
   hasTouch?: boolean;
   /** Nothing is drawn. */
   isBlind?: boolean;
-  /** Between frames as much time passes as the last one took. */
+  /** Between frames thrice the time passes that the last one took. */
   hasRests?: boolean;
   /** The page stays open from test to test of the `describe`, none of which disturbs another. */
   sharesPage?: boolean;

@@ -58,14 +58,17 @@ export class HandsStand {
   }
 }
 
-export function prepareHands(viewport = { width: 640, height: 320 }): () => HandsStand {
+export function prepareHands(
+  viewport = { width: 640, height: 320 },
+  pixelRatio?: number,
+): () => HandsStand {
   let browser: Browser;
   let script: string;
   let stand: HandsStand;
 
   beforeAll(async () => {
     script = await bundled(new URL("./harness.ts", import.meta.url));
-    browser = await openBrowser({ viewport });
+    browser = await openBrowser({ viewport, pixelRatio });
     const page = await browser.context.newPage();
     await page.route(ADDRESS, (route) => route.fulfill({ body: PAGE, contentType: "text/html" }));
     stand = new HandsStand(page);
