@@ -25,6 +25,7 @@ from support import phantoms
 from support.dicom_reading import interpolation_bound
 from support.dicom_series import (
     BRIGHTEST,
+    FEW_ORIENTATIONS,
     ORIENTATIONS,
     grid,
     oriented,
@@ -34,6 +35,7 @@ from support.dicom_series import (
     turn,
     write_series,
 )
+from support.exhaustive import sweep
 from support.nifti_files import write
 
 SHAPE = (22, 24, 26)
@@ -140,7 +142,7 @@ def test_a_real_ct_of_28_uneven_tilted_slices_gives_28_pictures(tmp_path: Path) 
         assert np.abs(picture - expected)[inside].max() <= 0.5 + 1e-3
 
 
-@pytest.mark.parametrize(("order", "signs"), ORIENTATIONS)
+@pytest.mark.parametrize(("order", "signs"), sweep(ORIENTATIONS, kept=FEW_ORIENTATIONS))
 @pytest.mark.parametrize("kind", ["dicom", "nifti"])
 def test_every_plane_of_every_orientation_is_the_right_way_up(
     tmp_path: Path, kind: str, order: tuple[int, ...], signs: tuple[int, ...]
