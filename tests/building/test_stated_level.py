@@ -19,6 +19,7 @@ from stereocell.report.facts import gather
 from stereocell.report.remarks import find_remarks
 from support import phantoms
 from support.exhaustive import sweep
+from support.validators import make_assets
 
 SPACING = (2.0, 1.0, 1.0)
 SHAPE = (20, 64, 96)
@@ -69,9 +70,10 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def out(source: Path) -> Path:
     settings = source.parent / "settings.toml"
     settings.write_text(SETTINGS)
-    flags = ["-o", str(source.parent / "out"), "--grid", "2x1", "--workers", "0"]
-    assert main(["build", str(source), *flags, "--config", str(settings)]) == 0
-    return source.parent / "out"
+    out = source.parent / "out"
+    told = ("--config", str(settings))
+    assert make_assets(source, out, "2x1", "--workers", "0", plan=told) == 0
+    return out
 
 
 def _stated(out: Path, channel: str) -> dict[str, Any]:
