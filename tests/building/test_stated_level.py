@@ -184,6 +184,7 @@ def test_a_value_above_the_background_is_that_of_the_build(
     assert found == ours  # the same keys: the very same surfaces
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("given", "side"), sweep([("5000", "below"), ("-3", "above")], kept=[("5000", "below")])
 )
@@ -227,6 +228,7 @@ def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
     assert volume == pytest.approx(4 / 3 * np.pi * 17.0**3, rel=0.03)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -255,6 +257,7 @@ def test_a_level_above_no_background_is_said_to_count_from_0(
     assert told in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
     flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
     surfaces = ["--surfaces", "even=outer,800"]
@@ -359,6 +362,7 @@ def test_a_window_given_twice_is_refused(
     assert "--window names channel 'even' twice, expected once" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_tiles_of_their_own_level_state_it_as_a_field(source: Path, tmp_path: Path) -> None:
     copy = tmp_path / "it's a copy.ome.zarr"
     shutil.copytree(source, copy)

@@ -108,12 +108,12 @@ def asset_digests(out: Path) -> dict[str, str]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("workers", sweep(["1", "2"], kept=["2"]))
 def test_number_of_workers_does_not_change_the_bytes(
-    built: Path, tmp_path: Path, workers: str, monkeypatch: pytest.MonkeyPatch
+    built: Path, tmp_path: Path, workers: str
 ) -> None:
     # one command, whose phases have the same workers: to start them takes longest
-    monkeypatch.setattr("stereocell.report.phase.run_report", lambda out: None)
     told = ["-o", str(tmp_path / "out"), "--grid", "2x1", "--workers", workers]
     assert main(["build", str(_source(tmp_path)), *told]) == 0
     assert asset_digests(tmp_path / "out") == asset_digests(built)
@@ -243,6 +243,7 @@ def test_all_zero_volume_builds_without_a_surface(tmp_path: Path) -> None:
     assert manifest["channels"][0]["tileset"] is None
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_nan_outside_the_field_of_view_is_built_as_the_darkest(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -313,6 +314,7 @@ def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[st
         assert f"example: stereocell {name}" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_fewer_channels_leave_no_stale_file_in_the_stage(built: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(built, out)
