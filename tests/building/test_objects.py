@@ -35,7 +35,7 @@ from support.digests import digests_of
 from support.exhaustive import sweep
 from support.phantoms import write_ome_tiff
 
-SHAPE = (24, 72, 96)
+SHAPE = (24, 48, 96)
 PHASES = ("plan", "units", "stage", "bundle")
 
 
