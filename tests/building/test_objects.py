@@ -636,7 +636,13 @@ def test_the_deep_check_measures_the_surfaces_anew(
     assert "column area_um2 is not that of the surface of 3" in said(capsys)
 
 
-@pytest.mark.parametrize("fault", ["none", "a wall too many", "a wall that is missing", "smaller"])
+@pytest.mark.parametrize(
+    "fault",
+    sweep(
+        ["none", "a wall too many", "a wall that is missing", "smaller"],
+        kept=["a wall too many", "a wall that is missing", "smaller"],
+    ),
+)
 @pytest.mark.parametrize("grid", sweep(["1x1", "2x1"], kept=["2x1"]))
 def test_the_deep_check_finds_shared_walls_anew(
     tmp_path: Path,
