@@ -59,7 +59,7 @@ PARSED = {
 }
 # ... and run, but on less
 SMALLER = {
-    "sample cycif my.ome.zarr": "sample cycif tissue.ome.zarr --grid 1x1 --tile-size 8,96,96",
+    "sample cycif my.ome.zarr": "sample cycif tissue.ome.zarr --grid 1x1 --tile-size 8,64,64",
     "--grid 5x2": "--grid 2x1",
 }
 
