@@ -235,6 +235,7 @@ def test_targets_exist() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")
 def test_python_runs(sources: Path) -> None:
     texts = blocks(DOCS / "python.md", "python")
     assert len(texts) == 3
