@@ -1,6 +1,7 @@
 """PNG slices of a series, with what they show."""
 
 import json
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -105,8 +106,13 @@ def test_uneven_images_of_a_tilted_gantry_are_shown_as_they_are_stored(
     assert across["shape"][0] > 30  # of the grid, onto which the tilted slices are moved
 
 
-@pytest.mark.parametrize("plane", ["axial", "coronal", "sagittal"])
-@pytest.mark.parametrize("flag", [(), ("--neurological",)])
+@pytest.mark.parametrize(
+    ("flag", "plane"),
+    sweep(
+        product([(), ("--neurological",)], ["axial", "coronal", "sagittal"]),
+        kept=[((), "axial"), ((), "coronal"), ((), "sagittal"), (("--neurological",), "axial")],
+    ),
+)
 def test_images_of_a_tilted_gantry_lie_where_the_json_says(
     tmp_path: Path, plane: str, flag: tuple[str, ...]
 ) -> None:
