@@ -52,6 +52,12 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 @pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Builds draw no report: where no test opens it, it is most of what a small one takes."""
+    monkeypatch.setattr("stereocell.report.phase.run_report", lambda out: None)
+
+
+@pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     """An empty file system of 400 kB; it takes root."""
     disk = tmp_path / "disk"

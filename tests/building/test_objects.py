@@ -35,7 +35,7 @@ from support.digests import digests_of
 from support.exhaustive import sweep
 from support.phantoms import write_ome_tiff
 
-SHAPE = (24, 72, 96)
+SHAPE = (24, 48, 96)
 PHASES = ("plan", "units", "stage", "bundle")
 
 
@@ -482,7 +482,7 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     assert 1 in found
 
 
-@pytest.mark.parametrize("omit_empty", [False, True])
+@pytest.mark.parametrize("omit_empty", sweep([False, True], kept=[True]))
 def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> None:
     """Two organs by DICOM's own numbers, the first planes of them left out or not."""
     voxels = np.zeros((12, 16, 14, 2), np.uint8)
@@ -540,7 +540,7 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     assert wanted in said(capsys)
 
 
-@pytest.mark.parametrize("grid", ["1x1", "2x1"])
+@pytest.mark.parametrize("grid", sweep(["1x1", "2x1"], kept=["2x1"]))
 def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: str) -> None:
     """Of three boxes in a row, the last in two tiles: 10 x 16 voxels of .5 x .2 um, 10 x 8."""
     labels = np.zeros((16, 24, 80), np.uint16)
@@ -636,7 +636,13 @@ def test_the_deep_check_measures_the_surfaces_anew(
     assert "column area_um2 is not that of the surface of 3" in said(capsys)
 
 
-@pytest.mark.parametrize("fault", ["none", "a wall too many", "a wall that is missing", "smaller"])
+@pytest.mark.parametrize(
+    "fault",
+    sweep(
+        ["none", "a wall too many", "a wall that is missing", "smaller"],
+        kept=["a wall too many", "a wall that is missing", "smaller"],
+    ),
+)
 @pytest.mark.parametrize("grid", sweep(["1x1", "2x1"], kept=["2x1"]))
 def test_the_deep_check_finds_shared_walls_anew(
     tmp_path: Path,

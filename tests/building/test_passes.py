@@ -20,6 +20,7 @@ from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.volume import zyx_to_xyz
 from support import phantoms
+from support.exhaustive import sweep
 from support.meshes import enclosed_volume
 
 SPACING = (1.0, 1.0, 1.0)
@@ -134,16 +135,22 @@ def _center_of(mesh: Mesh) -> NDArray[np.float64]:
     return center
 
 
+FINE, COARSE = (["--level", level] for level in "01")
+FINE_PART = ([*FINE, "--region", "7:44,5:46,3:42"], (7, 5, 3, 44, 46, 42))
+COARSE_PART = ([*COARSE, "--region", "2:18,3:19,1:17"], (2, 3, 1, 18, 19, 17))
+
+
 @pytest.mark.parametrize(
-    ("flags", "region"),
-    [
-        (["--level", "0"], (0, 0, 0, 48, 48, 48)),
-        (["--level", "0", "--region", "7:44,5:46,3:42"], (7, 5, 3, 44, 46, 42)),
-        (["--level", "1"], None),
-        (["--level", "1", "--region", "2:18,3:19,1:17"], (2, 3, 1, 18, 19, 17)),
-    ],
+    ("flags", "region", "stated"),
+    sweep(
+        [
+            (*place, stated)
+            for place in ((FINE, (0, 0, 0, 48, 48, 48)), FINE_PART, (COARSE, None), COARSE_PART)
+            for stated in (False, True)
+        ],
+        kept=[(*FINE_PART, False), (COARSE, None, False), (*COARSE_PART, True)],
+    ),
 )
-@pytest.mark.parametrize("stated", [False, True])
 def test_a_body_lies_at_its_place_at_any_level_and_in_any_region(
     tmp_path: Path, flags: list[str], region: tuple[int, ...] | None, stated: bool
 ) -> None:

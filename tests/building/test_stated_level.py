@@ -19,6 +19,7 @@ from stereocell.report.facts import gather
 from stereocell.report.remarks import find_remarks
 from support import phantoms
 from support.exhaustive import sweep
+from support.validators import make_assets
 
 SPACING = (2.0, 1.0, 1.0)
 SHAPE = (20, 64, 96)
@@ -69,9 +70,10 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def out(source: Path) -> Path:
     settings = source.parent / "settings.toml"
     settings.write_text(SETTINGS)
-    flags = ["-o", str(source.parent / "out"), "--grid", "2x1", "--workers", "0"]
-    assert main(["build", str(source), *flags, "--config", str(settings)]) == 0
-    return source.parent / "out"
+    out = source.parent / "out"
+    told = ("--config", str(settings))
+    assert make_assets(source, out, "2x1", "--workers", "0", plan=told) == 0
+    return out
 
 
 def _stated(out: Path, channel: str) -> dict[str, Any]:
@@ -182,6 +184,7 @@ def test_a_value_above_the_background_is_that_of_the_build(
     assert found == ours  # the same keys: the very same surfaces
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("given", "side"), sweep([("5000", "below"), ("-3", "above")], kept=[("5000", "below")])
 )
@@ -225,6 +228,7 @@ def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
     assert volume == pytest.approx(4 / 3 * np.pi * 17.0**3, rel=0.03)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -253,6 +257,7 @@ def test_a_level_above_no_background_is_said_to_count_from_0(
     assert told in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
     flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
     surfaces = ["--surfaces", "even=outer,800"]
@@ -357,6 +362,7 @@ def test_a_window_given_twice_is_refused(
     assert "--window names channel 'even' twice, expected once" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_tiles_of_their_own_level_state_it_as_a_field(source: Path, tmp_path: Path) -> None:
     copy = tmp_path / "it's a copy.ome.zarr"
     shutil.copytree(source, copy)

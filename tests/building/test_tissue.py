@@ -2,13 +2,17 @@
 
 import json
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
 import pytest
 import zarr
+from numpy.typing import NDArray
 
+from stereocell.building import tissue as tissue_channels
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan_file import from_json, to_json
 from stereocell.cli.__main__ import main
@@ -16,6 +20,7 @@ from stereocell.samples.head import make_head
 from stereocell.samples.head_dicom import PATIENT, write_dicom
 from stereocell.storage.assets import find_asset
 from stereocell.storage.json_files import read_json
+from stereocell.tissue.classify import TissueOptions
 from stereocell.verify.formats import check
 from support.bundles import channel, load
 from support.onnx_models import write_model
@@ -30,6 +35,23 @@ errors = [1.0]
 [unwrap]
 max_texture = 64
 """
+
+
+@pytest.fixture(scope="module", autouse=True)
+def learned_once() -> Iterator[None]:
+    """What is learned of the same voxels is the same, and takes seconds: tissue/test_classify.py"""
+    found: dict[tuple[bytes, str], Any] = {}
+    learn = tissue_channels.learn_tissue
+
+    def learn_once(voxels: NDArray[Any], spacing_um: Any, options: TissueOptions) -> Any:
+        given = (np.ascontiguousarray(voxels).tobytes(), f"{voxels.dtype} {spacing_um} {options}")
+        if given not in found:
+            found[given] = learn(voxels, spacing_um, options)
+        return found[given]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tissue_channels, "learn_tissue", learn_once)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +169,9 @@ def test_a_build_gains_the_classes_and_keeps_what_was_built(planned: Path, tmp_p
     (tmp_path / "quick.toml").write_text(QUICK)
     out, source = tmp_path / "out", planned.parent / "head"
     given = ["--preset", "mri", "--config", str(tmp_path / "quick.toml"), "--workers", "0"]
-    assert main(["build", str(source), "-o", str(out), *given]) == 0
+    assert main(["plan", str(source), "-o", str(out), *given[:-2]]) == 0
+    for phase in ("units", "stage", "bundle"):  # the report is drawn by the command, below
+        assert main([phase, str(out), "--workers", "0"]) == 0
 
     def built() -> dict[str, int]:
         files = (out / "units" / "r0_c0" / "MR").rglob("*")

@@ -30,6 +30,7 @@ from stereocell.storage.claim import LOCK
 from stereocell.tissue.classify import TissueOptions
 from stereocell.verify import formats as check_module
 from support import phantoms
+from support.exhaustive import sweep
 from support.onnx_models import write_model
 
 pytestmark = pytest.mark.slow
@@ -314,14 +315,17 @@ def flip(file: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "damage"),
-    [
-        (CHUNK, cut),
-        (CHUNK, flip),
-        (CHUNK, Path.unlink),
-        ("tissue/classes.ome.zarr/0/zarr.json", flip),
-        ("tissue/tissue.json", cut),
-        ("tissue/tissue.json", Path.unlink),
-    ],
+    sweep(
+        [
+            (CHUNK, cut),
+            (CHUNK, flip),
+            (CHUNK, Path.unlink),
+            ("tissue/classes.ome.zarr/0/zarr.json", flip),
+            ("tissue/tissue.json", cut),
+            ("tissue/tissue.json", Path.unlink),
+        ],
+        kept=[(CHUNK, flip), (CHUNK, Path.unlink), ("tissue/tissue.json", cut)],
+    ),
 )
 def test_damaged_file_is_named_and_made_again(
     undisturbed: Path,

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
 from stereocell.bundle.write import write_bundle
-from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from support.bundles import files
 from support.phantoms import f_phantom, write_ome_tiff
+from support.validators import make_assets
 
 SPACING_UM = (0.5, 0.25, 0.25)
 WINDOW = (-310, -290)  # within a step and a half of those that were built
@@ -32,8 +32,8 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def build(source: Path, out: Path, *flags: str) -> Path:
-    command = ["build", str(source), "--out", str(out), "--grid", "2x1", "--workers", "0"]
-    assert main([*command, "--iso-value", "F=150", "--preset", "none", *flags]) == 0
+    told = ("--iso-value", "F=150", "--preset", "none", *flags)
+    assert make_assets(source, out, "2x1", "--workers", "0", plan=told) == 0
     return out
 
 

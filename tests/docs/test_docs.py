@@ -59,7 +59,7 @@ PARSED = {
 }
 # ... and run, but on less
 SMALLER = {
-    "sample cycif my.ome.zarr": "sample cycif tissue.ome.zarr --grid 1x1 --tile-size 8,96,96",
+    "sample cycif my.ome.zarr": "sample cycif tissue.ome.zarr --grid 1x1 --tile-size 8,64,64",
     "--grid 5x2": "--grid 2x1",
 }
 
@@ -235,6 +235,7 @@ def test_targets_exist() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")
 def test_python_runs(sources: Path) -> None:
     texts = blocks(DOCS / "python.md", "python")
     assert len(texts) == 3

@@ -19,6 +19,7 @@ from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.claim import LOCK
 from stereocell.storage.lock import alone_in
 from support import ctrl_c, phantoms
+from support.exhaustive import examples
 from support.object_store import ObjectStore, serving
 from support.server.timeouts import PATIENCE_S
 from support.validators import make_assets
@@ -33,7 +34,7 @@ PATHS = os.pathsep.join([str(ROOT), str(ROOT / "tests"), str(ROOT / "pipeline")]
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """The scheduler file of two workers, which stand in another folder, and an object store."""
+    """The scheduler file of workers, which stand in another folder, and an object store."""
     folder = tmp_path_factory.mktemp("cluster")
     (folder / "objects").mkdir()
     file = folder / "scheduler.json"
@@ -44,7 +45,8 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         told = ["--scheduler-file", str(file), "--no-dashboard"]
         processes = [_start("scheduler", "--port", "0", *told, cwd=folder)]
         try:
-            processes += [_start("worker", "--nthreads", "1", *told, cwd=folder) for _ in range(2)]
+            lone = ("worker", "--nthreads", "1", "--no-nanny")  # a nanny is a process of its own
+            processes += [_start(*lone, *told, cwd=folder) for _ in range(examples(2, 1))]
             end = time.monotonic() + 60
             while not file.exists() and time.monotonic() < end:
                 time.sleep(0.05)

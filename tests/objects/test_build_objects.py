@@ -37,7 +37,7 @@ def one_object(mesh: Mesh, number: int) -> Mesh:
 @pytest.fixture(scope="module")
 def halves() -> tuple[np.ndarray, np.ndarray, list[list[int]], list[BuiltObjects]]:
     """Cells in two tiles, each with a window of its own: its cells' box and what changes them."""
-    labels, centres = touching_cells((36, 72, 160), SPACING_UM)
+    labels, centres = touching_cells((36, 56, 160), SPACING_UM)
     left = centres[:, 2] < 40
     owned = [np.flatnonzero(part) + 1 for part in (left, ~left)]
     built = []

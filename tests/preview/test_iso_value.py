@@ -34,10 +34,17 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return phantoms.write_ome_zarr(path, [channels], "czyx", scales=scales)
 
 
+@pytest.fixture
+def small_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nobody looks at the picture: one of full size takes a second."""
+    monkeypatch.setattr(iso_value, "_LONGEST_PX", 90)
+
+
 def _iso(source: Path, *flags: str) -> int:
     return main(["iso", str(source), "--tile-size", "24,32,32", *flags])
 
 
+@pytest.mark.usefixtures("small_picture")
 def test_the_table_names_the_levels_with_shares_and_what_takes_them(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -61,6 +68,7 @@ def test_the_table_names_the_levels_with_shares_and_what_takes_them(
     assert set(flags) <= {"--surfaces", "--iso-value"}
 
 
+@pytest.mark.usefixtures("small_picture")
 @pytest.mark.parametrize(
     "flags",
     sweep(
@@ -79,11 +87,9 @@ def test_a_setting_of_the_table_takes_its_level(
     source: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
     flags: str,
 ) -> None:
     """Beside the settings that were given, but for the one that it is instead of."""
-    monkeypatch.setattr(iso_value, "_LONGEST_PX", 90)  # nobody looks at the picture
     given = flags.split()
     where = ("--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / "ball.png"))
     assert _iso(source, *where, *given) == 0
@@ -102,6 +108,7 @@ def test_a_setting_of_the_table_takes_its_level(
         assert found.endswith("+b") == any(word.endswith("+b") for word in row.split()[:4]), row
 
 
+@pytest.mark.usefixtures("small_picture")
 def test_a_setting_leaves_the_channel_s_other_surfaces_as_they_are(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -158,6 +165,7 @@ def test_contours_in_the_slices_lie_where_the_ball_has_their_levels(
         assert len(np.unique(sectors)) == 36, name
 
 
+@pytest.mark.usefixtures("small_picture")
 def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
     source: Path, tmp_path: Path
 ) -> None:
@@ -179,6 +187,7 @@ def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
     assert table(result)[-1] == "* a build takes it; given, and judged on all tiles"
 
 
+@pytest.mark.usefixtures("small_picture")
 def test_a_level_for_each_tile_is_the_build_s(tmp_path: Path) -> None:
     balls = [
         height * phantoms.blurred_ball((24, 32, 64), SPACING, (12.0, 16.0, x), 8.0, 1.0)
@@ -215,6 +224,7 @@ def test_same_input_same_bytes(source: Path, tmp_path: Path) -> None:
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
+@pytest.mark.usefixtures("small_picture")
 def test_picture_is_named_by_channel_and_tile_unless_told(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,11 +13,11 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 
-from stereocell.cli.__main__ import main
 from stereocell.serve.measured_values import parse_place
 from stereocell.serve.server import BundleServer
 from support.phantoms import write_ome_tiff
 from support.server.requests import ask
+from support.validators import make_assets
 
 SPACING_UM = (0.5, 0.25, 0.25)
 SHAPE = (16, 48, 36)
@@ -30,8 +30,8 @@ def counts() -> np.ndarray[Any, np.dtype[np.int16]]:
 def build(folder: Path, *flags: str) -> Path:
     """Build two tiles, to be changed by none of the tests."""
     source = write_ome_tiff(folder / "f.ome.tif", counts(), spacing=SPACING_UM, names=["F"])
-    command = ["build", str(source), "--out", str(folder / "out"), "--grid", "2x1", "--workers=0"]
-    assert main([*command, "--iso-value", "F=900", "--preset", "none", *flags]) == 0
+    told = ("--iso-value", "F=900", "--preset", "none", *flags)
+    assert make_assets(source, folder / "out", "2x1", "--workers", "0", plan=told) == 0
     (folder / "out/bundle/index.html").write_text("<!doctype html>")
     return folder / "out"
 

@@ -82,6 +82,8 @@ def grid(
 ORIENTATIONS = [  # of stored axes among those of LPS: the axis of each, and its sign
     (order, signs) for order in permutations(range(3)) for signs in product((1, -1), repeat=3)
 ]
+# of them every order of the axes, and every choice of signs, at least once
+FEW_ORIENTATIONS = [*ORIENTATIONS[::7], ORIENTATIONS[41]]
 
 
 def oriented(order: Sequence[int], signs: Sequence[int], shape: Sequence[int]) -> Affine:

@@ -135,6 +135,7 @@ class Torture:
     folder: Path
     place: Place
     seed: int
+    workers: int = 2
     outcomes: Counter[str] = field(default_factory=Counter)
     phases: Counter[str] = field(default_factory=Counter)
 
@@ -154,8 +155,7 @@ class Torture:
         is_cluster = kind in ("scheduler", "cluster worker")
         environment = {**os.environ, **self.place.environment}
         with _cluster(self.folder, environment) if is_cluster else nullcontext() as cluster:
-            told = ["--scheduler", cluster.file] if cluster else ["--workers", "2"]
-            build = self._start(told)
+            build = self._start(["--scheduler", cluster.file] if cluster else self._own_workers())
             if not self._await_moment(build, phase):
                 build.wait(PATIENCE_S)
                 self._require_ended(build)
@@ -199,13 +199,13 @@ class Torture:
 
     def end(self) -> None:
         """Let the build come to its end."""
-        build = self._start(["--workers", "2"])
+        build = self._start(self._own_workers())
         build.wait(PATIENCE_S)
         self._require_ended(build)
 
     def _build_undisturbed(self) -> tuple[dict[str, str], dict[str, float]]:
         """Return what it leaves, and the seconds of each phase."""
-        build = self._start(["--workers", "2"])
+        build = self._start(self._own_workers())
         seconds = dict.fromkeys(PHASES, 0.0)
         last = time.monotonic()
         while build.poll() is None:
@@ -219,6 +219,9 @@ class Torture:
         digests = of_assets(self.place.digests())
         self.place.clear()
         return digests, seconds
+
+    def _own_workers(self) -> list[str]:
+        return ["--workers", str(self.workers)]
 
     def _start(self, told: list[str]) -> subprocess.Popen[bytes]:
         out = ["-o", self.place.address]

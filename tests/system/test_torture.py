@@ -15,12 +15,14 @@ SESSION = {"session": "stage"}
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "kills", sweep([SESSION, SESSION | {"scheduler": "bundle"}], kept=[SESSION])
+    ("kills", "workers"),
+    # of one worker and its command a kill of all differs in nothing but the seconds
+    sweep([(SESSION, 1), (SESSION | {"scheduler": "bundle"}, 2)], kept=[(SESSION, 1)]),
 )
 def test_killed_at_any_moment_a_build_goes_on_to_the_same_bytes(
-    tmp_path: Path, kills: dict[str, str]
+    tmp_path: Path, kills: dict[str, str], workers: int
 ) -> None:
-    torture = Torture(tmp_path, Folder(tmp_path / "out"), seed=3)
+    torture = Torture(tmp_path, Folder(tmp_path / "out"), seed=3, workers=workers)
     for kind, phase in kills.items():
         torture.kill_in(kind, phase)
     torture.end()

@@ -1,5 +1,7 @@
 """Boundaries found in the histogram of bodies whose materials and blur are known."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -19,6 +21,7 @@ from stereocell.transfer.joint_histogram import (
     to_eight_bits,
 )
 from stereocell.transfer.shapes2d import evaluate2d, find_fault
+from support.exhaustive import sweep
 from support.phantoms import blurred_ball
 
 Spacing = tuple[float, float, float]
@@ -52,9 +55,20 @@ def boundaries_in(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> tuple[B
     return find_boundaries(rebin(fine, gradient_max), gradient_max, spacing), gradient_max
 
 
-@pytest.mark.parametrize("spacing", [EVEN, (2.0, 1.0, 1.0)])
-@pytest.mark.parametrize("noise", [0.01, 0.02, 0.03])
-@pytest.mark.parametrize("sigma", [0.7, 1.0, 1.5])
+@pytest.mark.parametrize(
+    ("sigma", "noise", "spacing"),
+    sweep(
+        product([0.7, 1.0, 1.5], [0.01, 0.02, 0.03], [EVEN, (2.0, 1.0, 1.0)]),
+        # each blur, each noise and each spacing, the farthest with each other
+        kept=[
+            (0.7, 0.01, EVEN),
+            (0.7, 0.03, (2.0, 1.0, 1.0)),
+            (1.0, 0.02, EVEN),
+            (1.5, 0.01, (2.0, 1.0, 1.0)),
+            (1.5, 0.03, EVEN),
+        ],
+    ),
+)
 def test_arcs_of_three_nested_materials_end_at_the_materials(
     sigma: float, noise: float, spacing: Spacing
 ) -> None:

@@ -2,6 +2,7 @@ import json
 import re
 import shutil
 import subprocess
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,6 +19,7 @@ from stereocell.read import Level
 from stereocell.storage.assets import find_asset
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.usd.written_files import write_list
+from stereocell.verify import formats
 from stereocell.verify.formats import check
 from support import object_bundle, spheres
 
@@ -64,6 +66,15 @@ def node():
         pytest.skip("needs Node 20 and its packages: `make setup`")
 
 
+@pytest.fixture(autouse=True)
+def node_finds_nothing(request, monkeypatch):
+    """To start node takes longest: only tests that ask for it look at what it finds."""
+    if "node" not in request.fixturenames:
+        answer = subprocess.CompletedProcess([], 0, "[]", "")
+        monkeypatch.setattr(formats, "subprocess", SimpleNamespace(**vars(subprocess)))
+        monkeypatch.setattr(formats.subprocess, "run", lambda *args, **options: answer)
+
+
 @pytest.mark.usefixtures("node")
 def test_what_the_pipeline_writes_passes_all_checks(made):
     found = lines(made)
@@ -84,6 +95,7 @@ def test_a_folder_without_a_build_is_one_error(tmp_path, name):
         lines(tmp_path / name)
 
 
+@pytest.mark.usefixtures("node")
 def test_a_bundle_by_itself_is_checked_as_in_its_build(out):
     whole, alone = lines(out), lines(out / "bundle")
     assert alone == {name: whole[name] for name in alone}
@@ -314,18 +326,19 @@ def test_missing_node_is_named(made, monkeypatch):
 
 def test_missing_packages_are_named(made, monkeypatch):
     answer = subprocess.CompletedProcess([], 1, "", "Error [ERR_MODULE_NOT_FOUND]: no package")
-    monkeypatch.setattr(subprocess, "run", lambda *args, **options: answer)
+    monkeypatch.setattr(formats.subprocess, "run", lambda *args, **options: answer)
     found = lines(made)
     assert "run `make setup`" in found["glTF validator"].detail
 
 
 @pytest.fixture
-def cells(tmp_path, node):
+def cells(tmp_path):
     """A bundle of a label map."""
     object_bundle.write(tmp_path / "cells")
     return tmp_path / "cells"
 
 
+@pytest.mark.usefixtures("node")
 def test_a_bundle_of_objects_passes(cells):
     assert [line for line in check(cells) if not line.ok] == []
     assert lines(cells)["object tables"].detail == f"{object_bundle.COUNT} objects"
