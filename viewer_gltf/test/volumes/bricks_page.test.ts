@@ -8,7 +8,7 @@ import { cp, mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Page } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import { afterAll, beforeAll, describe, expect, inject, it } from "vitest";
 import type { Shape } from "../../src/bundle/transfer_2d";
 import { writeShapes } from "../../src/share/shapes_link";
 import { makeShape } from "../../src/state/transfer_shapes";
@@ -21,7 +21,6 @@ import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
 import { IS_EXHAUSTIVE } from "../support/exhaustive";
-import { writeFixture } from "../support/fixture/bundle";
 
 const VIEWPORT = { width: 240, height: 160 }; // small: software draws it
 const QUERY = "?mode=all&quality=high";
@@ -74,7 +73,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
     beforeAll(async () => {
       out = await mkdtemp(join(tmpdir(), "stereocell-served-"));
       const bundle = join(out, "bundle");
-      await writeFixture(bundle);
+      await cp(inject("fixture"), bundle, { recursive: true });
       await cp(DIST, bundle, { recursive: true });
       server = await serve(out);
       host = await Host.start({ "/": bundle });

@@ -35,8 +35,12 @@ const SOFTWARE = [
   "--disable-gpu-compositing",
   "--disable-gpu-rasterization",
 ];
-/** Mesa alone, and no graphics card, though one be there. */
-const ENVIRONMENT = { __EGL_VENDOR_LIBRARY_FILENAMES: MESA, LIBGL_ALWAYS_SOFTWARE: "1" };
+/** Mesa alone, and no graphics card, though one be there; no threads of its own, which wait for one another. */
+const ENVIRONMENT = {
+  __EGL_VENDOR_LIBRARY_FILENAMES: MESA,
+  LIBGL_ALWAYS_SOFTWARE: "1",
+  LP_NUM_THREADS: "0",
+};
 
 export function hasChromium(): boolean {
   return existsSync(CHROMIUM);
