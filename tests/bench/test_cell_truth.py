@@ -54,6 +54,7 @@ def test_a_box_lies_on_its_voxels_faces() -> None:
     assert shifted.max() == pytest.approx(0.25)
 
 
+@pytest.mark.slow
 def test_overlap_is_the_share_of_what_any_has() -> None:
     near = [Nearest(ball(5.0, 60), 1), Nearest(moved(ball(5.0, 60), (6.0, 0.0, 0.0)), 1)]
     lens = np.pi * 4 * (3 * 5 - 2) / 3 * 2

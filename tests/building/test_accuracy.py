@@ -92,6 +92,7 @@ def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
         assert found["value"] + found["background"] == pytest.approx(expected, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("radius", "sigma", "noise"), [(3.0, 0.15, 10.0), (5.0, 0.3, 10.0), (1.5, 0.3, 50.0)]
 )

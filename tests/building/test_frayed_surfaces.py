@@ -39,6 +39,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_of_a_sponge_fewer_planes_carry_the_surface_and_it_is_said(
     out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -55,6 +56,7 @@ def test_of_a_sponge_fewer_planes_carry_the_surface_and_it_is_said(
     assert f"{MAX_FACES:,} (surface.max_faces)" in survey["sponge"].thinning(plan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channel", ["sponge", "ball"])
 def test_its_tiles_make_one_sound_surface_of_no_more_triangles_than_that(
     out: Path, channel: str

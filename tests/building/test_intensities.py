@@ -58,6 +58,7 @@ def test_an_image_that_is_taken_for_labels_is_told(
     assert "cells: looks like intensities: " in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objects", sweep([2, 4], kept=[2]))
 @pytest.mark.parametrize("kind", ["uint8", "float32", "float64"])
 def test_few_objects_far_from_each_other_are_seen(
@@ -115,6 +116,7 @@ def test_wide_integers_that_number_objects_end_the_plan(
     assert f"voxels are {kind}: read as float32, which keeps 24 of 32 bits" in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", sweep([4, 11], kept=[11]))
 def test_a_label_map_among_many_channels_is_seen(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], place: int
@@ -145,6 +147,7 @@ def test_labels_stored_as_floats_with_nan_around_are_seen(
     assert "looks like a label map" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_objects_off_the_middle_and_in_a_region_are_seen(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

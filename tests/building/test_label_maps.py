@@ -155,6 +155,7 @@ def test_names_that_are_taken(scan: tuple[Path, Dataset], tmp_path: Path, name: 
         )
 
 
+@pytest.mark.slow
 def test_a_segmentation_of_oblique_planes_is_refused_on_an_axial_scan(
     scan: tuple[Path, Dataset], tmp_path: Path
 ) -> None:

@@ -75,6 +75,7 @@ def _unmatched(*parts: Drawn) -> NDArray[np.float32]:
     return points[np.stack([lone // count, lone % count], axis=-1)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ours", "theirs"), list(product(range(4), repeat=2)))
 def test_two_tiles_close_at_any_pair_of_levels(
     levels: tuple[list[Drawn], ...], ours: int, theirs: int
@@ -87,6 +88,7 @@ def test_two_tiles_close_at_any_pair_of_levels(
     assert len(_unmatched(one, other)) == 0
 
 
+@pytest.mark.slow
 def test_levels_get_lighter_and_rims_stay(levels: tuple[list[Drawn], ...]) -> None:
     for tile in levels:
         counts = [len(level.triangles) for level in tile]

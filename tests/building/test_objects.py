@@ -91,6 +91,7 @@ def labels_of(out: Path) -> np.ndarray:
     return np.fromfile(out / "bundle" / objects_of(out)["labels"]["path"], "<u4")
 
 
+@pytest.mark.slow
 def test_each_cell_is_there_once_with_its_voxels_volume(out: Path) -> None:
     tissue = make_tissue(SHAPE, 3)
     labels, counts = np.unique(tissue.labels[tissue.labels > 0], return_counts=True)
@@ -107,6 +108,7 @@ def test_each_cell_is_there_once_with_its_voxels_volume(out: Path) -> None:
             assert place == pytest.approx(at, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_cell_lies_in_the_tile_of_its_centroid(out: Path) -> None:
     tiles = objects_of(out)["tiles"]
     assert sorted(tiles) == ["r0_c0", "r0_c1"]
@@ -148,6 +150,7 @@ def test_the_table_is_joined_by_number_and_tells_what_does_not_fit(
     assert np.isnan(column_of(out, "CD8")[labels_of(out) == 1]).all()
 
 
+@pytest.mark.slow
 def test_a_stage_with_classes_is_valid(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
     classes = stage.GetPrimAtPath("/Specimen/Classes/cells").GetChildren()
@@ -155,6 +158,7 @@ def test_a_stage_with_classes_is_valid(out: Path, capsys: pytest.CaptureFixture[
     assert run("check", out, "--deep", "--workers", 0) == 0, said(capsys)
 
 
+@pytest.mark.slow
 def test_classes_of_other_names_reach_the_bundle(out: Path, tmp_path: Path) -> None:
     layer = Sdf.Layer.CreateNew(str(out / "stage/names.usda"))
     layer.subLayerPaths = ["./stage.usda"]
@@ -189,6 +193,7 @@ def test_every_level_of_a_file_names_its_cells(out: Path) -> None:
                 assert (high < box[3:] + farthest).all()
 
 
+@pytest.mark.slow
 def test_nothing_is_done_twice_and_a_table_changes_the_stage_alone(
     out: Path, sample: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -216,6 +221,7 @@ def test_nothing_is_done_twice_and_a_table_changes_the_stage_alone(
     assert np.isnan(scores[5])
 
 
+@pytest.mark.slow
 def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
     """A value and a colour, as an artist's layer overrides them."""
     stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
@@ -276,6 +282,7 @@ def test_the_same_bytes_with_any_workers(out: Path, tmp_path: Path, workers: int
     assert made[0] == made[1]
 
 
+@pytest.mark.slow
 def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -324,6 +331,7 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
         assert np.mean([one[0] for one in shared]) == pytest.approx(at, abs=0.3)
 
 
+@pytest.mark.slow
 def test_an_object_in_pieces_has_the_percentile_of_all_its_voxels(tmp_path: Path) -> None:
     labels = np.zeros((16, 24, 90), np.uint16)
     labels[3:13, 4:20, 2:88] = 7
@@ -410,6 +418,7 @@ def test_what_can_not_be_built_is_told_in_one_line(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_of_two_label_maps_the_first_one_has_the_table(
     sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -430,6 +439,7 @@ def test_of_two_label_maps_the_first_one_has_the_table(
     assert told.endswith(", score")
 
 
+@pytest.mark.slow
 def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: Path) -> None:
     """Labels at half the image's resolution, in a file of their own with a place of their own."""
     tissue = make_tissue(SHAPE, 3)
@@ -482,6 +492,7 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     assert 1 in found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omit_empty", sweep([False, True], kept=[True]))
 def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> None:
     """Two organs by DICOM's own numbers, the first planes of them left out or not."""
@@ -508,6 +519,7 @@ def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> 
     assert exact(means)[order] == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_report_and_the_deep_check_tell_of_objects(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -540,6 +552,7 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     assert wanted in said(capsys)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grid", sweep(["1x1", "2x1"], kept=["2x1"]))
 def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: str) -> None:
     """Of three boxes in a row, the last in two tiles: 10 x 16 voxels of .5 x .2 um, 10 x 8."""
@@ -564,6 +577,7 @@ def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: st
         assert found[one, other] == found[other, one] == pytest.approx(0.1 * area, rel=0.05)
 
 
+@pytest.mark.slow
 def test_levels_that_stop_early_are_told_of(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -585,6 +599,7 @@ def test_levels_that_stop_early_are_told_of(
     assert wanted in (tmp_path / "out/report/index.html").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("measure_of", sweep(["mean", "p95"], kept=["p95"]))
 def test_the_deep_check_measures_the_image_anew(
     tmp_path: Path,
@@ -617,6 +632,7 @@ def test_the_deep_check_measures_the_image_anew(
     assert told.count("voxels'") == 1
 
 
+@pytest.mark.slow
 def test_the_deep_check_measures_the_surfaces_anew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -636,6 +652,7 @@ def test_the_deep_check_measures_the_surfaces_anew(
     assert "column area_um2 is not that of the surface of 3" in said(capsys)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault",
     sweep(
@@ -690,6 +707,7 @@ def test_the_deep_check_finds_shared_walls_anew(
     )
 
 
+@pytest.mark.slow
 def test_numbers_of_objects_are_read_as_they_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -701,6 +719,7 @@ def test_numbers_of_objects_are_read_as_they_are(
     assert labels_of(tmp_path / "out").tolist() == [2**31 + 1]
 
 
+@pytest.mark.slow
 def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
     """Of two boxes the first lies in the dark, the second in what is stained."""
     labels = np.zeros((20, 24, 48), np.uint16)
@@ -732,6 +751,7 @@ def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
     assert run("plan", tmp_path / "l.tif", "-o", tmp_path / "o", *alone) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_alone", [False, True])
 def test_what_is_too_thin_is_named_and_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], is_alone: bool
@@ -755,6 +775,7 @@ def test_what_is_too_thin_is_named_and_left_out(
         assert labels_of(out).tolist() == [12]
 
 
+@pytest.mark.slow
 def test_names_of_columns_that_mean_something_else_and_places_that_tell_too_much(
     sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -786,6 +807,7 @@ def test_names_of_columns_that_mean_something_else_and_places_that_tell_too_much
         assert f"{phase}: up to date" in said(capsys)
 
 
+@pytest.mark.slow
 def test_more_objects_than_a_file_can_name_need_more_tiles(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

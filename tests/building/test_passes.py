@@ -44,6 +44,7 @@ def _lods(out_folder: OutFolder) -> dict[str, tuple[Lod, ...]]:
 # --- iso-values
 
 
+@pytest.mark.slow
 def test_command_holds_the_evidence_of_one_channel_at_a_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -67,6 +68,7 @@ def test_command_holds_the_evidence_of_one_channel_at_a_time(
     assert max(held) <= 2 * 4
 
 
+@pytest.mark.slow
 def test_each_tile_s_body_is_cut_at_its_own_brightness_where_asked(
     tmp_path: Path,
 ) -> None:
@@ -94,6 +96,7 @@ def _mixed_family() -> NDArray[np.uint16]:
     return phantoms.as_counts(field, 100, 1100, noise=15.0)
 
 
+@pytest.mark.slow
 def test_few_bright_bodies_do_not_hide_the_many_dim_ones(tmp_path: Path) -> None:
     """The mean gradient climbs into the brightest bodies: why it isn't the default."""
     source = phantoms.write_ome_tiff(tmp_path / "mix.ome.tif", _mixed_family(), spacing=SPACING)
@@ -140,6 +143,7 @@ FINE_PART = ([*FINE, "--region", "7:44,5:46,3:42"], (7, 5, 3, 44, 46, 42))
 COARSE_PART = ([*COARSE, "--region", "2:18,3:19,1:17"], (2, 3, 1, 18, 19, 17))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flags", "region", "stated"),
     sweep(
@@ -198,6 +202,7 @@ def _surface(mesh: Mesh) -> pv.PolyData:
     return pv.PolyData.from_regular_faces(mesh.positions, mesh.triangles.astype(np.int64))
 
 
+@pytest.mark.slow
 def test_all_but_a_hundredth_of_the_surface_lies_within_the_recorded_distance(
     tmp_path: Path,
 ) -> None:

@@ -4,6 +4,7 @@ import cProfile
 import pstats
 from pathlib import Path
 
+import pytest
 import zarr
 
 from stereocell.building.out_folder import OutFolder
@@ -32,6 +33,7 @@ def write_empty(path: Path, channels: int) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_plan_of_16940_units_takes_few_calls_by_unit(tmp_path: Path) -> None:
     """Calls are counted, not seconds: those depend on what else the machine does."""
     source = write_empty(tmp_path / "whole.ome.zarr", 70)

@@ -103,6 +103,7 @@ def plans(draw: st.DrawFn) -> Plan:
         raise
 
 
+@pytest.mark.slow
 @MANY
 @given(plans())
 def test_a_plan_covers_its_region_once_and_its_windows_lie_inside(plan: Plan) -> None:
@@ -129,6 +130,7 @@ def test_a_plan_covers_its_region_once_and_its_windows_lie_inside(plan: Plan) ->
     assert count.sum() == count[plan.region.slices].size
 
 
+@pytest.mark.slow
 @MANY
 @given(plans())
 def test_a_plan_survives_its_file(plan: Plan) -> None:
@@ -139,6 +141,7 @@ def test_a_plan_survives_its_file(plan: Plan) -> None:
     assert len(set(ids)) == len(ids)
 
 
+@pytest.mark.slow
 @MANY
 @given(st.lists(st.text(min_size=1, max_size=300), min_size=2, max_size=12, unique=True))
 def test_identifiers_are_unique_and_stable_and_fit_a_file_name(texts: list[str]) -> None:

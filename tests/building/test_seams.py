@@ -150,6 +150,7 @@ def _assert_same_rims(built: Built, level: int) -> None:
         assert set(rim) == set(seam.rim(theirs[0], built.plan)), seam
 
 
+@pytest.mark.slow
 def test_scene_could_tell_neighbours_apart(built: Built) -> None:
     """Else the tests below would show nothing."""
     seams = _seams(built.plan)
@@ -164,6 +165,7 @@ def test_scene_could_tell_neighbours_apart(built: Built) -> None:
         assert filled > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", range(LODS))
 def test_neighbours_have_the_same_vertices_on_their_common_plane(built: Built, level: int) -> None:
     _assert_same_rims(built, level)

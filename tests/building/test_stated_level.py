@@ -107,6 +107,7 @@ def _again(voxels: NDArray[np.uint16], stated: dict[str, Any]) -> NDArray[np.flo
     return field - stated["iso"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channel", ["uneven", "even"])
 def test_scikit_image_finds_the_surface_where_the_stage_says(out: Path, channel: str) -> None:
     stated = _stated(out, channel)
@@ -136,6 +137,7 @@ def test_scikit_image_finds_the_surface_where_the_stage_says(out: Path, channel:
     assert cKDTree(ours).query(theirs)[0].max() < 3
 
 
+@pytest.mark.slow
 def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> None:
     stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
     manifest = json.loads((out / "bundle" / "manifest.json").read_text())
@@ -170,6 +172,7 @@ def test_all_tiles_have_the_channel_s_level_and_say_what_they_hold(out: Path) ->
         assert (values == {None}) == (name in ("noise", "flat"))
 
 
+@pytest.mark.slow
 def test_a_value_above_the_background_is_that_of_the_build(
     source: Path, out: Path, tmp_path: Path
 ) -> None:
@@ -184,6 +187,7 @@ def test_a_value_above_the_background_is_that_of_the_build(
     assert found == ours  # the same keys: the very same surfaces
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("given", "side"), sweep([("5000", "below"), ("-3", "above")], kept=[("5000", "below")])
@@ -199,6 +203,7 @@ def test_a_given_level_that_parts_nothing_has_no_surface_and_says_why(
     assert channel["tileset"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [(0, 1), (0, 255), (3, 900)])
 @pytest.mark.parametrize("scope", ["channel", "tile"])
 def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
@@ -228,6 +233,7 @@ def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
     assert volume == pytest.approx(4 / 3 * np.pi * 17.0**3, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -245,6 +251,7 @@ def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
     assert channel["surface"] == "none"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flag", ["--iso-value=even=500+b", "--surfaces=even=500+b"])
 def test_a_level_above_no_background_is_said_to_count_from_0(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flag: str
@@ -257,6 +264,7 @@ def test_a_level_above_no_background_is_said_to_count_from_0(
     assert told in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
     flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
@@ -330,6 +338,7 @@ def test_a_setting_that_another_overrules_is_told_to_go_unused(
     assert f"plan: {told}" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_surfaces_are_rungs_of_the_ladder_whatever_the_criterion(
     source: Path, tmp_path: Path
 ) -> None:
@@ -362,6 +371,7 @@ def test_a_window_given_twice_is_refused(
     assert "--window names channel 'even' twice, expected once" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_tiles_of_their_own_level_state_it_as_a_field(source: Path, tmp_path: Path) -> None:
     copy = tmp_path / "it's a copy.ome.zarr"

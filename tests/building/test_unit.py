@@ -68,6 +68,7 @@ def test_voxels_stay_as_measured_where_8_bits_lose_something_and_not_if_8_are_as
     np.testing.assert_array_equal(unit.measured, np.pad(voxels, APRON, mode="edge"))
 
 
+@pytest.mark.slow
 def test_texels_are_held_against_the_voxels_not_against_the_planes_that_carry_the_surface() -> None:
     given = replace(_given(1.0), step=(1, 3, 3))
     unwrap = replace(given.settings.unwrap, maps=True, texel_um=0.02)

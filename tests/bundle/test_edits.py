@@ -58,6 +58,7 @@ def edit(stage, tmp_path):
     return export
 
 
+@pytest.mark.slow
 def test_color_edited_over_the_stage_reaches_manifest_and_meshes(bundle, edit):
     edited = edit(
         lambda s: s.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(0.25, 0.5, 0.75))
@@ -74,6 +75,7 @@ def texels(data):
     return np.frombuffer(zstandard.decompress(data[offset : offset + length]), np.uint8)
 
 
+@pytest.mark.slow
 def test_window_edited_over_the_stage_reaches_manifest_voxels_and_bricks(bundle, edit):
     low, high = 490.0, 2050.0  # as source values: an eighth and a half of the old window
     edited = edit(
@@ -128,6 +130,7 @@ def test_a_window_edited_over_measured_voxels_loses_nothing(measured_stage, tmp_
         assert len(np.unique(texels(data))) > 20
 
 
+@pytest.mark.slow
 def test_a_bundle_whose_window_was_not_edited_only_names_the_measured_voxels(
     measured_stage, tmp_path
 ):
@@ -324,6 +327,7 @@ def test_representation_chosen_for_a_tile_reaches_the_manifest_and_takes_nothing
         assert channel(edited, name) == channel(bundle, name)
 
 
+@pytest.mark.slow
 def test_representation_survives_flattening(edit, tmp_path):
     def change(stage):
         choose(stage, "r0_c0", representation="volume")
@@ -358,6 +362,7 @@ def test_coarse_lod_chosen_for_a_tile_is_the_finest_that_the_bundle_has(bundle, 
     assert volumes(edited) == volumes(bundle)
 
 
+@pytest.mark.slow
 def test_triangles_are_told_by_the_stage_s_levels_whatever_is_left_out(tmp_path, monkeypatch):
     monkeypatch.setattr(spheres, "LEVELS", (*spheres.LEVELS, (6, 0.6)))
     tiles = [spheres.tile(0), spheres.tile(1)]
@@ -473,6 +478,7 @@ def errors_um(bundle):
     return found
 
 
+@pytest.mark.slow
 def test_a_stage_without_hashes_or_edits_gives_the_same_bundle(bundle, stage, edit, tmp_path):
     assert files(edit(lambda s: None)) == files(bundle)
     assert edit.told == []
@@ -499,6 +505,7 @@ def test_a_stage_without_hashes_or_edits_gives_the_same_bundle(bundle, stage, ed
     assert files(tmp_path / "from_old") == files(bundle)
 
 
+@pytest.mark.slow
 def test_coarser_levels_are_made_anew_of_an_edited_finest_one(bundle, edit):
     edited = edit(lambda s: in_level(s, "lod0", swell(1.25)))
     large = 1.25 * spheres.RADIUS
@@ -522,6 +529,7 @@ def test_coarser_levels_are_made_anew_of_an_edited_finest_one(bundle, edit):
     assert "images" not in document
 
 
+@pytest.mark.slow
 def test_the_cut_of_levels_made_anew_is_the_edited_one(edit):
     edited = edit(lambda s: in_level(s, "lod0", swell(1.25)))
     cut = {}
@@ -591,6 +599,7 @@ def test_another_topology_reaches_all_levels(edit, place):
     assert "lod0 (sound)" in line
 
 
+@pytest.mark.slow
 def test_faults_of_an_edited_mesh_are_told(edit):
     def open_it(mesh):
         mesh.GetFaceVertexCountsAttr().Set(list(mesh.GetFaceVertexCountsAttr().Get())[:-40])
@@ -660,6 +669,7 @@ def test_a_transform_of_the_finest_level_alone_is_an_edit(edit):
     assert "made anew from lod0: lod1" in edit.told[0]
 
 
+@pytest.mark.slow
 def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
     shutil.copytree(stage.parent, tmp_path / "own")
     own = Usd.Stage.Open(str(tmp_path / "own/tiles/r0_c0/tile.usdc"))
@@ -724,6 +734,7 @@ def test_points_that_are_no_numbers_are_refused(edit):
         edit(lambda s: in_level(s, "lod0", spoil))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first_lod", [1, 2])
 def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, first_lod):
     """By the stage's own settings: lod1 has maps, or values at its vertices."""

@@ -58,6 +58,7 @@ def volumes(bundle: Path) -> dict[Path, Any]:
     return {path: data for path, data in files(bundle).items() if path.parts[0] == "volumes"}
 
 
+@pytest.mark.slow
 def test_an_edited_window_gives_the_volumes_of_a_build_with_it(
     built: Path, source: Path, tmp_path: Path
 ) -> None:
@@ -69,6 +70,7 @@ def test_an_edited_window_gives_the_volumes_of_a_build_with_it(
     assert volumes(edited) != volumes(built / "bundle")
 
 
+@pytest.mark.slow
 def test_8_bits_leave_the_measured_voxels_out_and_the_log_says_their_size(
     built: Path, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -184,6 +184,7 @@ def _runs_the_workflow(folder: Path) -> None:
     assert answer.returncode == 1
 
 
+@pytest.mark.slow
 def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() -> None:
     used = set()
     for page in PAGES:
@@ -195,6 +196,7 @@ def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() ->
     assert used == set(PARSED)  # what the docs no longer show is no excuse
 
 
+@pytest.mark.slow
 def test_other_programs_are_those_that_other_tests_run() -> None:
     """`dask` by engine/test_cluster.py, `pip install` of a wheel by system/test_wheel.py.
 
@@ -221,6 +223,7 @@ def test_python_in_the_docs_compiles() -> None:
             compile(text, str(page), "exec")
 
 
+@pytest.mark.slow
 def test_targets_exist() -> None:
     if shutil.which("make") is None:
         pytest.skip("no make")

@@ -76,6 +76,7 @@ def test_an_edit_over_the_stage_is_in_it(edited: Callable[..., Path], tmp_path: 
     assert material["pbrMetallicRoughness"]["baseColorFactor"] == [0.25, 0.5, 0.75, 1.0]
 
 
+@pytest.mark.slow
 def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -102,6 +103,7 @@ def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
         assert len(meshes["CD31 r0_c1"].faces) < 2.2 * spheres.LEVELS[2][0] ** 2
 
 
+@pytest.mark.slow
 def test_the_finest_level_within_the_bounds_is_taken(sphere_stage: Path, tmp_path: Path) -> None:
     path = tmp_path / "s.glb"
     sizes = []
@@ -140,6 +142,7 @@ def test_a_level_that_is_given_is_the_finest_within_the_bounds(
         export_stage(sphere_stage, path, ExportOptions(lod=0, max_triangles=3))
 
 
+@pytest.mark.slow
 def test_what_a_region_leaves_out_is_not_counted(sphere_stage: Path, tmp_path: Path) -> None:
     path, box = tmp_path / "s.glb", parse_region("9:,:-5,:")
     export_stage(sphere_stage, path, ExportOptions(region=box))
@@ -237,6 +240,7 @@ console.log(JSON.stringify(found))
 """
 
 
+@pytest.mark.slow
 def test_khronos_validator_finds_no_error_and_three_opens_it(
     sphere_stage: Path, tmp_path: Path
 ) -> None:

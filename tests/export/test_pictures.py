@@ -39,6 +39,7 @@ def covered(pixels: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return pixels.astype(int).max(axis=-1) > 40
 
 
+@pytest.mark.slow
 def test_a_picture_opens_with_label_maps_alone_as_the_viewer(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -79,6 +80,7 @@ def test_label_maps_that_an_edit_has_hidden_leave_the_picture_to_the_others(
     assert len(chosen.channels) > 1
 
 
+@pytest.mark.slow
 def test_a_picture_shows_the_sphere_in_its_edited_colour(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -102,6 +104,7 @@ def test_a_picture_shows_the_sphere_in_its_edited_colour(
     assert (tmp_path / "s.png").read_bytes() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["mp4", "webm"])
 def test_a_turntable_goes_once_round(
     sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str

@@ -128,6 +128,7 @@ def test_a_solid_that_touches_itself_is_closed_to_programs_that_join_places() ->
         assert found.volume == pytest.approx(2, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_neighbours_of_hidden_and_moved_tiles_are_closed_at_the_cut(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -177,6 +178,7 @@ def test_a_corner_that_is_missing_is_closed_along_the_lines_where_planes_meet() 
     assert solid.volume() == pytest.approx(wanted, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_surface_that_an_edit_opened_is_refused_in_a_line(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:

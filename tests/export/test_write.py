@@ -106,6 +106,7 @@ def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture
     assert not (tmp_path / "s.glb").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", sweep(sorted(FORMATS), kept=[".precomputed"]))
 def test_a_full_disk_is_one_line_and_leaves_nothing(
     sphere_stage: Path, small_disk: Path, capfd: pytest.CaptureFixture[str], ending: str

@@ -16,6 +16,7 @@ def _ramp() -> np.ndarray:
     return (100 + 2 * z + 0.5 * y + 1.0 * x).astype(np.float32)
 
 
+@pytest.mark.slow
 def test_ramp_under_noise_and_bodies_is_found_where_it_lies() -> None:
     rng = np.random.default_rng(0)
     ball = blurred_ball(REGION.shape, SPACING, (6.7, 9.0, 9.0), 2.0, 0.3)
@@ -37,6 +38,7 @@ def test_a_ground_that_falls_to_the_rim_is_found_on_to_the_rim() -> None:
     assert np.ptp(np.percentile(error, [1, 99])) < 60  # of 300
 
 
+@pytest.mark.slow
 def test_coarser_voxels_give_the_same_background() -> None:
     fine = find_background(_ramp(), REGION, spacing_um=SPACING, block_um=4.5)
     coarse = find_background(_ramp()[:, ::2, ::2], REGION, spacing_um=SPACING, block_um=4.5)

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -10,6 +11,7 @@ shapes = st.tuples(*[st.integers(1, 21)] * 3)
 volumes = shapes.flatmap(lambda shape: arrays(np.uint8, shape))
 
 
+@pytest.mark.slow
 @given(volumes, st.integers(0, 2**32 - 1))
 def test_bricks_hold_every_value_that_trilinear_interpolation_gives(volume, seed):
     bricks = min_max_bricks(volume)
@@ -24,6 +26,7 @@ def test_bricks_hold_every_value_that_trilinear_interpolation_gives(volume, seed
     assert (samples <= ranges[:, 1] + 1e-6).all()
 
 
+@pytest.mark.slow
 @given(volumes)
 def test_bricks_cover_their_voxels_and_one_more_on_each_side_and_nothing_else(volume):
     bricks = min_max_bricks(volume)

@@ -155,6 +155,7 @@ def test_same_volume_same_bytes():
     assert encode_tree(build(volume, 9), SOURCE) == encode_tree(build(volume.copy(), 9), SOURCE)
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(st.integers(0, 183), st.integers(0, 255))
 def test_a_spoilt_byte_is_refused_or_changes_no_structure(at, value):
@@ -170,6 +171,7 @@ def test_a_spoilt_byte_is_refused_or_changes_no_structure(at, value):
     assert table.nodes["x"].tolist() == [0, 0, 1]
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.binary(max_size=200))
 def test_no_bytes_make_the_readers_stumble(data):

@@ -105,6 +105,7 @@ def sliced_in_unity(atlas: Atlas) -> NDArray[np.float16]:
     return sheet.reshape(-1, height, width)[:, ::-1]
 
 
+@pytest.mark.slow
 @needs_viewer
 def test_slicing_by_either_recipe_gives_the_volume_back(atlas: Atlas, tile: str) -> None:
     (content,) = (each for each in make_tiles() if each.id == tile)
@@ -123,6 +124,7 @@ def test_slicing_by_either_recipe_gives_the_volume_back(atlas: Atlas, tile: str)
     assert np.array_equal(np.rint(unreal[:nz].astype(np.float64) * 255), channel.volume)
 
 
+@pytest.mark.slow
 @needs_viewer
 def test_voxels_lie_where_the_recipe_says(atlas: Atlas) -> None:
     depth_um, height_um, width_um = SPACING_UM

@@ -152,6 +152,7 @@ def test_same_objects_same_bytes():
     )
 
 
+@pytest.mark.slow
 def test_the_bundle_of_the_tests_is_valid(tmp_path):
     object_bundle.write(tmp_path)
     paths = [str(path) for path in sorted(tmp_path.rglob("*.glb"))]

@@ -111,6 +111,7 @@ def lowest_um(shape: tuple[int, ...]) -> tuple[float, float, float]:
     return 9.0 - 0.15, -(7.0 + 0.14 * (shape[1] - 2)), 5.0 - 0.28
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dtype", "low", "high"),
     [(np.uint8, 0, 256), (np.uint16, 0, 65536), (np.int16, -1024, 3072), (np.float32, -2, 2)],
@@ -147,6 +148,7 @@ def test_a_part_of_measured_voxels_is_read_by_its_place(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found, measured[5:14, 17:37, 120:180])
 
 
+@pytest.mark.slow
 def test_measured_voxels_of_a_damaged_file_are_one_clear_line(tmp_path: Path) -> None:
     path = tmp_path / "a.vdb"
     measured = np.random.default_rng(2).integers(0, 9999, (12, 20, 30)).astype(np.uint16)

@@ -33,11 +33,13 @@ def dice(sight: Sight, rung: int = 0) -> float:
     return float(2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sweep(EASY, kept=[name for name in EASY if name != "dim tissue"]))
 def test_finds_the_bodies(name: str) -> None:
     assert dice(look_at(MADE[name])) > EASY[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     sweep(
@@ -56,6 +58,7 @@ def test_finds_nothing_where_nothing_is(name: str) -> None:
     assert look_at(EMPTY[name]).found.clear == ()
 
 
+@pytest.mark.slow
 def test_of_uneven_light_is_said_that_it_is_light() -> None:
     found = look_at(EMPTY["empty, emccd, depth x 10"]).found
     assert found.light > 0.95
@@ -64,11 +67,13 @@ def test_of_uneven_light_is_said_that_it_is_light() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["slab", "bodies in depth", "edge at 5 degrees"])
 def test_bodies_are_found_in_uneven_light_and_so_are_sections_and_edges(name: str) -> None:
     assert dice(look_at(MADE[name])) > 0.85
 
 
+@pytest.mark.slow
 def test_the_cut_into_tiles_changes_no_level() -> None:
     case = MADE["tissue"]
     cuts = [look_at(replace(case, grid=grid)).found for grid in ((1, 1), (3, 2), (1, 5))]
@@ -81,6 +86,7 @@ def test_the_cut_into_tiles_changes_no_level() -> None:
             assert a.sharpness == pytest.approx(b.sharpness, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_tile_without_both_sides_is_said_to_hold_nothing() -> None:
     sight = look_at(replace(MADE["tissue"], grid=(1, 8)))
     level = sight.found.clear[0]
@@ -128,6 +134,7 @@ def test_of_mr_the_outer_level_keeps_skin_that_is_dim_beside_a_bright_brain(ghos
     assert 2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()) > 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nested, 40 photons, x 1.5", "nested, 160 photons, x 5"])
 def test_nuclei_in_cells_have_a_level_of_their_own(name: str) -> None:
     sight = look_at(NESTED[name])
@@ -180,6 +187,7 @@ def test_held_out_cases_are_not_all_easy_and_none_is_named_twice() -> None:
     assert {case.group for case in all_cases() if case.held_out} >= {"made", "empty"}
 
 
+@pytest.mark.slow
 def test_without_evidence_there_is_no_level() -> None:
     sight = look_at(EMPTY["empty, scmos, plain"])
     bare = [replace(tile, plain=_none(tile.plain), padding=_none(tile.padding), above=None)

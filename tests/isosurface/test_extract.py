@@ -71,6 +71,7 @@ def test_body_at_the_data_s_end_is_capped() -> None:
     assert mesh.normals[cap & ~rim, 2].max() < -0.99  # it faces away from the body
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("axis", "tile_size"), [(2, (48, 100, 50)), (1, (48, 50, 100)), (0, (24, 100, 100))]
 )

@@ -42,6 +42,7 @@ def _cradle(gap_mm: float) -> NDArray[np.bool_]:
     return (away > 99) & (away < 105) & (y > 35)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap_mm", [8.0, 0.0])
 def test_a_cradle_is_left_out_whether_it_touches_or_not(gap_mm: float) -> None:
     hu, body = _head()
@@ -76,6 +77,7 @@ def test_other_units_than_hounsfield_s_have_no_holder() -> None:
     assert find_holder(np.full(SHAPE, -1000, np.int16), SPACING, WHOLE) is None
 
 
+@pytest.mark.slow
 def test_the_mask_of_a_part_and_of_a_file_is_the_same() -> None:
     hu, body = _head()
     holder = find_holder(_with(hu, _cradle(8.0) & ~body), SPACING, WHOLE)
@@ -111,6 +113,7 @@ def _skull() -> NDArray[np.bool_]:
     return (outer < 1) & (inner > 1)
 
 
+@pytest.mark.slow
 def test_a_dry_skull_with_something_thick_in_it_stays_and_its_cradle_goes() -> None:
     z, y, x = _places()
     skull, cradle = _skull(), _cradle(8.0)
@@ -122,6 +125,7 @@ def test_a_dry_skull_with_something_thick_in_it_stays_and_its_cradle_goes() -> N
     assert (out & cradle).sum() > 0.7 * cradle.sum()
 
 
+@pytest.mark.slow
 def test_an_animal_s_ears_and_tail_stay() -> None:
     z, y, x = _places()
     body = (z / 70) ** 2 + (y / 45) ** 2 + (x / 40) ** 2 < 1

@@ -29,11 +29,13 @@ def call(**environment: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_second_process_takes_what_the_first_compiled(tmp_path: Path) -> None:
     assert call(NUMBA_CACHE_DIR=str(tmp_path)) == [str(tmp_path), "2", "0"]
     assert call(NUMBA_CACHE_DIR=str(tmp_path)) == [str(tmp_path), "2", "1"]
 
 
+@pytest.mark.slow
 def test_kernels_work_where_no_folder_can_be_written(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.touch()  # root may write into any folder, but no one into a file

@@ -20,6 +20,7 @@ def scene() -> Mesh:
     return joined(ball(5.0, 30), moved(ball(0.5, 30), (7.0, 0.0, 0.0)), large)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reach", [6.0, 60.0, 600.0])
 def test_distances_are_libigl_s(reach: float) -> None:
     mesh = scene()
@@ -47,6 +48,7 @@ def test_sides_are_libigl_s() -> None:
     np.testing.assert_array_equal(Nearest(mesh, 10).holds(points), signed <= 1e-6)
 
 
+@pytest.mark.slow
 def test_a_part_is_measured_by_the_whole_s_grid() -> None:
     mesh = joined(ball(5.0, 30), moved(ball(2.0, 7), (9.0, 0.0, 0.0)))
     alone, gone = ball(5.0, 30), np.zeros(len(mesh.positions), bool)

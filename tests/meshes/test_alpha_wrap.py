@@ -51,6 +51,7 @@ def test_unknown_wrap_lists_the_known(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "'foil', expected one of voxels, alpha-wrap" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_wrap_is_closed_and_lies_the_offset_away() -> None:
     shape = (30, 40, 40)
     z, y, x = np.indices(shape) - np.float64(14.6)

@@ -58,6 +58,7 @@ def _rims(tiles: list[tuple[Mesh, Lattice]]) -> dict[tuple[int, float, int], lis
     return found
 
 
+@pytest.mark.slow
 def test_both_tiles_keep_the_same_edges_and_less_than_half(sponge: Field) -> None:
     whole, thinned = (_rims(_tiles(sponge, error)) for error in (0.0, ERROR))
     assert len(thinned) == 4
@@ -66,11 +67,13 @@ def test_both_tiles_keep_the_same_edges_and_less_than_half(sponge: Field) -> Non
         assert 20 < len(one) < 0.6 * len(whole[plane][0])
 
 
+@pytest.mark.slow
 def test_each_tile_is_sound(sponge: Field) -> None:
     for mesh, lattice in _tiles(sponge, ERROR):
         assert kinds(find_defects(mesh, lattice.cut_planes())) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 6])
 def test_no_triangle_comes_to_lie_in_the_other_plane_where_two_meet(seed: int) -> None:
     noise = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=SHAPE), 0.8)
@@ -79,12 +82,14 @@ def test_no_triangle_comes_to_lie_in_the_other_plane_where_two_meet(seed: int) -
         assert not len(find_defects(mesh, lattice.cut_planes()).walls)
 
 
+@pytest.mark.slow
 def test_no_vertex_of_the_fine_rim_is_farther_than_the_error(sponge: Field) -> None:
     for (fine, _), (thin, _) in zip(_tiles(sponge, 0.0), _tiles(sponge, ERROR), strict=True):
         away = Nearest(thin, 10).distances(fine.positions.astype(np.float64))
         assert 0 < away.max() <= ERROR * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_vertices_beside_the_planes_stay(sponge: Field) -> None:
     for (fine, lattice), (thin, _) in zip(_tiles(sponge, 0.0), _tiles(sponge, ERROR), strict=True):
         inside = np.ones(len(fine.positions), bool)

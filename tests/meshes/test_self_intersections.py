@@ -106,6 +106,7 @@ def _common_points(one: list[Point], other: list[Point]) -> set[Point]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shared", sweep([0, 1, 2], kept=[1]))
 def test_random_triangles_on_a_coarse_grid_against_rational_arithmetic(shared: int) -> None:
     """On 4 x 4 x 3 points, most pairs are special: coplanar, collinear, touching."""
@@ -180,6 +181,7 @@ def test_floats_alone_part_triangles_of_one_plane(
     assert [len(pairs) for pairs in asked] == [0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:
     """Of triangles in a crowd, some with common corners, every share of which is fresh."""
@@ -211,6 +213,7 @@ def test_few_fresh_triangles_among_many_are_found_in_all_their_pairs() -> None:
     np.testing.assert_array_equal(find_crossings(positions, triangles, fresh=fresh), expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind",
     sweep(["a star", "round twice", "anyhow", "in a plane", "on edge"], ["round twice", "on edge"]),

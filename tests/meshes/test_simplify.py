@@ -49,6 +49,7 @@ def test_cut_edges_are_locked() -> None:
     assert _border(half) == _border(coarse)
 
 
+@pytest.mark.slow
 def test_distance_between_concentric_spheres_is_the_difference_of_radii() -> None:
     measured = measure_distance(Nearest(_sphere(5.0), 4000), Nearest(_sphere(4.0), 4000))
     assert measured == pytest.approx(1.0, abs=0.02)

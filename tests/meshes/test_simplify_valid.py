@@ -24,6 +24,7 @@ def sponge(seed: int) -> Mesh:
     return extract_surface(distance, Lattice.of_whole(whole, (1.0,) * 3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "max_error_um"), [(0, 0.8), (1, 2.0), (2, 4.0)])
 def test_crossings_that_simplification_makes_are_mended(seed: int, max_error_um: float) -> None:
     fine = sponge(seed)
@@ -53,6 +54,7 @@ def test_simplified_ball_is_one_body_and_says_so() -> None:
     assert len(done.mesh.triangles) < 0.3 * len(ball().triangles)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error_um", [0.5, 1.5])
 def test_one_frayed_body_of_many_crossings_is_sound_as_a_whole(error_um: float) -> None:
     """Later tries look only at what is new in them: nothing may be missed by that."""

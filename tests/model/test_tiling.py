@@ -32,6 +32,7 @@ def test_tiles_cover_every_voxel_once_and_lattices_every_cell_once(
     _assert_whole(cut(region, size), region)
 
 
+@pytest.mark.slow
 @given(columns=st.integers(1, 9), rows=st.integers(1, 9), more=st.tuples(lengths, lengths, lengths))
 def test_grid_gives_columns_by_rows_of_even_sizes(
     columns: int, rows: int, more: tuple[int, int, int]

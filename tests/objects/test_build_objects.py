@@ -49,6 +49,7 @@ def halves() -> tuple[np.ndarray, np.ndarray, list[list[int]], list[BuiltObjects
     return labels, centres, [part.tolist() for part in owned], built
 
 
+@pytest.mark.slow
 def test_each_object_is_closed_and_keeps_its_volume(halves) -> None:
     labels, _, owned, built = halves
     for numbers, one in zip(owned, built, strict=True):
@@ -64,6 +65,7 @@ def test_each_object_is_closed_and_keeps_its_volume(halves) -> None:
                 assert not any(counts.values()), (place, counts)
 
 
+@pytest.mark.slow
 def test_two_tiles_have_the_same_wall_at_the_finest_level(halves) -> None:
     """To the bit: each cell is closed, and between the two of a pair there is no gap."""
     _, _, owned, built = halves
@@ -94,6 +96,7 @@ def test_two_tiles_have_the_same_wall_at_the_finest_level(halves) -> None:
     assert area == pytest.approx(sum(between[0].values()), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_walls_are_those_of_faces_between_voxels(halves) -> None:
     labels, _, owned, built = halves
     pairs = set()

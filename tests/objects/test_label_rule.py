@@ -86,6 +86,7 @@ KEPT = (
 REAL = ("nuclei", "ovule walls", "CT skin", "MRI head", "light sheet, cells")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", sweep(CASES, kept=[*KEPT, *(name for name in REAL if name in CASES)])
 )

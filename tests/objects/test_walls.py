@@ -51,6 +51,7 @@ def require_sound(walls: Walls, objects: int) -> None:
         assert not any(counts.values()), (number, counts)
 
 
+@pytest.mark.slow
 def test_each_object_is_closed_and_valid_at_each_level() -> None:
     levels, _, centres = tissue()
     assert len(centres) >= 12
@@ -61,6 +62,7 @@ def test_each_object_is_closed_and_valid_at_each_level() -> None:
     assert all(fewer < 0.75 * many for many, fewer in pairwise(triangles)), triangles
 
 
+@pytest.mark.slow
 def test_neighbours_share_their_wall_triangle_by_triangle() -> None:
     levels, _, centres = tissue()
     for walls in levels:
@@ -162,6 +164,7 @@ def test_labels_without_an_object_have_no_walls() -> None:
     assert all(walls.triangles.shape == walls.positions.shape == (0, 3) for walls in levels)
 
 
+@pytest.mark.slow
 def test_small_objects_stay() -> None:
     labels = np.zeros((6, 6, 40), np.int32)
     for number in range(1, 10):
@@ -172,6 +175,7 @@ def test_small_objects_stay() -> None:
     np.testing.assert_allclose(measure_volumes(levels[-1], 9)[1:], volumes[1:], rtol=0.02)
 
 
+@pytest.mark.slow
 def test_the_same_labels_give_the_same_walls() -> None:
     labels, _ = touching_cells((36, 72, 72), SPACING_UM)
     again, _ = levels_of(labels, SPACING_UM, AIMS_UM)
@@ -189,6 +193,7 @@ def _mask(name: str) -> NDArray[np.integer]:
         return file["label"][:]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
 @pytest.mark.parametrize("name", sweep(["ovule", "nuclei"], kept=["nuclei"]))
 def test_masks_of_real_cells(name: str) -> None:

@@ -44,6 +44,7 @@ def _iso(source: Path, *flags: str) -> int:
     return main(["iso", str(source), "--tile-size", "24,32,32", *flags])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_picture")
 def test_the_table_names_the_levels_with_shares_and_what_takes_them(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -68,6 +69,7 @@ def test_the_table_names_the_levels_with_shares_and_what_takes_them(
     assert set(flags) <= {"--surfaces", "--iso-value"}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_picture")
 @pytest.mark.parametrize(
     "flags",
@@ -120,6 +122,7 @@ def test_a_setting_leaves_the_channel_s_other_surfaces_as_they_are(
     assert not any(setting.endswith("outer,outer") for setting in settings)
 
 
+@pytest.mark.slow
 def test_the_legend_has_every_candidate_s_colour_and_nothing_else_is_written(
     source: Path, tmp_path: Path
 ) -> None:
@@ -136,6 +139,7 @@ def _radius_um(candidate: Candidate) -> float:
     return 0.01 * int(np.abs(along[0, 0] - (candidate.raw - LOW) / HEIGHT).argmin())
 
 
+@pytest.mark.slow
 def test_contours_in_the_slices_lie_where_the_ball_has_their_levels(
     source: Path, tmp_path: Path
 ) -> None:
@@ -187,6 +191,7 @@ def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
     assert table(result)[-1] == "* a build takes it; given, and judged on all tiles"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_picture")
 def test_a_level_for_each_tile_is_the_build_s(tmp_path: Path) -> None:
     balls = [

@@ -75,6 +75,7 @@ def written(source: Path, out: Path, *flags: str) -> tuple[dict[str, Any], np.nd
     return about, pictures(out, about)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plane", ["acquired", "axial", "coronal", "sagittal"])
 def test_slices_show_the_scene_where_the_json_says(tmp_path: Path, plane: str) -> None:
     write_series(tmp_path / "s", grid("sagittal", rotation=turn((1, 2, 3), 20)))
@@ -87,6 +88,7 @@ def test_slices_show_the_scene_where_the_json_says(tmp_path: Path, plane: str) -
     assert np.abs(shown - expected).max() <= 1 + bound
 
 
+@pytest.mark.slow
 def test_uneven_images_of_a_tilted_gantry_are_shown_as_they_are_stored(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -106,6 +108,7 @@ def test_uneven_images_of_a_tilted_gantry_are_shown_as_they_are_stored(
     assert across["shape"][0] > 30  # of the grid, onto which the tilted slices are moved
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flag", "plane"),
     sweep(
@@ -185,6 +188,7 @@ def test_every_plane_of_every_orientation_is_the_right_way_up(
                 assert left == ("L" if flag else "R")
 
 
+@pytest.mark.slow
 def test_the_widest_spacing_or_dim_info_says_how_nifti_was_acquired(tmp_path: Path) -> None:
     voxels = np.arange(10 * 11 * 12, dtype=np.int16).reshape(10, 11, 12)
     found = {}
@@ -203,6 +207,7 @@ def test_the_widest_spacing_or_dim_info_says_how_nifti_was_acquired(tmp_path: Pa
     assert found == {"wide": ("coronal", 11), "last": ("axial", 12), "said": ("sagittal", 10)}
 
 
+@pytest.mark.slow
 def test_microscopy_has_planes_by_its_axes_with_square_pixels(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -263,6 +268,7 @@ def test_another_folder_is_left_alone_and_slices_are_replaced_as_a_whole(
     assert names == ["0.png", "1.png", "2.png", "3.png", "slices.json"]
 
 
+@pytest.mark.slow
 def test_lengths_of_surfaces_do_not_matter(tmp_path: Path) -> None:
     """Preset mri takes every 1.4 mm for the surface; this head is as large as a grain."""
     write_series(tmp_path / "s", grid(spacing=(0.02, 0.02, 0.02)))

@@ -68,6 +68,7 @@ def below(folder: Path) -> dict[str, bytes]:
     return {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
 
 
+@pytest.mark.slow
 def test_a_folder_gets_the_bundle_and_then_what_has_changed(
     out: Path, run: Run, tmp_path: Path
 ) -> None:
@@ -99,6 +100,7 @@ def test_a_folder_gets_the_bundle_and_then_what_has_changed(
     assert after["CNAME"] == b"me.example"
 
 
+@pytest.mark.slow
 def test_of_a_bundle_as_it_is_written_every_file_is_there(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -248,6 +250,7 @@ class _Quiet(http.server.SimpleHTTPRequestHandler):
         pass
 
 
+@pytest.mark.slow
 def test_every_file_is_fetched_as_browsers_do(
     out: Path, run: Run, host: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -279,6 +282,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
         yield store
 
 
+@pytest.mark.slow
 def test_an_object_store_gets_types_and_a_second_run_nothing(
     out: Path, run: Run, store: ObjectStore
 ) -> None:
@@ -314,6 +318,7 @@ def test_an_object_store_gets_types_and_a_second_run_nothing(
     assert listed["index.html"]["sha256"] == hashlib.sha256(b"<!doctype html>other").hexdigest()
 
 
+@pytest.mark.slow
 def test_any_file_system_of_fsspec_will_do(out: Path, run: Run) -> None:
     import fsspec
 

@@ -62,6 +62,7 @@ def test_only_the_tiles_that_a_box_touches_are_decoded(
 # Addresses
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fixture", FORMATS)
 def test_http_gives_what_the_disk_gives(
     fixture: str, request: pytest.FixtureRequest, serve: Callable[[Path], Server]
@@ -90,6 +91,7 @@ def test_a_remote_window_doesnt_fetch_the_whole_tiff(
     assert 2 * 128 * 128 * 2 <= fetched < path.stat().st_size / 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fixture", FORMATS)
 def test_s3_gives_what_the_disk_gives(
     fixture: str, request: pytest.FixtureRequest, s3_bucket: Path

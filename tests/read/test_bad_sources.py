@@ -372,6 +372,7 @@ def test_addresses_without_an_image(
     refusal(f"nosuchprotocol://host/{name}")
 
 
+@pytest.mark.slow
 def test_s3_without_the_object(s3_bucket: Path) -> None:
     assert s3_bucket.is_dir()
     refusal("s3://bucket/missing.zarr")

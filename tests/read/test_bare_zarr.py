@@ -38,6 +38,7 @@ def test_an_array_is_a_volume(tmp_path: Path, version: int, name: str) -> None:
         read.open(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [2, 3])
 def test_axes_come_from_names_of_dimensions_or_the_user(tmp_path: Path, version: int) -> None:
     body = f_phantom()

@@ -15,6 +15,7 @@ from stereocell.read.fingerprint import BUDGET_BYTES
 from support.phantoms import write_ome_zarr
 
 
+@pytest.mark.slow
 def test_fingerprint_ignores_path_and_chunks_of_a_copy(tiny_zarr_05: Path, tmp_path: Path) -> None:
     copy = shutil.copytree(tiny_zarr_05, tmp_path / "elsewhere" / "other.ome.zarr")
     assert read.open(copy).fingerprint == read.open(tiny_zarr_05).fingerprint
@@ -36,6 +37,7 @@ def test_fingerprint_sees_a_voxel_a_name_a_spacing(
     assert len({same, of(changed), of(voxels, "C"), of(voxels, spacing_um=(1.0, 1.0, 1.0))}) == 4
 
 
+@pytest.mark.slow
 def test_fingerprint_reads_a_bounded_part(tmp_path: Path) -> None:
     # 240 MB by its header; chunks that were never written are zeros and cost nothing here.
     path = write_ome_zarr(tmp_path / "v.zarr", [np.zeros((4, 8, 8), np.uint8)])

@@ -201,6 +201,7 @@ def test_a_block_cut_short_is_one_line(tmp_path: Path, packing: str) -> None:
     refusal(path)
 
 
+@pytest.mark.slow
 def test_a_bomb_unpacks_no_further_than_its_block(tmp_path: Path) -> None:
     path = write(tmp_path / "a.n5", packing={"type": "bzip2"}, **NM)
     block = path / "0" / "0" / "0"

@@ -253,6 +253,7 @@ def test_what_is_no_volume_is_refused_in_one_line(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
 def test_garbled_files_raise_nothing_else(tmp_path: Path, suffix: str) -> None:
     """Bytes are changed at random; a file opens all the same, or is refused in one line."""

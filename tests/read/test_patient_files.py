@@ -229,6 +229,7 @@ def test_a_file_cut_short_is_one_line(tmp_path: Path, suffix: str, compress: boo
     assert "is a folder" in refusal(path)
 
 
+@pytest.mark.slow
 def test_a_bomb_unpacks_no_further_than_the_header_says(tmp_path: Path) -> None:
     head = HEADS[".nhdr"].replace("raw\ndata file: {}", "bzip2\n").encode()
     (tmp_path / "a.nrrd").write_bytes(head + bz2.compress(bytes(1 << 26)))

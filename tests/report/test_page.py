@@ -288,6 +288,7 @@ def written(built: Path) -> tuple[str, _Page]:
     return _write(built)
 
 
+@pytest.mark.slow
 def test_page_holds_its_pictures(written: tuple[str, _Page]) -> None:
     html, parsed = written
     inside = [a for a in parsed.addresses if a.startswith(("data:image/webp;base64,", "#"))]
@@ -298,6 +299,7 @@ def test_page_holds_its_pictures(written: tuple[str, _Page]) -> None:
     assert drawn == ["All surfaces of <i>f", "Surfaces of tile r0_c0", "Surfaces of tile r0_c1"]
 
 
+@pytest.mark.slow
 def test_page_tells_of_each_unit(written: tuple[str, _Page]) -> None:
     html, parsed = written
     for channel in (NASTY, "twin", "empty"):
@@ -314,6 +316,7 @@ def test_page_tells_of_each_unit(written: tuple[str, _Page]) -> None:
     assert "there is no bundle yet" in html
 
 
+@pytest.mark.slow
 def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     built: Path, tmp_path: Path
 ) -> None:
@@ -368,6 +371,7 @@ def test_same_results_give_the_same_page(built: Path) -> None:
     assert _write(built)[0] == _write(built)[0]
 
 
+@pytest.mark.slow
 def test_page_with_too_many_units_shows_some_and_says_so(
     built: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -455,6 +459,7 @@ def test_each_unit_s_slowest_step_is_named(built: Path, written: tuple[str, _Pag
         assert re.search(rf"{re.escape(escape(unit.name))}.*{escape(step)}</td>", text), unit.name
 
 
+@pytest.mark.slow
 def test_report_goes_without_seconds_that_were_lost(built: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(built, out)
@@ -473,6 +478,7 @@ def test_totals_take_the_worst_distance_and_angle_and_add_up_faults() -> None:
     assert total.lods == (LodFacts(15, 0.3, 140, 0.02, 0.2, 0.4, 1, 2, 4.0, 0.6),)
 
 
+@pytest.mark.slow
 def test_other_levels_are_shown_where_the_surface_is_or_said_to_be_out_of_sight(
     tmp_path: Path,
 ) -> None:

@@ -55,6 +55,7 @@ def lods() -> tuple[Lod, ...]:
     return build_unit(volume, given).lods
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("level", "least"), [(1, 0.95), (2, 0.94)])
 def test_level_with_maps_looks_like_the_finest(
     lods: tuple[Lod, ...], level: int, least: float
@@ -72,6 +73,7 @@ def test_level_with_maps_looks_like_the_finest(
     assert 1 - np.mean(found) < 0.8 * (1 - np.mean(bare))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stain", sweep(range(len(STAINS)), kept=[1]))
 def test_coarsest_level_has_the_finest_s_outlines(stain: int) -> None:
     """SSIM of the outlines, close up, is .9 or more at each view: nuclei, membranes, vessels."""
@@ -100,6 +102,7 @@ def test_coarsest_level_has_the_finest_s_outlines(stain: int) -> None:
         assert compare(one, other) >= 0.9
 
 
+@pytest.mark.slow
 def test_picture_shows_the_surface_lit_from_the_eye(lods: tuple[Lod, ...]) -> None:
     ends = np.array([lods[0].mesh.positions.min(axis=0), lods[0].mesh.positions.max(axis=0)])
     picture = draw(lods[0], VIEWS[0], ends=ends, size=64)

@@ -41,6 +41,7 @@ def truth_of(path: Path) -> Any:
     return json.loads((path.parent / name).read_text())
 
 
+@pytest.mark.slow
 def test_cycif_is_an_ome_zarr_with_names_colours_and_a_pyramid(cycif: Path) -> None:
     assert zarr.open_group(cycif, mode="r").metadata.zarr_format == 3
     dataset = read.open(cycif)
@@ -54,6 +55,7 @@ def test_cycif_is_an_ome_zarr_with_names_colours_and_a_pyramid(cycif: Path) -> N
     assert dataset.levels[2].origin_um == pytest.approx((0.0, 0.21, 0.21))
 
 
+@pytest.mark.slow
 def test_coarser_levels_are_means_of_blocks(cycif: Path) -> None:
     dataset = read.open(cycif)
     fine = dataset.read(2, dataset.levels[0].box).voxels.astype(np.float64)
@@ -62,6 +64,7 @@ def test_coarser_levels_are_means_of_blocks(cycif: Path) -> None:
     assert np.abs(coarse - means).max() <= 0.5
 
 
+@pytest.mark.slow
 def test_cycif_repeats_to_the_byte(cycif: Path, tmp_path: Path) -> None:
     write_cycif(tmp_path / "block.ome.zarr", **SMALL)
     assert digests_of(tmp_path) == digests_of(cycif.parent)
@@ -92,6 +95,7 @@ def test_cycif_interrupted_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Mo
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_cycif_stopped_between_two_files_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
@@ -110,6 +114,7 @@ def test_cycif_stopped_between_two_files_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_cycif_on_a_full_disk_is_one_line_and_leaves_nothing(
     small_disk: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -122,6 +127,7 @@ def test_cycif_on_a_full_disk_is_one_line_and_leaves_nothing(
     assert list(small_disk.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_sample_that_lost_chunks_is_made_again_and_a_damaged_one_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -160,6 +166,7 @@ def test_wrong_arguments_are_named(tmp_path: Path, change: Any, message: str) ->
 # The truth against the voxels
 
 
+@pytest.mark.slow
 def test_voxels_hold_the_boundary_intensity_at_the_nuclei_s_surface() -> None:
     box = Box((0, 0, 0), (64, 200, 360))
     size_um = tuple(n * h for n, h in zip(box.shape, SPACING_UM, strict=True))
@@ -208,6 +215,7 @@ def test_nuclei_keep_their_gap(cycif: Path) -> None:
     assert gaps[~np.eye(len(nuclei), dtype=bool)].min() >= NUCLEUS_GAP_UM - 1e-9
 
 
+@pytest.mark.slow
 def test_brightness_fills_its_range() -> None:
     tissue = grow_tissue((20.0, 45.0, 90.0), seed=5, brightness_spread=1.5)
     brightness = np.array([nucleus.brightness for nucleus in tissue.nuclei])
@@ -217,6 +225,7 @@ def test_brightness_fills_its_range() -> None:
     assert np.median(brightness) == pytest.approx(math.sqrt(2.5), rel=0.1)
 
 
+@pytest.mark.slow
 def test_tumour_cells_are_denser_on_their_side_and_vessels_fork() -> None:
     tissue = grow_tissue((18.0, 45.0, 112.0), seed=0, brightness_spread=1.0)
     x = np.array([nucleus.center_um[2] for nucleus in tissue.nuclei])

@@ -36,6 +36,7 @@ def out(tmp_path: Path) -> Path:
     return write_bundle(tmp_path)
 
 
+@pytest.mark.slow
 def test_every_attack_is_refused_and_the_server_writes_nothing(
     out: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -89,6 +90,7 @@ def test_connections_are_counted_by_client_and_in_all_and_forgotten(
     asyncio.run(visit())
 
 
+@pytest.mark.slow
 def test_a_viewers_pace_is_served_by_the_server_itself(out: Path) -> None:
     """Six connections, as browsers open, with forty files each."""
     # the deadline of the server itself: on a busy machine a half second passes between requests
@@ -176,6 +178,7 @@ def read_all(stream: socket.socket, for_s: float) -> int:
     return size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_lets_transfers_end_and_nothing_begin(out: Path, kind: signal.Signals) -> None:
     with (
@@ -198,6 +201,7 @@ def test_a_signal_lets_transfers_end_and_nothing_begin(out: Path, kind: signal.S
     assert told == "finishing 1 transfer, at most 8 s; Ctrl+C again stops at once\n"
 
 
+@pytest.mark.slow
 def test_a_second_ctrl_c_stops_at_once(out: Path) -> None:
     with command(out) as (process, port), begin_download(port):
         assert process.stdout is not None
@@ -211,6 +215,7 @@ def test_a_second_ctrl_c_stops_at_once(out: Path) -> None:
     assert len(faults.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_in_the_background_ctrl_c_is_not_its_own_and_sigterm_is(out: Path) -> None:
     with command(out, ctrl_c.ignored) as (process, port):
         for _ in range(3):
@@ -243,6 +248,7 @@ def test_a_transfer_that_takes_too_long_is_cut_off(
     assert caplog.text == ""
 
 
+@pytest.mark.slow
 def test_a_file_that_is_cut_while_it_is_sent_is_named_in_a_line(out: Path) -> None:
     file, size = out / "bundle" / "large.bin", 0
     whole = file.stat().st_size

@@ -261,6 +261,7 @@ def serving(arguments, encoding):
             assert process.communicate(timeout=30)[1] == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", sweep(["ascii", "latin-1", "utf-8"], kept=["ascii", "utf-8"]))
 def test_a_program_is_told_the_address_in_json_and_a_person_in_any_encoding(tmp_path, encoding):
     bundle = tmp_path / "\u00fc\u4e2d" / "bundle"

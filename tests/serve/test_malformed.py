@@ -166,6 +166,7 @@ def fate(port, message, hello):
             return closed.rcvd.code, closed.rcvd.reason
 
 
+@pytest.mark.slow
 def test_every_malformed_message_is_closed_with_a_reason_or_ignored(port, capfd, caplog):
     fates = []
     count = examples(170, 60)
@@ -207,6 +208,7 @@ def raw_stream(port):
         yield stream
 
 
+@pytest.mark.slow
 def test_who_is_refused_reads_why_although_it_goes_on_sending(port):
     with raw_stream(port) as stream:
         whole = frame(1, bytes(MESSAGE_BYTES + 1))

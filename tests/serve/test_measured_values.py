@@ -66,6 +66,7 @@ def at_voxel(z: float, y: float, x: float) -> str:
     return f"{x * 0.25},{-y * 0.25},{z * 0.5}"
 
 
+@pytest.mark.slow
 def test_every_voxel_has_the_value_that_was_measured(out: Path) -> None:
     rng = np.random.default_rng(0)
     with served(out) as port:
@@ -81,6 +82,7 @@ def test_every_voxel_has_the_value_that_was_measured(out: Path) -> None:
         assert value(port, "r0_c0/F", at_voxel(3, 4, 18)) == counts()[3, 4, 18]
 
 
+@pytest.mark.slow
 def test_what_lies_elsewhere_has_no_value(out: Path) -> None:
     with served(out) as port:
         for place, at in (
@@ -103,6 +105,7 @@ def test_a_place_that_is_none_is_refused(out: Path, at: str) -> None:
         assert (response.status, body) == (400, b"at: expected x,y,z in um")
 
 
+@pytest.mark.slow
 def test_a_stage_that_is_not_the_bundle_s_any_more_tells_nothing(out: Path, tmp_path: Path) -> None:
     at = at_voxel(3, 4, 5)
     other = build(tmp_path, "--window", "F=-500:0")

@@ -137,6 +137,7 @@ def test_an_asset_changes_the_keys_of_what_is_made_of_it(
     assert changed(before, copy, file, lambda text: f"{text}\n# changed\n") == reached
 
 
+@pytest.mark.slow
 def test_comments_and_docstrings_change_no_key(copy: Path, before: dict[str, str]) -> None:
     """In all modules at once: a comment above, one in each body, another docstring."""
     for file in (copy / PACKAGE).rglob("*.py"):
@@ -210,12 +211,14 @@ def test_versions_of_libraries_count_those_of_lone_extension_modules_too() -> No
     assert {"usd-core", "OpenEXR"} <= cache_key.libraries_of(stage_tasks).keys()
 
 
+@pytest.mark.slow
 def test_packages_are_found_as_python_finds_them() -> None:
     found = cache_key._distributions()
     for top, names in packages_distributions().items():
         assert {package.name for package in found[top]} == set(names), top
 
 
+@pytest.mark.slow
 def test_what_is_imported_is_declared() -> None:
     """A package that comes along with another one is gone when that one does without it."""
     declared = {canonicalize_name(Requirement(line).name) for line in requires("stereocell") or ()}

@@ -242,6 +242,7 @@ def _objects(fs: Any, start: str) -> dict[str, object]:
     }
 
 
+@pytest.mark.slow
 def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
     store: ObjectStore, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -279,6 +280,7 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
     ended.wait()
 
 
+@pytest.mark.slow
 def test_a_lock_whose_putting_was_done_and_not_told_is_held(store: ObjectStore) -> None:
     with before(store.endpoint) as faults:
         fs = ObjectStore(store.kind, faults.endpoint).files()
@@ -291,6 +293,7 @@ def test_a_lock_whose_putting_was_done_and_not_told_is_held(store: ObjectStore) 
         assert not fs.exists("bucket/untold/.lock")
 
 
+@pytest.mark.slow
 def test_who_reads_leaves_what_a_command_is_making_there(store: ObjectStore) -> None:
     fs = store.files()
     owner = {"process": os.getpid(), "machine": machine(), "start": start_of(os.getpid())}
@@ -373,6 +376,7 @@ def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.M
     assert seen == [{"bundle"}]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
@@ -423,6 +427,7 @@ def test_tissue_classes_are_found_and_built_there(store: ObjectStore, tmp_path: 
     assert main(["check", "s3://bucket/classes"]) == 0
 
 
+@pytest.mark.slow
 def test_what_killed_commands_left_is_removed_and_what_others_work_in_is_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

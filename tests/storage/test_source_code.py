@@ -32,6 +32,7 @@ def read(home: Path, *texts: str) -> tuple[int, list[str]]:
     return int(said[0]), said[1:]
 
 
+@pytest.mark.slow
 def test_a_source_is_parsed_once_and_another_by_itself(tmp_path: Path) -> None:
     first = read(tmp_path, "x = 1", "y = 2")
     assert first[0] == 2
@@ -42,6 +43,7 @@ def test_a_source_is_parsed_once_and_another_by_itself(tmp_path: Path) -> None:
     assert codes[1] != first[1][1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["", "[1]", '{"a": 1}', '{"a": ["b"]}', "\0"])
 def test_what_is_kept_and_broken_is_found_anew(tmp_path: Path, text: str) -> None:
     expected = read(tmp_path, "x = 1")

@@ -64,6 +64,7 @@ def test_an_import_of_a_test_is_seen(module: str, expected: bool) -> None:
     assert any(names_a_test(name) for name in imported(module)) == expected
 
 
+@pytest.mark.slow
 def test_no_test_imports_another_and_nothing_shared_imports_a_test() -> None:
     modules = {file: file.read_text() for file in TESTS.rglob("*.py") if ".venv" not in file.parts}
     assert len(modules) > 100
@@ -104,6 +105,7 @@ def test_files_that_begin_since_they_take_long_exist() -> None:
     assert [file for file in LONG_FILES if not file.is_file()] == []
 
 
+@pytest.mark.slow
 def test_long_files_begin() -> None:
     files = ["filters/test_background.py", "isosurface/test_channel_level.py"]
     command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-o", "addopts="]

@@ -20,6 +20,7 @@ def test_f_differs_from_all_its_turns_and_mirror_images() -> None:
     assert len(poses) == 48
 
 
+@pytest.mark.slow
 def test_blurred_ball_keeps_its_volume_and_is_a_numeric_convolution() -> None:
     from scipy import ndimage
 

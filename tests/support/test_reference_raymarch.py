@@ -75,6 +75,7 @@ def test_nothing_is_drawn_of_an_empty_volume_or_past_the_box() -> None:
     assert picture[1:3, 1:3, 3].all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shading", [False, True])
 def test_it_converges_as_steps_halve(shading: bool) -> None:
     block = block_of(smooth(0), smooth(1), opacity=0.5)
@@ -130,6 +131,7 @@ def test_perspective_keeps_a_point_where_the_field_of_view_puts_it() -> None:
     assert abs(column + 0.5 - expected) <= 1
 
 
+@pytest.mark.slow
 def test_a_wall_is_lit_by_its_angle_to_the_lamp() -> None:
     volume = np.zeros((12, 9, 9), np.uint8)
     volume[:6] = 255  # faces the eye, and is thick behind its boundary

@@ -91,6 +91,7 @@ def rippled(positions: NDArray[np.floating]) -> NDArray[np.float64]:
     return ripples / np.linalg.norm(ripples, axis=1, keepdims=True)
 
 
+@pytest.mark.slow
 def test_baked_map_gives_back_the_fine_surface_s_normals() -> None:
     """Shade a coarse sphere by its map: it must have the fine one's normals, ripples and all."""
     body = sphere()
@@ -112,6 +113,7 @@ def test_baked_map_gives_back_the_fine_surface_s_normals() -> None:
     assert maps.paint is None
 
 
+@pytest.mark.slow
 def test_baked_map_of_a_thin_shell_shows_no_other_wall() -> None:
     """The inner wall's triangles are nearer than the outer wall's to a chord of a coarse mesh."""
     outer, inner = sphere(5.0, 24), sphere(4.8, 96)
@@ -220,6 +222,7 @@ def on_the_cut(lod: Lod) -> dict[bytes, tuple[NDArray[np.float64], float]]:
     return {place.tobytes(): (normal, float(share)) for place, normal, share in rows}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [1, 2])
 def test_neighbours_shade_alike_along_the_cut(
     neighbours: tuple[tuple[Lod, ...], ...], level: int
@@ -250,6 +253,7 @@ def test_levels_record_what_they_wear(neighbours: tuple[tuple[Lod, ...], ...]) -
             assert lod.baked.charts > 2  # a part of a ball and its cap
 
 
+@pytest.mark.slow
 def test_baking_twice_gives_the_same() -> None:
     body = sphere(sides=48)
     fine = replace(body, normals=rippled(body.positions).astype(np.float32))

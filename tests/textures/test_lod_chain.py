@@ -72,6 +72,7 @@ def test_simplification_alone_makes_defects_here(sponge: Mesh) -> None:
     assert kinds(find_defects(simplify(sponge, 2.0, PLANES), PLANES)) == {"crossings"}
 
 
+@pytest.mark.slow
 def test_every_level_is_sound_and_keeps_its_border(sponge: Mesh) -> None:
     levels = list(_chain(sponge))
     for level in levels:
@@ -102,6 +103,7 @@ def test_body_that_cannot_be_simplified_keeps_its_surface_and_is_counted(
     assert (kept.mesh.positions[:, 2] < -5).sum() < 0.5 * len(alone.positions)  # the ball isn't
 
 
+@pytest.mark.slow
 def test_mesh_with_defects_of_its_own_keeps_the_body_that_has_them() -> None:
     """Nothing hides: what is at fault stays, and is found by whoever checks."""
     holed = replace(ball(), triangles=ball().triangles[1:])
@@ -148,6 +150,7 @@ def test_no_level_strays_from_the_one_before_and_the_process_stays(with_process:
         assert lod.quality.away.max < 8
 
 
+@pytest.mark.slow
 def test_each_level_has_the_fine_volume(sponge: Mesh) -> None:
     """Of an open mesh too: what its border spans is the same at all levels."""
     settings = _settings((0.1, 0.5, 1.0))
@@ -159,6 +162,7 @@ def test_each_level_has_the_fine_volume(sponge: Mesh) -> None:
             assert _rim(lod.mesh) == _rim(fine)
 
 
+@pytest.mark.slow
 def test_bodies_without_room_for_their_volume_are_simplified_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -220,6 +224,7 @@ def test_every_share_of_enclosure_is_measured() -> None:
     assert measure_enclosure(ball_, aside) == pytest.approx(0.5 - 0.5 / 8, abs=0.02)
 
 
+@pytest.mark.slow
 def test_simplification_says_the_same_twice(sponge: Mesh) -> None:
     first, second = (list(_chain(sponge)) for _ in range(2))
     for a, b in zip(first, second, strict=True):
@@ -227,6 +232,7 @@ def test_simplification_says_the_same_twice(sponge: Mesh) -> None:
         np.testing.assert_array_equal(a.mesh.positions, b.mesh.positions)
 
 
+@pytest.mark.slow
 def test_record_tells_distances_faults_and_angles(sponge: Mesh) -> None:
     settings = Settings()
     settings = replace(settings, surface=settings.surface.resolved(SPACING))

@@ -79,6 +79,7 @@ def _sides(positions: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray[n
     return positions[:, 0] < 17, positions[:, 0] > 24
 
 
+@pytest.mark.slow
 def test_unit_knows_the_paint_at_vertices_and_texels(built: Path) -> None:
     out_folder = OutFolder(built)
     assert out_folder.plan().settings.paint == {"body": "marker"}
@@ -100,6 +101,7 @@ def test_unit_knows_the_paint_at_vertices_and_texels(built: Path) -> None:
         assert lod.baked.paint.max() > 200
 
 
+@pytest.mark.slow
 def test_stage_shows_the_paint_and_leaves_other_channels_to_be_recoloured(built: Path) -> None:
     stage = Usd.Stage.Open(str(built / "stage/stage.usda"))
     assert validate_stage(built / "stage/stage.usda") == []
@@ -179,6 +181,7 @@ def test_wrong_paint_is_one_line(
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_report_tells_what_is_painted_how_dense_texels_are_and_how_like_levels_look(
     built: Path,
 ) -> None:

@@ -112,6 +112,7 @@ def test_charts_do_not_overlap_and_fill_the_map() -> None:
     assert (count > 0).mean() > 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("padding", "levels"), [(3, 1), (6, 2), (12, 3)])
 def test_lookups_in_a_chart_meet_no_other_at_the_mip_levels_that_are_promised(
     padding: int, levels: int

@@ -48,6 +48,7 @@ def learned() -> tuple[HeadPhantom, Tissue]:
     return head, learn_tissue(head.voxels, head.spacing_um, THREE)
 
 
+@pytest.mark.slow
 def test_each_class_overlaps_the_truth_and_beats_multi_otsu(
     learned: tuple[HeadPhantom, Tissue],
 ) -> None:
@@ -66,6 +67,7 @@ def test_it_does_in_other_shapes_noises_and_biases(
     require_overlap(head, learn_tissue(head.voxels, head.spacing_um, THREE), 0.9)
 
 
+@pytest.mark.slow
 def test_probabilities_sum_to_one_in_the_mask_and_to_nothing_outside(
     learned: tuple[HeadPhantom, Tissue],
 ) -> None:
@@ -117,6 +119,7 @@ def test_the_same_voxels_give_the_same_bytes(monkeypatch: pytest.MonkeyPatch) ->
     assert first.probabilities.tobytes() == second.probabilities.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", sweep([2, 3, 4], kept=[3]))
 def test_auto_finds_how_many_classes_there_are(count: int) -> None:
     voxels, labels = blobs(count)

@@ -114,6 +114,7 @@ def test_classes_have_their_signals_bias_and_noise(head: HeadPhantom, clean: Hea
     assert OTHER in head.labels
 
 
+@pytest.mark.slow
 def test_a_finer_grid_shows_the_same_head(clean: HeadPhantom) -> None:
     fine = make_head((140, 120, 120), noise=0, bias=0)
     for label in (CSF, GREY, WHITE):
@@ -212,6 +213,7 @@ def test_the_bytes_repeat_and_another_seed_is_another_series(
     assert not one & other
 
 
+@pytest.mark.slow
 def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -345,6 +345,7 @@ def manifest(bundle: Path) -> dict[str, object]:
     return channel
 
 
+@pytest.mark.slow
 def test_the_adaptive_criterion_takes_it_in_every_tile(built: Path) -> None:
     (found,) = read_survey(OutFolder(built)).values()
     threshold = found.appearance.threshold
@@ -356,6 +357,7 @@ def test_the_adaptive_criterion_takes_it_in_every_tile(built: Path) -> None:
     assert 250 < threshold < 850
 
 
+@pytest.mark.slow
 def test_the_threshold_reaches_the_bundle_and_check_finds_nothing(built: Path) -> None:
     (found,) = read_survey(OutFolder(built)).values()
     low, high = found.appearance.window
@@ -367,6 +369,7 @@ def test_the_threshold_reaches_the_bundle_and_check_finds_nothing(built: Path) -
     assert [line for line in check(built) if not line.ok] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("edit", "expected"), [("= 400", 400.0), ("= -9000", -1e9), ("= None", None)]
 )

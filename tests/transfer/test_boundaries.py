@@ -128,6 +128,7 @@ def test_without_a_boundary_nothing_is_suggested_and_it_is_said(
     assert suggested.transfer_2d.gradient_max > 0
 
 
+@pytest.mark.slow
 def test_the_suggestion_takes_the_boundaries_and_leaves_the_materials() -> None:
     voxels = nested((0.15, 0.5, 0.85), (28, 18), 1.2, 0.02)
     fine = fine_counts(voxels)
@@ -163,6 +164,7 @@ def test_a_triangle_ends_below_an_arc_that_passes_over_it() -> None:
     assert inner.apex < upper.gradients[1] < 1.5 * inner.apex
 
 
+@pytest.mark.slow
 def test_the_head_has_the_levels_of_its_tissues() -> None:
     """Signals of the phantom: background, CSF 300, grey 620, white 1000, in noise of 50."""
     head = make_head()
@@ -188,6 +190,7 @@ def head_boundaries(noise: float) -> tuple[Boundaries, tuple[float, float]]:
     return found, (low, high)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("noise", "expected"),
     [
@@ -211,6 +214,7 @@ def test_tissues_of_the_head_that_touch_have_arcs_of_their_own(
     assert not [e for e in ends if abs(e[0] - FLUID) < 40 and abs(e[1] - SKIN) < 40]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.02, 0.05])
 def test_no_shape_reaches_the_values_of_its_materials(noise: float) -> None:
     """Rician noise of sigma: a voxel inside of a material lies within one of it, two in three."""

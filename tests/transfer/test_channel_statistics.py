@@ -34,6 +34,7 @@ def test_sparse_channel_keeps_its_few_bright_voxels() -> None:
     assert find_statistics(voxels, WindowOptions(1, 99)).window == (0, 900)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limit", "levels", "seen"),
     [
@@ -76,6 +77,7 @@ def test_window_is_that_of_the_region_alone(
     assert sum(channel["statistics"]["values"]["counts"]) == np.count_nonzero(inside)
 
 
+@pytest.mark.slow
 def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

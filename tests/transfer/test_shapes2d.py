@@ -146,6 +146,7 @@ def random_shapes(seed: int) -> Shapes:
 VIEWER = find_asset("viewer_gltf")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     shutil.which("node") is None or not (VIEWER / "node_modules" / "tsx").is_dir(),
     reason="needs node and the viewer's packages: run `make setup`",
@@ -373,6 +374,7 @@ def line_of(out: Path) -> CheckLine:
     return next(line for line in check(out) if line.name == "2D transfer functions")
 
 
+@pytest.mark.slow
 def test_a_build_proposes_the_boundary_and_says_where_there_is_none(tmp_path: Path) -> None:
     shape, spacing = (40, 48, 48), (0.5, 0.5, 0.5)
     center = tuple((n - 1) * h / 2 for n, h in zip(shape, spacing, strict=True))

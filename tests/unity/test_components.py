@@ -18,6 +18,7 @@ Run = Callable[..., subprocess.CompletedProcess[bytes]]
 Import = Callable[..., Any]
 
 
+@pytest.mark.slow
 def test_transfer_functions_are_rows_of_one_table(bundle: Path, imported: Import) -> None:
     found = imported(bundle)
     channels = load(bundle / "manifest.json")["channels"]
@@ -42,6 +43,7 @@ def test_transfer_functions_are_rows_of_one_table(bundle: Path, imported: Import
         assert box["keywords"] == []
 
 
+@pytest.mark.slow
 def test_channels_are_shown_coloured_and_classified_by_name(bundle: Path, imported: Import) -> None:
     calls = [
         {"name": "SetVisible", "args": ["Hoechst 33342", False]},
@@ -72,6 +74,7 @@ def test_channels_are_shown_coloured_and_classified_by_name(bundle: Path, import
             assert level["enabled"]
 
 
+@pytest.mark.slow
 def test_hidden_channels_hide_their_surfaces_and_empty_boxes(
     bundle: Path, imported: Import
 ) -> None:
@@ -118,6 +121,7 @@ def test_volumes_are_blended_from_the_farthest_along_every_ray(run: Run) -> None
     assert crossed > 3000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("x", [-1.0, 1.0])
 def test_the_farther_tile_is_blended_first(bundle: Path, imported: Import, x: float) -> None:
     found = imported(bundle, calls=[{"name": "SortFrom", "args": [x, 0, 0.1]}])

@@ -16,6 +16,7 @@ Run = Callable[..., subprocess.CompletedProcess[bytes]]
 Import = Callable[..., Any]
 
 
+@pytest.mark.slow
 def test_large_volumes_are_read_at_a_coarser_level(bundle: Path, imported: Import) -> None:
     fine, coarse = imported(bundle), imported(bundle, mostTexels=12)
     for (tile, box), (_, whole) in zip(boxes(coarse["root"]), boxes(fine["root"]), strict=True):
@@ -29,6 +30,7 @@ def test_large_volumes_are_read_at_a_coarser_level(bundle: Path, imported: Impor
         assert all(box["material"][name] == whole["material"][name] for name in same)
 
 
+@pytest.mark.slow
 def test_more_than_four_channels_are_marched_apart(
     bundle: Path, imported: Import, tmp_path: Path
 ) -> None:
@@ -56,6 +58,7 @@ def test_more_than_four_channels_are_marched_apart(
     assert [c["isVisible"] for c in found["channels"]] == [False, False, True, False, False]
 
 
+@pytest.mark.slow
 def test_a_bad_bundle_is_told_in_a_line_and_leaves_no_prefab(
     run: Run, bundle: Path, tmp_path: Path
 ) -> None:

@@ -153,6 +153,7 @@ def aslant(block: Block, size_px: int = 40) -> Camera:
     return Camera(tuple(eye), tuple(middle), (size_px, size_px), fov_deg=35.0)
 
 
+@pytest.mark.slow
 def test_a_uniform_cube_has_the_opacity_of_its_length(program: Path) -> None:
     block = block_of(np.full((11, 40, 40), 255, np.uint8), opacity=0.1)
     per_voxel = np.rint(25.5) / 255
@@ -166,6 +167,7 @@ def test_a_uniform_cube_has_the_opacity_of_its_length(program: Path) -> None:
         assert found.light[0] == pytest.approx([*(tint * a), a], abs=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_the_picture_is_the_reference_s(program: Path, count: int) -> None:
     block = block_of(*(waves((18, 44, 40), seed, fades=False) for seed in range(count)))
@@ -177,6 +179,7 @@ def test_the_picture_is_the_reference_s(program: Path, count: int) -> None:
     assert psnr(np.rint(255 * found[..., :3]), np.rint(255 * expected[..., :3])) > 45
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fades", sweep([True, False], kept=[False]))  # is cut by the box's faces
 @pytest.mark.parametrize("count", sweep([1, 2], kept=[2]))
 def test_so_is_its_light(program: Path, count: int, fades: bool) -> None:
@@ -190,6 +193,7 @@ def test_so_is_its_light(program: Path, count: int, fades: bool) -> None:
     assert psnr(np.rint(255 * found[..., :3]), np.rint(255 * expected[..., :3])) > 42
 
 
+@pytest.mark.slow
 def test_a_mirrored_picture_is_another(program: Path) -> None:
     """What the comparison is worth: a flip of x, y or z is seen."""
     voxels = waves((18, 44, 40), 1, fades=False)
@@ -210,6 +214,7 @@ def test_a_hidden_channel_absorbs_nothing(program: Path) -> None:
     assert np.allclose(found, picture(program, alone, camera, How()), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_no_ray_takes_more_than_its_steps_and_each_reaches_its_end(program: Path) -> None:
     block = block_of(np.full((80, 300, 300), 255, np.uint8), opacity=0.005)
     camera = aslant(block, 12)

@@ -120,6 +120,7 @@ def check_surfaces(found: Any, bundle: Path) -> int:
     return count
 
 
+@pytest.mark.slow
 def test_volumes_and_surfaces_are_in_their_places(bundle: Path, imported: Import) -> None:
     found = imported(bundle)
     check_volumes(found, bundle)
@@ -140,6 +141,7 @@ def test_volumes_and_surfaces_are_in_their_places(bundle: Path, imported: Import
     assert found["bars"] == 0
 
 
+@pytest.mark.slow
 def test_surface_and_volume_of_a_sphere_are_one(bundle: Path, imported: Import) -> None:
     """The glb by its own places, the volume by the shader's: both about the same centre."""
     found = imported(bundle)
@@ -163,6 +165,7 @@ def test_surface_and_volume_of_a_sphere_are_one(bundle: Path, imported: Import) 
     assert np.allclose(world.max(axis=0), surface[1], atol=2.1 * voxel)
 
 
+@pytest.mark.slow
 def test_the_package_s_own_test_in_the_editor_tells_a_mirrored_surface(
     run: Run, bundle: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -187,6 +190,7 @@ def flipped() -> Gf.Matrix4d:
     return Gf.Matrix4d().SetScale((-1, 1, 1)) * Gf.Matrix4d().SetTranslate((40, 0, 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("move", [turned, sheared, flipped])
 def test_a_tile_that_was_moved_keeps_its_matrix(
     edited: Callable[[Gf.Matrix4d], Path], imported: Import, move: Callable[[], Gf.Matrix4d]
@@ -197,6 +201,7 @@ def test_a_tile_that_was_moved_keeps_its_matrix(
     check_volumes(imported(bundle), bundle)
 
 
+@pytest.mark.slow
 def test_levels_of_detail_follow_their_errors(bundle: Path, imported: Import) -> None:
     found = imported(bundle)
     root_error: dict[str, list[float]] = {}
@@ -225,6 +230,7 @@ def test_levels_of_detail_follow_their_errors(bundle: Path, imported: Import) ->
         assert [level["name"] for level in group["children"]] == ["lod0", "lod1", "lod2"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("errors", "expected"),
     [
@@ -240,6 +246,7 @@ def test_heights_fall(run: Run, errors: str, expected: list[float]) -> None:
     assert json.loads(done.stdout) == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_tilesets_of_tilesets_are_followed(
     stage: Path, tmp_path: Path, imported: Import, monkeypatch: pytest.MonkeyPatch
 ) -> None:

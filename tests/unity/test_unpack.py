@@ -55,6 +55,7 @@ def unpack(run: Run, frames: list[tuple[bytes, int]]) -> list[bytes | None]:
     return found
 
 
+@pytest.mark.slow
 def test_frames_unpack_to_what_was_packed(run: Run) -> None:
     plain, frames = [], []
     for content in kinds():
@@ -66,6 +67,7 @@ def test_frames_unpack_to_what_was_packed(run: Run) -> None:
     assert unpack(run, frames) == plain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_contents(run: Run, seed: int) -> None:
     """Blocks of every make: literals of few and many symbols, copies near and far."""
@@ -83,6 +85,7 @@ def test_random_contents(run: Run, seed: int) -> None:
     assert unpack(run, frames) == plain
 
 
+@pytest.mark.slow
 def test_a_damaged_frame_is_refused_or_another_never_a_crash(run: Run) -> None:
     rng = np.random.default_rng(1)
     frames: list[tuple[bytes, int]] = []

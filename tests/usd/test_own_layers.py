@@ -93,6 +93,7 @@ NAMED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", NAMED)
 @pytest.mark.parametrize("form", ["{}/other/", "../other/"])
 def test_a_file_elsewhere_is_refused_and_named(
@@ -111,6 +112,7 @@ def test_a_file_elsewhere_is_refused_and_named(
     assert not (out / "bundle").exists()
 
 
+@pytest.mark.slow
 def test_files_of_the_edit_s_own_folder_and_of_the_stage_s_are_read(out: Path) -> None:
     folder = out.parents[1] / "edits"
     path, over = edit_of(out, folder)
@@ -123,6 +125,7 @@ def test_files_of_the_edit_s_own_folder_and_of_the_stage_s_are_read(out: Path) -
     assert bundle(out, folder / "link.usda") == 0
 
 
+@pytest.mark.slow
 def test_a_link_out_of_the_stage_is_refused(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     atlas = out / "stage/tiles/r0_c0/Channel0.exr"
     bait = out.parents[1] / "other/tiles/r0_c0/Channel0.exr"

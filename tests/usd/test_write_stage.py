@@ -290,6 +290,7 @@ def test_unloaded_tiles_still_have_their_bounds(stage_path: Path) -> None:
     assert tuple(box.GetMax()) == pytest.approx((35.5 * 0.25, 0.125, 15.5 * 0.5))
 
 
+@pytest.mark.slow
 def test_another_process_writes_the_same_bytes(stage_path: Path, tmp_path: Path) -> None:
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         pool.apply(write_whole, (tmp_path / "again",))

@@ -169,6 +169,7 @@ def test_faults_of_a_usdz_are_found(stage_path: Path, small: Path, tmp_path: Pat
     assert "usdUtilsValidators" in text  # bytes that start anywhere: USD finds it
 
 
+@pytest.mark.slow
 def test_another_process_writes_the_same_bytes(
     small: Path, stage_path: Path, tmp_path: Path
 ) -> None:

@@ -75,6 +75,7 @@ def node_finds_nothing(request, monkeypatch):
         monkeypatch.setattr(formats.subprocess, "run", lambda *args, **options: answer)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("node")
 def test_what_the_pipeline_writes_passes_all_checks(made):
     found = lines(made)
@@ -82,6 +83,7 @@ def test_what_the_pipeline_writes_passes_all_checks(made):
     assert found["glTF validator"].detail == "3 files"
 
 
+@pytest.mark.slow
 def test_what_needs_no_node_passes(made):
     found = lines(made)
     assert failed(found) <= {"glTF validator", "KTX2 textures"}
@@ -95,6 +97,7 @@ def test_a_folder_without_a_build_is_one_error(tmp_path, name):
         lines(tmp_path / name)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("node")
 def test_a_bundle_by_itself_is_checked_as_in_its_build(out):
     whole, alone = lines(out), lines(out / "bundle")
@@ -205,6 +208,7 @@ def test_tileset_whose_errors_grow_is_found(out):
     assert "larger geometricError" in found["tilesets"].detail
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("node")
 def test_a_build_without_any_surface_passes(tmp_path):
     tile = spheres.tile(0, (spheres.BLUE,))
@@ -297,6 +301,7 @@ def test_stage_with_a_lost_file_is_found(out):
     assert "CD31.vdb" in found["stage"].detail
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("node")
 def test_positions_that_leave_their_bounds_are_found_inside_the_compression(out):
     path = out / "bundle" / GLB
@@ -309,6 +314,7 @@ def test_positions_that_leave_their_bounds_are_found_inside_the_compression(out)
     assert "decompressed: ACCESSOR_MAX_MISMATCH" in detail
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("node")
 def test_cut_texture_is_found(out):
     path = out / "bundle" / "volumes/r0_c0/CD31.ktx2"
@@ -338,6 +344,7 @@ def cells(tmp_path):
     return tmp_path / "cells"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("node")
 def test_a_bundle_of_objects_passes(cells):
     assert [line for line in check(cells) if not line.ok] == []

@@ -130,6 +130,7 @@ def test_enhanced_images_agree_with_itk_and_nibabel(tmp_path: Path, modality: st
         assert difference(ours, by_nibabel(in_order)[:, [2, 0, 1, 3]]) < TOLERANCE_MM
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("STEREOCELL_DATA" not in os.environ, reason="STEREOCELL_DATA is not set")
 def test_real_series_agrees_with_dicom2nifti_and_itk() -> None:
     folder = Path(os.environ["STEREOCELL_DATA"]) / "mri_t1_7t" / "dicoms"

@@ -165,6 +165,7 @@ def test_streams_that_claim_more_than_the_header_are_not_decoded(
     assert len(decoded) == 3
 
 
+@pytest.mark.slow
 def test_streams_on_which_gdcm_aborts_are_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -104,6 +104,7 @@ def test_orientations_that_wobble_are_one_series_of_their_mean(
     assert error(dataset) <= 0.51
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0, 1, 0)])
 def test_planes_that_wobble_about_their_middles_make_no_tilt(
     tmp_path: Path, axis: tuple[int, int, int]

@@ -64,6 +64,7 @@ def test_a_region_has_the_values_of_the_whole(tmp_path: Path) -> None:
     assert part.min() == -1000
 
 
+@pytest.mark.slow
 def test_the_window_of_padded_ct_is_that_of_what_was_measured(tmp_path: Path) -> None:
     folder = write(tmp_path / "s", padded(measured(), -2000), PixelPaddingValue=-2000)
     # the preset of CT has a window of its own
@@ -135,6 +136,7 @@ def test_a_slice_that_is_all_padding_takes_the_others_least_value(tmp_path: Path
     assert np.unique(as_stored(dataset)[4]).tolist() == [-1000]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("syntax", [JPEGLosslessSV1, RLELossless])
 def test_compressed_images_are_padded_alike(tmp_path: Path, syntax: str) -> None:
     stored = padded(measured(), -2000)

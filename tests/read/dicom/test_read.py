@@ -149,6 +149,7 @@ def test_duplicates_give_the_first_by_instance_number_and_say_so(
     assert error(dataset) <= 0.51
 
 
+@pytest.mark.slow
 def test_as_many_at_every_place_are_points_in_time(tmp_path: Path) -> None:
     def later(ds: pydicom.Dataset) -> None:
         ds.InstanceNumber += 100
@@ -162,6 +163,7 @@ def test_as_many_at_every_place_are_points_in_time(tmp_path: Path) -> None:
     assert np.array_equal(whole(second), whole(read.open(tmp_path / "s")) + 7)
 
 
+@pytest.mark.slow
 def test_the_largest_series_is_taken_and_any_can_be_named(tmp_path: Path) -> None:
     write_series(tmp_path / "s" / "deep" / "er", grid("coronal"), name="{}".format)
     small = grid("axial", (6, 10, 12))
@@ -220,6 +222,7 @@ def as_patients_come(ds: pydicom.Dataset) -> None:
         setattr(ds, f"{name}Time", "000000")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modality", ["MR", "CT"])
 def test_enhanced_images_that_highdicom_converts_lie_where_the_slices_did(
     tmp_path: Path, modality: str
@@ -246,6 +249,7 @@ SYNTAXES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYNTAXES)
 def test_compressed_pixels_are_what_was_compressed(tmp_path: Path, name: str) -> None:
     syntax, dtype, tolerance = SYNTAXES[name]
@@ -276,6 +280,7 @@ def test_twelve_of_sixteen_bits_signed_with_an_overlay_above(tmp_path: Path) -> 
     assert np.array_equal(np.sort(whole(dataset).ravel()), values.ravel())
 
 
+@pytest.mark.slow
 def test_monochrome1_is_inverted_within_its_bits(tmp_path: Path) -> None:
     write_series(tmp_path / "a", grid(), dtype=np.uint16, bits=12)
     write_series(tmp_path / "b", grid(), dtype=np.uint16, bits=12, photometric="MONOCHROME1")
@@ -307,6 +312,7 @@ def test_no_pixels_are_read_before_they_are_asked_for(
     assert calls == [1]  # once a process
 
 
+@pytest.mark.slow
 def test_fingerprint_is_of_geometry_modality_and_pixels(tmp_path: Path) -> None:
     first = read.open(write_series(tmp_path / "a", grid())[0].parent).fingerprint
 

@@ -59,6 +59,7 @@ def on_our_grid(
     return voxels[index[..., 0], index[..., 1], index[..., 2]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["BINARY", "FRACTIONAL", "LABELMAP"])
 def test_a_segmentation_ends_the_plan_by_a_line_without_its_texts(
     tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
@@ -241,6 +242,7 @@ def test_objects_have_the_standards_words_alone(tmp_path: Path) -> None:
     assert notes.colors[1] == pytest.approx((1, 1, 1), abs=2e-3)
 
 
+@pytest.mark.slow
 def test_free_text_names_segments_where_it_is_asked_for(tmp_path: Path) -> None:
     def change(ds: Any) -> None:
         ds.SegmentSequence[0].SegmentLabel = "node  1\n\x1b[31m"
@@ -338,6 +340,7 @@ def test_numbers_beyond_a_byte_stay(tmp_path: Path) -> None:
     assert dataset.objects.names.keys() == {1, 40_000}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["BINARY", "LABELMAP"])
 def test_garbled_segmentations_raise_nothing_else(tmp_path: Path, kind: str) -> None:
     """Bytes are changed at random; a label map is read all the same, or refused in one line."""

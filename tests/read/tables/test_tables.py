@@ -184,6 +184,7 @@ def fill_anndata(group: Any, x: str) -> None:
     put(uns, "instance_key", np.array("id"), "string")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [2, 3, "h5ad"])
 @pytest.mark.parametrize("x", ["dense", "csr", "csc"])
 def test_a_table_of_spatialdata(tmp_path: Path, version: int | str, x: str) -> None:
