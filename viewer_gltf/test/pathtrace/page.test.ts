@@ -201,7 +201,7 @@ describeInChromium("the path-traced page", () => {
     const { width, height } = whole;
     const at = (p: readonly [number, number, number]) => project(p, bounds, width, height);
     const edge = Math.max(at([34, -48, 24]).x, at([34, 0, 24]).x) + 2;
-    expect(right(whole, edge)).toBeGreaterThan(12);
+    expect(right(whole, edge) / (width * height)).toBeGreaterThan(25 / (240 * 150));
     await page().goto("about:blank");
     await open(`&quality=low#v=1&mode=traced&dwell=off&cut=1,0,0,34&${ONCE}`);
     const cut = await shoot(6); // by now nothing is marched

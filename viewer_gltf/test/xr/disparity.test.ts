@@ -5,7 +5,7 @@ import { addHeadset } from "../support/browser/chromium";
 import { isBackground, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
-import { IS_EXHAUSTIVE } from "../support/exhaustive";
+import { sweep } from "../support/exhaustive";
 import { BALLS } from "../support/fixture/bodies";
 
 const VIEWPORT = { width: 480, height: 240 };
@@ -109,39 +109,36 @@ describeInChromium("in stereo", () => {
     ["volume", "&mode=all"],
     ["disc", "&mode=disc&switch=9&disc=40"],
   ] as const;
-  for (const [as, query] of drawn) {
-    it.runIf(IS_EXHAUSTIVE)(
-      `a ball's middle lies where both eyes should see it, as a ${as}`,
-      async () => {
-        await addHeadset(stand.viewer.page);
-        await stand.open(`${query}&quality=high#v=1&c=Balls`);
-        await stand.viewer.enterStereo();
-        await stand.viewer.settled();
+  for (const [as, query] of sweep(drawn, ([as]) => as === "volume")) {
+    it(`a ball's middle lies where both eyes should see it, as a ${as}`, async () => {
+      await addHeadset(stand.viewer.page);
+      await stand.open(`${query}&quality=high#v=1&c=Balls`);
+      await stand.viewer.enterStereo();
+      await stand.viewer.settled();
 
-        const { scale, center } = place(stand.manifest.specimen.bounds_um);
-        const [{ center: ball, radius }] = BALLS;
-        const [x, y, z] = ball.map((v, i) => (v - center[i]) * scale);
-        const depth = XR_DISTANCE_M - z;
-        // the middle of a ball's outline lies a little farther out than its centre's image
-        const perMetre = (FOCAL_PX * depth) / (depth ** 2 - (radius * scale) ** 2);
-        const around_px = (1.3 * radius * scale * FOCAL_PX) / depth;
+      const { scale, center } = place(stand.manifest.specimen.bounds_um);
+      const [{ center: ball, radius }] = BALLS;
+      const [x, y, z] = ball.map((v, i) => (v - center[i]) * scale);
+      const depth = XR_DISTANCE_M - z;
+      // the middle of a ball's outline lies a little farther out than its centre's image
+      const perMetre = (FOCAL_PX * depth) / (depth ** 2 - (radius * scale) ** 2);
+      const around_px = (1.3 * radius * scale * FOCAL_PX) / depth;
 
-        const found = [];
-        for (const [left, side] of EYES) {
-          const eye = await pictureOf(left);
-          const wanted_px = HALF_PX / 2 + perMetre * (x - (side * PUPILS_M) / 2);
-          const row_px = VIEWPORT.height / 2 - perMetre * y;
-          const drawn = eye
-            .where((pixel) => !isBackground(pixel))
-            .filter(([px, py]) => Math.hypot(px - wanted_px, py - row_px) < around_px);
-          expect(drawn.length).toBeGreaterThan(100);
-          const middle_px = drawn.reduce((sum, [px]) => sum + px + 0.5, 0) / drawn.length;
-          expect(Math.abs(middle_px - wanted_px)).toBeLessThan(1);
-          found.push(middle_px);
-        }
-        const disparity_px = found[0] - found[1];
-        expect(Math.abs(disparity_px - perMetre * PUPILS_M)).toBeLessThan(1);
-      },
-    );
+      const found = [];
+      for (const [left, side] of EYES) {
+        const eye = await pictureOf(left);
+        const wanted_px = HALF_PX / 2 + perMetre * (x - (side * PUPILS_M) / 2);
+        const row_px = VIEWPORT.height / 2 - perMetre * y;
+        const drawn = eye
+          .where((pixel) => !isBackground(pixel))
+          .filter(([px, py]) => Math.hypot(px - wanted_px, py - row_px) < around_px);
+        expect(drawn.length).toBeGreaterThan(100);
+        const middle_px = drawn.reduce((sum, [px]) => sum + px + 0.5, 0) / drawn.length;
+        expect(Math.abs(middle_px - wanted_px)).toBeLessThan(1);
+        found.push(middle_px);
+      }
+      const disparity_px = found[0] - found[1];
+      expect(Math.abs(disparity_px - perMetre * PUPILS_M)).toBeLessThan(1);
+    });
   }
 });
