@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import kernel, part
+from stereocell.kernels.copying import copy_row
 
 Field = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -43,7 +44,7 @@ def _square_in_plane(
             line[x] = min(line[x] * line[x] * square, np.float32(far))
     for y in range(height):
         row = out[y]
-        row[:] = lines[y]
+        copy_row(lines[y], row)
         for j in range(1, reach + 1):
             away = np.float32(j) * np.float32(j) * np.float32(hy) * np.float32(hy)
             for other in (y - j, y + j):
@@ -58,7 +59,7 @@ def _least_over_planes(
     ring: Field, z: int, depth: int, y: int, reach: int, hz: float, least: Field
 ) -> None:
     """Write the squared distance of each voxel of a row from what the planes within reach hold."""
-    least[:] = ring[z % len(ring), y]
+    copy_row(ring[z % len(ring), y], least)
     for j in range(1, reach + 1):
         away = np.float32(j) * np.float32(j) * np.float32(hz) * np.float32(hz)
         for other in (z - j, z + j):

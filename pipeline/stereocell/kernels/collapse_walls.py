@@ -271,7 +271,7 @@ def collapse_walls(
             strayed = away[u] + distance_after(at, corner, u, v, beyond, size, out)
             away[v] = max(away[v], strayed)
             move_onto(u, v, size, out, corner, first, after, gone, quadrics)
-            made[steps] = u, v
+            made[steps, 0], made[steps, 1] = u, v
             steps += 1
             continue
         differs[u] = differs[v] = True
@@ -372,7 +372,7 @@ def collapse_walls(
                         continue
                     away[v] = max(away[v], strayed)
                     move_onto(u, v, size, out, corner, first, after, gone, quadrics)
-                    made[steps] = u, v
+                    made[steps, 0], made[steps, 1] = u, v
                     steps += 1
                     later = NEVER
                     if order_of[v] != CORNER and not locked[v]:

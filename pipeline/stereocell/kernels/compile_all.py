@@ -89,6 +89,8 @@ def compile_of_meshes() -> None:
     order_triangles(triangles, order_vertices(at))
     left = collapse(at, triangles, flags, bits, errors, 3.0, 0.9)
     flip_edges(at, left, flags, bits, errors, 0.9)
+    orders, nothing = find_orders(triangles, 4), np.zeros((0, 2), np.int32)
+    collapse_walls(at, triangles, flags, errors, 3.0, 0.9, orders, nothing)
     thin_rim(at, triangles, np.zeros(4, np.int8), np.zeros(4, np.uint8), flags, 0.1, 0.9)
 
 
@@ -103,8 +105,6 @@ def compile_others() -> None:
     find_near(low, high, flags, origin, edge, shape)
     first, listed = list_by_cell(low, high, origin, edge, shape)
     find_maybe_flat(at, triangles)
-    orders, nothing = find_orders(triangles, 4), np.zeros((0, 2), np.int32)
-    collapse_walls(at, triangles, flags, np.full(4, 0.1), 3.0, 0.9, orders, nothing)
     sides = np.tile(np.array([0, 1], np.int32), (4, 1))
     entries, own = slope_volumes(at, triangles, sides, np.array([-1, 0], np.int32))
     couple(*entries, own, 1)

@@ -312,7 +312,8 @@ def find_doubtful(
                     continue
                 if count == len(found):
                     larger = np.empty((2 * count, 2), np.int64)
-                    larger[:count] = found
+                    for n in range(count):
+                        larger[n, 0], larger[n, 1] = found[n, 0], found[n, 1]
                     found = larger
                 found[count, 0], found[count, 1] = i, j
                 count += 1

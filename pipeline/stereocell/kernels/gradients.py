@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import kernel, part
+from stereocell.kernels.copying import copy_plane
 
 Field = NDArray[np.float32]
 Row = NDArray[np.float64]
@@ -72,7 +73,7 @@ def divide_by_slopes(field: Field, steps: Row, least: float, limit: float) -> No
                 row[x] = min(max(far, -limit), limit)
         before, plane = plane, before
         if z + 1 < depth:
-            plane[:] = field[z + 1]
+            copy_plane(field[z + 1], plane)
 
 
 @kernel

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import kernel, part
+from stereocell.kernels.copying import copy_plane
 
 Field = NDArray[np.float32]
 Weights = NDArray[np.float64]
@@ -98,7 +99,7 @@ def smooth_in_place(
             if has_median:
                 _find_median(field[z], plane, low, mid, high)
             else:
-                plane[:] = field[z]
+                copy_plane(field[z], plane)
             _smooth_plane(plane, ring[z % len(ring)], along_y, along_x, total, wide)
         done = z - rz
         if done < 0:
