@@ -2,6 +2,7 @@
 """OME-TIFF: cut and flipped files, tags that lie, directories in a ring, OME-XML of every ill."""
 
 import os
+import re
 import struct
 import zlib
 from collections.abc import Callable, Iterator
@@ -67,6 +68,17 @@ def xml(
         f'<Pixels ID="Pixels:0" {pixels} {rest}><Channel ID="Channel:0:0" {channel}/>{inside}'
         "</Pixels></Image></OME>"
     )
+
+
+def behind_comment(text: str) -> str:
+    """Return OME-XML that doesn't name itself in its first characters."""
+    return f"<!--{'x' * 5000}-->" + text.partition("?>")[2]
+
+
+def with_prefix(text: str) -> str:
+    """Return OME-XML with another name for its namespace, and another namespace."""
+    text = re.sub(r"<(/?)(?=[A-Z])", r"<\1o:", text.partition("?>")[2])
+    return text.replace(f'xmlns="{_NS}"', 'xmlns:o="x"')
 
 
 def write_tiff(
@@ -259,6 +271,7 @@ def _others() -> Iterator[Case]:
         ("pipe", "x2.ome.tif", "refused"), ("endless", "/dev/zero", "refused"), ("folder", "own", "refused"),
         ("backslash", "..\\bait\\x.ome.tif", "refused"), ("address", "http://127.0.0.1:9/x.tif", "refused"),
         ("itself", "x.ome.tif", "any"), ("nowhere", "own/y.ome.tif", "refused"), ("empty", "", "refused"),
+        ("behind a long comment", "../bait/x.ome.tif", "refused"), ("with a prefix", "../bait/x.ome.tif", "refused"),
     ):  # fmt: skip
 
         def make(base: Path, folder: Path, name: str = name, target: str = target) -> list[str]:
@@ -269,6 +282,10 @@ def _others() -> Iterator[Case]:
             text = xml(inside=uuid).replace(
                 "<OME ", '<OME UUID="urn:uuid:00000000-0000-0000-0000-000000000002" '
             )
+            if name == "behind a long comment":
+                text = behind_comment(text)
+            elif name == "with a prefix":
+                text = with_prefix(text)
             write_tiff(home / "x.ome.tif", text)
             write_tiff(home / "own" / "x.ome.tif")
             write_tiff(folder / "bait" / "x.ome.tif")

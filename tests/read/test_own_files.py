@@ -15,7 +15,7 @@ import pydicom
 import pytest
 
 from conftest import Server
-from malformed.tiff_cases import write_tiff, xml
+from malformed.tiff_cases import behind_comment, with_prefix, write_tiff, xml
 from stereocell import read
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
@@ -41,12 +41,12 @@ def refusal(source: str | Path) -> str:
     return line
 
 
-def tiff_of(path: Path, name: str) -> Path:
-    """Write an OME-TIFF whose planes lie in another file."""
+def tiff_of(path: Path, name: str, written: Callable[[str], str] = str) -> Path:
+    """Write an OME-TIFF whose planes lie in another file, its OME-XML otherwise written."""
     planes = f'<TiffData IFD="0" PlaneCount="4"><UUID FileName="{name}">{_ID.format(1)}</UUID>'
     text = xml(inside=f"{planes}</TiffData>").replace("<OME ", f'<OME UUID="{_ID.format(2)}" ')
     path.parent.mkdir(exist_ok=True)
-    write_tiff(path, text)
+    write_tiff(path, written(text))
     return path
 
 
@@ -67,6 +67,23 @@ def test_planes_in_a_tiff_elsewhere_are_refused(home: Path, name: str) -> None:
     line = refusal(source)
     assert f"UUID FileName '{name.format(home.parent)}'" in line
     assert f"expected a file in {home} or below" in line
+
+
+@pytest.mark.parametrize("written", [behind_comment, with_prefix])
+@pytest.mark.parametrize("name", ["x.ome.tif", "my scan.tif"])
+def test_planes_elsewhere_are_refused_however_the_file_names_its_kind(
+    home: Path, name: str, written: Callable[[str], str]
+) -> None:
+    source = tiff_of(home / name, "../other/secret.ome.tif", written)
+    assert "UUID FileName '../other/secret.ome.tif'" in refusal(source)
+
+
+def test_no_file_is_opened_by_a_text_that_only_ends_as_ome_xml_does(home: Path) -> None:
+    write_tiff(home.parent / "other" / "secret.ome.tif", strip=b"\7" * 512)
+    source = tiff_of(home / "x.tif", "../other/secret.ome.tif", lambda text: "scan 1\n" + text)
+    dataset = read.open(source, spacing_um=(1, 1, 1))
+    own = np.arange(16 * 16, dtype="<u2").reshape(16, 16)
+    assert (dataset.read(0, dataset.levels[0].box, 0).voxels == own).all()
 
 
 def test_a_link_out_of_a_tiff_s_folder_is_refused(home: Path) -> None:

@@ -25,7 +25,7 @@ logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are ra
 _OME_NAMES = (".ome.tif", ".ome.tiff", ".ome.tf2", ".ome.tf8", ".ome.btf")
 _COMPANION = ".companion.ome"
 _BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's words
-_HEAD = 4096  # characters of a description, in which OME-XML names itself
+_HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
 _MAX_COMPANION = 64 << 20  # bytes of an OME-XML beside the TIFF files
 
 
@@ -87,9 +87,10 @@ def _first_of_set(location: Location) -> Location:
 
 
 def _is_ome(description: str) -> bool:
-    head = description[:_HEAD]
-    is_xml = head.lstrip("\ufeff \t\r\n").startswith("<")
-    return is_xml and ("<OME" in head or "openmicroscopy.org" in head)
+    text = description.strip("\ufeff\0 \t\r\n")
+    head = text[:_HEAD]
+    is_named = text.endswith("OME>") or "<OME" in head or "openmicroscopy.org" in head
+    return text.startswith("<") and is_named
 
 
 def _with_note(location: Location, image: Image) -> Image:
@@ -103,7 +104,6 @@ def _otherwise(tiff: TiffFile) -> str:
     """Return the words for what a file is whose OME-XML can't be read."""
     try:
         with one_line("", "pages"):
-            tiff.is_ome = False  # as tifffile's constructor does
             found = kind_of(tiff.series[0])
     except SourceError:
         return ""

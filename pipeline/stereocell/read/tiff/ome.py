@@ -61,6 +61,7 @@ def read_ome(
     with one_line(where, "an OME-TIFF file, whole, with its OME-XML"):
         _check_claims(where, tiff, text)
         _check_files(location, tiff, root)
+        tiff.is_ome = True
         images = ome_xml.images_of(root, where)
         series = tiff.series[0]
         pages = [list(level.pages) for level in series.levels]

@@ -30,12 +30,13 @@ _EXPECTED = "a TIFF file, whole"
 def open_tiff(location: Location, stack: ExitStack, **options: Any) -> TiffFile:
     """Return the open file; `stack` closes it.
 
-    options  of TiffFile; formats whose index makes tifffile open other files are off by default
+    options  of TiffFile; formats in which tifffile opens other files that this one names are off
+             by default: whoever has checked the names turns one on
 
     Raises SourceError where it is no TIFF, or where directories lie beyond its end.
     """
     where = location.shown
-    options = {"is_mmstack": False, "is_ndtiff": False} | options
+    options = {"is_ome": False, "is_mmstack": False, "is_ndtiff": False} | options
     with one_line(where, _EXPECTED):
         if location.is_local:  # by path, so that the files of a set find each other
             path = os.path.realpath(location.source)
