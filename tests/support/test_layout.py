@@ -42,10 +42,52 @@ def imported(module: str) -> Iterator[str]:
             yield from (f"{node.module or ''}.{alias.name}" for alias in node.names)
 
 
+def touches_files(module: str) -> Iterator[str]:
+    """Yield what in a Python module reads or writes files by the standard library alone."""
+    methods = {"open", "read_bytes", "read_text", "write_bytes", "write_text", "mkdir", "unlink"}
+    for node in ast.walk(ast.parse(module)):
+        if isinstance(node, ast.Call):
+            called = node.func
+            name = called.id if isinstance(called, ast.Name) else getattr(called, "attr", "")
+            if name in methods or name in ("fromfile", "tofile", "memmap", "savez"):
+                yield name
+    yield from {"os", "io", "shutil", "tempfile", "subprocess"} & {
+        name.partition(".")[0] for name in imported(module)
+    }
+
+
 def names_a_test(module: str) -> bool:
     """Whether a dotted name leads to a test module, or to a folder of tests but the shared one."""
     first, *_ = parts = module.strip(".").split(".")
     return any(re.fullmatch(r"test_\w+", part) for part in parts) or first == "tests"
+
+
+# algorithms: what stands left of the bar in docs/architecture.md
+WITHOUT_FILES = (
+    "model", "filters", "transfer", "isosurface", "objects", "meshes", "textures", "tissue",
+    "kernels",
+)  # fmt: skip
+OF_COMPILING = {"cache_place.py", "compile_all.py"}  # where numba's results lie, and their making
+
+
+@pytest.mark.parametrize("package", WITHOUT_FILES)
+def test_an_algorithm_touches_no_file(package: str) -> None:
+    modules = list((PACKAGE / package).rglob("*.py"))
+    assert modules
+    found = {
+        file.relative_to(PACKAGE).as_posix(): list(touches_files(file.read_text("utf-8")))
+        for file in modules
+        if file.name not in OF_COMPILING
+    }
+    assert {name: calls for name, calls in found.items() if calls} == {}
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["open('a')", "path.read_bytes()", "np.fromfile(x)", "from os import path", "import io"],
+)
+def test_what_touches_files_is_found(module: str) -> None:
+    assert list(touches_files(module))
 
 
 @pytest.mark.parametrize(

@@ -74,6 +74,17 @@ def test_out_inside_the_input_is_refused(
     assert sorted(file.name for file in path.iterdir()) == ["0", "zarr.json"]
 
 
+@pytest.mark.parametrize("name", ["a\nb", "a\nb/out", "bell\a"])
+def test_an_out_that_usd_can_t_name_is_refused_before_anything_is_made(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    line = _refused(capsys, "build", str(source), "-o", str(home / name), "--workers", "0")
+    assert "expected a path without control characters" in line
+    assert list(home.iterdir()) == []
+
+
 def test_an_iso_value_by_index_is_kept_by_name(source: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     flags = ["--grid", "2x1", "--iso-value", "1=400"]

@@ -34,13 +34,17 @@ def expected(voxels: np.ndarray[Any, Any], slopes: Sequence[float]) -> np.ndarra
     return np.asarray(shares / shares.sum(axis=0))
 
 
+def load(path: Path) -> Network:
+    return Network.load(path, path.read_bytes())
+
+
 @pytest.mark.parametrize("has_softmax", [False, True])
 @pytest.mark.parametrize("patch", [(1, 1, 8, 8, 8), (1, 1, 16, 64, 9), (1, 1, "D", "H", "W")])
 def test_patches_blend_to_what_the_whole_would_be(
     tmp_path: Path, patch: Shape, has_softmax: bool
 ) -> None:
     path = write_model(tmp_path / "m.onnx", shape=patch, has_softmax=has_softmax)
-    network = Network.load(path)
+    network = load(path)
     assert network.classes == ("tissue 1", "tissue 2")
     voxels = volume()
     found = apply_network(network, voxels)
@@ -51,15 +55,15 @@ def test_patches_blend_to_what_the_whole_would_be(
 
 def test_a_model_may_name_its_classes_and_leave_some_out(tmp_path: Path) -> None:
     path = write_model(tmp_path / "m.onnx", slopes=(0, 1, 2), names=["", "bone", "marrow"])
-    network = Network.load(path)
+    network = load(path)
     assert network.classes == ("", "bone", "marrow")
     assert network.count == 2
 
 
 def test_a_network_is_known_by_its_bytes_and_not_by_its_name(tmp_path: Path) -> None:
-    one = Network.load(write_model(tmp_path / "Jane_Doe.onnx"))
-    same = Network.load(write_model(tmp_path / "b.onnx"))
-    other = Network.load(write_model(tmp_path / "c.onnx", slopes=(1, 2)))
+    one = load(write_model(tmp_path / "Jane_Doe.onnx"))
+    same = load(write_model(tmp_path / "b.onnx"))
+    other = load(write_model(tmp_path / "c.onnx", slopes=(1, 2)))
     assert one.settings() == same.settings() != other.settings()
     assert "Jane" not in json.dumps(one.settings())
 
@@ -80,18 +84,16 @@ def test_what_does_not_fit_is_said_in_a_line(
     tmp_path: Path, options: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(SourceError, match=message) as error:
-        Network.load(write_model(tmp_path / "m.onnx", **options))
+        load(write_model(tmp_path / "m.onnx", **options))
     assert "\n" not in str(error.value)
 
 
 def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "m.onnx"
-    with pytest.raises(SourceError, match=r"m\.onnx: No such file"):
-        Network.load(path)
     for content in (b"root:x:0:0:root:/root:/bin/bash\n", b"", b"GIF89a"):
         path.write_bytes(content)
         with pytest.raises(SourceError) as error:
-            Network.load(path)
+            load(path)
         assert str(error.value) == f"{path}: found another kind of file, expected an ONNX model"
 
 
@@ -103,4 +105,4 @@ def test_without_onnxruntime_the_remedy_is_said(
 
     monkeypatch.setattr(module, "import_module", missing)
     with pytest.raises(UsageError, match=r"pip install 'stereocell\[onnx\]'"):
-        Network.load(write_model(tmp_path / "m.onnx"))
+        load(write_model(tmp_path / "m.onnx"))

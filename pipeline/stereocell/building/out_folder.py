@@ -5,6 +5,7 @@ is written under a temporary name and renamed, so a killed run resumes and a fin
 nothing.
 """
 
+import re
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -15,7 +16,7 @@ from typing import Any
 from stereocell.building import plan as plan_module
 from stereocell.building.plan import Plan
 from stereocell.building.plan_file import from_json, to_json
-from stereocell.model.errors import OutputError
+from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import (
@@ -30,6 +31,7 @@ from stereocell.storage.workspace import remove, sizes_below
 SURVEY = "units.schema.json#Survey"
 _PLAN = "plan.schema.json"
 _PHASES = "units.schema.json#Phases"
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
 
 
@@ -50,6 +52,14 @@ class OutFolder:
         self.bundle_dir = out / "bundle"
         self.parts_dir = out / "bundle_parts"  # the bundle's finished tiles, until it is complete
         self.report_file = out / "report" / "index.html"
+
+    def require_name(self) -> None:
+        """Raise UsageError where USD can't have OUT's path: it holds a control character."""
+        path = str(self.out.absolute())
+        if _CONTROL.search(path):
+            raise UsageError(
+                f"OUT is {path!r}, expected a path without control characters: USD reads none such"
+            )
 
     def require_writable(self) -> None:
         """Create OUT. Raises OutputError where it can't be created or written."""

@@ -66,6 +66,7 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     """
     require_apart(source, out)
     out_folder = OutFolder(out)
+    out_folder.require_name()
     with phase_of(out_folder, "plan") as phase:
         plan = settle(source, settings)
         out_folder.require_writable()

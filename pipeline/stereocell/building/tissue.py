@@ -99,7 +99,7 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
             f"tissue: the region holds {voxels:,} voxels, expected at most {MAX_VOXELS:,}: plan a "
             "coarser --level or a smaller --region"
         )
-    network = None if request.model is None else Network.load(request.model)
+    network = None if request.model is None else _load_network(request.model)
     if network is not None and request.classes not in (None, "auto", network.count):
         raise UsageError(
             f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
@@ -141,6 +141,15 @@ def with_tissue(plan: Plan, out: Path, record: dict[str, Any]) -> Plan:
     values = {**plan.settings.iso_values, **{channel.name: LEVEL for channel in added}}
     settings = replace(plan.settings, iso_values=values)
     return replace(plan, channels=(*plan.channels, *added), settings=settings)
+
+
+def _load_network(path: Path) -> Network:
+    """Return the model in a file. Raises SourceError, UsageError as `Network.load`."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise SourceError(f"{path}: {error.strerror}, expected an ONNX model") from None
+    return Network.load(path, content)
 
 
 def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:

@@ -67,16 +67,14 @@ class Network:
         }
 
     @classmethod
-    def load(cls, path: Path) -> "Network":
-        """Return the model, tried on one empty patch.
+    def load(cls, path: Path, content: bytes) -> "Network":
+        """Return the model of a file's content, tried on one empty patch.
+
+        path  of the file, for its name and for messages
 
         Raises UsageError if onnxruntime isn't installed, SourceError if the file is no such model.
         """
         onnxruntime = _find_runtime()
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise SourceError(f"{path}: {error.strerror}, expected an ONNX model") from None
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = 4
