@@ -78,6 +78,7 @@ def _headers() -> Iterator[Case]:
             ("dimension: 3", "dimension: 999"), ("dimension: 3", "dimension: \udcff"),
             ("encoding: raw", "encoding: gzip"),
             ("encoding: raw", "encoding: raw\ndata file: ../x"),
+            ("encoding: raw", "encoding: raw\ndata file: LIST\na.raw\nb.raw"),
             ("encoding: raw", "encoding: raw\nline skip: 99999999999"),
             ("encoding: raw", "encoding: raw\nbyte skip: -7"), ("endian: little", "endian: middle"),
             ("endian: little", "endian: little\nendian: little"),

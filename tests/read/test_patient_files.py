@@ -129,6 +129,13 @@ def test_nrrd_spaces_encodings_and_byte_orders(
     assert "Jane" not in f"{dataset.name} {dataset.notes} {dataset.channels}"
 
 
+@pytest.mark.parametrize("files", ["LIST\na.raw\nb.raw", "list 2\na.raw", "a%02d.raw 1 9 1"])
+def test_a_nrrd_whose_voxels_lie_in_several_files_is_refused(tmp_path: Path, files: str) -> None:
+    head = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 4 2\nspacings: 1 1 1\nencoding: raw\n"
+    (tmp_path / "a.nhdr").write_text(f"{head}data file: {files}\n")
+    assert "data file: found a list of files, expected one" in refusal(tmp_path / "a.nhdr")
+
+
 def test_a_nrrd_of_no_body_is_a_stack_as_stored(tmp_path: Path) -> None:
     header = {"space dimension": 3, "space units": ["microns"] * 3}
     header |= {"space directions": np.diag([0.25, 0.2, 0.5])}  # type: ignore[dict-item]

@@ -10,31 +10,17 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from stereocell.model.errors import StereoCellError
+from stereocell.read.open_dataset import OTHER, READERS
 from stereocell.storage.cache_key import key_of, libraries_of
 
-# modules whose code must be equal on all workers; by name, since this package stands below them
-_MAKERS = (
+# tasks whose code must be equal on all workers, as that of the readers; by name, since this package
+# stands below them
+_TASKS = (
     "stereocell.building.tasks.window",
     "stereocell.building.tasks.evidence",
     "stereocell.building.tasks.solids",
     "stereocell.building.tasks.unit",
     "stereocell.building.stage_tasks",
-    "stereocell.read.ome_zarr",
-    "stereocell.read.tiff",
-    "stereocell.read.planes",
-    "stereocell.read.nifti",
-    "stereocell.read.dicom",
-    "stereocell.read.ims",
-    "stereocell.read.hdf5",
-    "stereocell.read.n5",
-    "stereocell.read.bdv",
-    "stereocell.read.nrrd",
-    "stereocell.read.metaimage",
-    "stereocell.read.mrc",
-    "stereocell.read.czi",
-    "stereocell.read.lif",
-    "stereocell.read.nd2",
-    "stereocell.read.bioio_image",
 )
 T = TypeVar("T")
 R = TypeVar("R")
@@ -159,5 +145,6 @@ def _look_at(shared: str) -> _Sight:
 
 
 def _look() -> _Sight:
-    versions = {"StereoCell": version("stereocell"), **libraries_of(*_MAKERS)}
-    return _Sight(socket.gethostname(), tuple(versions.items()), key_of("", *_MAKERS))
+    makers = (*_TASKS, *(reader.module for reader in (*READERS.values(), OTHER)))
+    versions = {"StereoCell": version("stereocell"), **libraries_of(*makers)}
+    return _Sight(socket.gethostname(), tuple(versions.items()), key_of("", *makers))

@@ -31,6 +31,7 @@ from stereocell.storage.location import Location, require_file, require_own
 
 NAME = "NRRD"
 _MAX_HEADER = 1 << 20  # bytes
+_LIST = re.compile(rb"^data ?file:\s*LIST\b.*$", re.MULTILINE | re.IGNORECASE)
 _MAX_LINES = 10_000  # `line skip`
 _TYPES = {
     "i1": ("signed char", "int8", "int8_t"),
@@ -93,6 +94,8 @@ def _header(location: Location) -> tuple[Mapping[str, Any], int]:
             raise ValueError("no `NRRD` at the start")
         blank = re.search(rb"\n\r?\n", content)
         head = content[: blank.start()] if blank else content
+        if listed := _LIST.search(head):
+            head = head[: listed.end()]  # names follow, no fields
         fields = nrrd.read_header([f"{line}\n" for line in head.decode("latin-1").splitlines()])
         missing = {"sizes", "type", "encoding"} - set(fields)
         if missing:
