@@ -181,7 +181,7 @@ lint: $(READY) $(VIEWER_READY) ## ruff, mypy, layers of imports, biome, tsc
 # a process for each core, and of each one thread: others would wait for one another, busily
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"
 SUPPORT := PYTHONPATH=tests $(BIN)/python -m support
-VITEST := cd $(VIEWER) && npm run --silent types && npm exec --silent -- vitest run
+VITEST := cd $(VIEWER) && npm exec --silent -- vitest run
 
 test-here: setup ## A package's tests, not the slow ones:  T=meshes; of the viewer: T=panel
 	@found=; \
