@@ -21,7 +21,7 @@ from stereocell.objects.label_rule import Kind, recognise
 from stereocell.read import Dataset
 
 _SIDE = 128  # voxels: largest edge of a block that is looked at
-_MIN_SIDE = 32  # of many channels, whose blocks together are to be as those of _MAX_CHANNELS
+_MIN_SIDE = 32  # voxels: smallest edge of a block, however many channels are looked at
 _WIDE = 4  # bytes
 _MAX_EXACT = 2.0**53  # whole numbers below are exact as float64
 _FEW_VALUES = 8  # fewer tell nothing

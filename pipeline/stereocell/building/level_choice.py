@@ -18,8 +18,8 @@ from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, LADDER, RUN
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Tile
 
-APART_SHARE = 0.25  # of all voxels inside: a rung whose largest solids hold less is one of many
-# ... and what may be taken for many that touch: their share, and how many solids there must be
+APART_SHARE = 0.25  # share of all voxels inside: a rung whose largest solids hold less has many
+# the same where many solids may touch: the share, and the least number of solids
 JOINED_SHARE, MANY = 2 / 3, 30
 Solids = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
 

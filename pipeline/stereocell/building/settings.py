@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 EIGHT_BITS = 8
-INTENSITY = "intensity"  # what voxels may be taken for, whatever they look like
+INTENSITY = "intensity"  # value of taken_as: voxels are intensities, even if they look like labels
 NO_PRESET = "none"  # names the defaults
 PRESETS = Path(__file__).parent / "presets"
 # of a file of settings; tomllib's time grows with the square of a dotted key's length

@@ -53,7 +53,7 @@ from stereocell.usd.read_variants import Representation
 from stereocell.usd.written_files import AsWritten
 
 _RECORD = "tile.json"
-FIRST_COLUMN = "volume_um3"  # which every table of objects has
+FIRST_COLUMN = "volume_um3"  # first column of every table of objects
 
 
 @dataclass(frozen=True, slots=True)

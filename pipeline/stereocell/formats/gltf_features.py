@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from stereocell.formats.meshopt import CompressedBuffers
 from stereocell.model.object_table import MISSING, Column, ObjectTable
 
-MAX_OBJECTS = 1 << 16  # in a file: 16 bits name them
-MAX_COLUMNS = 8  # in a file, besides the label
+MAX_OBJECTS = 1 << 16  # most objects of a file: 16 bits name them
+MAX_COLUMNS = 8  # most columns of a file, besides the label
 _LABEL = "label"
 _UNSIGNED_SHORT = 5123
 _NO_NUMBER = float(np.finfo(np.float32).min)  # stands for NaN, which JSON has not

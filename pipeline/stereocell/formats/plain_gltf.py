@@ -24,7 +24,7 @@ from stereocell.storage.atomic_write import replacing
 
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5121, 5123, 5125, 5126
 _VERTICES, _INDICES = 34962, 34963  # bufferView.target
-_MAX_BYTES = 2**32 - 1  # of a .glb, whose length is a number of 32 bits
+_MAX_BYTES = 2**32 - 1  # largest size of a .glb in bytes: its length is a number of 32 bits
 
 
 class Buffers(Protocol):

@@ -13,7 +13,7 @@ from stereocell.storage.json_files import read_json
 
 MANIFEST, _FILES = "manifest.json", "files.json"
 _REMEDY = "run `stereocell bundle OUT`"
-_LIGHTS = ("environments/sky.hdr", "environments/studio.hdr")  # of the viewer
+_LIGHTS = ("environments/sky.hdr", "environments/studio.hdr")  # the viewer's environments
 _WHOLE, _PART, _MISSING, _UNSATISFIABLE = 200, 206, 404, 416
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 PERCENTILE = 95.0
 NO_PIECES = np.zeros(0, np.int32)
-QUANTILES = 1001  # of a piece: its share of an object's percentile is known to a thousandth
+QUANTILES = 1001  # quantiles of a piece: the share of an object's percentile is exact to 0.001
 
 
 @dataclass(frozen=True, slots=True)

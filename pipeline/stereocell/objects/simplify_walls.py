@@ -24,8 +24,8 @@ from stereocell.kernels.walls import (
 from stereocell.meshes.simplify import OF_DIAGONAL, OF_SIDE, SHARPEST_DEG, STRAY
 from stereocell.objects.walls import Walls, find_faults, measure_volumes, put_on_lattice
 
-_ROUNDS = 12  # of simplifying, and of moving back
-_ANEW = 6  # of those rounds of moving, in which the way is found anew
+_ROUNDS = 12  # rounds of simplifying, and rounds of moving back
+_SEARCHES = 6  # first rounds of moving, in which the moves are found again
 _NEWTON = 4  # steps towards the volumes, at most
 _CLOSE = 5e-4  # share of a volume that may be missing
 
@@ -104,7 +104,7 @@ def keep_volumes(
     positions, past = walls.positions, walls.positions
     at_fault = np.zeros(0, np.int64)
     for turn in range(_ROUNDS):
-        if turn < _ANEW:  # what can't move makes the others move more
+        if turn < _SEARCHES:  # what can't move makes the others move more
             moved = _moved(walls, positions, volumes_um3, fixed, most_um)
             positions = put_on_lattice(moved, step_um)
         fresh = (positions != past).any(axis=1)

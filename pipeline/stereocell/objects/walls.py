@@ -29,7 +29,7 @@ from stereocell.model.volume import zyx_to_xyz
 # Still more turns make pillows of boxes
 SMOOTHINGS = 70
 _INWARD, _OUTWARD = 0.64, -0.65  # shares of the way to the mean of the neighbours, by turns
-_ROUNDS = 12  # of putting vertices back
+_ROUNDS = 12  # rounds in which vertices are put back
 _REACH = 0.5  # voxels; farthest way of a vertex from its cube's centre, along each axis
 
 

@@ -66,7 +66,7 @@ class FolderTarget:
     """A folder of this machine: of a web server, or of a checked out `gh-pages` branch."""
 
     address = None
-    at_once = 1  # of a folder each writer clears what killed ones have left
+    at_once = 1  # files at a time: in a folder each writer clears what killed writers have left
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -39,7 +39,7 @@ from stereocell.read.zarr_store import GuardedStore, open_array, open_store, qui
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_MAX_LEVELS = 64  # of the pyramid
+_MAX_LEVELS = 64  # most levels of the pyramid
 
 
 def read_image(location: Location, axes: str = "", *, is_part: bool = False) -> Image:

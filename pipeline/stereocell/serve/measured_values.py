@@ -24,7 +24,7 @@ from stereocell.serve.headers import policy
 from stereocell.storage.file_list import find_faults, read_list
 
 VALUES_HEADER = {"Stereocell-Values": "version=1"}  # announces /values to a page
-_LIST = "files.json"  # of the stage
+_LIST = "files.json"  # the stage's list of files
 _KEPT_FILES = 32
 _LONGEST = 200  # characters of `at`
 _HEADERS = {"Cache-Control": "no-store", **policy("application/json")}

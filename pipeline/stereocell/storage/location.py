@@ -50,7 +50,7 @@ _FILE_SUFFIXES = {
 _BY_CONTENT = ("dicom", "tiff", "hdf5", "nrrd", "czi", "nd2", "lif", "mrc")
 _KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf)):(.*)", re.IGNORECASE | re.DOTALL)
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
-_CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs repeats it
+_CONNECT_S, SILENCE_S = 15.0, 30.0  # limits of one request; s3fs repeats it
 _AWS_CREDENTIALS = (
     "AWS_ACCESS_KEY_ID",
     "AWS_PROFILE",

@@ -20,9 +20,9 @@ from stereocell.model.tiling import Box
 
 ROWS, COLUMNS = 64, 256  # gradient magnitudes, values of 8 bits
 STEEPEST = 3**0.5  # the largest step there is: all of the window along each axis
-FINE_ROWS = 1024  # of 0..STEEPEST, before gradient_max is known: half a step of 8 bits each
-ENERGY_SHARE = 0.995  # of the squared steps lies below gradient_max
-SMALLEST_MAX = 0.05  # 13 steps of 8 bits: below it, rows would be finer than what is told apart
+FINE_ROWS = 1024  # rows over 0..STEEPEST, before gradient_max is known: half a step of 8 bits each
+ENERGY_SHARE = 0.995  # share of the squared steps that lies below gradient_max
+SMALLEST_MAX = 0.05  # share of the window: 13 steps of 8 bits; below, rows are too fine to differ
 SAMPLE_EDGE = (16, 128, 128)  # voxels (z, y, x) of a block, where not all of a region is counted
 
 

@@ -16,7 +16,7 @@ THRESHOLD = "threshold"  # name of the function of channels that have a threshol
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
 NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them
-FAINT = 1e-2  # of the peak's count: noise that is rarer is left, dim materials are there, too
+FAINT = 1e-2  # share of the peak's count: rarer noise is left, since dim materials are as rare
 MAX_SHIFT = 1.5  # x the level, to which noise may push the start of the opacity
 
 

@@ -51,7 +51,7 @@ from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice
 from stereocell.usd.written_files import AsWritten
 
-_SIDE_DIGITS = 9  # of the unit vectors to a patient's sides: finer than any scanner states them
+_SIDE_DIGITS = 9  # decimals of the unit vectors to a patient's sides: scanners state fewer
 _FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 

@@ -47,7 +47,7 @@ from stereocell.usd.written_files import AsWritten
 
 USDZ_NAME = "specimen.usdz"
 SIZE_M = 0.15  # m, the specimen's longest edge
-MAX_TRIANGLES = 200_000  # of all meshes together
+MAX_TRIANGLES = 200_000  # most triangles of all meshes together
 
 _LAYER = "specimen.usdc"
 # zip: bytes of a local header without its name, of an extra field's header; its ID for padding

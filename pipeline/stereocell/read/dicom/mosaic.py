@@ -33,7 +33,7 @@ _SIEMENS_TAGS: list[Any] = [
 ]
 _UIH_SLICES = 0x00651051
 _MAX_SLICES = 4096  # slices of one image
-_ALIGNED = 0.01  # of the cosine between the stated normal and the rows' and columns' own
+_MAX_COSINE_ERROR = 0.01  # largest error of the cosine of the stated and the computed normal
 
 
 class MosaicError(Exception):
@@ -106,7 +106,7 @@ def _siemens(
     gap = float(header.get("SpacingBetweenSlices") or header.get("SliceThickness") or 0)
     if (
         not 0 < gap < math.inf
-        or abs(abs(normal @ np.cross(along_row, along_column)) - 1) > _ALIGNED
+        or abs(abs(normal @ np.cross(along_row, along_column)) - 1) > _MAX_COSINE_ERROR
     ):
         raise MosaicError(f"{told} without a direction or a distance of theirs")
     down, across = spacing

@@ -19,7 +19,7 @@ from stereocell.read.tables.table import (
 )
 from stereocell.storage.location import Location
 
-_MAX_BYTES = 4 << 30  # of a table
+_MAX_BYTES = 4 << 30  # most bytes of a table
 _LONGEST = 1 << 17  # characters of a cell: the csv module's own limit
 _LONGEST_LINE = 1 << 24  # characters
 

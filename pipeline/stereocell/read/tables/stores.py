@@ -18,7 +18,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _EXPECTED = "a table of AnnData (obs, var, X)"
-_TEXT_BYTES = 1024  # of a text, on average in its chunk
+_TEXT_BYTES = 1024  # bytes of a text, on average in its chunk
 _LARGEST_CHUNK = 1 << 28  # bytes
 _LONGEST_TEXT = 4096  # bytes, of texts of one length
 
