@@ -86,7 +86,7 @@ def build(
             require_apart(source, folder)
             stack.enter_context(alone_in(folder, "build"))
         else:
-            folder = stack.enter_context(opened(place.source, "build"))
+            folder = stack.enter_context(opened(place.source, command="build"))
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
         with named_as_settings():

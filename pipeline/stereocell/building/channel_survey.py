@@ -237,7 +237,7 @@ def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
     level, window = plan.level_of(channel), (0.0, 255.0) if channel.source else None
     if channel.name in settings.windows:
         window = parse_window(f"--window {channel.name}", settings.windows[channel.name])
-    ref = source_of(plan, channel)
+    ref = source_of(plan, channel=channel)
     finds_holder = plan.modality == "CT" and not channel.source and not settings.surface.keep_holder
     return StatisticsTask(
         ref, level, channel.index, plan.region, settings, subtracts, finds_holder, window
@@ -248,7 +248,7 @@ def evidence_task(plan: Plan, tile: Tile, *, channel: Channel, window: Window) -
     """Return the task that gathers one tile's evidence."""
     criterion = LADDER if channel.rung else plan.settings.isovalue.criterion
     return EvidenceTask(
-        source_of(plan, channel),
+        source_of(plan, channel=channel),
         plan.level_of(channel),
         channel.index,
         tile.box,
@@ -328,7 +328,7 @@ def _solids(
             return None
         surface = plan.settings.surface
         task = SolidsTask(
-            source_of(plan, channel),
+            source_of(plan, channel=channel),
             plan.level_of(channel),
             channel.index,
             tile.box,

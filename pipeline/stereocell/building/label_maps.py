@@ -118,7 +118,7 @@ def _opened(
 ) -> tuple[Dataset, SourceRef]:
     """Return a label map's dataset, and how it was opened."""
     if SELF in (name, place):
-        return _as_stored(image), as_asked(source, options, image.fingerprint)
+        return _as_stored(image), as_asked(source, options, fingerprint=image.fingerprint)
     where = Location.of(place or f"{source.rstrip('/')}/labels/{name}").source
     ref = SourceRef(where, 0, ())
     try:

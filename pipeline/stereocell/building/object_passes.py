@@ -233,7 +233,7 @@ def images_of(plan: Plan) -> tuple[ImageRef, ...]:
 
 
 def _image(plan: Plan, channel: Channel) -> ImageRef:
-    ref, level = source_of(plan, channel), plan.level_of(channel)
+    ref, level = source_of(plan, channel=channel), plan.level_of(channel)
     return ImageRef(ref, channel.index, level, plan.region, plan.spacing_um, plan.origin_um)
 
 

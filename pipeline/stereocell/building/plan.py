@@ -223,7 +223,7 @@ def make_plan(
         plan=replace(settings.plan, level=level[0], tile_size=tile_size),
         iso_values=by_name("--iso-value", settings.iso_values, channels),
         windows=windows_of(settings.windows, channels, modality),
-        paint=painted(settings.paint, channels, [one.name for one in labels]),
+        paint=painted(settings.paint, channels, labels=[one.name for one in labels]),
     )
     _require_planes(settings, chosen.spacing_um)
     require_no_background(settings, channels, modality)

@@ -43,7 +43,7 @@ def load_for(
     try:
         location = Location.of(source).source
         dataset = open_source(as_asked(location, options))
-        chosen, reason = choose_preset(dataset, options.modality)
+        chosen, reason = choose_preset(dataset, modality=options.modality)
     except StereoCellError:
         return settings, ""
     return (load(chosen, None, flags=flags, where=where) if chosen else settings), reason
@@ -55,7 +55,7 @@ def tell(choice: str) -> None:
         console.print(f"plan: {choice}", markup=False)
 
 
-def choose_preset(dataset: Dataset, modality: str = "") -> tuple[str | None, str]:
+def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, str]:
     """Return the name of a preset, or None for the defaults, and the reason in a sentence.
 
     modality  the settings', where the input says none

@@ -278,7 +278,7 @@ def with_vertex_values(mesh: Mesh, maps: ComposedMaps | MadeMaps) -> Mesh:
 
 def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
     """Return the mesh and its defects; it is welded where seams of UVs or normals cut it open."""
-    defects = find_defects(mesh, planes)
+    defects = find_defects(mesh, planes=planes)
     if not defects.total:
         return mesh, defects
     _, first, twin = np.unique(mesh.positions, axis=0, return_index=True, return_inverse=True)
@@ -286,7 +286,7 @@ def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
     has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # at a UV pole they lack it
     triangles = triangles[has_area]
     welded = compact(mesh, triangles)
-    found = find_defects(welded, planes)
+    found = find_defects(welded, planes=planes)
     if found.total >= defects.total:
         return mesh, defects
     used = np.unique(triangles)

@@ -32,7 +32,7 @@ _LOG_FROM = 10.0  # least ratio of the span's ends for a logarithmic scale
 
 
 def write_objects(
-    root: Path, folder: str, table: ObjectTable, paint: str = ""
+    root: Path, folder: str, table: ObjectTable, *, paint: str = ""
 ) -> tuple[FileRef, list[FileRef]]:
     """Write a channel's table below `folder` of a bundle; return objects.json, and all files.
 

@@ -86,7 +86,7 @@ def _shapes(chosen: Chosen, level: int) -> Iterator[Shape]:
     for piece in chosen.pieces(level):
         count += 1
         color = np.array(piece.material.color)
-        factors = vertex_colors(piece.mesh, bool(chosen.options.occlusion))
+        factors = vertex_colors(piece.mesh, occlusion=bool(chosen.options.occlusion))
         if factors is not None:
             color = factors / 255 * color
         mesh = piece.mesh

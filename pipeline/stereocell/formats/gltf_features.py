@@ -32,7 +32,7 @@ class Features:
     columns: tuple[Column, ...]
 
 
-def tile_features(table: ObjectTable, tile: str, wanted: tuple[str, ...] = ()) -> Features:
+def tile_features(table: ObjectTable, tile: str, *, wanted: tuple[str, ...] = ()) -> Features:
     """Return a tile's objects, with `volume_um3` and the wanted columns, MAX_COLUMNS at most."""
     rows = table.rows[tile]
     first = table.columns[0].id if table.columns else _LABEL

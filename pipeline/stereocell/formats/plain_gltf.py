@@ -136,7 +136,9 @@ class Document:
             self._nodes[0]["children"].append(len(self._nodes) - 1)
         key = group, material
         number = self._materials.setdefault(key, len(self._materials))
-        primitive, place = self._buffers.add_mesh(mesh, positions, vertex_colors(mesh, occlusion))
+        primitive, place = self._buffers.add_mesh(
+            mesh, positions, vertex_colors(mesh, occlusion=occlusion)
+        )
         self._meshes.append({"name": name, "primitives": [{**primitive, "material": number}]})
         node = {"name": name, "mesh": len(self._meshes) - 1, **place, "extras": dict(extras)}
         self._nodes.append(node)

@@ -66,12 +66,14 @@ class IsoValueOptions:
         LADDER,
         f"{LADDER}: by histograms of all tiles; {', '.join(CRITERIA)}: by edges; {ADAPTIVE}: the "
         "channel's threshold",
-        Flag("--iso-criterion", "how iso-values are found: ladder (default), edges, adaptive, ..."),
+        flag=Flag(
+            "--iso-criterion", "how iso-values are found: ladder (default), edges, adaptive, ..."
+        ),
     )
     scope: str = setting(
         "channel",
         "channel: one level for all tiles; tile: each tile's own, near the channel's",
-        Flag("--iso-scope", "channel (default): one level for all tiles; tile: each its own"),
+        flag=Flag("--iso-scope", "channel (default): one level for all tiles; tile: each its own"),
     )
     rung: str = setting(
         "outer",
@@ -142,12 +144,14 @@ class SurfaceOptions:
     wrap: str = setting(
         "voxels",
         "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)",
-        Flag("--wrap", "how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"),
+        flag=Flag(
+            "--wrap", "how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"
+        ),
     )
     closed_tiles: bool = setting(
         False,
         "whether the stage gets a closed STL of every tile and channel, in um",
-        Flag(
+        flag=Flag(
             "--closed-tiles",
             "also a closed STL of every tile and channel, for printing and booleans",
         ),

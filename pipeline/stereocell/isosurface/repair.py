@@ -63,7 +63,7 @@ class Repaired:
 
 
 def repair(
-    distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
+    distance: Distance, spacing_um: tuple[float, float, float], *, options: RepairOptions
 ) -> Repaired:
     """Clean a signed distance, in place.
 

@@ -133,7 +133,7 @@ class FineVolumes:
                 other[faulty] = True
                 fresh = other[mesh.triangles].any(axis=1)
             placed = replace(mesh, positions=positions)
-            defects = find_defects(placed, planes, fresh, topology)
+            defects = find_defects(placed, planes=planes, fresh=fresh, topology=topology)
             faulty = defects.vertices(mesh.triangles)
             worst = np.zeros(count, bool)
             worst[label[faulty]] = True

@@ -25,7 +25,7 @@ SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle, unless those aroun
 FLIP_DEG = 25.0  # degrees; edges of sharper triangles flip
 
 
-def simplify(mesh: Mesh, max_error_um: float, planes: tuple[Plane, ...] = ()) -> Mesh:
+def simplify(mesh: Mesh, max_error_um: float, *, planes: tuple[Plane, ...] = ()) -> Mesh:
     """Return the mesh with as few triangles as the error allows; boundary vertices stay.
 
     mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)

@@ -79,7 +79,7 @@ def simplify_without_defects(
         used, own = renumber(triangles, len(mesh.positions))
         draft = Mesh(mesh.positions[used], own, mesh.normals[used])
         found = find_topology(own, len(used))
-        defects = find_defects(draft, planes, fresh, found)
+        defects = find_defects(draft, planes=planes, fresh=fresh, topology=found)
         worst = set(body[used[defects.vertices(own)]].tolist()) - kept
         if not worst:
             break

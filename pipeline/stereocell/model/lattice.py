@@ -33,13 +33,13 @@ class Lattice:
     origin_um: Point
 
     @classmethod
-    def of_whole(cls, box: Box, spacing_um: Spacing, origin_um: Point = (0, 0, 0)) -> "Lattice":
+    def of_whole(cls, box: Box, spacing_um: Spacing, *, origin_um: Point = (0, 0, 0)) -> "Lattice":
         """Return the lattice of a volume that is a single tile, and the whole region."""
         return cls(box, box, box, spacing_um, origin_um)
 
     def alone(self) -> "Lattice":
         """Return the lattice of the tile's own points as if no other tile followed."""
-        return Lattice.of_whole(self.own, self.spacing_um, self.origin_um)
+        return Lattice.of_whole(self.own, self.spacing_um, origin_um=self.origin_um)
 
     def grown(self, voxels: int) -> "Lattice":
         """Return the lattice with `voxels` more own points on each side, within the region."""

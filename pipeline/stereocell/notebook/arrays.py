@@ -147,7 +147,7 @@ def _names_of(array: Any, count: int) -> list[str]:
     return [f"channel {i + 1}" for i in range(count)]
 
 
-def find_blocks(source: ArraySource, most: int = MAX_VOXELS) -> tuple[int, int, int]:
+def find_blocks(source: ArraySource, *, most: int = MAX_VOXELS) -> tuple[int, int, int]:
     """Return the voxels (z, y, x) that become one, so that at most so many are left.
 
     The edges of the new voxels grow step by step until few enough are left: where those of the

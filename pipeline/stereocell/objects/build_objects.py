@@ -81,7 +81,7 @@ def build_objects(
         owned = np.setdiff1d(owned, thin)
     z, y, x = (o - MARGIN * s for o, s in zip(origin_um, spacing_um, strict=True))
     with clock("walls"):
-        walls = extract_walls(mended, spacing_um, step_um, (z, y, x))
+        walls = extract_walls(mended, spacing_um, step_um, origin_um=(z, y, x))
         del mended
         walls = _with_owned(walls, owned)
     count = int(padded.max(initial=0)) + 1

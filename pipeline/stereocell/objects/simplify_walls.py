@@ -35,6 +35,7 @@ def simplify_walls(
     max_error_um: float,
     volumes_um3: NDArray[np.float64],
     step_um: float,
+    *,
     locked: NDArray[np.bool_] | None = None,
 ) -> tuple[Walls, bool]:
     """Return the walls with fewer triangles, and whether that came to an end.
@@ -70,7 +71,7 @@ def simplify_walls(
         )
         fewer = Walls(walls.positions, triangles[~gone], walls.sides[~gone])
         # triangles that are as they were don't meet one another
-        at_fault = find_faults(fewer, (triangles != walls.triangles).any(axis=1)[~gone])
+        at_fault = find_faults(fewer, fresh=(triangles != walls.triangles).any(axis=1)[~gone])
         if not len(at_fault):
             fewer, used = _compact(fewer)
             # twice: what smoothing took of objects of a few voxels comes back, too
@@ -110,7 +111,7 @@ def keep_volumes(
         fresh = (positions != past).any(axis=1)
         fresh[at_fault] = True
         moved_now = fresh[walls.triangles].any(axis=1)
-        at_fault = find_faults(replace(walls, positions=positions), moved_now)
+        at_fault = find_faults(replace(walls, positions=positions), fresh=moved_now)
         if not len(at_fault):
             return replace(walls, positions=positions), True
         fixed[at_fault] = True

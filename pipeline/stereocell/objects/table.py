@@ -114,7 +114,7 @@ def number_column(name: str, values: NDArray[np.float64], about: str) -> Column:
 
 
 def category_column(
-    name: str, texts: Sequence[str], about: str, colors: Mapping[str, Triple] | None = None
+    name: str, texts: Sequence[str], about: str, *, colors: Mapping[str, Triple] | None = None
 ) -> Column | None:
     """Return a column of words; None: of more than MAX_CATEGORIES. An empty one is missing."""
     words = sorted({text for text in texts if text})

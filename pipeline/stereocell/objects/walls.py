@@ -51,6 +51,7 @@ def extract_walls(
     labels: NDArray[np.int32],
     spacing_um: tuple[float, float, float],
     step_um: float,
+    *,
     origin_um: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Walls:
     """Return the walls of a label map.
@@ -76,7 +77,7 @@ def extract_walls(
         walls = Walls(positions, *_split(positions, quads, sides))
         if fresh is not None:
             fresh |= (walls.triangles != before).any(axis=1)
-        at_fault = find_faults(walls, fresh)
+        at_fault = find_faults(walls, fresh=fresh)
         if not len(at_fault):
             return walls
         placed[at_fault] = centres[at_fault]
@@ -89,7 +90,7 @@ def put_on_lattice(positions: NDArray[np.float64], step_um: float) -> NDArray[np
     return np.round(positions / step_um) * step_um
 
 
-def find_faults(walls: Walls, fresh: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
+def find_faults(walls: Walls, *, fresh: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
     """Return the vertices (n,) of triangles without area, or that meet beside their corners.
 
     fresh  bool (m,), which triangles are looked at, and held against all; None: all

@@ -141,7 +141,7 @@ def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:
 
 
 def paint_slices(
-    slices: Sequence[Slice], longest_px: int, shown_px: int = _SHOWN_PX
+    slices: Sequence[Slice], longest_px: int, *, shown_px: int = _SHOWN_PX
 ) -> Image.Image:
     """Return a picture of three slices: the second below the first, the third on its right.
 

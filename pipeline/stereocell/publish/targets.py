@@ -84,7 +84,7 @@ class FolderTarget:
 
     def read(self, path: str) -> bytes:
         """Return a file's content."""
-        with one_line(str(self.folder / path), "a file that can be read", OutputError):
+        with one_line(str(self.folder / path), "a file that can be read", raised=OutputError):
             return self._own(path).read_bytes()
 
     def write(self, path: str, content: bytes) -> None:
@@ -94,7 +94,7 @@ class FolderTarget:
     def remove(self, path: str) -> None:
         """Remove a file, and the folders that have nothing else in them."""
         file = self._own(path)
-        with one_line(str(file), "a file that may be removed", OutputError):
+        with one_line(str(file), "a file that may be removed", raised=OutputError):
             file.unlink(missing_ok=True)
         for folder in file.relative_to(self.folder).parents[:-1]:
             with suppress(OSError):  # something else is in it
@@ -139,7 +139,7 @@ class StoreTarget:
     @contextmanager
     def _telling(self, path: str) -> Iterator[None]:
         where = f"{self.shown}/{path}".rstrip("/")
-        with one_line(where, "a place that this machine may write to", OutputError):
+        with one_line(where, "a place that this machine may write to", raised=OutputError):
             try:
                 yield
             except ImportError as error:

@@ -99,7 +99,7 @@ def _require_whole(path: str, where: str) -> None:
         )
 
 
-def read_image(location: Location, series: int = 0) -> Image:
+def read_image(location: Location, *, series: int = 0) -> Image:
     """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
     return read_chosen(location.shown, series, partial(_opened, location), _image)
 

@@ -95,7 +95,7 @@ class N5Array:
             raise OSError(f"block {path} is cut short ({len(content)} bytes)") from None
 
 
-def read_image(location: Location, axes: str = "") -> Image:
+def read_image(location: Location, *, axes: str = "") -> Image:
     """Return the image of a dataset, a pyramid or a container. Raises SourceError."""
     if location.is_local and not os.path.isdir(location.source):
         raise SourceError(f"{location.shown}: is a file, expected a folder of N5")
@@ -149,7 +149,7 @@ def _pyramid(
     arrays = [N5Array(files, path, attributes) for path, attributes in levels]
     named = levels[0][1].get("axes", group.get("axes"))
     listed = [str(a).lower() for a in reversed(named)] if isinstance(named, list) else []
-    names, notes = settle_axes(files.where, arrays[0].shape, axes, listed)
+    names, notes = settle_axes(files.where, arrays[0].shape, axes, named=listed)
     if any(len(array.shape) != len(names) for array in arrays):
         raise SourceError(f"{files.where}: levels: expected {len(names)} dimensions in each")
     voxels = tuple(VoxelArray(array, names) for array in arrays)

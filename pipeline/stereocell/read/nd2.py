@@ -64,7 +64,7 @@ def _require_end(path: str, where: str) -> None:
         )
 
 
-def read_image(location: Location, series: int = 0) -> Image:
+def read_image(location: Location, *, series: int = 0) -> Image:
     """Return the image of one position; 0 is the first. Raises SourceError, UsageError."""
     return read_chosen(location.shown, series, partial(_opened, location), _image)
 

@@ -31,7 +31,7 @@ class Placed:
     placement: Matrix
     notes: tuple[str, ...] = ()
 
-    def image(self, title: str, notes: Sequence[str] = (), *, has_sides: bool) -> Image:
+    def image(self, title: str, *, notes: Sequence[str] = (), has_sides: bool) -> Image:
         """Return the image of a format whose files name no channel, after more notes."""
         count = self.array.size("c")
         return Image(

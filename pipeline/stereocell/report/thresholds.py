@@ -106,6 +106,7 @@ def draw_cut(
     volume: NDArray[np.uint8],
     spacing_um: tuple[float, float, float],
     threshold: float,
+    *,
     views: Sequence[View] = MICROSCOPE,
 ) -> Picture:
     """Return a volume's mid-slices in which voxels below the threshold are hidden.

@@ -71,7 +71,7 @@ class CellTissue:
     levels: NDArray[np.float64]
 
 
-def write_cells(path: Path, seed: int = 1, shape: tuple[int, int, int] = SHAPE) -> None:
+def write_cells(path: Path, *, seed: int = 1, shape: tuple[int, int, int] = SHAPE) -> None:
     """Write the sample to `path` (NAME.ome.zarr), and its table to NAME.csv beside it.
 
     shape  voxels (z, y, x); the number of cells goes by the volume

@@ -72,7 +72,7 @@ class MeasuredValues:
             return self._files[key][1]
         path = f"tiles/{volume.tile}/{volume.channel}.vdb"
         listed = read_list(self._stage / _LIST, "").get(path)
-        if listed != named or find_faults(self._stage, {path: named}, self._stage / _LIST):
+        if listed != named or find_faults(self._stage, {path: named}, since=self._stage / _LIST):
             return None
         values = VdbValues(self._stage / path, MEASURED_NAME)
         self._files[key] = named["sha256"], values

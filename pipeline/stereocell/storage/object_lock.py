@@ -116,5 +116,7 @@ def _is_stale(content: bytes, age_s: float) -> bool:
     with suppress(ValueError, KeyError, TypeError):
         owner = json.loads(content)
         if owner["machine"] == machine():
-            return not is_alive(int(owner["process"]), owner.get("start", "")) or age_s > STALE_S
+            return (
+                not is_alive(int(owner["process"]), start=owner.get("start", "")) or age_s > STALE_S
+            )
     return age_s > STALE_S

@@ -112,7 +112,7 @@ def start_of(process: int) -> str:
     return ""
 
 
-def is_alive(process: int, start: str = "") -> bool:
+def is_alive(process: int, *, start: str = "") -> bool:
     """Return whether a process with this ID runs and, where its start is known, is the same."""
     import psutil
 

@@ -23,7 +23,7 @@ class UnwrapOptions:
     maps: bool = setting(
         False,
         "whether coarser levels get UVs and baked maps, 4 to 6 times as large",
-        Flag(
+        flag=Flag(
             "--maps",
             "coarser levels get UVs and baked maps of normals, occlusion and paint, for DCC tools "
             "(default: normals and values at vertices alone)",

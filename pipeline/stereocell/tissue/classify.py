@@ -68,7 +68,7 @@ class Tissue:
 
 
 def learn_tissue(
-    voxels: NDArray[Any], spacing_um: tuple[float, float, float], options: TissueOptions
+    voxels: NDArray[Any], spacing_um: tuple[float, float, float], *, options: TissueOptions
 ) -> Tissue:
     """Return the tissue classes of a volume.
 

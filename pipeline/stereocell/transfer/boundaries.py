@@ -96,17 +96,17 @@ class SuggestedShapes:
         return self.transfer_2d.functions.get(NAME, ())
 
 
-def suggest(fine: NDArray[np.int64], spacing_um: Ratios = EVEN) -> SuggestedShapes:
+def suggest(fine: NDArray[np.int64], *, spacing_um: Ratios = EVEN) -> SuggestedShapes:
     """Return shapes on the boundaries of a channel; `fine`: counts, see choose_gradient_max."""
     gradient_max = choose_gradient_max(fine)
-    found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um)
+    found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um=spacing_um)
     shapes = suggest_shapes(found)
     functions = {NAME: shapes} if shapes else {}
     return SuggestedShapes(TransferFunctions2d(gradient_max, functions), found.reason)
 
 
 def find_boundaries(
-    counts: NDArray[np.int64], gradient_max: float, spacing_um: Ratios = EVEN
+    counts: NDArray[np.int64], gradient_max: float, *, spacing_um: Ratios = EVEN
 ) -> Boundaries:
     """Return materials and boundaries of a histogram, int (rows, columns); see
     transfer/joint_histogram.py.

@@ -126,7 +126,7 @@ def make_appearance(
     functions = make_transfer_functions(
         np.asarray(statistics.histogram),
         appearance.iso_normalized,
-        appearance.threshold_normalized,
+        threshold_normalized=appearance.threshold_normalized,
         has_magnitudes=modality == "MR",
     )
     if modality == "CT":

@@ -113,7 +113,7 @@ def run_objects(task: ObjectsTask) -> None:
         pieces = owned[is_piece[owned]]
         measured = [
             measure_intensities(
-                compact, read_on_labels(task.labels, task.window, image), owned, pieces
+                compact, read_on_labels(task.labels, task.window, image), owned, pieces=pieces
             )
             for image in task.images
         ]
@@ -217,7 +217,7 @@ def _paint(lods: Sequence[Lod], painted: Painted) -> tuple[Lod, ...]:
     (z0, y0, x0), (z1, y1, x1) = start.tolist(), stop.tolist()
     box = Box((z0, y0, x0), (z1, y1, x1))
     volume = open_source(image.ref).read(image.channel, box, image.level)
-    lattice = Lattice.of_whole(box, image.spacing_um, image.origin_um)
+    lattice = Lattice.of_whole(box, image.spacing_um, origin_um=image.origin_um)
     return tuple(
         replace(
             lod,

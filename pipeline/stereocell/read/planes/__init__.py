@@ -37,7 +37,7 @@ _SHOWN = 4  # names in a message
 _EVEN = 0.01  # share of a step along z by which planes may deviate
 
 
-def read_image(location: Location, series: int = 0, pattern: str = "") -> Image:
+def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Image:
     """Return one volume of the folder; 0 is the largest, others count from 1 as `list_series` does.
 
     pattern  how the names are built, as `img_c{c}_z{z}.tif`; empty: guessed

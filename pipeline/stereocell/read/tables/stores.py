@@ -81,7 +81,7 @@ class _Hdf5Node:
     def find(self, name: str) -> "_Hdf5Node | None":
         if not isinstance(self._node, h5py.Group) or name not in self._node:
             return None
-        return _Hdf5Node(self._tree, self._tree.find(name, self._node))
+        return _Hdf5Node(self._tree, self._tree.find(name, start=self._node))
 
     def read(self, key: Any) -> NDArray[Any]:
         where = f"{self._tree.where}:{self._node.name}"

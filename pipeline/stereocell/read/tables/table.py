@@ -112,7 +112,7 @@ def named(names: Sequence[str]) -> list[str]:
     return [clean(name) or f"column {place}" for place, name in enumerate(names, start=1)]
 
 
-def as_column(name: str, texts: Sequence[str], point: str = ".") -> TableColumn:
+def as_column(name: str, texts: Sequence[str], *, point: str = ".") -> TableColumn:
     """Return a column of texts, as numbers where all that are there are numbers.
 
     point  what stands before a number's fraction
