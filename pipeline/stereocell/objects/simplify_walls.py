@@ -95,8 +95,9 @@ def keep_volumes(
 
     And whether that came to an end; if not, they are as they were.
 
-    fixed    bool (n,), vertices that stay
-    most_um  how far a vertex may move
+    fixed        bool (n,), vertices that stay
+    most_um      how far a vertex may move
+    volumes_um3  float64 (objects + 1,), the volume that each object should have
 
     Moved is along the volumes' gradients, the least by the areas of the vertices' surroundings: a
     linear system of one unknown an object.

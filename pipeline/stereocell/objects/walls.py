@@ -86,7 +86,7 @@ def extract_walls(
 
 
 def put_on_lattice(positions: NDArray[np.float64], step_um: float) -> NDArray[np.float64]:
-    """Return the points of the lattice that are nearest."""
+    """Return the points of the lattice that are nearest; positions are float64 (n, 3), um."""
     return np.round(positions / step_um) * step_um
 
 
@@ -190,7 +190,7 @@ def measure_areas(walls: Walls) -> tuple[NDArray[np.int32], NDArray[np.float64]]
 def surfaces_of(walls: Walls, numbers: NDArray[np.int32]) -> Mesh:
     """Return the closed surfaces of objects as one mesh, one after the other, each by itself.
 
-    numbers  ascending; `Mesh.objects` counts in them
+    numbers  int32 (k,), ascending; `Mesh.objects` counts in them
 
     Normals are means over the areas of an object's own triangles.
     """

@@ -97,7 +97,12 @@ class SuggestedShapes:
 
 
 def suggest(fine: NDArray[np.int64], *, spacing_um: Ratios = EVEN) -> SuggestedShapes:
-    """Return shapes on the boundaries of a channel; `fine`: counts, see choose_gradient_max."""
+    """Return shapes on the boundaries of a channel.
+
+    fine        int64 (FINE_ROWS, COLUMNS), counts of voxels by gradient and value; see
+                choose_gradient_max
+    spacing_um  (z, y, x); only its ratios count
+    """
     gradient_max = choose_gradient_max(fine)
     found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um=spacing_um)
     shapes = suggest_shapes(found)
@@ -108,8 +113,11 @@ def suggest(fine: NDArray[np.int64], *, spacing_um: Ratios = EVEN) -> SuggestedS
 def find_boundaries(
     counts: NDArray[np.int64], gradient_max: float, *, spacing_um: Ratios = EVEN
 ) -> Boundaries:
-    """Return materials and boundaries of a histogram, int (rows, columns); see
-    transfer/joint_histogram.py.
+    """Return materials and boundaries of a histogram.
+
+    counts        int64 (rows, columns), voxels by gradient magnitude and value; see count_joint
+    gradient_max  magnitude that the last row stands for
+    spacing_um    (z, y, x); only its ratios count
 
     Same histogram, same answer. A constant volume, or one of a single material, has no boundaries.
     """

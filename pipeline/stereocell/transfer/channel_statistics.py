@@ -62,8 +62,11 @@ def find_statistics(
 ) -> ChannelStatistics:
     """Return window and histogram of a channel's voxels; a constant channel's window is 1 wide.
 
-    `window`, where it is known, is not sought. The voxels are left in another order: a sorted copy
-    would be what the memory of a small build peaks at.
+    voxels  any shape, any number type, voxel values
+    window  lowest and highest voxel value, where they are known; None: they are found
+
+    The voxels are left in another order: a sorted copy would be what the memory of a small build
+    peaks at.
     """
     percentiles = (options.low_percentile, options.high_percentile)
     voxels = voxels.reshape(-1)
