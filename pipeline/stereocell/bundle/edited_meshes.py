@@ -32,6 +32,7 @@ from stereocell.model.color import to_srgb8
 from stereocell.model.errors import StageError
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.spacing import Spacing
 from stereocell.model.timing import Clock
 from stereocell.textures.bake import Baker, FineSurface, bake
 from stereocell.textures.lod_chain import make_levels
@@ -340,7 +341,7 @@ def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[
     return np.array(low, np.float64), np.array(high, np.float64)
 
 
-def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[float, float, float]:
+def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> Spacing:
     """Return the voxel spacing (z, y, x), um; without a volume, the median length of an edge."""
     box, prim = _box(tile, channel_id), _volume(tile, channel_id)
     size = prim.GetAttribute("stereocell:atlasSize").Get() if box is not None else None

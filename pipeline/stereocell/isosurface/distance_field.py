@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes
-
-Spacing = tuple[float, float, float]
+from stereocell.model.spacing import Spacing
 
 
 def gradient_magnitude(field: NDArray[np.float32], spacing_um: Spacing) -> NDArray[np.float32]:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
 SKIN_HU = -300.0
@@ -103,9 +104,7 @@ class Holder:
         )
 
 
-def find_holder(
-    voxels: NDArray[Any], spacing_um: tuple[float, float, float], region: Box
-) -> Holder | None:
+def find_holder(voxels: NDArray[Any], spacing_um: Spacing, region: Box) -> Holder | None:
     """Return what is to be left out of a CT; None: nothing is.
 
     voxels      (z, y, x), Hounsfield units; they cover `region` at any resolution

@@ -7,6 +7,7 @@ from typing import Any
 
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, Flag, length_um, setting
+from stereocell.model.spacing import Spacing
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +165,7 @@ class SurfaceOptions:
         AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"
     )
 
-    def resolved(self, spacing_um: tuple[float, float, float]) -> "SurfaceOptions":
+    def resolved(self, spacing_um: Spacing) -> "SurfaceOptions":
         """Return the options with lengths in place of `auto`, but for alpha and offset.
 
         `auto` alpha and offset follow from the connected components. Raises UsageError for a value

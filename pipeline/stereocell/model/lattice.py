@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.volume import zyx_to_xyz
 
-Spacing = tuple[float, float, float]  # distance between samples in um, (z, y, x)
-Point = tuple[float, float, float]  # position in um, (z, y, x)
 Step = tuple[int, int, int]  # every how many planes of voxels one is kept, (z, y, x)
 Plane = tuple[int, float]  # axis of a position (0 x, 1 y, 2 z), and its value in um
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stereocell.meshes.distance import Nearest, measure_spread
 from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.timing import Clock
 from stereocell.objects.options import ObjectOptions
 from stereocell.objects.simplify_walls import simplify_walls
@@ -57,8 +58,8 @@ def build_objects(
     labels: NDArray[np.int32],
     owned: NDArray[np.int32],
     *,
-    spacing_um: tuple[float, float, float],
-    origin_um: tuple[float, float, float],
+    spacing_um: Spacing,
+    origin_um: Point,
     step_um: float,
     options: ObjectOptions,
     clock: Clock | None = None,

@@ -21,6 +21,7 @@ from scipy import sparse
 from stereocell.kernels.walls import smooth_walls
 from stereocell.meshes.self_intersections import find_crossings, find_flat
 from stereocell.model.mesh import Mesh
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.volume import zyx_to_xyz
 
 # The last slices of a ball end in plates as wide as many voxels, which a filter keeps that passes
@@ -49,10 +50,10 @@ class Walls:
 
 def extract_walls(
     labels: NDArray[np.int32],
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     step_um: float,
     *,
-    origin_um: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    origin_um: Point = (0.0, 0.0, 0.0),
 ) -> Walls:
     """Return the walls of a label map.
 

@@ -22,6 +22,7 @@ from scipy import ndimage
 from sklearn.cluster import KMeans  # type: ignore[import-untyped]
 from sklearn.mixture import GaussianMixture  # type: ignore[import-untyped]
 
+from stereocell.model.spacing import Spacing
 from stereocell.tissue.bias_field import BiasField, fit_bias_field, flat_field
 from stereocell.tissue.brain_mask import find_brain, find_foreground
 from stereocell.tissue.potts_prior import apply_potts_prior
@@ -67,9 +68,7 @@ class Tissue:
     bic: dict[int, float]
 
 
-def learn_tissue(
-    voxels: NDArray[Any], spacing_um: tuple[float, float, float], *, options: TissueOptions
-) -> Tissue:
+def learn_tissue(voxels: NDArray[Any], spacing_um: Spacing, *, options: TissueOptions) -> Tissue:
     """Return the tissue classes of a volume.
 
     voxels      (z, y, x), any number type

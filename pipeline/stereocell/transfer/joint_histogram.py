@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
 ROWS, COLUMNS = 64, 256  # gradient magnitudes, values of 8 bits
@@ -26,9 +27,7 @@ SMALLEST_MAX = 0.05  # share of the window: 13 steps of 8 bits; below, rows are 
 SAMPLE_EDGE = (16, 128, 128)  # voxels (z, y, x) of a block, where not all of a region is counted
 
 
-def find_steps(
-    voxels: NDArray[np.uint8], spacing_um: tuple[float, float, float]
-) -> NDArray[np.float32]:
+def find_steps(voxels: NDArray[np.uint8], spacing_um: Spacing) -> NDArray[np.float32]:
     """Return the gradient magnitude at all voxels but the outermost, as 8-bit values: 255 is 1.
 
     voxels      uint8 (z, y, x)
@@ -51,7 +50,7 @@ def find_steps(
 
 def count_joint(
     voxels: NDArray[np.uint8],
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     *,
     gradient_max: float,
     rows: int = ROWS,

@@ -14,6 +14,7 @@ from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.unit_files import save_unit
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Lod
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.model.unit import ObjectFacts, Unit
@@ -37,8 +38,8 @@ class ImageRef:
     channel: int
     level: int
     region: Box
-    spacing_um: tuple[float, float, float]
-    origin_um: tuple[float, float, float]
+    spacing_um: Spacing
+    origin_um: Point
 
 
 @dataclass(frozen=True, slots=True)
