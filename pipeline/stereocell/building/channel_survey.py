@@ -150,14 +150,14 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for channel in plan.channels:
         look, mask = survey[channel.id].appearance, windows[channel.id].counting.mask
         if mask is not None and found[channel.id].is_fixed and given_level(plan, channel) is None:
-            told = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
-            told += _loss(plan, survey[channel.id], inside[channel.id])
-            console.print(f"units: {look.name}: {told}", markup=False)
+            remark = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
+            remark += _loss(plan, survey[channel.id], inside[channel.id])
+            console.print(f"units: {look.name}: {remark}", markup=False)
         if found[channel.id].subtracts and found[channel.id].background is None:
-            told = "there is no background to subtract: its level counts from 0"
-            console.print(f"units: {look.name}: {told}", markup=False)
-        if told := survey[channel.id].thinning(plan):
-            console.print(f"units: {look.name}: {told}", markup=False)
+            remark = "there is no background to subtract: its level counts from 0"
+            console.print(f"units: {look.name}: {remark}", markup=False)
+        if remark := survey[channel.id].thinning(plan):
+            console.print(f"units: {look.name}: {remark}", markup=False)
         if look.surface_reason:
             console.print(f"units: {look.name}: {look.surface_reason}", markup=False)
     return survey

@@ -159,8 +159,8 @@ def hold_to_histogram(found: Found) -> Found:
 
 def _without_surface(found: Found, side: str) -> Found:
     above = " above the background" if found.subtracts else ""
-    told = f"no surface: all voxels lie {side} the level {_value_of(found.rungs[0]):.5g}{above}"
-    return replace(found, rungs=(), doubt=told)
+    reason = f"no surface: all voxels lie {side} the level {_value_of(found.rungs[0]):.5g}{above}"
+    return replace(found, rungs=(), doubt=reason)
 
 
 def _value_of(level: Level | float) -> float:

@@ -115,12 +115,12 @@ def plan(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for, tell
+    from stereocell.building.preset_choice import load_for, print_choice
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
     made = phases.make(options.input, options.out, wanted)
-    tell(choice)
+    print_choice(choice)
     return Answer(
         {
             "out": str(options.shown),
@@ -138,7 +138,7 @@ def iso(options: argparse.Namespace) -> Answer:
     """Write the picture of one tile's iso-value and print the candidates."""
     if listed := _series(options):
         return listed
-    from stereocell.building.preset_choice import load_for, tell
+    from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.preview import iso_value as iso_preview
 
     flags = flags_of(options)
@@ -146,7 +146,7 @@ def iso(options: argparse.Namespace) -> Answer:
     found, path = iso_preview.preview(
         options.input, options.channel, tile_id=options.tile, out=options.out, settings=wanted
     )
-    tell(choice)
+    print_choice(choice)
     print_unless_json(options, "\n".join(iso_preview.table(found)))
     print_unless_json(options, f"wrote {path}")
     return Answer({"picture": str(path), **asdict(found)})
@@ -215,7 +215,7 @@ def slices(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for, tell
+    from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.preview.png_slices import without_surface, write_slices
     from stereocell.storage.location import require_apart
 
@@ -223,7 +223,7 @@ def slices(options: argparse.Namespace) -> Answer:
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
     require_apart(options.input, options.out)
     plan = phases.settle(options.input, without_surface(wanted))
-    tell(choice)
+    print_choice(choice)
     written = write_slices(plan, options.out, plane=options.plane)
     print_unless_json(options, f"wrote to {options.out}: {written.line}")
     return Answer({"out": str(options.out), "slices": written.count, "plane": written.plane})

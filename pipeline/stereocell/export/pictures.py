@@ -74,9 +74,9 @@ def _encode(chosen: Chosen, path: Path, shapes: list[Shape], ffmpeg: str) -> tup
             encoder.stdin.close()
         except BrokenPipeError:
             pass  # ffmpeg says why
-        told = encoder.stderr.read().decode(errors="replace").strip()
+        printed = encoder.stderr.read().decode(errors="replace").strip()
     if encoder.returncode:
-        last = told.splitlines()[-1] if told else f"exit code {encoder.returncode}"
+        last = printed.splitlines()[-1] if printed else f"exit code {encoder.returncode}"
         raise OutputError(f"{path}: ffmpeg: {last}")
     return size
 

@@ -185,18 +185,18 @@ class StoreTarget:
     def write(self, path: str, content: bytes) -> None:
         """Put an object there: on S3 with its type, and how long it may be kept."""
         fs, base = self._storage
-        said = {}
+        headers = {}
         if self.scheme in _S3:
-            said = {
+            headers = {
                 "ContentType": media_type(PurePosixPath(path)),
                 "CacheControl": cache_control(path),
             }
             if self.is_public:
-                said["ACL"] = "public-read"
+                headers["ACL"] = "public-read"
         with self._telling(path):
-            if not said and "/" in path:
+            if not headers and "/" in path:
                 fs.makedirs(f"{base}/{path}".rpartition("/")[0], exist_ok=True)
-            fs.pipe_file(f"{base}/{path}", content, **said)
+            fs.pipe_file(f"{base}/{path}", content, **headers)
 
     def remove(self, path: str) -> None:
         """Remove an object."""

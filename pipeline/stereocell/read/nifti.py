@@ -183,8 +183,8 @@ def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[s
     """Note the number of NaN and infinities at a time point, which this reads; it is cached."""
     _ = voxels[time, slice(0, 0), 0, 0]
     found = counts.get(time, 0)
-    told = f"{found:,} voxels are NaN or infinite: read as the smallest finite value"
-    return (told,) if found else ()
+    note = f"{found:,} voxels are NaN or infinite: read as the smallest finite value"
+    return (note,) if found else ()
 
 
 def _open(location: Location) -> Any:

@@ -102,8 +102,8 @@ def learn_tissue(voxels: NDArray[Any], spacing_um: Spacing, *, options: TissueOp
     bic, has_modes = {}, {}
     for k, field in fields.items():
         bic[k], has_modes[k] = _score(sampled, field.log_at(indices), k, independent)
-    told = [k for k in counts if has_modes[k]] or list(counts)[:1]
-    count = min(told, key=lambda k: bic[k])
+    separated = [k for k in counts if has_modes[k]] or list(counts)[:1]
+    count = min(separated, key=lambda k: bic[k])
     field = fields[count]
     corrected = sampled / np.exp(field.log_at(indices))[:, None]
     mixture = _fit(corrected, count)

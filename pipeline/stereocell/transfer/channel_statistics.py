@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from stereocell.model.channel import (
     LOW_CONFIDENCE,
     Appearance,
+    SurfaceConfidence,
     SurfaceLevel,
-    SurfaceVerdict,
     TransferFunctions2d,
 )
 from stereocell.model.lattice_field import LatticeField
@@ -107,9 +107,9 @@ def make_appearance(
         iso_value = level.iso + below
         # where nothing tells a surface from noise, peaks of the histogram are noise too
         threshold = statistics.threshold
-    verdict: SurfaceVerdict = "none" if level is None else "clear"
+    surface: SurfaceConfidence = "none" if level is None else "clear"
     if level is not None and confidence < LOW_CONFIDENCE:
-        verdict = "unsure"
+        surface = "unsure"
         doubt = (
             f"unsure surface: at {level.words} with a confidence of {confidence:.2f}; "
             f"below {LOW_CONFIDENCE:g} about half of such surfaces are right"
@@ -120,7 +120,7 @@ def make_appearance(
         statistics.window,
         iso_value,
         confidence,
-        verdict,
+        surface,
         {},
         threshold=None if threshold is None else threshold.value,
         surface_reason=doubt,

@@ -128,5 +128,5 @@ class AsWritten:
         elif fault == DOUBTFUL:
             raise StageError(f"{file}: {fault}: remove it and {REMEDY}; {ADVICE}")
         else:
-            said = f"damaged, not the bytes that {FILES} says"
-            raise StageError(f"{file}: {said}: remove it and {REMEDY}")
+            problem = f"damaged, not the bytes that {FILES} says"
+            raise StageError(f"{file}: {problem}: remove it and {REMEDY}")
