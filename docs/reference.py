@@ -255,7 +255,8 @@ def settings_page() -> str:
         "What `stereocell settings` prints. A file of these, or of some of them, goes to "
         "`--config`; flags go before the file, and the file before the preset.",
         "```toml\n"
-        f"{settings_module.to_toml(settings_module.Settings(), settings_module.TEMPLATE)}```",
+        + settings_module.to_toml(settings_module.Settings(), header=settings_module.TEMPLATE)
+        + "```",
     ]
     for path in sorted(settings_module.PRESETS.glob("*.toml")):
         parts += [f"## Preset {path.stem}", f"```toml\n{path.read_text()}```"]

@@ -49,7 +49,7 @@ def build(
         built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
     """
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for, tell
+    from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.building.setting_names import named_as_settings
     from stereocell.engine.run import Engine
     from stereocell.report import phase as report_phase
@@ -86,12 +86,12 @@ def build(
             require_apart(source, folder)
             stack.enter_context(alone_in(folder, "build"))
         else:
-            folder = stack.enter_context(opened(place.source, "build"))
+            folder = stack.enter_context(opened(place.source, command="build"))
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
         with named_as_settings():
             phases.make(str(source), folder, wanted)
-        tell(choice)
+        print_choice(choice)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
         phases.run_bundle(folder, engine)

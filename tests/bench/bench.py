@@ -82,7 +82,7 @@ def main() -> None:
 
     compare(
         "repair (all of it)",
-        lambda: repair.repair(distance.copy(), SPACING, options),
+        lambda: repair.repair(distance.copy(), SPACING, options=options),
         close_by_morphology,
         "a binary closing alone",
     )

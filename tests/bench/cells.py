@@ -140,7 +140,7 @@ def _levels(labels: NDArray[np.int32], spacing_um: Triple, step_um: float) -> Ma
     z, y, x = (-MARGIN * s for s in spacing_um)
     meter, made = Meter(), []
     mended, _, _ = make_well_composed(np.pad(labels, MARGIN))
-    walls = extract_walls(mended, spacing_um, step_um, (z, y, x))
+    walls = extract_walls(mended, spacing_um, step_um, origin_um=(z, y, x))
     for level, error in enumerate(ObjectOptions().errors):
         walls, _ = simplify_walls(walls, error * min(spacing_um), volumes, step_um)
         mesh = surfaces_of(walls, np.arange(1, count + 1, dtype=np.int32))

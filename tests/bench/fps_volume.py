@@ -11,7 +11,7 @@ from support.phantoms import write_ome_tiff
 
 
 def main(out: Path, edge: int) -> None:
-    head = make_head((edge, edge, edge))
+    head = make_head(shape=(edge, edge, edge))
     temporary = out.with_name(f"{out.name}.part")
     write_ome_tiff(temporary, head.voxels, spacing=head.spacing_um, names=["T1"], compression=None)
     os.replace(temporary, out)

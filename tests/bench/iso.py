@@ -173,7 +173,7 @@ def _by_edges(
     sums = gather_edges(field, slopes, scale=scale, criterion=CRITERIA[criterion])
     counts = np.bincount(scale.bins_of(field).ravel(), minlength=BINS_OF_SCALE).astype(np.float64)
     histogram = LevelHistogram(counts, scale.edges())
-    return choose_by_edges(sums, histogram, IsoValueOptions(criterion=criterion))
+    return choose_by_edges(sums, histogram, options=IsoValueOptions(criterion=criterion))
 
 
 def main() -> None:

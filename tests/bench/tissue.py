@@ -39,9 +39,11 @@ def main() -> None:
     print("| shape | noise | bias | seed | method | " + " | ".join(NAMES) + " | s |")
     print("|---" * 9 + "|")
     for shape, noise, bias, seed in CASES:
-        head = make_head(shape, noise, bias=bias, seed=seed)
+        head = make_head(shape=shape, noise=noise, bias=bias, seed=seed)
         start = time.perf_counter()
-        tissue = learn_tissue(head.voxels, head.spacing_um, TissueOptions(classes=3, brain=True))
+        tissue = learn_tissue(
+            head.voxels, head.spacing_um, options=TissueOptions(classes=3, brain=True)
+        )
         seconds = time.perf_counter() - start
         inside = np.zeros(head.voxels.shape, np.int64)
         inside[tissue.mask] = 1 + by_otsu(head.voxels[tissue.mask], 3)

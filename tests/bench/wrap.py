@@ -114,7 +114,7 @@ def wrap(given: Input) -> Mesh:
         max_cavity_um=np.inf,
     )
     whole = Box((0, 0, 0), distance.shape)
-    closed = repair(distance, spacing, options).distance
+    closed = repair(distance, spacing, options=options).distance
     surface = extract_surface(closed, Lattice.of_whole(whole, spacing))
     return simplify_without_defects(surface, (), max_error_um=given.error * alpha).mesh
 

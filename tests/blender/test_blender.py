@@ -499,7 +499,7 @@ def test_a_picture_shows_mesh_volume_and_the_new_colour(stage_path: Path, tmp_pa
 
 def test_its_own_importer_opens_an_exported_gltf(stage_path: Path, tmp_path: Path) -> None:
     for packing in (None, "draco"):
-        export_stage(stage_path, tmp_path / "f.glb", ExportOptions(lod=0, compress=packing))
+        export_stage(stage_path, tmp_path / "f.glb", options=ExportOptions(lod=0, compress=packing))
         found = run("gltf", tmp_path, file=tmp_path / "f.glb")
         assert found["parents"] == {f"{name} {tile}": name for name in NAMES[:2] for tile in TILES}
         for name, color in zip(NAMES[:2], COLORS[:2], strict=True):

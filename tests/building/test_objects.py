@@ -618,8 +618,8 @@ def test_the_deep_check_measures_the_image_anew(
     assert run("check", tmp_path / "right", "--deep", "--workers", 0) == 0
     right = objects_maker.measure_intensities
 
-    def measure(*given: Any) -> Measured:
-        found = right(*given)
+    def measure(*given: Any, **named: Any) -> Measured:
+        found = right(*given, **named)
         getattr(found, measure_of)[-1] += 30
         return found
 

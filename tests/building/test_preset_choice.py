@@ -68,8 +68,8 @@ def test_a_level_above_the_background_is_refused_of_ct(
 
 def test_what_the_input_says_goes_first(tmp_path: Path) -> None:
     dataset = open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400)))
-    assert choose_preset(dataset, "CT")[0] == "ct"
-    assert choose_preset(dataset, "PT")[0] is None
+    assert choose_preset(dataset, modality="CT")[0] == "ct"
+    assert choose_preset(dataset, modality="PT")[0] is None
 
 
 def test_what_is_too_small_for_a_patient_follows_the_spacing(tmp_path: Path) -> None:
@@ -79,7 +79,7 @@ def test_what_is_too_small_for_a_patient_follows_the_spacing(tmp_path: Path) -> 
     nibabel.save(image, tmp_path / "a.nii")
     dataset = open_dataset(tmp_path / "a.nii")
     for modality in ("", "MR"):
-        chosen, reason = choose_preset(dataset, modality)
+        chosen, reason = choose_preset(dataset, modality=modality)
         assert chosen is None
         assert "6.4 mm across, too small for a patient" in reason
     assert main(["plan", str(tmp_path / "a.nii"), "-o", str(tmp_path / "o")]) == 0

@@ -21,7 +21,7 @@ def test_printed_settings_are_the_defaults_again() -> None:
 
 
 def test_the_header_says_whether_the_file_is_to_be_edited() -> None:
-    template = settings_module.to_toml(settings_module.Settings(), settings_module.TEMPLATE)
+    template = settings_module.to_toml(settings_module.Settings(), header=settings_module.TEMPLATE)
     assert template.startswith("# StereoCell settings. Every key may be left out")
     record = settings_module.to_toml(settings_module.Settings())
     assert record.startswith("# The settings that this build used")

@@ -24,7 +24,7 @@ from support.validators import make_assets
 SPACING = (2.0, 1.0, 1.0)
 SHAPE = (20, 64, 96)
 NAMES = ("uneven", "noise", "flat", "even", "dim")
-VERDICTS = {"uneven": "clear", "even": "clear", "dim": "unsure", "noise": "none", "flat": "none"}
+CONFIDENCES = {"uneven": "clear", "even": "clear", "dim": "unsure", "noise": "none", "flat": "none"}
 BEGINNINGS = {"clear": "", "unsure": "unsure surface: at ", "none": "no clear surface: "}
 SETTINGS = """
 [surface]
@@ -145,18 +145,18 @@ def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> No
     reasons: dict[str, list[str]] = {}
     for channel in manifest["channels"]:
         prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel['id']}")
-        verdict = VERDICTS[channel["name"]]
-        has_surface = verdict != "none"
-        assert channel["surface"] == verdict
+        confidence = CONFIDENCES[channel["name"]]
+        has_surface = confidence != "none"
+        assert channel["surface"] == confidence
         assert prim.GetAttribute("stereocell:surfaceVerdict").Get() == channel["surface"]
         assert (channel["tileset"] is None) == (not has_surface)
         assert (channel["level"] is None) == (not has_surface)
         assert channel["volumes"]  # what there is can be seen all the same
         reason = prim.GetAttribute("stereocell:surfaceReason").Get() or ""
         assert channel["surface_reason"] == reason
-        assert reason.startswith(BEGINNINGS[verdict])
-        assert bool(reason) == (verdict != "clear")
-        reasons.setdefault(verdict, []).append(f"{channel['name']}: {reason}")
+        assert reason.startswith(BEGINNINGS[confidence])
+        assert bool(reason) == (confidence != "clear")
+        reasons.setdefault(confidence, []).append(f"{channel['name']}: {reason}")
     assert remarks["2 channels without a surface"] == tuple(reasons["none"])
     assert remarks["1 channel with an unsure surface"] == tuple(reasons["unsure"])
     uneven = next(c for c in manifest["channels"] if c["name"] == "uneven")

@@ -43,10 +43,10 @@ def learned_once() -> Iterator[None]:
     found: dict[tuple[bytes, str], Any] = {}
     learn = tissue_channels.learn_tissue
 
-    def learn_once(voxels: NDArray[Any], spacing_um: Any, options: TissueOptions) -> Any:
+    def learn_once(voxels: NDArray[Any], spacing_um: Any, *, options: TissueOptions) -> Any:
         given = (np.ascontiguousarray(voxels).tobytes(), f"{voxels.dtype} {spacing_um} {options}")
         if given not in found:
-            found[given] = learn(voxels, spacing_um, options)
+            found[given] = learn(voxels, spacing_um, options=options)
         return found[given]
 
     with pytest.MonkeyPatch.context() as patch:
@@ -58,7 +58,7 @@ def learned_once() -> Iterator[None]:
 def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A plan of the head from DICOM, nothing built."""
     folder = tmp_path_factory.mktemp("tissue")
-    write_dicom(folder / "head", make_head(SHAPE, bias=0.3, seed=4), 4)
+    write_dicom(folder / "head", make_head(shape=SHAPE, bias=0.3, seed=4), seed=4)
     out = folder / "out"
     given = ["--preset", "mri", "--level", "0"]
     assert main(["plan", str(folder / "head"), "-o", str(out), *given]) == 0

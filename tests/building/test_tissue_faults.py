@@ -75,7 +75,7 @@ def without_viewer() -> Iterator[None]:
         yield
 
 
-def learn(voxels: NDArray[Any], _: object, options: TissueOptions) -> SimpleNamespace:
+def learn(voxels: NDArray[Any], _: object, *, options: TissueOptions) -> SimpleNamespace:
     """Give classes at once: by brightness, in soft steps. Learning has tests of its own."""
     count = int(options.classes)
     place = voxels / voxels.max() * (count - 1)

@@ -76,7 +76,7 @@ def test_auto_is_a_level() -> None:
 
 
 def test_a_setting_s_comment_is_its_flag_s_help(capsys: pytest.CaptureFixture[str]) -> None:
-    (field,) = fields(make_dataclass("O", [("n", int, setting(1, "how many", Flag("--n")))]))
+    (field,) = fields(make_dataclass("O", [("n", int, setting(1, "how many", flag=Flag("--n")))]))
     made = argparse.ArgumentParser()
     flags.declare_setting(made, field.metadata["flag"], field)
     made.print_help()
@@ -85,7 +85,7 @@ def test_a_setting_s_comment_is_its_flag_s_help(capsys: pytest.CaptureFixture[st
 
 
 def test_a_length_or_auto_can_have_a_flag(capsys: pytest.CaptureFixture[str]) -> None:
-    declared = setting("auto", "5 % of it, in um", Flag("--n"))
+    declared = setting("auto", "5 % of it, in um", flag=Flag("--n"))
     (field,) = fields(make_dataclass("O", [("n", float | str, declared)]))
     made = argparse.ArgumentParser()
     flags.declare_setting(made, field.metadata["flag"], field)

@@ -99,7 +99,7 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     phantoms.write_ome_tiff(tmp_path / "my.ome.tif", voxels, "CZYX", names=names)
     labels = [{"label": name, "color": "00FF80"} for name in names]
     phantoms.write_ome_zarr(tmp_path / "my.ome.zarr", [voxels], "czyx", channels=labels)
-    write_dicom(tmp_path / "scans" / "head", make_head((24, 20, 22), seed=4), 4)
+    write_dicom(tmp_path / "scans" / "head", make_head(shape=(24, 20, 22), seed=4), seed=4)
     write_series(tmp_path / "scans" / "head" / "other", np.diag([3.0, 3, 3, 1]), (9, 12, 14))
     write_enhanced(tmp_path / "frames.dcm", np.diag([3.0, 3, 3, 1]), (9, 12, 14))
     write_f_nifti(tmp_path / "brain.nii.gz", body, (500, 200, 200))

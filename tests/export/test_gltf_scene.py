@@ -31,7 +31,7 @@ def document(path: Path) -> dict:
 def test_another_library_finds_the_sphere_in_metres_with_colour_and_names(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
-    line = export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    line = export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions())
     scene = trimesh.load(tmp_path / "s.glb")
     assert set(scene.geometry) == {"CD31 r0_c0", "CD31 r0_c1"}
     low, high = scene.bounds
@@ -49,7 +49,7 @@ def test_another_library_finds_the_sphere_in_metres_with_colour_and_names(
 
 
 def test_tiles_meet_without_a_gap(sphere_stage: Path, tmp_path: Path) -> None:
-    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions())
     joined = trimesh.load(tmp_path / "s.glb", force="mesh")
     joined.merge_vertices(merge_norm=True, merge_tex=True)
     joined.update_faces(joined.nondegenerate_faces())
@@ -62,7 +62,7 @@ def test_the_same_stage_gives_the_same_bytes_and_nothing_else_is_left(
 ) -> None:
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
-        export_stage(sphere_stage, tmp_path / folder / name, ExportOptions())
+        export_stage(sphere_stage, tmp_path / folder / name, options=ExportOptions())
         assert [file.name for file in (tmp_path / folder).iterdir()] == [name]
     assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
@@ -71,7 +71,7 @@ def test_an_edit_over_the_stage_is_in_it(edited: Callable[..., Path], tmp_path: 
     layer = edited(
         lambda s: s.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(0.25, 0.5, 0.75))
     )
-    export_stage(layer, tmp_path / "s.glb", ExportOptions())
+    export_stage(layer, tmp_path / "s.glb", options=ExportOptions())
     (material,) = document(tmp_path / "s.glb")["materials"]
     assert material["pbrMetallicRoughness"]["baseColorFactor"] == [0.25, 0.5, 0.75, 1.0]
 
@@ -94,7 +94,7 @@ def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
     layer = edited(change)
     for lod in (0, 1):  # coarser levels are made anew from what was edited
         told: list[str] = []
-        export_stage(layer, tmp_path / "s.glb", ExportOptions(lod=lod), told.append)
+        export_stage(layer, tmp_path / "s.glb", options=ExportOptions(lod=lod), report=told.append)
         assert any(line.startswith("r0_c0/CD31: edited by hand: lod0") for line in told)
         assert told[-1] == "2/2 r0_c1"
         meshes = trimesh.load(tmp_path / "s.glb").geometry
@@ -108,20 +108,20 @@ def test_the_finest_level_within_the_bounds_is_taken(sphere_stage: Path, tmp_pat
     path = tmp_path / "s.glb"
     sizes = []
     for lod in (0, 1, 2):
-        export_stage(sphere_stage, path, ExportOptions(lod=lod))
+        export_stage(sphere_stage, path, options=ExportOptions(lod=lod))
         sizes.append(path.stat().st_size)
     assert sizes == sorted(sizes, reverse=True)
     counts = [4 * rings * rings for rings, _ in spheres.LEVELS]
     for options in (
         ExportOptions(max_triangles=counts[1]), ExportOptions(max_bytes=sizes[1]),
     ):  # fmt: skip
-        assert export_stage(sphere_stage, path, options).endswith("at lod1")
+        assert export_stage(sphere_stage, path, options=options).endswith("at lod1")
         assert path.stat().st_size == sizes[1]
     before = path.read_bytes()
     with pytest.raises(UsageError, match=f"--max-bytes is 100: the smallest file has {sizes[2]}"):
-        export_stage(sphere_stage, path, ExportOptions(max_bytes=100))
+        export_stage(sphere_stage, path, options=ExportOptions(max_bytes=100))
     with pytest.raises(UsageError, match="--max-triangles is 3: the coarsest level has"):
-        export_stage(sphere_stage, path, ExportOptions(max_triangles=3))
+        export_stage(sphere_stage, path, options=ExportOptions(max_triangles=3))
     assert path.read_bytes() == before
 
 
@@ -131,40 +131,42 @@ def test_a_level_that_is_given_is_the_finest_within_the_bounds(
     path = tmp_path / "s.glb"
     rings = [n for n, _ in spheres.LEVELS]
     assert export_stage(
-        sphere_stage, path, ExportOptions(lod=0, max_triangles=4 * rings[1] ** 2)
+        sphere_stage, path, options=ExportOptions(lod=0, max_triangles=4 * rings[1] ** 2)
     ).endswith("at lod1")
     size = path.stat().st_size
-    assert export_stage(sphere_stage, path, ExportOptions(lod=0, max_bytes=size)).endswith("lod1")
+    assert export_stage(sphere_stage, path, options=ExportOptions(lod=0, max_bytes=size)).endswith(
+        "lod1"
+    )
     assert export_stage(
-        sphere_stage, path, ExportOptions(lod=2, max_triangles=4 * rings[0] ** 2)
+        sphere_stage, path, options=ExportOptions(lod=2, max_triangles=4 * rings[0] ** 2)
     ).endswith("at lod2")
     with pytest.raises(UsageError, match="--max-triangles is 3: the coarsest level has"):
-        export_stage(sphere_stage, path, ExportOptions(lod=0, max_triangles=3))
+        export_stage(sphere_stage, path, options=ExportOptions(lod=0, max_triangles=3))
 
 
 @pytest.mark.slow
 def test_what_a_region_leaves_out_is_not_counted(sphere_stage: Path, tmp_path: Path) -> None:
     path, box = tmp_path / "s.glb", parse_region("9:,:-5,:")
-    export_stage(sphere_stage, path, ExportOptions(region=box))
+    export_stage(sphere_stage, path, options=ExportOptions(region=box))
     meshes = trimesh.load(path).geometry.values()
     within = sum(len(mesh.faces) for mesh in meshes)
     assert within < 4 * spheres.LEVELS[1][0] ** 2  # of the whole at the next level
     options = ExportOptions(region=box, max_triangles=within)
-    assert export_stage(sphere_stage, path, options).endswith("at lod0")
+    assert export_stage(sphere_stage, path, options=options).endswith("at lod0")
     options = ExportOptions(region=box, max_triangles=within - 1)
-    assert export_stage(sphere_stage, path, options).endswith("at lod1")
+    assert export_stage(sphere_stage, path, options=options).endswith("at lod1")
 
 
 def test_a_region_cuts_the_surface_and_tiles_leave_some_out(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
     box = ExportOptions(region=parse_region("9:,:-5,:"))
-    export_stage(sphere_stage, tmp_path / "s.glb", box)
+    export_stage(sphere_stage, tmp_path / "s.glb", options=box)
     low, high = trimesh.load(tmp_path / "s.glb").bounds * 1e6
     assert low[0] == pytest.approx(9, abs=1e-4)
     assert high[1] == pytest.approx(-5, abs=1e-4)
     assert high[0] == pytest.approx(spheres.CENTER[0] + spheres.RADIUS, abs=0.02)
-    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions(tiles=("r0_c1",)))
+    export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions(tiles=("r0_c1",)))
     assert list(trimesh.load(tmp_path / "s.glb").geometry) == ["CD31 r0_c1"]
 
 
@@ -172,9 +174,9 @@ def test_a_region_cuts_the_surface_and_tiles_leave_some_out(
 def test_packed_files_have_the_same_surface_and_seam(
     sphere_stage: Path, tmp_path: Path, packing: str
 ) -> None:
-    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions())
     path = tmp_path / "packed.glb"
-    export_stage(sphere_stage, path, ExportOptions(compress=packing))
+    export_stage(sphere_stage, path, options=ExportOptions(compress=packing))
     assert path.stat().st_size < 0.35 * (tmp_path / "s.glb").stat().st_size
     found = document(path)
     places = []
@@ -252,7 +254,7 @@ def test_khronos_validator_finds_no_error_and_three_opens_it(
         ("meshopt.glb", ExportOptions(compress="meshopt")),
         ("draco.glb", ExportOptions(compress="draco")),
     ):  # fmt: skip
-        export_stage(sphere_stage, tmp_path / name, options)
+        export_stage(sphere_stage, tmp_path / name, options=options)
     files = sorted(map(str, tmp_path.iterdir()))
     command = [node, "--input-type=module", "-e", NODE, *files]
     told = subprocess.run(command, cwd=VIEWER, capture_output=True, text=True, check=True)

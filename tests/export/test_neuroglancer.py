@@ -33,7 +33,7 @@ WHOLE = (9, 20, 40)  # voxels (z, y, x) of both tiles
 @pytest.fixture(scope="module")
 def folder(sphere_stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("precomputed") / "s.precomputed"
-    line = export_stage(sphere_stage, path, ExportOptions())
+    line = export_stage(sphere_stage, path, options=ExportOptions())
     assert line.endswith("1 scales; mesh: CD31, up to 3 levels")
     return path
 
@@ -116,10 +116,10 @@ def test_the_same_stage_gives_the_same_folder_in_place_of_an_older_one(
     path.mkdir()
     (path / "mine.txt").touch()
     with pytest.raises(OutputError, match="exists and is a folder of something else"):
-        export_stage(sphere_stage, path, ExportOptions())
+        export_stage(sphere_stage, path, options=ExportOptions())
     (path / "image").mkdir()
     (path / "image" / "info").touch()
-    export_stage(sphere_stage, path, ExportOptions())
+    export_stage(sphere_stage, path, options=ExportOptions())
     files = [file.relative_to(folder) for file in sorted(folder.rglob("*")) if file.is_file()]
     again = [file.relative_to(path) for file in sorted(path.rglob("*")) if file.is_file()]
     assert files == again
@@ -135,7 +135,7 @@ def test_without_draco_it_says_how_to_install_it(
         ("s.precomputed", ExportOptions()), ("s.glb", ExportOptions(compress="draco")),
     ):  # fmt: skip
         with pytest.raises(UsageError, match=r"pip install 'stereocell\[draco\]'"):
-            export_stage(sphere_stage, tmp_path / name, options)
+            export_stage(sphere_stage, tmp_path / name, options=options)
     assert not list(tmp_path.iterdir())
 
 

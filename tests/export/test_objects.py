@@ -35,7 +35,7 @@ def document(path: Path) -> dict:
 def test_a_gltf_has_a_node_an_object_with_label_name_and_colour(
     stage: Path, tmp_path: Path
 ) -> None:
-    export_stage(stage, tmp_path / "o.glb", ExportOptions())
+    export_stage(stage, tmp_path / "o.glb", options=ExportOptions())
     scene = trimesh.load(tmp_path / "o.glb")
     nodes = document(tmp_path / "o.glb")["nodes"]
     labels = {node["extras"]["label"]: node["name"] for node in nodes if "mesh" in node}
@@ -52,7 +52,7 @@ def test_of_very_many_objects_a_tile_is_one_mesh_in_their_colours(
     stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(gltf_scene, "MAX_NODES", 1)
-    export_stage(stage, tmp_path / "o.glb", ExportOptions())
+    export_stage(stage, tmp_path / "o.glb", options=ExportOptions())
     scene = trimesh.load(tmp_path / "o.glb")
     assert set(scene.geometry) == {"cells r0_c0", "cells r0_c1"}
     seen = {
@@ -64,7 +64,7 @@ def test_of_very_many_objects_a_tile_is_one_mesh_in_their_colours(
 
 
 def test_bodies_of_a_3mf_are_objects_closed_and_whole(stage: Path, tmp_path: Path) -> None:
-    line = export_stage(stage, tmp_path / "o.3mf", ExportOptions(scale=1000, wall_mm=2.5))
+    line = export_stage(stage, tmp_path / "o.3mf", options=ExportOptions(scale=1000, wall_mm=2.5))
     bodies = trimesh.load(tmp_path / "o.3mf").geometry
     assert set(bodies) == set(NAMES)
     assert all(body.is_watertight for body in bodies.values())
@@ -78,22 +78,24 @@ def test_of_many_thin_bodies_some_are_named_and_all_are_counted(
     stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(print_solids, "_MAX_TOLD", 1)
-    told = export_stage(stage, tmp_path / "o.3mf", ExportOptions(scale=1, wall_mm=5)).split("\n")
+    told = export_stage(stage, tmp_path / "o.3mf", options=ExportOptions(scale=1, wall_mm=5)).split(
+        "\n"
+    )
     assert len(told) == 3
     assert told[2] == f"... and of {len(NAMES) - 1} more parts"
 
 
 def test_a_label_map_has_no_volume_and_that_is_told(stage: Path, tmp_path: Path) -> None:
     with pytest.raises(StageError, match="no volume of cells: of a label map the stage has surf"):
-        export_stage(stage, tmp_path / "o.nrrd", ExportOptions(channels=("cells",)))
+        export_stage(stage, tmp_path / "o.nrrd", options=ExportOptions(channels=("cells",)))
 
 
 def test_ply_has_their_colours_and_stl_is_one_solid(stage: Path, tmp_path: Path) -> None:
-    export_stage(stage, tmp_path / "o.ply", ExportOptions(scale=1000))
+    export_stage(stage, tmp_path / "o.ply", options=ExportOptions(scale=1000))
     mesh = trimesh.load(tmp_path / "o.ply")
     seen = {tuple(color[:3].tolist()) for color in mesh.visual.vertex_colors}
     assert seen == {tuple(to_srgb8(np.array(color, np.float32)).tolist()) for color in COLORS}
-    export_stage(stage, tmp_path / "o.stl", ExportOptions(scale=1000))
+    export_stage(stage, tmp_path / "o.stl", options=ExportOptions(scale=1000))
     solid = trimesh.load(tmp_path / "o.stl")
     assert solid.is_watertight
     assert len(solid.split()) == 3
@@ -101,7 +103,7 @@ def test_ply_has_their_colours_and_stl_is_one_solid(stage: Path, tmp_path: Path)
 
 
 def test_neuroglancer_has_them_by_label(stage: Path, tmp_path: Path) -> None:
-    export_stage(stage, tmp_path / "o.precomputed", ExportOptions())
+    export_stage(stage, tmp_path / "o.precomputed", options=ExportOptions())
     info = json.loads((tmp_path / "o.precomputed/cells/segment_properties/info").read_text())
     named = dict(zip(info["inline"]["ids"], info["inline"]["properties"][0]["values"], strict=True))
     assert named == {str(label): name for label, name in zip(LABELS, NAMES, strict=True)}
@@ -112,5 +114,5 @@ def test_neuroglancer_has_them_by_label(stage: Path, tmp_path: Path) -> None:
 def test_a_picture_and_usd_show_them(stage: Path, tmp_path: Path) -> None:
     for name in ("o.png", "o.usdz", "o.usdc"):
         options = ExportOptions(width=300) if name == "o.png" else ExportOptions()
-        export_stage(stage, tmp_path / name, options)
+        export_stage(stage, tmp_path / name, options=options)
         assert (tmp_path / name).stat().st_size > 1000

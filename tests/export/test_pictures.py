@@ -58,7 +58,7 @@ def test_a_picture_opens_with_label_maps_alone_as_the_viewer(
         ("s.glb", ExportOptions(), False),
     ):
         told: list[str] = []
-        export_stage(layer, tmp_path / file, options, told.append)
+        export_stage(layer, tmp_path / file, options=options, report=told.append)
         assert (said in told) == is_said
     chosen = Chosen(layer, small)
     chosen.show_as_viewer()
@@ -88,7 +88,7 @@ def test_a_picture_shows_the_sphere_in_its_edited_colour(
         stage.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(0.0, 0.8, 0.0))
 
     layer = edited(paint)
-    line = export_stage(layer, tmp_path / "s.png", ExportOptions(width=300))
+    line = export_stage(layer, tmp_path / "s.png", options=ExportOptions(width=300))
     pixels = np.asarray(Image.open(tmp_path / "s.png").convert("RGB"))
     assert line == f"300 x {len(pixels)} pixels at lod0"
     seen = covered(pixels)
@@ -100,7 +100,7 @@ def test_a_picture_shows_the_sphere_in_its_edited_colour(
     # the box round it fills the picture, seen from a corner; both tiles' boxes are 3 times as wide
     assert 0.6 < width / 300 < 0.75
     before = (tmp_path / "s.png").read_bytes()
-    export_stage(layer, tmp_path / "s.png", ExportOptions(width=300))
+    export_stage(layer, tmp_path / "s.png", options=ExportOptions(width=300))
     assert (tmp_path / "s.png").read_bytes() == before
 
 
@@ -112,7 +112,7 @@ def test_a_turntable_goes_once_round(
     monkeypatch.setattr(pictures, "_FRAMES", 8)
     path = tmp_path / f"s.{ending}"
     half = ExportOptions(width=160, tiles=("r0_c0",))  # a bowl: it looks another way each time
-    export_stage(sphere_stage, path, half)
+    export_stage(sphere_stage, path, options=half)
     frames = read(path)
     height, width, _ = frames[0].shape
     assert (width, len(frames)) == (160, 8)
@@ -124,7 +124,7 @@ def test_a_turntable_goes_once_round(
         assert frame[one][:, 0].mean() > frame[one][:, 2].mean()
     assert all((a ^ b).sum() > 30 for a, b in pairwise(seen))
     before = path.read_bytes()
-    export_stage(sphere_stage, path, half)
+    export_stage(sphere_stage, path, options=half)
     assert path.read_bytes() == before
 
 
@@ -133,7 +133,7 @@ def test_without_its_package_a_turntable_says_how_to_install_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(UsageError, match=r"pip install 'stereocell\[video\]'"):
-        export_stage(sphere_stage, tmp_path / "s.mp4", ExportOptions())
+        export_stage(sphere_stage, tmp_path / "s.mp4", options=ExportOptions())
     assert not list(tmp_path.iterdir())
 
 

@@ -33,7 +33,7 @@ def test_two_tiles_become_one_closed_solid_of_the_sphere_s_volume(
     sphere_stage: Path, tmp_path: Path, ending: str
 ) -> None:
     path = tmp_path / f"s.{ending}"
-    line = export_stage(sphere_stage, path, ExportOptions(scale=2000))
+    line = export_stage(sphere_stage, path, options=ExportOptions(scale=2000))
     found = read(path)
     assert found.is_watertight
     assert found.is_winding_consistent
@@ -46,7 +46,7 @@ def test_two_tiles_become_one_closed_solid_of_the_sphere_s_volume(
     assert "14 x 14 x 14 mm, 2000 times the specimen" in line
     again = tmp_path / "again"
     again.mkdir()
-    export_stage(sphere_stage, again / path.name, ExportOptions(scale=2000))
+    export_stage(sphere_stage, again / path.name, options=ExportOptions(scale=2000))
     assert (again / path.name).read_bytes() == path.read_bytes()
 
 
@@ -55,21 +55,23 @@ def test_volume_is_that_of_the_mesh_within_rounding(sphere_stage: Path, tmp_path
     parts = [spheres.sphere(rings, keep) for keep in (slice(0, rings + 1), slice(rings, None))]
     corners = np.concatenate([part.positions[part.triangles] for part in parts]).astype(float)
     exact = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
-    export_stage(sphere_stage, tmp_path / "s.stl", ExportOptions(scale=1000))
+    export_stage(sphere_stage, tmp_path / "s.stl", options=ExportOptions(scale=1000))
     assert read(tmp_path / "s.stl").volume == pytest.approx(exact, rel=1e-5)
 
 
 def test_without_a_scale_it_fits_a_hand(sphere_stage: Path, tmp_path: Path) -> None:
-    line = export_stage(sphere_stage, tmp_path / "s.stl", ExportOptions())
+    line = export_stage(sphere_stage, tmp_path / "s.stl", options=ExportOptions())
     assert "5000 times the specimen" in line  # 20 um wide: 100 mm
-    line = export_stage(sphere_stage, tmp_path / "s.stl", ExportOptions(scale=1, units="um"))
+    line = export_stage(
+        sphere_stage, tmp_path / "s.stl", options=ExportOptions(scale=1, units="um")
+    )
     assert read(tmp_path / "s.stl").volume == pytest.approx(VOLUME_UM3, rel=0.012)
 
 
 def test_3mf_has_unit_name_and_colour_by_its_own_library(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
-    export_stage(sphere_stage, tmp_path / "s.3mf", ExportOptions(units="um", scale=1))
+    export_stage(sphere_stage, tmp_path / "s.3mf", options=ExportOptions(units="um", scale=1))
     model = lib3mf.get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
@@ -94,7 +96,7 @@ def test_a_tile_and_a_region_are_cut_off_and_closed(sphere_stage: Path, tmp_path
         (ExportOptions(region=parse_region(":,-5:,4:"), scale=1000), 0.25),
         (ExportOptions(tiles=("r0_c1",), region=parse_region(":,-5:,4:"), scale=1000), 0.125),
     ):
-        export_stage(sphere_stage, tmp_path / "s.stl", options)
+        export_stage(sphere_stage, tmp_path / "s.stl", options=options)
         found = read(tmp_path / "s.stl")
         assert found.is_watertight
         assert found.volume == pytest.approx(share * VOLUME_UM3, rel=0.02)
@@ -102,16 +104,16 @@ def test_a_tile_and_a_region_are_cut_off_and_closed(sphere_stage: Path, tmp_path
 
 def test_what_is_thinner_than_a_wall_is_named(sphere_stage: Path, tmp_path: Path) -> None:
     thick = ExportOptions(scale=1000, wall_mm=6.9)  # the ball is 7 mm thick
-    assert "thinner" not in export_stage(sphere_stage, tmp_path / "s.stl", thick)
+    assert "thinner" not in export_stage(sphere_stage, tmp_path / "s.stl", options=thick)
     thin = ExportOptions(scale=1000, wall_mm=7.1)
-    line = export_stage(sphere_stage, tmp_path / "s.stl", thin).split("\n")[1]
+    line = export_stage(sphere_stage, tmp_path / "s.stl", options=thin).split("\n")[1]
     assert line.startswith("CD31: 1 of 1 bodies are thinner than 7.1 mm and may be lost in print:")
     assert "6.9 mm at (10, -5, 4)" in line or "7 mm at (10, -5, 4)" in line
 
 
 def test_places_of_thin_bodies_are_in_the_file_s_unit(sphere_stage: Path, tmp_path: Path) -> None:
     thin = ExportOptions(scale=1000, wall_mm=7.1, units="m", channels=("CD31",))
-    line = export_stage(sphere_stage, tmp_path / "s.obj", thin).split("\n")[1]
+    line = export_stage(sphere_stage, tmp_path / "s.obj", options=thin).split("\n")[1]
     assert line.endswith(" mm at (0.01, -0.005, 0.004)")
     assert read(tmp_path / "s.obj").centroid == pytest.approx((0.01, -0.005, 0.004), rel=0.02)
 
@@ -141,7 +143,7 @@ def test_neighbours_of_hidden_and_moved_tiles_are_closed_at_the_cut(
         (lambda s: _move(s, tile, (-1, 0, 0)), 2 * half - np.pi * spheres.RADIUS**2, 1),
     ):
         (tmp_path / "edited.usda").unlink(missing_ok=True)
-        export_stage(edited(change), tmp_path / "s.stl", ExportOptions(scale=1000))
+        export_stage(edited(change), tmp_path / "s.stl", options=ExportOptions(scale=1000))
         found = read(tmp_path / "s.stl")
         assert found.is_watertight
         assert len(found.split()) == count
@@ -193,7 +195,7 @@ def test_a_surface_that_an_edit_opened_is_refused_in_a_line(
             mesh.GetFaceVertexCountsAttr().Set(Vt.IntArray(len(corners) - 100, 3))
 
     with pytest.raises(StageError, match=r"CD31: its surface is open at \d+ edges, one at \("):
-        export_stage(edited(drop), tmp_path / "s.stl", ExportOptions())
+        export_stage(edited(drop), tmp_path / "s.stl", options=ExportOptions())
     assert not (tmp_path / "s.stl").exists()
 
 
@@ -204,7 +206,7 @@ def test_a_whole_specimen_that_was_turned_stays_closed(
         tiles = UsdGeom.XformCommonAPI(stage.GetPrimAtPath("/Specimen/Tiles"))
         tiles.SetRotate(Gf.Vec3f(20, 30, 40))
 
-    export_stage(edited(turn), tmp_path / "s.stl", ExportOptions(scale=1000))
+    export_stage(edited(turn), tmp_path / "s.stl", options=ExportOptions(scale=1000))
     found = read(tmp_path / "s.stl")
     assert found.is_watertight
     assert found.volume == pytest.approx(VOLUME_UM3, rel=0.012)

@@ -33,7 +33,7 @@ def test_one_file_has_the_level_the_edit_and_the_tiles(
         lambda s: s.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(0.25, 0.5, 0.75))
     )
     path, again, part = (tmp_path / f"{name}.{ending}" for name in ("s", "again", "part"))
-    export_stage(layer, path, ExportOptions(lod=1))
+    export_stage(layer, path, options=ExportOptions(lod=1))
     stage = Usd.Stage.Open(str(path))
     found = meshes(stage)
     assert set(found) == {"CD31_r0_c0", "CD31_r0_c1"}
@@ -41,9 +41,9 @@ def test_one_file_has_the_level_the_edit_and_the_tiles(
     assert faces == pytest.approx(4 * spheres.LEVELS[1][0] ** 2, rel=0.1)
     assert all(color(mesh) == Gf.Vec3f(0.25, 0.5, 0.75) for mesh in found.values())
     assert (validate_usdz if ending == "usdz" else validate_stage)(path) == []
-    export_stage(layer, again, ExportOptions(lod=1))
+    export_stage(layer, again, options=ExportOptions(lod=1))
     assert path.read_bytes() == again.read_bytes()
-    export_stage(layer, part, ExportOptions(tiles=("r0_c1",), channels=("CD31",)))
+    export_stage(layer, part, options=ExportOptions(tiles=("r0_c1",), channels=("CD31",)))
     cut = Usd.Stage.Open(str(part))
     assert set(meshes(cut)) == {"CD31_r0_c1"}
     assert "Hoechst" not in cut.ExportToString()
@@ -52,7 +52,7 @@ def test_one_file_has_the_level_the_edit_and_the_tiles(
 def test_a_flattened_stage_names_its_files_from_where_it_lies(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
-    export_stage(sphere_stage, tmp_path / "s.usda", ExportOptions())
+    export_stage(sphere_stage, tmp_path / "s.usda", options=ExportOptions())
     layers, assets, lost = UsdUtils.ComputeAllDependencies(str(tmp_path / "s.usda"))
     assert (len(layers), lost) == (1, [])
     assert assets
@@ -68,7 +68,7 @@ def test_files_on_another_drive_are_named_from_its_root(
         raise ValueError("path is on mount 'C:', start on mount 'D:'")
 
     monkeypatch.setattr(os.path, "relpath", refuse)
-    export_stage(sphere_stage, tmp_path / "s.usda", ExportOptions())
+    export_stage(sphere_stage, tmp_path / "s.usda", options=ExportOptions())
     layers, assets, lost = UsdUtils.ComputeAllDependencies(str(tmp_path / "s.usda"))
     assert (len(layers), lost) == (1, [])
     assert all(Path(asset).is_relative_to(sphere_stage.parent) for asset in assets)

@@ -48,7 +48,9 @@ def test_the_source_s_values_lie_where_they_were(
     counted: Path, tmp_path: Path, ending: str
 ) -> None:
     name = "s.raw" if ending == "nhdr" else f"s.{ending}"
-    line = export_stage(counted, tmp_path / name, ExportOptions(units="um", channels=("CD31",)))
+    line = export_stage(
+        counted, tmp_path / name, options=ExportOptions(units="um", channels=("CD31",))
+    )
     values, image = read(tmp_path / f"s.{ending}")
     np.testing.assert_array_equal(values, COUNTS)
     um = unit(ending)
@@ -57,13 +59,13 @@ def test_the_source_s_values_lie_where_they_were(
     assert image.GetDirection() == pytest.approx(np.eye(3).ravel())
     assert line.startswith("40 x 20 x 9 voxels of uint16, CD31: the source's values")
     before = (tmp_path / name).read_bytes()
-    export_stage(counted, tmp_path / name, ExportOptions(units="um", channels=("CD31",)))
+    export_stage(counted, tmp_path / name, options=ExportOptions(units="um", channels=("CD31",)))
     assert (tmp_path / name).read_bytes() == before
 
 
 def test_channels_are_there_with_their_names_in_8_bits(sphere_stage: Path, tmp_path: Path) -> None:
     balls = spheres.ball((0, 0, 0), WHOLE)
-    export_stage(sphere_stage, tmp_path / "s.nrrd", ExportOptions())
+    export_stage(sphere_stage, tmp_path / "s.nrrd", options=ExportOptions())
     values, image = read(tmp_path / "s.nrrd")
     assert image.GetNumberOfComponentsPerPixel() == 2
     for channel in (0, 1):
@@ -73,7 +75,7 @@ def test_channels_are_there_with_their_names_in_8_bits(sphere_stage: Path, tmp_p
     assert (head["channel_0"], head["channel_1"]) == ("CD31", "Hoechst 33342")
     assert head["space units"] == ["mm"] * 3
     np.testing.assert_allclose(np.diag(head["space directions"][:3]), [5e-4, 5e-4, 1e-3])
-    export_stage(sphere_stage, tmp_path / "s.nii.gz", ExportOptions())
+    export_stage(sphere_stage, tmp_path / "s.nii.gz", options=ExportOptions())
     found = nibabel.load(tmp_path / "s.nii.gz")
     assert found.shape == (*WHOLE[::-1], 2)
     (names,) = found.header.extensions
@@ -91,7 +93,7 @@ def test_a_specimen_that_was_turned_lies_obliquely(
         tiles.SetTranslate((100, 200, 300))
 
     path = tmp_path / f"s.{ending}"
-    export_stage(edited(move), path, ExportOptions(units="um", channels=("CD31",)))
+    export_stage(edited(move), path, options=ExportOptions(units="um", channels=("CD31",)))
     values, image = read(path)
     weights = np.clip(values.astype(float) - 100, 0, None)
     middle = [np.average(n, weights=weights) for n in np.indices(values.shape)[::-1]]
@@ -114,14 +116,14 @@ def test_of_a_turned_specimen_a_region_is_the_least_box_of_voxels_round_it(
         tiles.SetRotate(Gf.Vec3f(5, 10, 20))
 
     layer, options = edited(move), {"units": "um", "channels": ("CD31",)}
-    export_stage(layer, tmp_path / "s.nrrd", ExportOptions(**options))
+    export_stage(layer, tmp_path / "s.nrrd", options=ExportOptions(**options))
     whole, image = read(tmp_path / "s.nrrd")
     k, j, i = np.indices(whole.shape).reshape(3, -1)
     index = np.stack([i, j, k], axis=-1)
     turned = np.array(image.GetDirection()).reshape(3, 3) * image.GetSpacing()
     places = (index @ turned.T + image.GetOrigin()) * (1, -1, 1)
     box = parse_region("9:12,-2:1,:5")
-    export_stage(layer, tmp_path / "t.nrrd", ExportOptions(**options, region=box))
+    export_stage(layer, tmp_path / "t.nrrd", options=ExportOptions(**options, region=box))
     values, part = read(tmp_path / "t.nrrd")
     first = image.TransformPhysicalPointToContinuousIndex(part.GetOrigin())
     x, y, z = np.rint(first).astype(int).tolist()
@@ -145,7 +147,7 @@ def test_what_is_in_no_region_is_told_with_where_there_is_something(
         )
         told = rf"--region: no {kind} is in it, expected a part of -0.25:19.75,-9.75:0.25,"
         with pytest.raises(UsageError, match=told):
-            export_stage(sphere_stage, tmp_path / name, options)
+            export_stage(sphere_stage, tmp_path / name, options=options)
 
 
 @pytest.mark.slow
@@ -178,11 +180,11 @@ def test_an_oblique_patient_s_voxels_are_in_the_patient_s_place(
 
 def test_a_region_and_a_tile_are_cut_out(counted: Path, tmp_path: Path) -> None:
     options = ExportOptions(units="um", region=parse_region("9:12,-5:-2,3:4"))
-    export_stage(counted, tmp_path / "s.nrrd", options)
+    export_stage(counted, tmp_path / "s.nrrd", options=options)
     values, image = read(tmp_path / "s.nrrd")
     np.testing.assert_array_equal(values, COUNTS[3:5, 4:11, 18:25])
     assert image.GetOrigin() == pytest.approx((9, 2, 3))
-    export_stage(counted, tmp_path / "s.nrrd", ExportOptions(units="um", tiles=("r0_c1",)))
+    export_stage(counted, tmp_path / "s.nrrd", options=ExportOptions(units="um", tiles=("r0_c1",)))
     values, image = read(tmp_path / "s.nrrd")
     np.testing.assert_array_equal(values, COUNTS[:, :, 20:])
     assert image.GetOrigin() == pytest.approx((10, 0, 0))
@@ -199,20 +201,20 @@ def test_a_tile_that_was_moved_by_whole_voxels_is_moved_and_by_others_refused(
         moved.SetTranslate((0, -by, 0))
         stage.GetRootLayer().Save()
         if is_fit:
-            export_stage(path, tmp_path / "s.nrrd", ExportOptions())
+            export_stage(path, tmp_path / "s.nrrd", options=ExportOptions())
             values, _ = read(tmp_path / "s.nrrd")
             np.testing.assert_array_equal(values[:, 6:26, 21:], COUNTS[:, :, 21:])
             assert not values[:, :6, 21:].any()
         else:
             with pytest.raises(StageError, match="r0_c1: an edit moved it by a part of a voxel"):
-                export_stage(path, tmp_path / "s.nrrd", ExportOptions())
+                export_stage(path, tmp_path / "s.nrrd", options=ExportOptions())
 
 
 def test_unity_gets_one_channel_upright_with_its_ini(sphere_stage: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--unity takes one channel, expected --channels with one"):
-        export_stage(sphere_stage, tmp_path / "s.raw", ExportOptions(unity=True))
+        export_stage(sphere_stage, tmp_path / "s.raw", options=ExportOptions(unity=True))
     options = ExportOptions(unity=True, channels=("CD31",))
-    export_stage(sphere_stage, tmp_path / "s.raw", options)
+    export_stage(sphere_stage, tmp_path / "s.raw", options=options)
     ini = dict(line.split(":") for line in (tmp_path / "s.raw.ini").read_text().split())
     assert ini == {
         "dimx": "40", "dimy": "20", "dimz": "9", "skip": "0", "format": "uint8",
@@ -222,7 +224,7 @@ def test_unity_gets_one_channel_upright_with_its_ini(sphere_stage: Path, tmp_pat
     values = np.fromfile(tmp_path / "s.raw", "u1").reshape(WHOLE)
     # Unity's y grows upwards, and its z away from the viewer: else all would be mirrored
     np.testing.assert_array_equal(values, ball[::-1, ::-1])
-    export_stage(sphere_stage, tmp_path / "s.nrrd", options)
+    export_stage(sphere_stage, tmp_path / "s.nrrd", options=options)
     upright, image = read(tmp_path / "s.nrrd")
     np.testing.assert_array_equal(upright, values)
     assert image.TransformIndexToPhysicalPoint((0, 19, 8)) == pytest.approx((0, 0, 0), abs=NM)
@@ -230,8 +232,10 @@ def test_unity_gets_one_channel_upright_with_its_ini(sphere_stage: Path, tmp_pat
 
 def test_bits_are_what_the_stage_has(sphere_stage: Path, counted: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--bits 16: the stage has no more than 8 of CD31"):
-        export_stage(sphere_stage, tmp_path / "s.nrrd", ExportOptions(bits=16, channels=("CD31",)))
-    export_stage(counted, tmp_path / "s.nrrd", ExportOptions(bits=8))
+        export_stage(
+            sphere_stage, tmp_path / "s.nrrd", options=ExportOptions(bits=16, channels=("CD31",))
+        )
+    export_stage(counted, tmp_path / "s.nrrd", options=ExportOptions(bits=8))
     low, high = spheres.RED.window
     share = ((COUNTS - low) / (high - low)).clip(0, 1)
     np.testing.assert_allclose(read(tmp_path / "s.nrrd")[0], 255 * share, atol=0.51)

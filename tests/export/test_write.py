@@ -22,16 +22,16 @@ def test_an_unknown_ending_and_an_option_of_others_are_refused(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
     with pytest.raises(UsageError, match=r"s\.fbx: expected a name that ends in \.glb, \.gltf"):
-        export_stage(sphere_stage, tmp_path / "s.fbx", ExportOptions())
+        export_stage(sphere_stage, tmp_path / "s.fbx", options=ExportOptions())
     with pytest.raises(UsageError, match=r"--compress can't be for \.stl, expected one of \.glb"):
-        export_stage(sphere_stage, tmp_path / "s.stl", ExportOptions(compress="draco"))
+        export_stage(sphere_stage, tmp_path / "s.stl", options=ExportOptions(compress="draco"))
 
 
 def test_unknown_channels_and_tiles_are_refused(sphere_stage: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--channels: no 'CD4', expected of CD31, Hoechst 33342"):
-        export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions(channels=("CD4",)))
+        export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions(channels=("CD4",)))
     with pytest.raises(UsageError, match="--tiles: no 'r9_c9' is visible, expected of r0_c0"):
-        export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions(tiles=("r9_c9",)))
+        export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions(tiles=("r9_c9",)))
 
 
 @pytest.mark.parametrize("text", ["1:2,3:4", "2:1,:,:", "a:b,:,:", "1:2,:,:,:"])
@@ -54,7 +54,7 @@ def test_a_region_may_begin_left_of_zero(
 def test_what_a_killed_command_left_is_removed(sphere_stage: Path, tmp_path: Path) -> None:
     (tmp_path / ".s.glb.0123abcd.partial").mkdir()
     (tmp_path / ".t.glb.0123abcd.partial").mkdir()  # of another file
-    export_stage(sphere_stage, tmp_path / "s.glb", ExportOptions())
+    export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions())
     assert {one.name for one in tmp_path.iterdir()} == {"s.glb", ".t.glb.0123abcd.partial"}
 
 
@@ -68,7 +68,7 @@ def test_a_failure_half_way_leaves_the_older_file(
 
     monkeypatch.setattr(volume_files, "nrrd_head", fail)
     with pytest.raises(OutputError, match=r"s\.raw: can't be written: No space left"):
-        export_stage(sphere_stage, tmp_path / "s.raw", ExportOptions())
+        export_stage(sphere_stage, tmp_path / "s.raw", options=ExportOptions())
     assert [one.name for one in tmp_path.iterdir()] == ["s.raw"]
     assert (tmp_path / "s.raw").read_text() == "old"
 

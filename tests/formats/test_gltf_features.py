@@ -77,7 +77,7 @@ def test_objects_come_one_after_another():
 
 
 def test_the_table_says_labels_and_columns():
-    features = tile_features(TABLE, TILE, ("CD8", "cell_type", "no such"))
+    features = tile_features(TABLE, TILE, wanted=("CD8", "cell_type", "no such"))
     found = property_table(encode(features=features))
     assert found["label"] == TABLE.labels[ROWS].tolist()
     assert list(found) == ["label", "volume_um3", "CD8", "cell_type"]
@@ -90,7 +90,7 @@ def test_the_table_says_labels_and_columns():
 
 
 def test_what_is_missing_has_no_data():
-    first = tile_features(TABLE, object_bundle.TILES[0], ("CD8", "cell_type"))
+    first = tile_features(TABLE, object_bundle.TILES[0], wanted=("CD8", "cell_type"))
     found = property_table(encode(object_bundle.tile_mesh(0, 8), first))
     assert [i for i, v in enumerate(found["CD8"]) if v is None] == [3]
     assert [i for i, v in enumerate(found["cell_type"]) if v is None] == [4]

@@ -24,7 +24,7 @@ def _extract(
 ) -> Mesh:
     field = smooth(Volume(voxels[window.slices], SPACING), 0.14)
     distance = signed_distance(field, np.float32(iso), spacing_um=SPACING, value_range=1000.0)
-    repaired = repair(distance, SPACING, OPTIONS)
+    repaired = repair(distance, SPACING, options=OPTIONS)
     return extract_surface(
         repaired.distance, Lattice(window, lattice, region, SPACING, (0.0, 0.0, 0.0))
     )

@@ -19,7 +19,7 @@ def _boxes(*boxes: tuple[slice, slice, slice], shape: int = 40) -> NDArray[np.fl
 
 def test_small_fragment_goes_and_large_solid_stays() -> None:
     small, large = np.s_[3:5, 3:5, 3:5], np.s_[15:30, 15:30, 15:30]
-    result = repair(_boxes(small, large), SPACING, RepairOptions(0.0, 4.0, 0.0))
+    result = repair(_boxes(small, large), SPACING, options=RepairOptions(0.0, 4.0, 0.0))
     assert result.fragments_dropped == 1
     assert (result.distance[small] < 0).all()
     assert (result.distance[large] > 0).all()
@@ -27,7 +27,7 @@ def test_small_fragment_goes_and_large_solid_stays() -> None:
 
 def test_fragment_that_leaves_the_window_is_not_judged() -> None:
     cut = np.s_[0:2, 3:5, 3:5]
-    result = repair(_boxes(cut), SPACING, RepairOptions(0.0, 4.0, 0.0))
+    result = repair(_boxes(cut), SPACING, options=RepairOptions(0.0, 4.0, 0.0))
     assert result.fragments_dropped == 0
     assert (result.distance[cut] > 0).all()
 
@@ -36,7 +36,7 @@ def test_cavity_up_to_the_limit_is_filled() -> None:
     distance = _boxes(np.s_[5:35, 5:35, 5:35])
     little, big = np.s_[10:12, 10:12, 10:12], np.s_[18:30, 18:30, 18:30]
     distance[little] = distance[big] = -2.0
-    result = repair(distance, SPACING, RepairOptions(0.0, 0.0, 4.0))
+    result = repair(distance, SPACING, options=RepairOptions(0.0, 0.0, 4.0))
     assert result.cavities_filled == 1
     assert (result.distance[little] > 0).all()
     assert (result.distance[big] < 0).all()
@@ -48,7 +48,7 @@ def test_slit_narrower_than_the_ball_closes_and_a_wider_one_stays() -> None:
         distance = _boxes(np.s_[8:32, 8:32, 8:32])
         distance[slit] = -2.0
         distance[8:32, slit[1], 30:32] = -2.0  # open to one side
-        result = repair(distance, SPACING, RepairOptions(3.0, 0.0, 0.0))
+        result = repair(distance, SPACING, options=RepairOptions(3.0, 0.0, 0.0))
         middle = result.distance[20, 20, 20]
         assert (middle > 0) == closes
 
@@ -56,7 +56,7 @@ def test_slit_narrower_than_the_ball_closes_and_a_wider_one_stays() -> None:
 def test_closing_leaves_a_smooth_ball_where_it_is() -> None:
     z, y, x = np.indices((40, 40, 40)) - 20.0
     ball = np.clip(12 - np.sqrt(z**2 + y**2 + x**2), -2, 2).astype(np.float32)
-    closed = repair(ball, SPACING, RepairOptions(3.0, 0.0, 0.0)).distance
+    closed = repair(ball, SPACING, options=RepairOptions(3.0, 0.0, 0.0)).distance
     near = np.abs(ball) < 1
     np.testing.assert_allclose(closed[near], ball[near], atol=1e-6)
 
@@ -78,7 +78,7 @@ def test_closing_is_that_of_exact_distances(
     away = ndimage.distance_transform_edt(nowhere, spacing)
     away = away[tuple(slice(m, -m) for m in margin)]
     wanted = np.maximum(distance, np.clip(away - (alpha + h), -2 * h, h))
-    found = repair(distance.copy(), spacing, RepairOptions(alpha, 0.0, 0.0)).distance
+    found = repair(distance.copy(), spacing, options=RepairOptions(alpha, 0.0, 0.0)).distance
     np.testing.assert_allclose(found, wanted, atol=1e-5 * h)
     assert 0 < (distance > 0).sum() <= (found > 0).sum()
     assert balls < 2 or (found > 0).sum() > (distance > 0).sum()
@@ -87,6 +87,6 @@ def test_closing_is_that_of_exact_distances(
 def test_windows_of_nothing_and_of_a_whole_solid_stay() -> None:
     for value in (-2.0, 2.0):
         whole = np.full((7, 8, 9), value, np.float32)
-        result = repair(whole.copy(), SPACING, RepairOptions(1.5, 3.0, 3.0))
+        result = repair(whole.copy(), SPACING, options=RepairOptions(1.5, 3.0, 3.0))
         np.testing.assert_array_equal(result.distance, whole)
         assert (result.fragments_dropped, result.cavities_filled) == (0, 0)

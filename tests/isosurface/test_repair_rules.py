@@ -50,7 +50,7 @@ def test_small_ball_is_under_half_of_the_means_and_goes() -> None:
     sums = sum_components(distance > 0, SPACING, 1.0)
     assert (sums.count, sums.kept) == (3, 2)
     options = choose(_plan_with(max_fragment_um=4.0), [asdict(sums)])
-    dropped = repair(distance, SPACING, options)
+    dropped = repair(distance, SPACING, options=options)
     assert dropped.fragments_dropped == 1
     assert dropped.distance[32, 60, 100] < 0  # the small one's centre
     assert dropped.distance[10, 20, 20] > 0
@@ -61,7 +61,7 @@ def test_rule_ends_where_the_halo_does_and_can_be_left_out() -> None:
     # what would go is larger than what a unit is sure to see whole
     for length in (3.0, 0.0):
         options = choose(_plan_with(max_fragment_um=length), [sums])
-        assert repair(_distance(), SPACING, options).fragments_dropped == 0
+        assert repair(_distance(), SPACING, options=options).fragments_dropped == 0
         assert options.min_diagonal_um <= max(1.5, length)
 
 
@@ -106,7 +106,7 @@ def test_what_is_given_is_used_and_offset_may_follow_alpha() -> None:
 def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:
     distance = _distance()
     options = RepairOptions(0.0, 5.0, 0.0, offset_um=0.3)
-    moved = repair(distance.copy(), SPACING, options)
+    moved = repair(distance.copy(), SPACING, options=options)
     assert moved.fragments_dropped == 1
     whole = Box((0, 0, 0), SHAPE)
     mesh = extract_surface(moved.distance, Lattice.of_whole(whole, SPACING))
@@ -117,7 +117,7 @@ def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:
         if radius > 2
     ]
     np.testing.assert_allclose(np.minimum.reduce(away), 0.3, atol=0.03)
-    without = repair(distance, SPACING, replace(options, min_diagonal_um=0.0))
+    without = repair(distance, SPACING, options=replace(options, min_diagonal_um=0.0))
     assert without.distance[32, 60, 100] > 0
 
 

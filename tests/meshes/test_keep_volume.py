@@ -20,7 +20,7 @@ def kept(fine: Mesh, planes: tuple[tuple[int, float], ...] = ()) -> tuple[Mesh, 
     """Return the simplified mesh, and the same with its volumes."""
     simple = simplify_without_defects(fine, planes, max_error_um=ERROR)
     found = FineVolumes(fine, planes).keep(simple.mesh, simple.vertices, max_move_um=ERROR)
-    assert found.defects.counts == find_defects(found.mesh, planes).counts
+    assert found.defects.counts == find_defects(found.mesh, planes=planes).counts
     return simple.mesh, found.mesh
 
 
@@ -40,7 +40,7 @@ def half_ball() -> tuple[Mesh, tuple[tuple[int, float], ...]]:
     upper = (flat[:, 2] >= 0)[sphere.triangles].all(axis=1)
     half = Mesh(flat, sphere.triangles[upper], sphere.normals)
     planes = ((2, float(flat[np.unique(border(half.triangles)), 2].min())),)
-    assert kinds(find_defects(half, planes)) == set()
+    assert kinds(find_defects(half, planes=planes)) == set()
     return half, planes
 
 
@@ -80,9 +80,9 @@ def test_where_very_many_would_cross_the_bodies_stay_at_once(
     pair = joined(one, moved(one, (10.02, 0.0, 0.0)))
     checks = []
 
-    def count_checks(*given: Any) -> Defects:
+    def count_checks(*given: Any, **named: Any) -> Defects:
         checks.append(given)
-        return find_defects(*given)
+        return find_defects(*given, **named)
 
     monkeypatch.setattr(keep_volume, "find_defects", count_checks)
     monkeypatch.setattr(keep_volume, "COSTLY", 1)

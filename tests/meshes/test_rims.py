@@ -70,7 +70,7 @@ def test_both_tiles_keep_the_same_edges_and_less_than_half(sponge: Field) -> Non
 @pytest.mark.slow
 def test_each_tile_is_sound(sponge: Field) -> None:
     for mesh, lattice in _tiles(sponge, ERROR):
-        assert kinds(find_defects(mesh, lattice.cut_planes())) == set()
+        assert kinds(find_defects(mesh, planes=lattice.cut_planes())) == set()
 
 
 @pytest.mark.slow
@@ -79,7 +79,7 @@ def test_no_triangle_comes_to_lie_in_the_other_plane_where_two_meet(seed: int) -
     noise = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=SHAPE), 0.8)
     field = np.clip(noise / noise.std() * 0.4, -0.56, 0.56).astype(np.float32)
     for mesh, lattice in _tiles(field, 0.1):
-        assert not len(find_defects(mesh, lattice.cut_planes()).walls)
+        assert not len(find_defects(mesh, planes=lattice.cut_planes()).walls)
 
 
 @pytest.mark.slow

@@ -71,13 +71,13 @@ def test_wall_in_a_cut_plane() -> None:
     mesh = replace(mesh, positions=np.column_stack([x, mesh.positions[:, 1:]]))
     half = _with(mesh, mesh.triangles[(x[mesh.triangles] >= 0).all(axis=1)])
     plane = (0, 0.0)
-    assert kinds(find_defects(half, (plane,))) == set()
+    assert kinds(find_defects(half, planes=(plane,))) == set()
     rim = border(half.triangles)
     after = dict(rim.tolist())
     first = int(rim[0, 0])
     second = after[first]
     lid = [[after[second], second, first]]
-    defects = find_defects(_with(half, np.concatenate([half.triangles, lid])), (plane,))
+    defects = find_defects(_with(half, np.concatenate([half.triangles, lid])), planes=(plane,))
     assert kinds(defects) == {"walls"}
     assert defects.walls.tolist() == [len(half.triangles)]
 
@@ -144,9 +144,9 @@ def _half(at: int) -> tuple[Mesh, Box, Box]:
 @pytest.mark.parametrize("at", [5, 10, 14])
 def test_mesh_may_be_open_on_its_cut_planes_only(at: int) -> None:
     mesh, _, _ = _half(at)
-    assert kinds(find_defects(mesh, ((0, float(at)),))) == set()
+    assert kinds(find_defects(mesh, planes=((0, float(at)),))) == set()
     assert kinds(find_defects(mesh)) >= {"open"}
-    assert kinds(find_defects(mesh, ((0, float(at) + 1e-5),))) >= {"open"}
+    assert kinds(find_defects(mesh, planes=((0, float(at) + 1e-5),))) >= {"open"}
     assert len(border(mesh.triangles)) == len(find_defects(mesh).open)
 
 
@@ -154,7 +154,7 @@ def test_mesh_may_be_open_on_its_cut_planes_only(at: int) -> None:
 def test_cut_body_inside_out_is_found(at: int) -> None:
     """Its volume is that between it and the plane: a small cap as well as all but a cap."""
     mesh, _, _ = _half(at)
-    assert kinds(find_defects(turned(mesh), ((0, float(at)),))) == {"inside_out"}
+    assert kinds(find_defects(turned(mesh), planes=((0, float(at)),))) == {"inside_out"}
 
 
 @pytest.mark.parametrize("seed", range(3))

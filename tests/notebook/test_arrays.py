@@ -125,7 +125,7 @@ def test_a_large_array_is_made_coarser_as_cubes_where_that_can_be():
     assert say_quality(source, (1, 1, 1)) == ""
     # four voxels stay along each axis, however many channels there are
     many = as_source(dask.array.zeros((300, 4, 400, 400)), SPACING, None)
-    assert find_blocks(many, 1000) == (1, 100, 100)
+    assert find_blocks(many, most=1000) == (1, 100, 100)
 
 
 def test_a_coarse_voxel_is_the_mean_of_its_block_at_the_far_side_too(tmp_path):

@@ -20,10 +20,10 @@ def files(bundle):
 def test_a_file_is_sent_whole_or_in_part_as_a_web_host_does(bundle, files):
     whole = (bundle / "manifest.json").read_bytes()
     assert files.answer("manifest.json") == (200, whole)
-    assert files.answer("manifest.json", "bytes=10-19") == (206, whole[10:20])
-    assert files.answer("manifest.json", "bytes=10-") == (206, whole[10:])
-    assert files.answer("manifest.json", f"bytes={len(whole)}-") == (416, b"")
-    assert files.answer("manifest.json", "lines=1-2") == (200, whole)
+    assert files.answer("manifest.json", header="bytes=10-19") == (206, whole[10:20])
+    assert files.answer("manifest.json", header="bytes=10-") == (206, whole[10:])
+    assert files.answer("manifest.json", header=f"bytes={len(whole)}-") == (416, b"")
+    assert files.answer("manifest.json", header="lines=1-2") == (200, whole)
 
 
 @pytest.mark.parametrize(

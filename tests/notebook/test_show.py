@@ -29,7 +29,7 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
     made: dict = {}
     exec(BALLS, made)
     monkeypatch.setattr(arrays, "MAX_VOXELS", 20_000)
-    monkeypatch.setattr(arrays.find_blocks, "__defaults__", (20_000,))
+    monkeypatch.setattr(arrays.find_blocks, "__kwdefaults__", {"most": 20_000})
     stack = np.stack([made["small"], made["ball"]])
     out = tmp_path / "out"
     viewer = stereocell.show(

@@ -117,7 +117,7 @@ def test_a_ball_is_round_where_its_slices_end(
     grid = np.meshgrid(*(axis - at for axis, at in zip(axes, middle, strict=True)), indexing="ij")
     inside = (np.linalg.norm(grid, axis=0) < radius_um).astype(np.int32)
     origin_um = tuple(float(axis[0]) for axis in axes)
-    walls = extract_walls(inside, spacing_um, STEP_UM, origin_um)
+    walls = extract_walls(inside, spacing_um, STEP_UM, origin_um=origin_um)
     at = walls.positions - zyx_to_xyz(middle)
     assert np.abs(np.linalg.norm(at, axis=1) - radius_um).mean() < 0.1 * max(spacing_um)
     corners = at[walls.triangles]

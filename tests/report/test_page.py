@@ -404,11 +404,11 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
     looks = {
         name: replace(
             facts.survey["empty"].appearance,
-            surface=verdict,
+            surface=confidence,
             surface_reason=reason,
             level=level,
         )
-        for name, verdict, reason, level in (
+        for name, confidence, reason, level in (
             ("CD31", "unsure", "unsure surface: so too", SurfaceLevel(100.0, None, 1.0)),
             ("dim", "none", "no clear surface: as the test has it", None),
         )

@@ -237,14 +237,14 @@ def test_the_code_says_the_address():
 def test_the_code_is_drawn_without_blocks_where_the_terminal_has_none():
     address = "https://192.168.7.9:8000/?token=" + "x" * 43
     dark = [list(row) for row in segno.make(address, error="l", micro=False).matrix_iter(border=2)]
-    text = draw_qr(address, "latin-1")
+    text = draw_qr(address, encoding="latin-1")
     assert text.isascii()
     rows = []
     for line in text.splitlines():
         runs = re.findall("\x1b\\[(7|49)m( +)", line)  # inverted is light; a module is two spaces
         rows.append([int(ground == "49") for ground, run in runs for _ in run[::2]])
     assert [row for row in rows if row] == dark
-    assert draw_qr(address, "utf-8") == draw_qr(address)
+    assert draw_qr(address, encoding="utf-8") == draw_qr(address)
 
 
 @contextmanager

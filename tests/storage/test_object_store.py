@@ -315,7 +315,7 @@ def _put_slowly(file: Path) -> None:
 
 def test_each_thread_of_a_worker_tells_what_it_put_itself(store: ObjectStore) -> None:
     with (
-        workspace.opened("s3://bucket/threads", "build") as root,
+        workspace.opened("s3://bucket/threads", command="build") as root,
         ThreadPoolExecutor(2) as threads,
     ):
         work, _ = object_store_tasks.carried(_put_slowly)
@@ -325,7 +325,7 @@ def test_each_thread_of_a_worker_tells_what_it_put_itself(store: ObjectStore) ->
 
 def test_work_for_a_command_that_has_ended_puts_nothing_there(store: ObjectStore) -> None:
     fs = store.files()
-    with workspace.opened("s3://bucket/late", "build") as root:
+    with workspace.opened("s3://bucket/late", command="build") as root:
         work, _ = object_store_tasks.carried(_put_slowly)
     carried = pickle.dumps(work)  # to a cluster's worker
     for lock in (None, b"another's"):

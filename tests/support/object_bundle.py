@@ -177,7 +177,7 @@ def write(
                 material=Material((0.8, 0.8, 0.8)),
                 name=f"{CHANNEL}_{tile}",
                 extras={"tile": tile, "channel": CHANNEL},
-                features=tile_features(table, tile, ("CD8", "cell_type")),
+                features=tile_features(table, tile, wanted=("CD8", "cell_type")),
             )
             uri = f"{tile}/lod{level}.glb"
             ref = put(f"channels/{CHANNEL}/{uri}", glb.data)
@@ -191,7 +191,7 @@ def write(
     transfer2d = put(f"channels/{CHANNEL}/transfer2d.json", compact_json(joint))
     volumes = put(f"channels/{CHANNEL}/volumes.json", compact_json({"volumes": []}))
     objects, written = write_objects(
-        root, f"channels/{CHANNEL}", table, "DNA" if is_painted else ""
+        root, f"channels/{CHANNEL}", table, paint="DNA" if is_painted else ""
     )
     files += written
     channel = {

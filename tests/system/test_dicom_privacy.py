@@ -243,9 +243,9 @@ def test_a_leak_put_in_by_hand_is_found(
 
     honest = dicom.read_image
 
-    def leaky(location: Any, series: int = 0) -> Any:
+    def leaky(location: Any, *, series: int = 0) -> Any:
         header = pydicom.dcmread(next(Path(location.source).rglob("*.dcm")))
-        return replace(honest(location, series), title=str(header.PatientName))
+        return replace(honest(location, series=series), title=str(header.PatientName))
 
     monkeypatch.setattr(dicom, "read_image", leaky)
     open_source.cache_clear()

@@ -68,15 +68,15 @@ def _rim(mesh: Mesh) -> set[bytes]:
 
 def test_simplification_alone_makes_defects_here(sponge: Mesh) -> None:
     """Else the tests below would show nothing."""
-    assert kinds(find_defects(sponge, PLANES)) == set()
-    assert kinds(find_defects(simplify(sponge, 2.0, PLANES), PLANES)) == {"crossings"}
+    assert kinds(find_defects(sponge, planes=PLANES)) == set()
+    assert kinds(find_defects(simplify(sponge, 2.0, planes=PLANES), planes=PLANES)) == {"crossings"}
 
 
 @pytest.mark.slow
 def test_every_level_is_sound_and_keeps_its_border(sponge: Mesh) -> None:
     levels = list(_chain(sponge))
     for level in levels:
-        assert kinds(find_defects(level.mesh, PLANES)) == set()
+        assert kinds(find_defects(level.mesh, planes=PLANES)) == set()
         assert _rim(level.mesh) == _rim(sponge)
         assert level.fallbacks == 0
     assert any(level.simplified_again for level in levels)
@@ -98,7 +98,7 @@ def test_body_that_cannot_be_simplified_keeps_its_surface_and_is_counted(
     monkeypatch.setattr(simplify_valid, "ROUNDS", 0)
     kept = simplify_without_defects(both, PLANES, max_error_um=2.0)
     assert kept.fallbacks > 0
-    assert kinds(find_defects(kept.mesh, PLANES)) == set()
+    assert kinds(find_defects(kept.mesh, planes=PLANES)) == set()
     assert len(kept.mesh.triangles) > 0.5 * len(sponge.triangles)  # the sponge is one body, mostly
     assert (kept.mesh.positions[:, 2] < -5).sum() < 0.5 * len(alone.positions)  # the ball isn't
 
@@ -123,7 +123,7 @@ def with_process() -> Mesh:
     process = 1.3 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - along) ** 2)
     whole = Box((0, 0, 0), shape)
     distance = np.clip(np.maximum(body, process), -2, 2).astype(np.float32)
-    return extract_surface(distance, Lattice.of_whole(whole, SPACING, ORIGIN))
+    return extract_surface(distance, Lattice.of_whole(whole, SPACING, origin_um=ORIGIN))
 
 
 def _farthest(mesh: Mesh, simplified: Mesh) -> float:

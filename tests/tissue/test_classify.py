@@ -44,8 +44,8 @@ def require_overlap(head: HeadPhantom, tissue: Tissue, least: float) -> None:
 @pytest.fixture(scope="module")
 def learned() -> tuple[HeadPhantom, Tissue]:
     # neither seed nor shape nor bias are those of tests/bench/tissue.py
-    head = make_head(SMALL, noise=0.05, bias=0.5, seed=23)
-    return head, learn_tissue(head.voxels, head.spacing_um, THREE)
+    head = make_head(shape=SMALL, noise=0.05, bias=0.5, seed=23)
+    return head, learn_tissue(head.voxels, head.spacing_um, options=THREE)
 
 
 @pytest.mark.slow
@@ -63,8 +63,8 @@ def test_each_class_overlaps_the_truth_and_beats_multi_otsu(
 def test_it_does_in_other_shapes_noises_and_biases(
     shape: tuple[int, int, int], bias: float, noise: float
 ) -> None:
-    head = make_head(shape, noise, bias=bias, seed=31)
-    require_overlap(head, learn_tissue(head.voxels, head.spacing_um, THREE), 0.9)
+    head = make_head(shape=shape, noise=noise, bias=bias, seed=31)
+    require_overlap(head, learn_tissue(head.voxels, head.spacing_um, options=THREE), 0.9)
 
 
 @pytest.mark.slow
@@ -114,8 +114,8 @@ def test_the_mask_is_the_brain_with_its_fluid_and_no_scalp(
 @pytest.mark.exhaustive
 def test_the_same_voxels_give_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(brain_hull, "ITERATIONS", 60)
-    head = make_head((56, 48, 48), bias=0.4, seed=5)
-    first, second = (learn_tissue(head.voxels, head.spacing_um, THREE) for _ in range(2))
+    head = make_head(shape=(56, 48, 48), bias=0.4, seed=5)
+    first, second = (learn_tissue(head.voxels, head.spacing_um, options=THREE) for _ in range(2))
     assert first.probabilities.tobytes() == second.probabilities.tobytes()
 
 
@@ -124,7 +124,7 @@ def test_the_same_voxels_give_the_same_bytes(monkeypatch: pytest.MonkeyPatch) ->
 def test_auto_finds_how_many_classes_there_are(count: int) -> None:
     voxels, labels = blobs(count)
     tissue = learn_tissue(
-        voxels, (1000.0, 1000.0, 1000.0), TissueOptions(sample=15_000, bias_rounds=4)
+        voxels, (1000.0, 1000.0, 1000.0), options=TissueOptions(sample=15_000, bias_rounds=4)
     )
     assert len(tissue.means) == count
     np.testing.assert_allclose(tissue.means[:, 0], 200 * np.arange(2, count + 2), rtol=0.12)
@@ -167,10 +167,10 @@ def test_a_hull_holds_its_volume() -> None:
 
 def test_a_constant_volume_has_no_tissue() -> None:
     with pytest.raises(SourceError, match="every voxel is 7"):
-        learn_tissue(np.full((8, 8, 8), 7, np.uint8), (1.0, 1.0, 1.0), THREE)
+        learn_tissue(np.full((8, 8, 8), 7, np.uint8), (1.0, 1.0, 1.0), options=THREE)
 
 
 def test_a_volume_without_a_brain_is_refused_in_a_line() -> None:
     voxels, _ = blobs(3)
     with pytest.raises(SourceError, match="no brain"):
-        learn_tissue(voxels, (100.0, 100.0, 100.0), THREE)  # 4 mm in all
+        learn_tissue(voxels, (100.0, 100.0, 100.0), options=THREE)  # 4 mm in all

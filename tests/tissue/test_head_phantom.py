@@ -44,7 +44,7 @@ def clean() -> HeadPhantom:
 
 @pytest.fixture(scope="module")
 def small() -> HeadPhantom:
-    return make_head(SMALL, seed=3)
+    return make_head(shape=SMALL, seed=3)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_classes_have_their_signals_bias_and_noise(head: HeadPhantom, clean: Hea
 
 @pytest.mark.slow
 def test_a_finer_grid_shows_the_same_head(clean: HeadPhantom) -> None:
-    fine = make_head((140, 120, 120), noise=0, bias=0)
+    fine = make_head(shape=(140, 120, 120), noise=0, bias=0)
     for label in (CSF, GREY, WHITE):
         ml = [
             h.fractions[label].sum(dtype=np.float64) * np.prod(h.spacing_um) / 1e12
@@ -203,7 +203,7 @@ def test_numbers_and_thickness_say_nothing_of_positions(series: Path) -> None:
 def test_the_bytes_repeat_and_another_seed_is_another_series(
     small: HeadPhantom, series: Path, tmp_path: Path
 ) -> None:
-    write_dicom(tmp_path / "head", make_head(SMALL, seed=3))
+    write_dicom(tmp_path / "head", make_head(shape=SMALL, seed=3))
     assert digests_of(tmp_path / "head") == digests_of(series)
     write_dicom(tmp_path / "other", small, seed=4)
     one, other = (
@@ -220,13 +220,13 @@ def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
     folder = tmp_path / "head"
     assert main(["sample", "mri", str(folder), "--seed", "2"]) == 0
     before = {file: file.stat().st_mtime_ns for file in folder.iterdir()}
-    write_head(folder, 2)
+    write_head(folder, seed=2)
     assert {file: file.stat().st_mtime_ns for file in folder.iterdir()} == before
     (folder / "IM0007.dcm").unlink()  # it lost a file: it is made again
-    write_head(folder, 2)
+    write_head(folder, seed=2)
     assert {file.name for file in folder.iterdir()} == {file.name for file in before}
     with pytest.raises(OutputError, match=r"holds something else.*remove it"):
-        write_head(folder, 5)
+        write_head(folder, seed=5)
     mine = tmp_path / "mine.txt"
     mine.write_text("mine")
     capsys.readouterr()

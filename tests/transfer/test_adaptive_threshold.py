@@ -259,7 +259,7 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
     assert appearance.threshold is not None
     assert 250 < appearance.threshold < 850
     assert appearance.threshold_normalized is not None
-    table = evaluate(appearance.transfer_functions[THRESHOLD], 1024)
+    table = evaluate(appearance.transfer_functions[THRESHOLD], size=1024)
     levels = np.linspace(0, 1, 1024)
     assert (table[levels <= appearance.threshold_normalized - 1e-3] == 0).all()
     assert table[np.searchsorted(levels, appearance.threshold_normalized) + 2] > 0

@@ -52,7 +52,9 @@ def fine_counts(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> NDArray[n
 def boundaries_in(voxels: NDArray[np.uint8], spacing: Spacing = EVEN) -> tuple[Boundaries, float]:
     fine = fine_counts(voxels, spacing)
     gradient_max = choose_gradient_max(fine)
-    return find_boundaries(rebin(fine, gradient_max), gradient_max, spacing), gradient_max
+    return find_boundaries(
+        rebin(fine, gradient_max), gradient_max, spacing_um=spacing
+    ), gradient_max
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ CD31 = "/Specimen/Channels/CD31"
 
 
 def test_a_rectangle_fades_to_its_edges_but_not_to_the_planes() -> None:
-    table = evaluate2d((RECTANGLE,), (5, 5))
+    table = evaluate2d((RECTANGLE,), size=(5, 5))
     # across: 0 at 1/4, 2/3 at 1/2, 1 on; up: 0 at 1/4, 2/3 at 1/2, 1 on; times half, times 255
     assert table[..., 3].tolist() == [
         [0, 0, 0, 0, 0],
@@ -73,7 +73,7 @@ def test_a_rectangle_fades_to_its_edges_but_not_to_the_planes() -> None:
 
 
 def test_a_triangle_widens_from_its_tip() -> None:
-    assert evaluate2d((TRIANGLE,), (5, 5))[..., 3].tolist() == [
+    assert evaluate2d((TRIANGLE,), size=(5, 5))[..., 3].tolist() == [
         [0, 0, 255, 0, 0],
         [0, 0, 255, 0, 0],
         [0, 0, 255, 0, 0],
@@ -84,7 +84,7 @@ def test_a_triangle_widens_from_its_tip() -> None:
 
 def test_shapes_that_overlap_share_the_colour_by_their_opacities() -> None:
     # 1/3 of (1, 1/2, 0) and 1 of (0, 0, 1), by 4/3
-    assert evaluate2d((RECTANGLE, TRIANGLE), (5, 5))[4, 2].tolist() == [64, 32, 191, 255]
+    assert evaluate2d((RECTANGLE, TRIANGLE), size=(5, 5))[4, 2].tolist() == [64, 32, 191, 255]
     half = replace(RECTANGLE, values=(0.0, 1.0), gradients=(0.0, 1.0))
     # two of a half each absorb three quarters
     assert (evaluate2d((half, half))[..., 3] == np.floor(0.75 * 255 + 0.5)).all()

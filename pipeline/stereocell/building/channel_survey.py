@@ -150,14 +150,14 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for channel in plan.channels:
         look, mask = survey[channel.id].appearance, windows[channel.id].counting.mask
         if mask is not None and found[channel.id].is_fixed and given_level(plan, channel) is None:
-            told = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
-            told += _loss(plan, survey[channel.id], inside[channel.id])
-            console.print(f"units: {look.name}: {told}", markup=False)
+            remark = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
+            remark += _loss(plan, survey[channel.id], inside[channel.id])
+            console.print(f"units: {look.name}: {remark}", markup=False)
         if found[channel.id].subtracts and found[channel.id].background is None:
-            told = "there is no background to subtract: its level counts from 0"
-            console.print(f"units: {look.name}: {told}", markup=False)
-        if told := survey[channel.id].thinning(plan):
-            console.print(f"units: {look.name}: {told}", markup=False)
+            remark = "there is no background to subtract: its level counts from 0"
+            console.print(f"units: {look.name}: {remark}", markup=False)
+        if remark := survey[channel.id].thinning(plan):
+            console.print(f"units: {look.name}: {remark}", markup=False)
         if look.surface_reason:
             console.print(f"units: {look.name}: {look.surface_reason}", markup=False)
     return survey
@@ -237,7 +237,7 @@ def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
     level, window = plan.level_of(channel), (0.0, 255.0) if channel.source else None
     if channel.name in settings.windows:
         window = parse_window(f"--window {channel.name}", settings.windows[channel.name])
-    ref = source_of(plan, channel)
+    ref = source_of(plan, channel=channel)
     finds_holder = plan.modality == "CT" and not channel.source and not settings.surface.keep_holder
     return StatisticsTask(
         ref, level, channel.index, plan.region, settings, subtracts, finds_holder, window
@@ -248,7 +248,7 @@ def evidence_task(plan: Plan, tile: Tile, *, channel: Channel, window: Window) -
     """Return the task that gathers one tile's evidence."""
     criterion = LADDER if channel.rung else plan.settings.isovalue.criterion
     return EvidenceTask(
-        source_of(plan, channel),
+        source_of(plan, channel=channel),
         plan.level_of(channel),
         channel.index,
         tile.box,
@@ -328,7 +328,7 @@ def _solids(
             return None
         surface = plan.settings.surface
         task = SolidsTask(
-            source_of(plan, channel),
+            source_of(plan, channel=channel),
             plan.level_of(channel),
             channel.index,
             tile.box,

@@ -183,7 +183,7 @@ def windows_of(
 
 
 def painted(
-    paint: Mapping[str, str], channels: Sequence[Channel], labels: Sequence[str] = ()
+    paint: Mapping[str, str], channels: Sequence[Channel], *, labels: Sequence[str] = ()
 ) -> dict[str, str]:
     """Return channel name -> name of the channel that is sampled onto its surface.
 

@@ -47,7 +47,7 @@ def require_added(plan: Plan) -> None:
     for folder in {Path(channel.source).parent for channel in plan.channels if channel.source}:
         read_whole(folder)
     for channel in plan.channels:
-        if channel.source and open_source(source_of(plan, channel)).fingerprint != (
+        if channel.source and open_source(source_of(plan, channel=channel)).fingerprint != (
             channel.fingerprint
         ):
             raise SourceError(

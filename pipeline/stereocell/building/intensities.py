@@ -21,7 +21,7 @@ from stereocell.objects.label_rule import Kind, recognise
 from stereocell.read import Dataset
 
 _SIDE = 128  # voxels: largest edge of a block that is looked at
-_MIN_SIDE = 32  # of many channels, whose blocks together are to be as those of _MAX_CHANNELS
+_MIN_SIDE = 32  # voxels: smallest edge of a block, however many channels are looked at
 _WIDE = 4  # bytes
 _MAX_EXACT = 2.0**53  # whole numbers below are exact as float64
 _FEW_VALUES = 8  # fewer tell nothing
@@ -55,7 +55,7 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
     for index in channels:
         found = _look_at(dataset, index, finest, side)
         if found.kind == "labels":
-            raise UsageError(_told(dataset, index, found))
+            raise UsageError(_describe(dataset, index, found))
         if stored.kind in "iu" and stored.itemsize >= _WIDE and found.is_plain:
             raise UsageError(
                 f"{dataset.shown}: channel {dataset.channels[index].name!r} may be a label map: "
@@ -145,7 +145,7 @@ def _blocks(region: Box, most: int) -> Iterator[Box]:
         yield Box((z0, y0, x0), (z1, y1, x1))
 
 
-def _told(dataset: Dataset, index: int, found: _Found) -> str:
+def _describe(dataset: Dataset, index: int, found: _Found) -> str:
     return (
         f"{dataset.shown}: channel {dataset.channels[index].name!r} looks like a label map of "
         f"{found.values} objects: found {found.pieces} pieces of equal voxels, expected "

@@ -15,7 +15,7 @@ from stereocell.read.label_map import LabelMap
 from stereocell.storage.location import Location
 
 SELF = "."  # in place of a path: the input itself
-_ALIGNED = 1e-6  # of rotations: rounding
+_MAX_ROUNDING = 1e-6  # largest difference of two rotations' elements: rounding
 _COLOURS = "colour pixels"  # how a reader's remark on them begins
 _AVERAGED = ("resampled", "interpolated")  # in what a reader says of voxels between others
 
@@ -118,7 +118,7 @@ def _opened(
 ) -> tuple[Dataset, SourceRef]:
     """Return a label map's dataset, and how it was opened."""
     if SELF in (name, place):
-        return _as_stored(image), as_asked(source, options, image.fingerprint)
+        return _as_stored(image), as_asked(source, options, fingerprint=image.fingerprint)
     where = Location.of(place or f"{source.rstrip('/')}/labels/{name}").source
     ref = SourceRef(where, 0, ())
     try:
@@ -166,7 +166,7 @@ def _origin(image: Dataset, labels: Dataset) -> Triple:
         )
     if image.has_sides or image.placement != IDENTITY:
         between = np.linalg.inv(np.array(image.placement)) @ np.array(labels.placement)
-        if np.abs(between[:3, :3] - np.eye(3)).max() > _ALIGNED:
+        if np.abs(between[:3, :3] - np.eye(3)).max() > _MAX_ROUNDING:
             raise SourceError(
                 f"{labels.shown}: lies turned to the image, expected labels along its axes"
             )

@@ -18,8 +18,8 @@ from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, LADDER, RUN
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Tile
 
-APART_SHARE = 0.25  # of all voxels inside: a rung whose largest solids hold less is one of many
-# ... and what may be taken for many that touch: their share, and how many solids there must be
+APART_SHARE = 0.25  # share of all voxels inside: a rung whose largest solids hold less has many
+# the same where many solids may touch: the share, and the least number of solids
 JOINED_SHARE, MANY = 2 / 3, 30
 Solids = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
 
@@ -159,8 +159,8 @@ def hold_to_histogram(found: Found) -> Found:
 
 def _without_surface(found: Found, side: str) -> Found:
     above = " above the background" if found.subtracts else ""
-    told = f"no surface: all voxels lie {side} the level {_value_of(found.rungs[0]):.5g}{above}"
-    return replace(found, rungs=(), doubt=told)
+    reason = f"no surface: all voxels lie {side} the level {_value_of(found.rungs[0]):.5g}{above}"
+    return replace(found, rungs=(), doubt=reason)
 
 
 def _value_of(level: Level | float) -> float:

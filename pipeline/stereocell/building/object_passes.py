@@ -116,14 +116,14 @@ def tell_objects(labels: Labels, located: Located) -> None:
 
 def told_of(labels: Labels, located: Located) -> str:
     """Return how many objects there are, which are cut, and how many are left out, in words."""
-    told = counted(len(located.owners), "object")
+    summary = counted(len(located.owners), "object")
     cut = located.extents.labels[located.owners == CUT]
     if len(cut):
         shown = ", ".join(map(str, cut[:8].tolist())) + ", ..." * (len(cut) > 8)
-        told += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
+        summary += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
     if located.small:
-        told += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
-    return f"{labels.name}: {told}"
+        summary += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
+    return f"{labels.name}: {summary}"
 
 
 def told_before(plan: Plan) -> Iterator[str]:
@@ -233,7 +233,7 @@ def images_of(plan: Plan) -> tuple[ImageRef, ...]:
 
 
 def _image(plan: Plan, channel: Channel) -> ImageRef:
-    ref, level = source_of(plan, channel), plan.level_of(channel)
+    ref, level = source_of(plan, channel=channel), plan.level_of(channel)
     return ImageRef(ref, channel.index, level, plan.region, plan.spacing_um, plan.origin_um)
 
 

@@ -155,7 +155,7 @@ def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
             for label, name in notes.names.items()
             if label in notes.colors
         }
-        made = category_column(NAMES, texts, "From the label map's file", colors)
+        made = category_column(NAMES, texts, "From the label map's file", colors=colors)
         found += [] if made is None else [made]
     for name, values in notes.columns.items():
         held = [values.get(label) for label in listed_labels]
@@ -291,7 +291,7 @@ def table_of(plan: Plan, labels: Labels) -> Table | None:
     return read_table(options.table, options.table_key, options.columns, labels.name)
 
 
-def appearance_of_labels(labels: Labels, painter: str = "") -> Appearance:
+def appearance_of_labels(labels: Labels, *, painter: str = "") -> Appearance:
     """Return how the objects of a label map are drawn: by their table, and without a volume.
 
     painter  ID of the channel that is painted on them; empty: none is

@@ -47,7 +47,7 @@ def open_source(ref: SourceRef) -> read.Dataset:
     )
 
 
-def as_asked(source: str, options: PlanOptions, fingerprint: str = "") -> SourceRef:
+def as_asked(source: str, options: PlanOptions, *, fingerprint: str = "") -> SourceRef:
     """Return the reference to a source that is read as the settings say."""
     return SourceRef(
         source,

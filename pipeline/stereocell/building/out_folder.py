@@ -102,11 +102,11 @@ class OutFolder:
         """Return a plan whose channel sources inside OUT are paths relative to OUT."""
         root = self.out.resolve()
 
-        def told(source: str) -> str:
+        def relative(source: str) -> str:
             inside = source and Path(source).is_relative_to(root)
             return Path(source).relative_to(root).as_posix() if inside else source
 
-        return _with_sources(plan, told)
+        return _with_sources(plan, relative)
 
     def _in_place(self, plan: Plan) -> Plan:
         root = self.out.resolve()

@@ -95,12 +95,12 @@ def unit_tasks(
             out_folder,
             plan.with_grid(survey[channel.id].grid_um),
             tile_id,
-            channel,
-            field,
-            repair,
-            statistics,
-            painted,
-            holder,
+            channel=channel,
+            iso=field,
+            repair=repair,
+            statistics=statistics,
+            painted=painted,
+            holder=holder,
         )
         yield f"{tile_id}/{channel.id}", task, key
 
@@ -137,6 +137,7 @@ def _unit_task(
     out_folder: OutFolder,
     plan: Plan,
     tile_id: str,
+    *,
     channel: Channel,
     iso: LatticeField | None,
     repair: RepairOptions,
@@ -176,5 +177,5 @@ def _unit_task(
     ]
     key = key_of(depends, unit_maker, reader_module(plan, channel))
     directory = out_folder.unit_dir(tile_id, channel.id, key)
-    ref, index = source_of(plan, channel), painted and painted[0]
+    ref, index = source_of(plan, channel=channel), painted and painted[0]
     return UnitTask(ref, plan.level_of(channel), channel.index, given, directory, index), key

@@ -194,7 +194,7 @@ def _added(plan: Plan) -> dict[str, Any]:
     return {"added_channels": added} if added else {}
 
 
-def run_units(out: Path, engine: Engine, only: str | None = None) -> None:
+def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
     """Find windows and levels for all units, then build the units, or `only` one of them.
 
     only  `<tile>/<channel>`; None: all units
@@ -225,7 +225,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         index, survey = out_folder.index(), read_survey(out_folder)
         appearances = [survey[channel.id].appearance for channel in plan.channels]
         appearances += [
-            appearance_of_labels(labels, painter.id if painter else "")
+            appearance_of_labels(labels, painter=painter.id if painter else "")
             for labels in plan.labels
             for painter in [plan.painter(labels)]
         ]
@@ -277,7 +277,9 @@ def run_stage(out: Path, engine: Engine) -> None:
         _tell_size(files, sum(measured for _, measured in lists))
         small = out_folder.stage_dir / usdz_writer.USDZ_NAME
         usdz_writer.write_usdz(
-            out_folder.stage_file, small, AsWritten({out_folder.stage_dir.resolve(): files})
+            out_folder.stage_file,
+            small,
+            as_written=AsWritten({out_folder.stage_dir.resolve(): files}),
         )
         looks_dir = out_folder.stage_dir / "looks"
         written_files.write_list(
@@ -312,7 +314,7 @@ def _tell_size(tiles: FileList, measured: int) -> None:
         )
 
 
-def run_bundle(out: Path, engine: Engine, stage: Path | None = None) -> None:
+def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
     """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it (`stage`).
 
     Raises OutputError where the stage is missing, StageError where it can't be read.

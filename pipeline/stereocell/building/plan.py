@@ -24,6 +24,7 @@ from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.settings import AUTO
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box, Tile, cut, cut_evenly
 
 # Largest window of a unit, at about 30 bytes a voxel: UNIT_VOXELS, or UNIT_TILES times its tile.
@@ -38,7 +39,7 @@ class LevelLike(Protocol):
     @property
     def shape(self) -> tuple[int, int, int]: ...
     @property
-    def spacing_um(self) -> tuple[float, float, float]: ...
+    def spacing_um(self) -> Spacing: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +62,8 @@ class Plan:
     fingerprint: str
     level: int
     level_reason: str
-    spacing_um: tuple[float, float, float]
-    origin_um: tuple[float, float, float]
+    spacing_um: Spacing
+    origin_um: Point
     region: Box
     halo: tuple[int, int, int]
     tiles: tuple[Tile, ...]
@@ -137,7 +138,7 @@ class Plan:
         """Return the tile with this ID; the plan must hold it."""
         return next(tile for tile in self.tiles if tile.id == tile_id)
 
-    def position_um(self, index_zyx: Sequence[float]) -> tuple[float, float, float]:
+    def position_um(self, index_zyx: Sequence[float]) -> Point:
         """Return the place of a voxel's centre, (z, y, x) in um."""
         z, y, x = (
             float(o + i * s)
@@ -188,7 +189,7 @@ def make_plan(
     *,
     fingerprint: str,
     levels: Sequence[LevelLike],
-    origin_um: tuple[float, float, float],
+    origin_um: Point,
     channels: Sequence[Channel],
     level: tuple[int, str],
     settings: Settings,
@@ -223,7 +224,7 @@ def make_plan(
         plan=replace(settings.plan, level=level[0], tile_size=tile_size),
         iso_values=by_name("--iso-value", settings.iso_values, channels),
         windows=windows_of(settings.windows, channels, modality),
-        paint=painted(settings.paint, channels, [one.name for one in labels]),
+        paint=painted(settings.paint, channels, labels=[one.name for one in labels]),
     )
     _require_planes(settings, chosen.spacing_um)
     require_no_background(settings, channels, modality)
@@ -293,7 +294,7 @@ def _tiles(settings: Settings, region: Box) -> tuple[tuple[int, int, int], tuple
 
 def _halo(
     settings: Settings,
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     region: Box,
 ) -> tuple[int, int, int]:
     """Return the voxels (z, y, x) that a unit reads around its tile, at most the region's.

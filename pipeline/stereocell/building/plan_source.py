@@ -5,8 +5,8 @@ from stereocell.building.open_source import SourceRef, as_asked
 from stereocell.building.plan import Plan
 
 
-def source_of(plan: Plan, channel: Channel | None = None) -> SourceRef:
+def source_of(plan: Plan, *, channel: Channel | None = None) -> SourceRef:
     """Return the reference to a plan's source, or to that of one of its channels."""
     if channel is not None and channel.source:
         return SourceRef(channel.source, 0, (), fingerprint=channel.fingerprint)
-    return as_asked(plan.source, plan.settings.plan, plan.fingerprint)
+    return as_asked(plan.source, plan.settings.plan, fingerprint=plan.fingerprint)

@@ -43,19 +43,19 @@ def load_for(
     try:
         location = Location.of(source).source
         dataset = open_source(as_asked(location, options))
-        chosen, reason = choose_preset(dataset, options.modality)
+        chosen, reason = choose_preset(dataset, modality=options.modality)
     except StereoCellError:
         return settings, ""
     return (load(chosen, None, flags=flags, where=where) if chosen else settings), reason
 
 
-def tell(choice: str) -> None:
+def print_choice(choice: str) -> None:
     """Print the choice of a preset, once the source proved to be one: errors stand alone."""
     if choice:
         console.print(f"plan: {choice}", markup=False)
 
 
-def choose_preset(dataset: Dataset, modality: str = "") -> tuple[str | None, str]:
+def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, str]:
     """Return the name of a preset, or None for the defaults, and the reason in a sentence.
 
     modality  the settings', where the input says none
@@ -64,21 +64,21 @@ def choose_preset(dataset: Dataset, modality: str = "") -> tuple[str | None, str
     level = dataset.levels[0]
     finest = min(level.spacing_um)
     if not known and finest < _BODY_UM:
-        return None, _told(None, f"voxels of {finest:.3g} um, as of a microscope")
+        return None, _describe(None, f"voxels of {finest:.3g} um, as of a microscope")
     across = max(n * h for n, h in zip(level.shape, level.spacing_um, strict=True))
     if across < _PART_UM:
-        return None, _told(None, f"{across / 1000:.3g} mm across, too small for a patient")
+        return None, _describe(None, f"{across / 1000:.3g} mm across, too small for a patient")
     if known:
         chosen = _BY_MODALITY.get(known)
-        return chosen, _told(chosen, f"the input is {known}")
+        return chosen, _describe(chosen, f"the input is {known}")
     chosen = "ct" if _has_hounsfield_units(dataset) else "mri"
     looks = "values like Hounsfield units"
     if chosen == "mri":
         looks = "no Hounsfield units, which a CT that was shifted has not either"
-    return chosen, _told(chosen, f"voxels of {finest / 1000:.3g} mm and {looks}")
+    return chosen, _describe(chosen, f"voxels of {finest / 1000:.3g} mm and {looks}")
 
 
-def _told(chosen: str | None, reason: str) -> str:
+def _describe(chosen: str | None, reason: str) -> str:
     if chosen is None:
         return f"no preset: {reason}: lengths follow the voxel spacing (--preset names another)"
     return f"preset {chosen}: {reason} (--preset {NO_PRESET}: the defaults)"

@@ -39,7 +39,7 @@ def in_flags(line: str, given: Collection[str]) -> str:
     return line
 
 
-def in_settings(line: str, has_sections: bool = True) -> str:
+def in_settings(line: str, *, has_sections: bool = True) -> str:
     """Return a message with settings in place of flags; without sections, as arguments are called.
 
     >>> in_settings("--grid is '3', expected columns x rows; --iso-value CD8: found -1")
@@ -55,12 +55,12 @@ def in_settings(line: str, has_sections: bool = True) -> str:
 
 
 @contextmanager
-def named_as_settings(has_sections: bool = True) -> Iterator[None]:
+def named_as_settings(*, has_sections: bool = True) -> Iterator[None]:
     """Raise errors of the block as `in_settings` has them, for users of Python."""
     try:
         yield
     except StereoCellError as error:
-        line = in_settings(str(error), has_sections)
+        line = in_settings(str(error), has_sections=has_sections)
         if line == str(error):
             raise
         raise type(error)(line) from error

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 EIGHT_BITS = 8
-INTENSITY = "intensity"  # what voxels may be taken for, whatever they look like
+INTENSITY = "intensity"  # value of taken_as: voxels are intensities, even if they look like labels
 NO_PRESET = "none"  # names the defaults
 PRESETS = Path(__file__).parent / "presets"
 # of a file of settings; tomllib's time grows with the square of a dotted key's length
@@ -48,7 +48,9 @@ class PlanOptions:
     level: int | str = setting(
         AUTO,
         "resolution level, 0 is the finest; auto: see max_voxels",
-        Flag("--level", "resolution level, 0 is the finest (default auto: see plan.max_voxels)"),
+        flag=Flag(
+            "--level", "resolution level, 0 is the finest (default auto: see plan.max_voxels)"
+        ),
     )
     max_voxels: int = setting(
         2_000_000_000, "auto takes the finest level within this: the region, all channels"
@@ -56,12 +58,14 @@ class PlanOptions:
     channels: tuple[str, ...] = setting(
         (),
         "names or indices; empty: all",
-        Flag("--channels", "names or indices, as CD31,MART1", "names or indices, as CD31,MART1"),
+        flag=Flag(
+            "--channels", "names or indices, as CD31,MART1", "names or indices, as CD31,MART1"
+        ),
     )
     region: str = setting(
         "",
         "z0:z1,y0:y1,x0:x1 in voxels of the level that is built; empty: all",
-        Flag(
+        flag=Flag(
             "--region",
             "z0:z1,y0:y1,x0:x1 in voxels of the level that is built: without --level the finest "
             "whose region stays within plan.max_voxels",
@@ -70,18 +74,18 @@ class PlanOptions:
     tile_size: tuple[int, ...] = setting(
         (194, 512, 512),
         "voxels z, y, x, clipped to the data",
-        Flag("--tile-size", "z,y,x in voxels", "three numbers z,y,x"),
+        flag=Flag("--tile-size", "z,y,x in voxels", "three numbers z,y,x"),
     )
     grid: str = setting(
         "",
         "columns x rows of equal tiles, as 5x2; instead of tile_size",
-        Flag("--grid", "columns x rows of equal tiles, as 5x2; not with --tile-size"),
+        flag=Flag("--grid", "columns x rows of equal tiles, as 5x2; not with --tile-size"),
     )
-    time: int = setting(0, "index into a time series", Flag("--time"))
+    time: int = setting(0, "index into a time series", flag=Flag("--time"))
     series: int = setting(
         0,
         "which of several images of a source, from 1 as --series list counts; 0: the largest",
-        Flag(
+        flag=Flag(
             "--series",
             "which of several images of a source: series of DICOM or planes, segments, scenes of "
             "CZI, LIF, ND2 (default: the largest); `list` shows them and does nothing else",
@@ -91,7 +95,7 @@ class PlanOptions:
     pattern: str = setting(
         "",
         "how the files of a folder of planes are named, as img_c{c}_z{z}.tif; empty: guessed",
-        Flag(
+        flag=Flag(
             "--pattern",
             "how the files of a folder of planes are named: {z} for the plane's number, {c} for "
             "the channel, {t} for the time, * for anything else, as img_c{c}_z{z}.tif (default: "
@@ -101,7 +105,7 @@ class PlanOptions:
     axes: str = setting(
         "",
         "axes of a TIFF, HDF5, Zarr or N5 array longer than 1, as czyx; empty: what the file says",
-        Flag(
+        flag=Flag(
             "--axes",
             "axes of a TIFF, HDF5, Zarr or N5 array longer than 1, slowest first, as zyx or czyx: "
             "where the file names none, or a TIFF's are wrong",
@@ -110,7 +114,7 @@ class PlanOptions:
     spacing_um: tuple[float, ...] = setting(
         (),
         "voxel spacing z, y, x, instead of the file's",
-        Flag(
+        flag=Flag(
             "--spacing-um",
             "z,y,x voxel spacing in um, instead of the file's",
             "three numbers z,y,x",
@@ -119,12 +123,12 @@ class PlanOptions:
     taken_as: str = setting(
         "",
         "intensity: build what looks like a label map all the same",
-        Flag("--as", "intensity: build what looks like a label map all the same"),
+        flag=Flag("--as", "intensity: build what looks like a label map all the same"),
     )
     neurological: bool = setting(
         False,
         "pictures of a patient have right on the right, and not as radiologists do",
-        Flag("--neurological", "pictures of a patient with right on the right"),
+        flag=Flag("--neurological", "pictures of a patient with right on the right"),
     )
     modality: str = setting(
         "", "where the input says none: a term of DICOM's Modality; MR and CT open path-traced"
@@ -163,7 +167,7 @@ class VolumeOptions:
     bits: int = setting(
         16,
         "16: the stage has the voxels as measured beside those of 8 bits; 8: these alone",
-        Flag(
+        flag=Flag(
             "--bits",
             "16 (default): the stage keeps the voxels as measured, so that another window loses "
             "nothing; 8: those of 8 bits alone, about half the size",
@@ -190,7 +194,7 @@ class Settings:
     iso_values: Mapping[str, float | str] = setting(
         {},
         "channel = voxel value, or one above the background as 162+b, instead of what is found",
-        Flag(
+        flag=Flag(
             "--iso-value",
             "use this iso-value (a voxel value, or one above the background as 162+b) for a "
             "channel, by name or index, or * for all others; may be repeated",
@@ -201,7 +205,7 @@ class Settings:
         {},
         "channel = the surfaces built of it: outer, inner, third, or voxel values, between "
         "commas; a value above the background as 162+b",
-        Flag(
+        flag=Flag(
             "--surfaces",
             "which surfaces are built of a channel: outer, inner, third, or voxel values, between "
             "commas; may be repeated",
@@ -211,7 +215,7 @@ class Settings:
     windows: Mapping[str, str] = setting(
         {},
         "channel = LOW:HIGH, voxel values that become 0 and 255, or brain, bone, lung, soft (CT)",
-        Flag(
+        flag=Flag(
             "--window",
             "the voxel values of a channel that become 0 and 255, as CT=-160:240, or a CT's window "
             "by name: brain, bone, lung, soft; * names all others; may be repeated",
@@ -221,7 +225,7 @@ class Settings:
     paint: Mapping[str, str] = setting(
         {},
         "channel or label map = channel whose intensity is painted on its surface",
-        Flag(
+        flag=Flag(
             "--paint",
             "paint the second channel's intensity on the first one's surface, as CD31=MART1; "
             "may be repeated",
@@ -233,7 +237,7 @@ class Settings:
         {},
         "label maps whose objects are built: name = path; empty: one of the input's own labels; .: "
         "the input itself",
-        Flag(
+        flag=Flag(
             "--labels",
             "build the objects of a label map: one of the input's own by name, or NAME=PATH; "
             "--labels . takes the input itself for one; may be repeated",
@@ -372,7 +376,7 @@ def from_dict(values: Mapping[str, Any]) -> Settings:
     return apply(Settings(), values, "plan.json: settings")
 
 
-def to_toml(settings: Settings, header: str = RECORD) -> str:
+def to_toml(settings: Settings, *, header: str = RECORD) -> str:
     """Return every setting as TOML, each with its comment, below the header's lines."""
     lines = [f"# {line}" for line in header.splitlines()]
     for section in fields(settings):

@@ -180,7 +180,7 @@ def _learn(
     dataset = open_source(source_of(plan))
     volume = dataset.read(channel.index, plan.region, plan.level)
     if network is None:
-        learned = learn_tissue(volume.voxels, plan.spacing_um, options)
+        learned = learn_tissue(volume.voxels, plan.spacing_um, options=options)
         names = _names(plan, len(learned.means), options.brain)
         bic = {str(count): value for count, value in learned.bic.items()}
         intensities: Sequence[float | None] = [float(mean) for mean in learned.means[:, 0]]

@@ -58,7 +58,7 @@ class UnitInput:
     holder: Holder | None = None
 
 
-def build_unit(volume: Volume, given: UnitInput, painted: Volume | None = None) -> Unit:
+def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = None) -> Unit:
     """Return meshes and volume of one unit.
 
     volume   voxels (z, y, x) of any dtype; they cover the lattice's window
@@ -139,7 +139,7 @@ def _repaired(
         options = (
             replace(given.repair, alpha_um=0.0, offset_um=0.0) if by_triangles else given.repair
         )
-        return repair(field, spacing, options), by_triangles
+        return repair(field, spacing, options=options), by_triangles
 
 
 def _extract(

@@ -32,6 +32,7 @@ from stereocell.model.color import to_srgb8
 from stereocell.model.errors import StageError
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.spacing import Spacing
 from stereocell.model.timing import Clock
 from stereocell.textures.bake import Baker, FineSurface, bake
 from stereocell.textures.lod_chain import make_levels
@@ -88,14 +89,14 @@ def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
     if emptied and (not lods or emptied[0] < lods[0].level):
         return Shown((), f"edited by hand: lod{emptied[0]} is empty: no surface is left")
     edited = _edited_levels(lods)
-    told = [f"lod{level} is empty and left out" for level in emptied]
+    remarks = [f"lod{level} is empty and left out" for level in emptied]
     if edited:
         if not np.isfinite(np.concatenate([lod.mesh.positions for lod in lods])).all():
             prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
             raise StageError(f"{prim}.points: a number that is not finite, expected places in um")
-        lods, said = _follow(tile, channel_id, lods, edited)
-        told = [*said, *told, *_odd_units(tile, channel_id, min(edited))]
-    line = f"edited by hand: {'; '.join(told)}" if told else ""
+        lods, changes = _follow(tile, channel_id, lods, edited)
+        remarks = [*changes, *remarks, *_odd_units(tile, channel_id, min(edited))]
+    line = f"edited by hand: {'; '.join(remarks)}" if remarks else ""
     return Shown(tuple(lod for lod in lods if lod.level >= finest), line)
 
 
@@ -123,23 +124,23 @@ def _follow(
         most = max(way.p99 for way in ways), max(way.max for way in ways)
         return replace(lod, distance_um=past_um + most[0], largest_um=past_um + most[1])
 
-    def verdict(lod: ComposedLod) -> str:
+    def describe(lod: ComposedLod) -> str:
         _, defects = _certified(read_local(tile, channel_id, lod.level), planes)
         lost = f", without {' and '.join(lod.lost)}, which fit other faces" if lod.lost else ""
         return f"lod{lod.level} ({_describe(defects)}{lost})"
 
     if fine.level not in edited:
-        told, result = [], []
+        remarks, result = [], []
         for lod in lods:
             if lod.level in edited:
                 um = measured(lod).distance_um
-                told.append(
-                    f"{verdict(lod)} {um:.3g} um from lod{fine.level}, which is as it was built"
+                remarks.append(
+                    f"{describe(lod)} {um:.3g} um from lod{fine.level}, which is as it was built"
                 )
                 lod = measured(lod, fine.largest_um)
             result.append(lod)
-        return result, told
-    told = [verdict(fine)]
+        return result, remarks
+    remarks = [describe(fine)]
     # an opinion outside the variants lies over all levels: it is the finest's edit, not their own
     own = {lod.level for lod in lods[1:] if lod.level in edited and lod.shape != fine.shape}
     made = _make(tile, channel_id, lods, options, planes) if len(own) < len(lods) - 1 else {}
@@ -148,15 +149,15 @@ def _follow(
     for lod in lods[1:]:
         if lod.level in own:
             lod = measured(lod)
-            told.append(f"{verdict(lod)} stays, {lod.distance_um:.3g} um from lod{fine.level}")
+            remarks.append(f"{describe(lod)} stays, {lod.distance_um:.3g} um from lod{fine.level}")
         else:
             lod, defects = made[lod.level]
             found = "" if not defects else f" with {defects} faults"
             anew.append(f"lod{lod.level}{found} within {lod.distance_um:.3g} um")
         result.append(lod)
     if anew:
-        told.append(f"made anew from lod{fine.level}: {', '.join(anew)}")
-    return result, told
+        remarks.append(f"made anew from lod{fine.level}: {', '.join(anew)}")
+    return result, remarks
 
 
 def _make(
@@ -278,7 +279,7 @@ def with_vertex_values(mesh: Mesh, maps: ComposedMaps | MadeMaps) -> Mesh:
 
 def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
     """Return the mesh and its defects; it is welded where seams of UVs or normals cut it open."""
-    defects = find_defects(mesh, planes)
+    defects = find_defects(mesh, planes=planes)
     if not defects.total:
         return mesh, defects
     _, first, twin = np.unique(mesh.positions, axis=0, return_index=True, return_inverse=True)
@@ -286,7 +287,7 @@ def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
     has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # at a UV pole they lack it
     triangles = triangles[has_area]
     welded = compact(mesh, triangles)
-    found = find_defects(welded, planes)
+    found = find_defects(welded, planes=planes)
     if found.total >= defects.total:
         return mesh, defects
     used = np.unique(triangles)
@@ -340,7 +341,7 @@ def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[
     return np.array(low, np.float64), np.array(high, np.float64)
 
 
-def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[float, float, float]:
+def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> Spacing:
     """Return the voxel spacing (z, y, x), um; without a volume, the median length of an edge."""
     box, prim = _box(tile, channel_id), _volume(tile, channel_id)
     size = prim.GetAttribute("stereocell:atlasSize").Get() if box is not None else None

@@ -19,7 +19,7 @@ from stereocell.usd.written_files import AsWritten
 
 
 def read_windowed(
-    volume: ComposedVolume, appearance: ComposedAppearance, as_written: AsWritten | None = None
+    volume: ComposedVolume, appearance: ComposedAppearance, *, as_written: AsWritten | None = None
 ) -> NDArray[np.uint8]:
     """Return a volume with its apron, uint8 (z, y, x). Raises StageError.
 

@@ -162,7 +162,7 @@ def _fill(
         table = gather_table(read_columns(stage, appearance.id), own)
         if table is not None:
             index_of_objects, more = write_objects(
-                root, f"channels/{appearance.id}", table, painter_of(stage, appearance.id)
+                root, f"channels/{appearance.id}", table, paint=painter_of(stage, appearance.id)
             )
             entry["objects"] = asdict(index_of_objects)
             written += more

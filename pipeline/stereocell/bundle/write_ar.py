@@ -25,7 +25,7 @@ def write_ar(
     the stage can't be read or a file of it is damaged, OutputError where the file can't be written.
     """
     path = root / USDZ_NAME
-    if write_usdz(stage_path, path, as_written) is None:
+    if write_usdz(stage_path, path, as_written=as_written) is None:
         return None, NO_SURFACE
     entry = {"path": USDZ_NAME, **measure(path)}
     if entry["bytes"] <= MAX_USDZ_BYTES:

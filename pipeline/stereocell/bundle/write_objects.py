@@ -26,13 +26,13 @@ from stereocell.model.object_table import MISSING, Column, ObjectTable
 from stereocell.storage.json_files import compact_json
 
 OBJECTS = "objects.json"
-ROWS = 4096  # of a range of exact values: 16 kB
+ROWS = 4096  # rows of a range of exact values: 16 kB
 _SPAN = (0.1, 99.9)  # percentiles that bytes 1 and 255 stand for
 _LOG_FROM = 10.0  # least ratio of the span's ends for a logarithmic scale
 
 
 def write_objects(
-    root: Path, folder: str, table: ObjectTable, paint: str = ""
+    root: Path, folder: str, table: ObjectTable, *, paint: str = ""
 ) -> tuple[FileRef, list[FileRef]]:
     """Write a channel's table below `folder` of a bundle; return objects.json, and all files.
 

@@ -53,7 +53,7 @@ from stereocell.usd.read_variants import Representation
 from stereocell.usd.written_files import AsWritten
 
 _RECORD = "tile.json"
-FIRST_COLUMN = "volume_um3"  # which every table of objects has
+FIRST_COLUMN = "volume_um3"  # first column of every table of objects
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,11 +170,19 @@ def export_tile(
     stage = open_stage(stage_path)
     with (
         replacing_folder(parts / tile_id) as root,
-        loaded(stage, tile_id, as_written) as (tile, choice),
+        loaded(stage, tile_id, as_written=as_written) as (tile, choice),
     ):
         volumes = [read_volume(tile, appearance.id) for appearance in appearances]
         channels = [
-            _export_channel(root, tile, appearance, volume, choice.finest_lod, step_m, as_written)
+            _export_channel(
+                root,
+                tile,
+                appearance,
+                volume=volume,
+                finest_lod=choice.finest_lod,
+                step_m=step_m,
+                as_written=as_written,
+            )
             for appearance, volume in zip(appearances, volumes, strict=True)
         ]
         low, high = find_bounds(tile, volumes)
@@ -201,6 +209,7 @@ def _export_channel(
     root: Path,
     tile: Usd.Prim,
     appearance: ComposedAppearance,
+    *,
     volume: ComposedVolume | None,
     finest_lod: int,
     step_m: float,
@@ -233,7 +242,7 @@ def _export_channel(
         lods.append(TileLod(uri, file.sha256, lod.largest_um, glb.min_m, glb.max_m))
     entry = joint = None
     if volume is not None:
-        voxels = read_windowed(volume, appearance, as_written)
+        voxels = read_windowed(volume, appearance, as_written=as_written)
         entry, written, joint = _export_volume(root, tile.GetName(), appearance, volume, voxels)
         files += written
     return TileChannel(

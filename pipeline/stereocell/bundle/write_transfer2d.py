@@ -21,7 +21,7 @@ from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_
 from stereocell.usd.read_appearances import ComposedAppearance
 from stereocell.usd.read_stage import ComposedVolume
 
-COUNTED_VOXELS = 4_000_000  # of a tile: of a larger one only some of the planes
+COUNTED_VOXELS = 4_000_000  # voxels of a tile; a larger tile is counted in part
 _STORED = np.dtype("<u4")
 
 

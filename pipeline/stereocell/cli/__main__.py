@@ -115,7 +115,7 @@ def _run(options: argparse.Namespace) -> int:
 
             is_writer = name in WRITERS
             options.out = stack.enter_context(
-                opened(out, name) if is_writer else opened(out, only=READERS[name])
+                opened(out, command=name) if is_writer else opened(out, only=READERS[name])
             )
         elif name in WRITERS:
             from stereocell.storage.lock import alone_in

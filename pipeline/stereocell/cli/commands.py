@@ -94,7 +94,7 @@ def settings(options: argparse.Namespace) -> Answer:
 
     found = settings_module.load(options.preset, options.config, flags={})
     print_unless_json(
-        options, settings_module.to_toml(found, settings_module.TEMPLATE).removesuffix("\n")
+        options, settings_module.to_toml(found, header=settings_module.TEMPLATE).removesuffix("\n")
     )
     return Answer(settings_module.to_dict(found))
 
@@ -115,12 +115,12 @@ def plan(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for, tell
+    from stereocell.building.preset_choice import load_for, print_choice
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
     made = phases.make(options.input, options.out, wanted)
-    tell(choice)
+    print_choice(choice)
     return Answer(
         {
             "out": str(options.shown),
@@ -138,7 +138,7 @@ def iso(options: argparse.Namespace) -> Answer:
     """Write the picture of one tile's iso-value and print the candidates."""
     if listed := _series(options):
         return listed
-    from stereocell.building.preset_choice import load_for, tell
+    from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.preview import iso_value as iso_preview
 
     flags = flags_of(options)
@@ -146,7 +146,7 @@ def iso(options: argparse.Namespace) -> Answer:
     found, path = iso_preview.preview(
         options.input, options.channel, tile_id=options.tile, out=options.out, settings=wanted
     )
-    tell(choice)
+    print_choice(choice)
     print_unless_json(options, "\n".join(iso_preview.table(found)))
     print_unless_json(options, f"wrote {path}")
     return Answer({"picture": str(path), **asdict(found)})
@@ -172,11 +172,11 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
     try:
         for name in names:
             if name == "units":
-                phases.run_units(out, engine, getattr(options, "only", None))
+                phases.run_units(out, engine, only=getattr(options, "only", None))
             elif name == "stage":
                 phases.run_stage(out, engine)
             elif name == "bundle":
-                phases.run_bundle(out, engine, edited)
+                phases.run_bundle(out, engine, stage=edited)
             else:
                 from stereocell.report import phase  # slow to import: it draws
 
@@ -215,7 +215,7 @@ def slices(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for, tell
+    from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.preview.png_slices import without_surface, write_slices
     from stereocell.storage.location import require_apart
 
@@ -223,8 +223,8 @@ def slices(options: argparse.Namespace) -> Answer:
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
     require_apart(options.input, options.out)
     plan = phases.settle(options.input, without_surface(wanted))
-    tell(choice)
-    written = write_slices(plan, options.out, options.plane)
+    print_choice(choice)
+    written = write_slices(plan, options.out, plane=options.plane)
     print_unless_json(options, f"wrote to {options.out}: {written.line}")
     return Answer({"out": str(options.out), "slices": written.count, "plane": written.plane})
 
@@ -248,9 +248,9 @@ def sample(options: argparse.Namespace) -> Answer:
             brightness_spread=options.brightness_spread,
         )
     elif options.name == "mri":
-        samples.write_head(options.out, options.seed)
+        samples.write_head(options.out, seed=options.seed)
     elif options.name == "cells":
-        samples.write_cells(options.out, options.seed)
+        samples.write_cells(options.out, seed=options.seed)
     else:
         samples.write_brain_cells(options.out)
     print_unless_json(options, f"wrote {options.out}")
@@ -307,7 +307,7 @@ def export(options: argparse.Namespace) -> Answer:
     about = write(
         options.out,
         options.file,
-        ExportOptions(**given),
+        options=ExportOptions(**given),
         stage=options.stage,
         report=lambda line: console.print(f"export: {line}", markup=False),
     )
@@ -339,7 +339,7 @@ def publish(options: argparse.Namespace) -> Answer:
     )
     if done.address is not None:
         if done.address.startswith("https://") and not options.json:
-            print_line(draw_qr(done.address, sys.stdout.encoding or "utf-8"))
+            print_line(draw_qr(done.address, encoding=sys.stdout.encoding or "utf-8"))
         print_unless_json(options, f"look at it: {done.address}")
     return Answer({"out": str(options.shown), "target": shown, **asdict(done)})
 

@@ -147,10 +147,10 @@ def _node() -> Finding:
     if path is None:
         return _finding("Node.js", False, "none on the PATH", cost)
     try:
-        told = subprocess.run(
+        answer = subprocess.run(
             [path, "--version"], capture_output=True, encoding="utf-8", timeout=20
         )
-        there = Version(told.stdout.strip())
+        there = Version(answer.stdout.strip())
     except (subprocess.TimeoutExpired, InvalidVersion):
         return _finding("Node.js", False, f"{path} does not tell its version", cost)
     is_new = there >= Version(_NODE)

@@ -283,7 +283,7 @@ def _progress(label: str, total: int) -> Iterator[Callable[[str, bool], None]]:
     if not console.is_terminal:
         done, start = 0, time.monotonic()
 
-        def tell(name: str, failure: bool) -> None:
+        def print_done(name: str, failure: bool) -> None:
             nonlocal done
             done += 1
             end = ": failed" if failure else ""
@@ -292,7 +292,7 @@ def _progress(label: str, total: int) -> Iterator[Callable[[str, bool], None]]:
                 end += f"; {in_words(spent / done * (total - done))} left"
             console.print(f"{label}: {done}/{total} {name}{end}", markup=False)
 
-        yield tell
+        yield print_done
         return
     failed = 0
     with Progress(

@@ -96,7 +96,7 @@ class Chosen:
     def _loaded(self, name: str) -> Iterator[tuple[Usd.Prim, TileChoice]]:
         """Yield a tile and what the stage selects of it, not what was selected to read it."""
         try:
-            with loaded(self.stage, name, self.as_written) as found:
+            with loaded(self.stage, name, as_written=self.as_written) as found:
                 yield found
         finally:
             self.stage.GetSessionLayer().Clear()
@@ -176,7 +176,7 @@ class Chosen:
         meshes = [UsdGeom.Mesh(prim) for prim in prims if prim is not None]
         return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
 
-    def levels(self, light: int | None = None) -> list[int]:
+    def levels(self, *, light: int | None = None) -> list[int]:
         """Return the levels to try, finest first: from --lod on, those within --max-triangles.
 
         light  triangles that are enough if neither is given; a coarsest level of more is taken

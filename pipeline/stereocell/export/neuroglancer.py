@@ -53,10 +53,10 @@ def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
         ) from None
     path.mkdir()
     layout = find_layout(chosen) if _has_volumes(chosen) else None
-    told = []
+    written = []
     if layout is not None:
         count = _write_image(path / "image", chosen, layout)
-        told.append(f"image: {layout.about}, {count} scales")
+        written.append(f"image: {layout.about}, {count} scales")
     to_nm = _places(chosen, layout)
     levels = len(chosen.count_triangles())
     channels: dict[int, str] = {}
@@ -71,15 +71,15 @@ def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
             write_mesh(folder, segment or number, _different(made), DracoPy.encode)
         if found.names:
             write_meshes_info(folder, found.names)
-            told.append(f"{folder.name}: {len(found.names)} meshes")
+            written.append(f"{folder.name}: {len(found.names)} meshes")
         else:
             channels[number] = channel.name
     if channels:
         write_meshes_info(path / "mesh", channels)
-        told.append(f"mesh: {', '.join(channels.values())}, up to {levels} levels")
-    if not told:
+        written.append(f"mesh: {', '.join(channels.values())}, up to {levels} levels")
+    if not written:
         raise StageError(f"{chosen.path}: neither a volume nor a surface is left to export")
-    return "; ".join(told)
+    return "; ".join(written)
 
 
 @dataclass(slots=True)

@@ -19,7 +19,7 @@ from stereocell.model.errors import UsageError
 from stereocell.model.mesh import Mesh
 
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5121, 5123, 5125, 5126
-_STEPS = 1 << 16  # of the lattice along a specimen's longest edge, for meshopt's 16 bits
+_STEPS = 1 << 16  # lattice steps along a specimen's longest edge: meshopt's 16 bits
 _DRACO_BITS, _NORMAL_BITS = 18, 10
 _DRACO_TYPES = {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2}  # GeometryAttribute::Type of Draco
 

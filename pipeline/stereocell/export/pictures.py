@@ -74,9 +74,9 @@ def _encode(chosen: Chosen, path: Path, shapes: list[Shape], ffmpeg: str) -> tup
             encoder.stdin.close()
         except BrokenPipeError:
             pass  # ffmpeg says why
-        told = encoder.stderr.read().decode(errors="replace").strip()
+        printed = encoder.stderr.read().decode(errors="replace").strip()
     if encoder.returncode:
-        last = told.splitlines()[-1] if told else f"exit code {encoder.returncode}"
+        last = printed.splitlines()[-1] if printed else f"exit code {encoder.returncode}"
         raise OutputError(f"{path}: ffmpeg: {last}")
     return size
 
@@ -86,7 +86,7 @@ def _shapes(chosen: Chosen, level: int) -> Iterator[Shape]:
     for piece in chosen.pieces(level):
         count += 1
         color = np.array(piece.material.color)
-        factors = vertex_colors(piece.mesh, bool(chosen.options.occlusion))
+        factors = vertex_colors(piece.mesh, occlusion=bool(chosen.options.occlusion))
         if factors is not None:
             color = factors / 255 * color
         mesh = piece.mesh

@@ -24,7 +24,9 @@ def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
     """Write .usdz; return a line about it."""
     channels = [channel.id for channel in chosen.channels]
     tiles = chosen.tiles
-    write_usdz(chosen.path, path, chosen.as_written, level=level, tiles=tiles, channels=channels)
+    write_usdz(
+        chosen.path, path, as_written=chosen.as_written, level=level, tiles=tiles, channels=channels
+    )
     return f"{counted(len(tiles), 'tile')} at lod{level}, the size of a hand"
 
 

@@ -208,7 +208,7 @@ def _read(
     layout: Layout, chosen: Chosen, channel: ComposedAppearance, volume: ComposedVolume
 ) -> NDArray[np.generic]:
     if layout.dtype == np.dtype("u1"):
-        return _without_apron(read_windowed(volume, channel, chosen.as_written), volume)
+        return _without_apron(read_windowed(volume, channel, as_written=chosen.as_written), volume)
     values = _measured(channel, volume, chosen)
     assert values is not None
     if layout.is_measured:
@@ -287,11 +287,11 @@ def _upright(layout: Layout) -> Layout:
 
 def map_file(file: Path, layout: Layout, offset: int) -> NDArray[np.generic]:
     """Return an array of zeros (channel, z, y, x) that lies in a file behind its head."""
-    return map_zeros(file, layout.dtype, layout.shape, offset)
+    return map_zeros(file, layout.dtype, layout.shape, offset=offset)
 
 
 def map_zeros(
-    file: Path, dtype: np.dtype[Any], shape: tuple[int, ...], offset: int = 0
+    file: Path, dtype: np.dtype[Any], shape: tuple[int, ...], *, offset: int = 0
 ) -> NDArray[Any]:
     """Return an array of zeros that lies in an existing file from a byte on.
 

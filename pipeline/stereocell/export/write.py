@@ -81,8 +81,8 @@ FORMATS = {
 def export(
     out: Path,
     file: Path,
-    options: ExportOptions,
     *,
+    options: ExportOptions,
     stage: Path | None = None,
     report: Report = lambda _: None,
 ) -> str:
@@ -100,11 +100,11 @@ def export(
         raise OutputError(f"{path} is missing: {remedy}")
     files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
     _require_outside(file, out_folder, files)
-    return export_stage(path, file, options, report)
+    return export_stage(path, file, options=options, report=report)
 
 
 def export_stage(
-    stage_path: Path, file: Path, options: ExportOptions, report: Report = lambda _: None
+    stage_path: Path, file: Path, *, options: ExportOptions, report: Report = lambda _: None
 ) -> str:
     """Write `file` from a stage; return a line about it, and more of what is to be known.
 
@@ -135,7 +135,7 @@ def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
     if not way.has_levels:
         return way.write(chosen, file, 0)
     most, size = chosen.options.max_bytes, 0
-    for level in chosen.levels(way.triangles):
+    for level in chosen.levels(light=way.triangles):
         line = way.write(chosen, file, level)
         size = file.stat().st_size
         if most is None or size <= most:

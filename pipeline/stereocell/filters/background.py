@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.model.lattice_field import LatticeField
+from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
 PERCENTILE = 15.0  # percent of a block's voxels that are at most the background
@@ -32,7 +33,7 @@ def find_background(
     field: NDArray[Any],
     region: Box,
     *,
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     block_um: float,
     padding: NDArray[np.bool_] | None = None,
 ) -> LatticeField:

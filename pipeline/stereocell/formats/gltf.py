@@ -107,7 +107,7 @@ def encode_glb(
         raise ValueError(f"{name} has no triangles")
     if mesh.objects is not None:
         require_whole(mesh.objects, mesh.triangles, name, features)
-    indices, order = reorder(mesh.triangles, len(mesh.positions), mesh.objects)
+    indices, order = reorder(mesh.triangles, len(mesh.positions), objects=mesh.objects)
 
     steps = np.rint(mesh.positions[order].astype(np.float64) * (_METRES_PER_UM / step_m))
     lattice = steps.astype(np.int64)
@@ -236,7 +236,7 @@ def _pick(textures: Textures) -> dict[str, bytes]:
     return {name: data for name, data in named.items() if data is not None}
 
 
-def vertex_colors(mesh: Mesh, occlusion: bool = True) -> NDArray[np.uint8] | None:
+def vertex_colors(mesh: Mesh, *, occlusion: bool = True) -> NDArray[np.uint8] | None:
     """Return the factors of the base colour, uint8 (n, 3): the mesh's colours, darker where light
     is occluded. None: the mesh has neither.
 

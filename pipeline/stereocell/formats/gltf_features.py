@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from stereocell.formats.meshopt import CompressedBuffers
 from stereocell.model.object_table import MISSING, Column, ObjectTable
 
-MAX_OBJECTS = 1 << 16  # in a file: 16 bits name them
-MAX_COLUMNS = 8  # in a file, besides the label
+MAX_OBJECTS = 1 << 16  # most objects of a file: 16 bits name them
+MAX_COLUMNS = 8  # most columns of a file, besides the label
 _LABEL = "label"
 _UNSIGNED_SHORT = 5123
 _NO_NUMBER = float(np.finfo(np.float32).min)  # stands for NaN, which JSON has not
@@ -32,7 +32,7 @@ class Features:
     columns: tuple[Column, ...]
 
 
-def tile_features(table: ObjectTable, tile: str, wanted: tuple[str, ...] = ()) -> Features:
+def tile_features(table: ObjectTable, tile: str, *, wanted: tuple[str, ...] = ()) -> Features:
     """Return a tile's objects, with `volume_um3` and the wanted columns, MAX_COLUMNS at most."""
     rows = table.rows[tile]
     first = table.columns[0].id if table.columns else _LABEL

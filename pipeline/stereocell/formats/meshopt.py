@@ -11,7 +11,7 @@ _VERTICES, _INDICES = 34962, 34963  # bufferView.target
 
 
 def reorder(
-    triangles: NDArray[np.uint32], vertex_count: int, objects: NDArray[np.int32] | None = None
+    triangles: NDArray[np.uint32], vertex_count: int, *, objects: NDArray[np.int32] | None = None
 ) -> tuple[NDArray[np.uint32], NDArray[np.intp]]:
     """Return the triangles in an order that suits the GPU's vertex cache, and the vertices to keep.
 
@@ -66,7 +66,7 @@ class CompressedBuffers:
         return self.add_attribute(_octahedral(directions), accessor, filter_name="OCTAHEDRAL")
 
     def add_attribute(
-        self, values: NDArray[Any], accessor: dict[str, Any], filter_name: str | None = None
+        self, values: NDArray[Any], accessor: dict[str, Any], *, filter_name: str | None = None
     ) -> int:
         """Store one row per vertex; return the accessor's index.
 

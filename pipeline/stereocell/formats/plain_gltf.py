@@ -24,7 +24,7 @@ from stereocell.storage.atomic_write import replacing
 
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5121, 5123, 5125, 5126
 _VERTICES, _INDICES = 34962, 34963  # bufferView.target
-_MAX_BYTES = 2**32 - 1  # of a .glb, whose length is a number of 32 bits
+_MAX_BYTES = 2**32 - 1  # largest size of a .glb in bytes: its length is a number of 32 bits
 
 
 class Buffers(Protocol):
@@ -136,7 +136,9 @@ class Document:
             self._nodes[0]["children"].append(len(self._nodes) - 1)
         key = group, material
         number = self._materials.setdefault(key, len(self._materials))
-        primitive, place = self._buffers.add_mesh(mesh, positions, vertex_colors(mesh, occlusion))
+        primitive, place = self._buffers.add_mesh(
+            mesh, positions, vertex_colors(mesh, occlusion=occlusion)
+        )
         self._meshes.append({"name": name, "primitives": [{**primitive, "material": number}]})
         node = {"name": name, "mesh": len(self._meshes) - 1, **place, "extras": dict(extras)}
         self._nodes.append(node)

@@ -40,6 +40,7 @@ from numcodecs import blosc
 from numpy.typing import NDArray
 
 from stereocell.model.errors import StageError
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.volume import zyx_to_xyz
 from stereocell.storage.atomic_write import write_bytes
 
@@ -80,8 +81,8 @@ def write_vdb(
     path: Path,
     density: NDArray[np.uint8],
     *,
-    first_um: tuple[float, float, float],
-    spacing_um: tuple[float, float, float],
+    first_um: Point,
+    spacing_um: Spacing,
     measured: NDArray[Any] | None = None,
     apron: int = 0,
 ) -> None:

@@ -28,7 +28,7 @@ from stereocell.formats.vdb import (
 from stereocell.model.errors import StageError
 
 _MAPS = {"ScaleTranslateMap", "UniformScaleTranslateMap"}
-_MASK_BYTES = LEAF**3 // 8  # of a leaf
+_MASK_BYTES = LEAF**3 // 8  # bytes of a leaf's mask: a bit for each voxel
 _FRAME_HEAD = 16  # bytes of a frame of Blosc before its numbers; at 4 stands what they unpack to
 
 

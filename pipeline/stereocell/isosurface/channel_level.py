@@ -162,7 +162,7 @@ class ChannelLevels:
         sight = self._sight_of(tile)
         if not sight.parts(level.value):
             return level.value
-        own = sight.histogram.half_height(level.value)
+        own = sight.histogram.half_height(start=level.value)
         if not np.isfinite(own) or not sight.parts(own):
             return level.value
         weight = sight.judge(own, sight.histogram, level.dip).confidence
@@ -170,7 +170,7 @@ class ChannelLevels:
         drawn = level.value + weight * (own - level.value) - level.outside
         return level.outside + min(max(drawn, height / TILE_FACTOR), height * TILE_FACTOR)
 
-    def curve(self, points: int = 256) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    def curve(self, *, points: int = 256) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return voxel values and the share of the voxels around each, highest 1, for a chart."""
         return self._sight.histogram.outline(self.noise, points)
 
@@ -254,7 +254,7 @@ def _by_edges(
     sums = [tile.edges[found.subtracts] for tile in tiles if tile.edges is not None]
     value = None
     if known := [one for one in sums if one is not None]:
-        value = choose_by_edges(reduce(EdgeSums.__add__, known), found.histogram, options)
+        value = choose_by_edges(reduce(EdgeSums.__add__, known), found.histogram, options=options)
     return replace(found, ladder=() if value is None else (found.judge(value),))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
+from stereocell.model.spacing import Spacing
 
 _Ints = NDArray[np.int32]
 
@@ -25,7 +26,7 @@ class Components:
     voxels: NDArray[np.int64]
     _faces: NDArray[np.int64]
     _shape: tuple[int, int, int]
-    _runs: tuple[NDArray[np.int64], _Ints, _Ints, _Ints]  # of rows, starts, stops, components
+    _runs: tuple[NDArray[np.int64], _Ints, _Ints, _Ints]  # each run's row, start, stop, component
 
     def faces(self) -> NDArray[np.int64]:
         """Return how many triangles an iso-surface around each component has, int64 (n,).
@@ -44,7 +45,7 @@ class Components:
 
 
 def find_components(
-    mask: NDArray[np.bool_], spacing_um: tuple[float, float, float], connectivity: Literal[6, 26]
+    mask: NDArray[np.bool_], spacing_um: Spacing, connectivity: Literal[6, 26]
 ) -> Components:
     """Return the connected components of a mask.
 

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes
-
-Spacing = tuple[float, float, float]
+from stereocell.model.spacing import Spacing
 
 
 def gradient_magnitude(field: NDArray[np.float32], spacing_um: Spacing) -> NDArray[np.float32]:
@@ -49,6 +48,11 @@ def signed_distance(
 
 
 def to_distance(above: NDArray[np.float32], *, spacing_um: Spacing, value_range: float) -> None:
-    """Replace a field above its iso-value by the distance, in place: see `signed_distance`."""
+    """Replace a field above its iso-value by the distance, in place: see `signed_distance`.
+
+    above        float32 (z, y, x), voxel values less the iso-value; afterwards um
+    spacing_um   (z, y, x)
+    value_range  dataset-wide, voxel values
+    """
     steps = np.array(spacing_um, np.float64)
     divide_by_slopes(above, steps, 1e-6 * value_range, 2.0 * max(spacing_um))

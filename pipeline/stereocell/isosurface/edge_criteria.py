@@ -79,7 +79,7 @@ def gather_edges(
 
 
 def choose_by_edges(
-    sums: EdgeSums, histogram: LevelHistogram, options: IsoValueOptions
+    sums: EdgeSums, histogram: LevelHistogram, *, options: IsoValueOptions
 ) -> float | None:
     """Return the level of the largest score, in voxel values; None where none separates anything.
 

@@ -22,18 +22,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
 SKIN_HU = -300.0
 MIN_HU = -500.0  # darkest voxel, at most: else the values are no Hounsfield units
 _DEPTH_UM, _DEPTH_SHARE = 12_000.0, 0.1  # depth of a core; at most this share of the body's side
-_CORE_SHARE = 0.02  # of the largest core's voxels: arms and legs have cores of their own
+_CORE_SHARE = 0.02  # least share of the largest core's voxels: arms and legs have own cores
 _SLACK = 1.5  # coarsest spacings that the body reaches beyond a core's depth
 _LENGTH = 8.0  # depths: diagonal of the box of a piece that is apart, at least
 _JOINED = 0.18  # share of its surface that joins it to the body or to the volume's end, at most
-_SMALLER = 0.5  # of the body's voxels: what has more is body
-_BONE_HU, _BONE_SHARE = 500.0, 0.1  # of its voxels, at most; of five head holders .02
-_WITHIN = 4  # of six directions: where most of a piece sees the body in as many, it lies within
+_MAX_PIECE_SHARE = 0.5  # share of the body's voxels: a piece with more of them belongs to the body
+_BONE_HU, _BONE_SHARE = 500.0, 0.1  # HU; largest share of a holder's voxels above; five had .02
+_MIN_DIRECTIONS = 4  # directions of six in which most of a piece inside the body sees the body
 _CELLS = 1 << 20  # most cells of the mask that is kept
 
 
@@ -103,9 +104,7 @@ class Holder:
         )
 
 
-def find_holder(
-    voxels: NDArray[Any], spacing_um: tuple[float, float, float], region: Box
-) -> Holder | None:
+def find_holder(voxels: NDArray[Any], spacing_um: Spacing, region: Box) -> Holder | None:
     """Return what is to be left out of a CT; None: nothing is.
 
     voxels      (z, y, x), Hounsfield units; they cover `region` at any resolution
@@ -128,7 +127,7 @@ def find_holder(
     boxes = np.asarray(measures["bounding_boxes"], np.int64).reshape(-1, 3, 2)
     largest_first = np.argsort(-counts[1:], kind="stable") + 1
     for number in largest_first:
-        if counts[number] <= _SMALLER * np.count_nonzero(body):
+        if counts[number] <= _MAX_PIECE_SHARE * np.count_nonzero(body):
             break
         body |= labels == number
     found, pieces = np.zeros(voxels.shape, bool), []
@@ -190,7 +189,7 @@ def _is_within(piece: NDArray[np.bool_], body: NDArray[np.bool_]) -> bool:
         for way in (slice(None), slice(None, None, -1)):
             along = tuple(way if k == axis else slice(None) for k in range(3))
             sides += np.logical_or.accumulate(body[along], axis=axis)[along][piece]
-    return bool(np.mean(sides >= _WITHIN) > 0.5)
+    return bool(np.mean(sides >= _MIN_DIRECTIONS) > 0.5)
 
 
 def _joined(

@@ -19,6 +19,7 @@ from stereocell.isosurface.level_histogram import BINS, Scale
 from stereocell.isosurface.neighbours import Neighbours
 from stereocell.isosurface.options import Criterion
 from stereocell.kernels.level_sums import count_differences, sum_by_value
+from stereocell.model.spacing import Spacing
 
 MAX_PADDING = 0.8  # share of the voxels: padding that covers more is the ground, without noise
 LAG = 4  # voxels along x between the two values whose difference is noise: beyond the denoising
@@ -96,9 +97,7 @@ class Counting:
     mask: tuple[float, float] | None = None
 
 
-def denoising_reach(
-    sigma_um: float, spacing_um: tuple[float, float, float]
-) -> tuple[int, int, int]:
+def denoising_reach(sigma_um: float, spacing_um: Spacing) -> tuple[int, int, int]:
     """Return how many voxels (z, y, x) away a denoised voxel depends on others."""
     z, y, x = (int(np.ceil(SMOOTHING_REACH * sigma_um / step)) for step in spacing_um)
     return z, y + MEDIAN_REACH, x + MEDIAN_REACH
@@ -145,7 +144,7 @@ def gather_evidence(
     own: Slices,
     *,
     voxels: NDArray[Any],
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     counting: Counting,
     start: tuple[int, int, int] = (0, 0, 0),
     background: NDArray[np.float32] | None = None,
@@ -201,7 +200,7 @@ def _gather(
     field: NDArray[np.float32],
     padding: NDArray[np.bool_],
     own: Slices,
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     counting: Counting,
     background: NDArray[np.float32] | None,
 ) -> TileEvidence:
@@ -217,7 +216,7 @@ def _edges(
     field: NDArray[np.float32],
     padding: NDArray[np.bool_],
     own: Slices,
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     scale: Scale,
     criterion: Criterion,
 ) -> EdgeSums:
@@ -230,7 +229,7 @@ def _binned(
     field: NDArray[np.float32],
     padding: NDArray[np.bool_],
     own: Slices,
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     scale: Scale,
 ) -> tuple[Sums, Sums]:
     """Return the sums over the voxels that are no padding, and over padding."""

@@ -172,7 +172,7 @@ class LevelHistogram:
             level = found
         return level + least
 
-    def half_height(self, start: float | None = None) -> float:
+    def half_height(self, *, start: float | None = None) -> float:
         """Return the level half-way between what it has inside and outside; NaN where none has.
 
         The search begins at `start`, by default Li's threshold. Each step goes half of the way, so

@@ -7,6 +7,7 @@ from typing import Any
 
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, Flag, length_um, setting
+from stereocell.model.spacing import Spacing
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +67,14 @@ class IsoValueOptions:
         LADDER,
         f"{LADDER}: by histograms of all tiles; {', '.join(CRITERIA)}: by edges; {ADAPTIVE}: the "
         "channel's threshold",
-        Flag("--iso-criterion", "how iso-values are found: ladder (default), edges, adaptive, ..."),
+        flag=Flag(
+            "--iso-criterion", "how iso-values are found: ladder (default), edges, adaptive, ..."
+        ),
     )
     scope: str = setting(
         "channel",
         "channel: one level for all tiles; tile: each tile's own, near the channel's",
-        Flag("--iso-scope", "channel (default): one level for all tiles; tile: each its own"),
+        flag=Flag("--iso-scope", "channel (default): one level for all tiles; tile: each its own"),
     )
     rung: str = setting(
         "outer",
@@ -142,12 +145,14 @@ class SurfaceOptions:
     wrap: str = setting(
         "voxels",
         "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)",
-        Flag("--wrap", "how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"),
+        flag=Flag(
+            "--wrap", "how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"
+        ),
     )
     closed_tiles: bool = setting(
         False,
         "whether the stage gets a closed STL of every tile and channel, in um",
-        Flag(
+        flag=Flag(
             "--closed-tiles",
             "also a closed STL of every tile and channel, for printing and booleans",
         ),
@@ -160,7 +165,7 @@ class SurfaceOptions:
         AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"
     )
 
-    def resolved(self, spacing_um: tuple[float, float, float]) -> "SurfaceOptions":
+    def resolved(self, spacing_um: Spacing) -> "SurfaceOptions":
         """Return the options with lengths in place of `auto`, but for alpha and offset.
 
         `auto` alpha and offset follow from the connected components. Raises UsageError for a value

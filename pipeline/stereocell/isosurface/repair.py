@@ -22,6 +22,7 @@ from scipy import ndimage
 
 from stereocell.isosurface.components import find_components
 from stereocell.kernels.closing import close_gaps
+from stereocell.model.spacing import Spacing
 
 Distance = NDArray[np.float32]
 
@@ -46,7 +47,7 @@ class RepairOptions:
     max_fragment_um: float = 0.0
     offset_um: float = 0.0
 
-    def reach_um(self, spacing_um: tuple[float, float, float]) -> float:
+    def reach_um(self, spacing_um: Spacing) -> float:
         """Return how far, in um, a voxel's result depends on others: the halo must cover it."""
         closing = 2 * self.alpha_um + 2 * max(spacing_um) if self.alpha_um > 0 else 0.0
         fragment = max(self.min_diagonal_um, self.max_fragment_um)
@@ -62,9 +63,7 @@ class Repaired:
     cavities_filled: int
 
 
-def repair(
-    distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
-) -> Repaired:
+def repair(distance: Distance, spacing_um: Spacing, *, options: RepairOptions) -> Repaired:
     """Clean a signed distance, in place.
 
     distance    float32 (z, y, x), um, positive inside
@@ -81,9 +80,7 @@ def repair(
     return Repaired(distance, dropped, filled)
 
 
-def _drop_fragments(
-    distance: Distance, spacing_um: tuple[float, float, float], options: RepairOptions
-) -> int:
+def _drop_fragments(distance: Distance, spacing_um: Spacing, options: RepairOptions) -> int:
     """Set small solids inside the window far outside, and return their number."""
     # 26-connected: a fragment that touches a neighbour by a corner belongs to it
     components = find_components(distance > 0, spacing_um, 26)
@@ -105,9 +102,7 @@ def _drop_fragments(
     return int(small.sum())
 
 
-def _fill_cavities(
-    distance: Distance, spacing_um: tuple[float, float, float], max_diagonal_um: float
-) -> int:
+def _fill_cavities(distance: Distance, spacing_um: Spacing, max_diagonal_um: float) -> int:
     """Set small cavities far inside, and return their number.
 
     A cavity is a hole that no path joins to the outside.
@@ -119,7 +114,7 @@ def _fill_cavities(
     return int(small.sum())
 
 
-def _close(distance: Distance, spacing_um: tuple[float, float, float], alpha_um: float) -> None:
+def _close(distance: Distance, spacing_um: Spacing, alpha_um: float) -> None:
     """Add to the solid the voxels that a ball of radius alpha, rolling outside, cannot reach.
 
     The added part lies one voxel inside, so that smooth parts of the surface stay where they are.

@@ -24,6 +24,7 @@ from stereocell.isosurface.components import find_components
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.settings import AUTO
+from stereocell.model.spacing import Spacing
 
 SHARE = 0.5  # share of a mean below which a fragment goes
 ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
@@ -49,7 +50,7 @@ class ComponentSums:
 
 
 def sum_components(
-    inside: NDArray[np.bool_], spacing_um: tuple[float, float, float], min_diagonal_um: float
+    inside: NDArray[np.bool_], spacing_um: Spacing, min_diagonal_um: float
 ) -> ComponentSums:
     """Return the sums over the connected components of {field > iso-value}.
 
@@ -82,7 +83,7 @@ def choose_repair(
     most: RepairOptions,
     *,
     surface: SurfaceOptions,
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
 ) -> RepairOptions:
     """Return how a channel's surface is repaired.
 

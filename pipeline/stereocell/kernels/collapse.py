@@ -42,16 +42,16 @@ from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_tw
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.triangles import Points, closest, doubled_area, smallest_angle_cosine
 
-CLASSES = 6  # of cost
-PASSES = 4  # over one class; the last class has LAST
+CLASSES = 6  # number of classes of cost
+PASSES = 4  # passes over one class; the last class has LAST
 LAST = 40
 MAX_NEIGHBOURS = 512  # neighbours of a vertex that is looked at
 NEVER = 32000  # class of a vertex that has no collapse
 TURN = 0.25  # squared cosine of the largest turn of a triangle: 60 degrees
 SLIVER = 0.9945  # cosine of 6 degrees: the normal of a sharper triangle says little
-SHARPER = 0.36  # of the sharpest angle around .6 is allowed: 1 - cos goes with its square
+SHARPER = 0.36  # square of the least share of the sharpest angle, .6: 1 - cos goes with the square
 VALENCE = 24  # most neighbours of two ends together
-SURE = 1 - 1e-9  # of a class's bound: a price below that is of no higher class, rounded as it is
+SURE = 1 - 1e-9  # share of a class's bound: a lower price, even rounded, is in no higher class
 BLOCK = 4096  # vertices that are worked on together
 LINE = 64  # bytes of the cache
 

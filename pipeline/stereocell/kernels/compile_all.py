@@ -54,7 +54,7 @@ from stereocell.kernels.walls import (
 
 OF_MESHES = "of-meshes"  # the argument of the process that compiles these
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
-_TWINS = [11, 6, 3, 2, 8, 9, 1, 10, 4, 5, 7, 0]  # of each edge of these triangles
+_TWINS = [11, 6, 3, 2, 8, 9, 1, 10, 4, 5, 7, 0]  # twin of each half-edge of _TRIANGLES
 _TRIANGLES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
 
 

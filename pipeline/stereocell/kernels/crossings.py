@@ -18,7 +18,7 @@ from stereocell.kernels.triangles import Points, Triple, doubled_area
 # relative errors of the determinants of orient3d and orient2d: Shewchuk's bounds A
 ERROR_3D = (7 + 56 * 2.0**-53) * 2.0**-53
 ERROR_2D = (3 + 16 * 2.0**-53) * 2.0**-53
-UNSURE = 2  # in place of a sign
+UNSURE = 2  # value of a sign that is not certain
 FACING = 1e-6  # least cosine of two normals that says on which side of an edge triangles lie
 
 

@@ -14,7 +14,7 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints
 from stereocell.kernels.triangles import Points
 
-BITS = 6  # of a cell's place along an axis: 64 cells along the longest side of the box
+BITS = 6  # bits of a cell's place along an axis: 64 cells along the longest side of the box
 
 
 @part

@@ -21,9 +21,9 @@ from stereocell.kernels.edge_records import (
 from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_twins
 from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_cosine
 
-STEPS = 4  # in which the error grows up to its bound: flat parts go first
-PASSES = 6  # over one step
-SHARPER = 0.1  # of the sharpest angle around a third is allowed: 1 - cos goes with its square
+STEPS = 4  # steps in which the error grows up to its bound: flat parts go first
+PASSES = 6  # passes over one step
+SHARPER = 0.1  # square of the least share of the sharpest angle: 1 - cos goes with the square
 
 
 @part

@@ -11,7 +11,7 @@ from stereocell.meshes.triangle_grid import make_grid
 from stereocell.model.mesh import Mesh, Spread
 
 PERCENTILE = 99.0  # percent; a sliver that vanishes, less than 1 % of the area, does not count
-VERTICES = 50_000  # of a mesh, at most, that are asked for the largest distance
+VERTICES = 50_000  # largest number of a mesh's vertices that are asked for the largest distance
 NEVER = np.int32(np.iinfo(np.int32).max)  # more than all points of a mesh's lifetime
 ON_UM = 1e-6  # um; points this close count as on the surface: float32 rounds
 

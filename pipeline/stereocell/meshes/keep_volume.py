@@ -11,8 +11,8 @@ for it, unless these are FEW; a body that still crosses after all TRIES stays. W
 in noise, of which walls are nearer than the move is long, these bodies stay at once: tries would
 cost more than all the rest of a level.
 
-Between near walls a body may have no room: it LACKS volume, and whoever makes the level simplifies
-it less (textures/lod_chain.py).
+Between near walls a body may have no room: it lacks volume, and textures/lod_chain.py simplifies
+the level less.
 """
 
 from dataclasses import dataclass, replace
@@ -33,10 +33,10 @@ from stereocell.model.mesh import Mesh
 
 STEPS = 4  # Newton's; volume is a cubic function of the distance
 FADE = 1.25  # moves are whole from this many largest moves from a cut on
-TRIES = 12  # in which vertices of defects move less far, before a body with defects stays
-EASED = 0.5  # what is left of the way of such vertices with each try
-MIN_WAY = 0.05  # share of the way under which they stay
-LACKS = 0.03  # of a body's volume, more of which it may not miss
+TRIES = 12  # most tries with shorter moves of defects' vertices, before a body with defects stays
+SHORTENING = 0.5  # factor by which each try shortens the moves of such vertices
+MIN_WAY = 0.05  # share of the way below which they stay
+MAX_VOLUME_ERROR = 0.03  # largest error of a body's volume, as a share of that volume
 
 FEW = 0.02  # share of a body's vertices that may stay without others moving farther for them
 MANY = 0.05  # share of a level's vertices in defects of its first try, and their number
@@ -51,7 +51,7 @@ class Kept:
     """A level that has got its volumes back, as far as that goes.
 
     defects  those that are left
-    lacks    bool (n,), vertices of bodies that are still off by more than LACKS of their volume;
+    lacks    bool (n,), vertices of bodies whose volume is still off by more than MAX_VOLUME_ERROR;
              none is named where MANY cross
     """
 
@@ -133,7 +133,7 @@ class FineVolumes:
                 other[faulty] = True
                 fresh = other[mesh.triangles].any(axis=1)
             placed = replace(mesh, positions=positions)
-            defects = find_defects(placed, planes, fresh, topology)
+            defects = find_defects(placed, planes=planes, fresh=fresh, topology=topology)
             faulty = defects.vertices(mesh.triangles)
             worst = np.zeros(count, bool)
             worst[label[faulty]] = True
@@ -145,14 +145,14 @@ class FineVolumes:
             if are_many or number == TRIES:
                 share[worst[label]] = 0.0
             else:
-                share[faulty] *= np.where(share[faulty] > MIN_WAY * whole[faulty], EASED, 0.0)
+                share[faulty] *= np.where(share[faulty] > MIN_WAY * whole[faulty], SHORTENING, 0.0)
             eased = np.divide(share, before, out=np.zeros_like(share), where=before > 0)[:, None]
             few = np.bincount(label, whole - share, count) < FEW * size
             moved = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
             moves = np.where(few[label][:, None], moves * eased, moved)
         assert placed is not None
         missing = wanted - self._measure(start + moves, triangles, label, count)
-        lacks = (np.abs(missing) > LACKS * self._solid[of_fine]) & (not are_many)
+        lacks = (np.abs(missing) > MAX_VOLUME_ERROR * self._solid[of_fine]) & (not are_many)
         return Kept(placed, defects, lacks[label])
 
     def find_bodies(self, chosen: NDArray[np.int64], among: NDArray[np.int64]) -> NDArray[np.bool_]:

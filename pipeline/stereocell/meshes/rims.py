@@ -22,7 +22,7 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 
 SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle at the plane, or a third of those there
-TRIES = 4  # with vertices near crossings kept, before all of the plane stay
+TRIES = 4  # most tries that keep vertices near crossings, before all of the plane stay
 
 Numbers = NDArray[np.int64]
 

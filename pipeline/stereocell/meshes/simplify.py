@@ -25,7 +25,7 @@ SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle, unless those aroun
 FLIP_DEG = 25.0  # degrees; edges of sharper triangles flip
 
 
-def simplify(mesh: Mesh, max_error_um: float, planes: tuple[Plane, ...] = ()) -> Mesh:
+def simplify(mesh: Mesh, max_error_um: float, *, planes: tuple[Plane, ...] = ()) -> Mesh:
     """Return the mesh with as few triangles as the error allows; boundary vertices stay.
 
     mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)
@@ -53,7 +53,7 @@ def find_errors(
     """Return the error that each vertex may have (n,), um: less on bodies that are small for it.
 
     max_error_um  of all, or of each (n,)
-    bodies        of each vertex, and their number: see `label_bodies`
+    bodies        body of each vertex, int32 (n,), and the number of bodies: see `label_bodies`
     """
     labels, count = bodies
     sides = measure_boxes(mesh.positions.astype(np.float64), labels, count)
@@ -96,7 +96,10 @@ def simplify_part(
 
 
 def find_planes(positions: NDArray[np.float32], planes: tuple[Plane, ...]) -> NDArray[np.uint8]:
-    """Return a bit for each plane that a vertex lies in, uint8 (n,)."""
+    """Return a bit for each plane that a vertex lies in, uint8 (n,).
+
+    positions  float32 (n, 3), (x, y, z), um
+    """
     bits = np.zeros(len(positions), np.uint8)
     for bit, (column, value) in enumerate(planes):
         bits |= (positions[:, column] == np.float32(value)).astype(np.uint8) << bit

@@ -21,8 +21,8 @@ from stereocell.model.mesh import Mesh
 
 ROUNDS = 12  # most rounds in which defective bodies are simplified again
 GROWTH = 2.0  # factor by which the ball of locked vertices grows with each try in a place
-HAIR = 1e-6  # by which a ball is larger than the way to its nearest vertex
-APART = 8  # of the vertices of a body that is inside out every 8th is locked first
+HAIR = 1e-6  # share by which a ball is larger than the way to its nearest vertex
+LOCKED_EVERY = 8  # every 8th vertex of a body that is inside out is locked first, then more of them
 
 Triangles = NDArray[np.uint32]
 
@@ -79,7 +79,7 @@ def simplify_without_defects(
         used, own = renumber(triangles, len(mesh.positions))
         draft = Mesh(mesh.positions[used], own, mesh.normals[used])
         found = find_topology(own, len(used))
-        defects = find_defects(draft, planes, fresh, found)
+        defects = find_defects(draft, planes=planes, fresh=fresh, topology=found)
         worst = set(body[used[defects.vertices(own)]].tolist()) - kept
         if not worst:
             break
@@ -92,7 +92,7 @@ def simplify_without_defects(
             tree = tree or cKDTree(mesh.positions, balanced_tree=False, compact_nodes=False)
             tries[_around(tree, draft, defects, tries)] += 1
             turned = body[used[own[defects.inside_out, 0]]]
-            tries[_some_of(body, turned, max(1, APART >> number))] += 1
+            tries[_some_of(body, turned, max(1, LOCKED_EVERY >> number))] += 1
             part = again(part)
         else:
             kept |= worst

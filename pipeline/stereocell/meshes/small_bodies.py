@@ -1,9 +1,9 @@
 """Bodies that a coarse level does without: fewer bodies, rather than thinner ones.
 
 A closed body whose box has a diagonal of less than SMALL errors goes as a whole, smallest first,
-as long as all that go have at most SHARE of the surface's area. Large bodies have less area for
-their volume, so the volume that goes is a smaller share. A body that a cut opens stays: both tiles
-would have to decide alike.
+as long as all that go have at most MAX_AREA_SHARE of the surface's area. Large bodies have less
+area for their volume, so the volume that goes is a smaller share. A body that a cut opens stays:
+both tiles would have to decide alike.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from stereocell.meshes.validity import Topology, find_topology
 from stereocell.model.mesh import Mesh
 
 SMALL = 4.0  # errors; at the default errors only lod3's is larger than fragments that stay
-SHARE = 0.02  # of the area
+MAX_AREA_SHARE = 0.02  # largest share of the surface's area in bodies that go
 
 
 class SmallBodies:
@@ -39,5 +39,5 @@ class SmallBodies:
         order = np.flatnonzero(small)
         order = order[np.argsort(self._diagonals[order], kind="stable")]
         goes = np.zeros(len(small), bool)
-        goes[order[np.cumsum(self._areas[order]) <= SHARE * self._areas.sum()]] = True
+        goes[order[np.cumsum(self._areas[order]) <= MAX_AREA_SHARE * self._areas.sum()]] = True
         return goes[self._label]

@@ -10,7 +10,7 @@ from stereocell.kernels.grid import bound_all, bound_boxes, count_entries, find_
 Points = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-EDGE = 1.5  # of a cell, in lengths of the median side of a triangle
+EDGE = 1.5  # edge of a cell, in lengths of the median side of a triangle
 ENTRIES = 12  # cells that a triangle may lie in, on average: large ones among small ask for more
 CELLS = 16  # a triangle, at most: a mesh fills little of its box
 COARSE = 128  # cells along the longest side of a mesh, to see which triangles are near others

@@ -109,6 +109,7 @@ def find_topology(triangles: NDArray[np.integer], vertices: int) -> Topology:
 
 def find_defects(
     mesh: Mesh,
+    *,
     planes: tuple[Plane, ...] = (),
     fresh: NDArray[np.bool_] | None = None,
     topology: Topology | None = None,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.lattice_field import LatticeField
 
-SurfaceVerdict = Literal["clear", "unsure", "none"]
+SurfaceConfidence = Literal["clear", "unsure", "none"]
 LOW_CONFIDENCE = 0.6  # 0..1; below it about half of the surfaces were right (docs/decisions.md)
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 ShapeKind = Literal["rectangle", "triangle"]
@@ -113,7 +113,7 @@ class Appearance:
     window: tuple[float, float]
     iso_value: float | None
     iso_confidence: float
-    surface: SurfaceVerdict
+    surface: SurfaceConfidence
     transfer_functions: dict[str, OpacityPoints]
     painted_by: str = ""
     transfer_2d: TransferFunctions2d = field(default_factory=TransferFunctions2d)

@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.volume import zyx_to_xyz
 
-Spacing = tuple[float, float, float]  # distance between samples in um, (z, y, x)
-Point = tuple[float, float, float]  # position in um, (z, y, x)
 Step = tuple[int, int, int]  # every how many planes of voxels one is kept, (z, y, x)
 Plane = tuple[int, float]  # axis of a position (0 x, 1 y, 2 z), and its value in um
 
@@ -33,13 +32,13 @@ class Lattice:
     origin_um: Point
 
     @classmethod
-    def of_whole(cls, box: Box, spacing_um: Spacing, origin_um: Point = (0, 0, 0)) -> "Lattice":
+    def of_whole(cls, box: Box, spacing_um: Spacing, *, origin_um: Point = (0, 0, 0)) -> "Lattice":
         """Return the lattice of a volume that is a single tile, and the whole region."""
         return cls(box, box, box, spacing_um, origin_um)
 
     def alone(self) -> "Lattice":
         """Return the lattice of the tile's own points as if no other tile followed."""
-        return Lattice.of_whole(self.own, self.spacing_um, self.origin_um)
+        return Lattice.of_whole(self.own, self.spacing_um, origin_um=self.origin_um)
 
     def grown(self, voxels: int) -> "Lattice":
         """Return the lattice with `voxels` more own points on each side, within the region."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_CATEGORIES = 255  # of a column; a column of more words is left out, and said so
+MAX_CATEGORIES = 255  # most words of a column; a column with more is left out, and the log says so
 MISSING = -1  # the code of an object without a category
 
 

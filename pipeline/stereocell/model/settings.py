@@ -22,7 +22,7 @@ class Flag:
     form: str = ""
 
 
-def setting(default: Any, comment: str, flag: Flag | None = None) -> Any:
+def setting(default: Any, comment: str, *, flag: Flag | None = None) -> Any:
     """Return a dataclass field: its default and comment become a line of `stereocell.toml`."""
     metadata = {"comment": comment, "flag": flag}
     if isinstance(default, dict):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from stereocell.model.channel import PaintColors
 from stereocell.model.mesh import Lod
 from stereocell.model.object_table import ObjectTable, SharedWalls
+from stereocell.model.spacing import Point, Spacing
 
 APRON = 1  # voxels added around a volume on every side; trilinear filtering reads them
 Provenance = dict[str, Any]
@@ -51,8 +52,8 @@ class TileContent:
     """
 
     id: str
-    spacing_um: tuple[float, float, float]
-    first_um: tuple[float, float, float]
-    last_um: tuple[float, float, float]
+    spacing_um: Spacing
+    first_um: Point
+    last_um: Point
     own_shape: tuple[int, int, int]
     channels: tuple[ChannelContent, ...]

@@ -43,7 +43,7 @@ class Box:
         z1, y1, x1 = stop
         return Box((z0, y0, x0), (z1, y1, x1))
 
-    def thinned(self, region: "Box", step: tuple[int, int, int], outward: bool = False) -> "Box":
+    def thinned(self, region: "Box", step: tuple[int, int, int], *, outward: bool = False) -> "Box":
         """Return the box in thinned planes: every `step`-th is kept, from the region's first on.
 
         It ends with the last kept plane inside it. With `outward` it ends with the next kept plane,

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stereocell.model.spacing import Point, Spacing
+
 
 @dataclass(frozen=True, slots=True)
 class Volume:
@@ -17,8 +19,8 @@ class Volume:
     """
 
     voxels: NDArray[Any]
-    spacing_um: tuple[float, float, float]
-    origin_um: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    spacing_um: Spacing
+    origin_um: Point = (0.0, 0.0, 0.0)
 
 
 def zyx_to_xyz(points_um: ArrayLike) -> NDArray[np.float64]:

@@ -20,7 +20,7 @@ from stereocell.read.spacing import um_per
 
 Triple = tuple[float, float, float]
 
-MAX_VOXELS = 4_000_000  # of all channels: a build of as many takes half a minute on two cores
+MAX_VOXELS = 4_000_000  # voxels of all channels: their build takes half a minute on two cores
 _MAX_READ = 2**30  # voxels: more take minutes to read
 _MIN_EDGE = 4  # voxels: a thinner array has no surface
 _AXES = {3: "zyx", 4: "czyx"}
@@ -147,7 +147,7 @@ def _names_of(array: Any, count: int) -> list[str]:
     return [f"channel {i + 1}" for i in range(count)]
 
 
-def find_blocks(source: ArraySource, most: int = MAX_VOXELS) -> tuple[int, int, int]:
+def find_blocks(source: ArraySource, *, most: int = MAX_VOXELS) -> tuple[int, int, int]:
     """Return the voxels (z, y, x) that become one, so that at most so many are left.
 
     The edges of the new voxels grow step by step until few enough are left: where those of the

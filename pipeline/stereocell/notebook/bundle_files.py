@@ -13,7 +13,7 @@ from stereocell.storage.json_files import read_json
 
 MANIFEST, _FILES = "manifest.json", "files.json"
 _REMEDY = "run `stereocell bundle OUT`"
-_LIGHTS = ("environments/sky.hdr", "environments/studio.hdr")  # of the viewer
+_LIGHTS = ("environments/sky.hdr", "environments/studio.hdr")  # the viewer's environments
 _WHOLE, _PART, _MISSING, _UNSATISFIABLE = 200, 206, 404, 416
 
 
@@ -36,7 +36,7 @@ class NotebookBundle:
         self.channels = [id_ for id_, _ in about]
         self.ids = {**{name: id_ for id_, name in about}, **{id_: id_ for id_, _ in about}}
 
-    def answer(self, path: object, header: object = None) -> tuple[int, bytes]:
+    def answer(self, path: object, *, header: object = None) -> tuple[int, bytes]:
         """Return the status of HTTP and the bytes of a file, or of the part that a Range asks for.
 
         What a page sends is anybody's: whatever it is, there is an answer.

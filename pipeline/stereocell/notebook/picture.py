@@ -58,7 +58,7 @@ def draw(out: Path, looks: Looks) -> bytes:
 def _layers(chosen: Chosen, looks: Looks) -> dict[float, list[Shape]]:
     """Return the shapes that show, by their opacity. Raises StageError where there is none."""
     layers: dict[float, list[Shape]] = {}
-    for piece in chosen.pieces(chosen.levels(_TRIANGLES)[0]):
+    for piece in chosen.pieces(chosen.levels(light=_TRIANGLES)[0]):
         look = looks.get(piece.channel.id, {})
         opacity = float(look.get("opacity", 1))
         if not (look.get("visible", True) and opacity):

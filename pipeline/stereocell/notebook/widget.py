@@ -131,7 +131,7 @@ class Viewer(anywidget.AnyWidget):
                 answer = {**about, "html": page.document(), "names": list(files)}
                 self.send(answer, list(files.values()))
             case "file":
-                status, found = self._files.answer(content.get("path"), content.get("range"))
+                status, found = self._files.answer(content.get("path"), header=content.get("range"))
                 self.send({**about, "status": status}, [found])
             case "picture":
                 png = bytes(buffers[0]) if buffers else b""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stereocell.meshes.distance import Nearest, measure_spread
 from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.timing import Clock
 from stereocell.objects.options import ObjectOptions
 from stereocell.objects.simplify_walls import simplify_walls
@@ -57,8 +58,8 @@ def build_objects(
     labels: NDArray[np.int32],
     owned: NDArray[np.int32],
     *,
-    spacing_um: tuple[float, float, float],
-    origin_um: tuple[float, float, float],
+    spacing_um: Spacing,
+    origin_um: Point,
     step_um: float,
     options: ObjectOptions,
     clock: Clock | None = None,
@@ -81,7 +82,7 @@ def build_objects(
         owned = np.setdiff1d(owned, thin)
     z, y, x = (o - MARGIN * s for o, s in zip(origin_um, spacing_um, strict=True))
     with clock("walls"):
-        walls = extract_walls(mended, spacing_um, step_um, (z, y, x))
+        walls = extract_walls(mended, spacing_um, step_um, origin_um=(z, y, x))
         del mended
         walls = _with_owned(walls, owned)
     count = int(padded.max(initial=0)) + 1

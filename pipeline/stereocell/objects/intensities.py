@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 PERCENTILE = 95.0
 NO_PIECES = np.zeros(0, np.int32)
-QUANTILES = 1001  # of a piece: its share of an object's percentile is known to a thousandth
+QUANTILES = 1001  # quantiles of a piece: the share of an object's percentile is exact to 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,7 @@ def measure_intensities(
     labels: NDArray[np.int32],
     voxels: NDArray[Any],
     numbers: NDArray[np.int32],
+    *,
     pieces: NDArray[np.int32] = NO_PIECES,
 ) -> Measured:
     """Return mean and percentile of the voxels of each object.
@@ -73,7 +74,7 @@ def _quantile(
 
 
 def merge_quantiles(
-    quantiles: NDArray[np.float32], voxels: NDArray[np.int64], share: float = PERCENTILE / 100
+    quantiles: NDArray[np.float32], voxels: NDArray[np.int64], *, share: float = PERCENTILE / 100
 ) -> float:
     """Return a quantile of an object of k pieces.
 
@@ -81,7 +82,7 @@ def merge_quantiles(
     voxels     int64 (k,), of each piece
 
     >>> pieces = np.array([[0, 1, 2], [10, 11, 12]], np.float32)
-    >>> merge_quantiles(pieces, np.array([30, 10]), 0.9)
+    >>> merge_quantiles(pieces, np.array([30, 10]), share=0.9)
     11.0
     """
     count = quantiles.shape[1]

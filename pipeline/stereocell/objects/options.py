@@ -22,7 +22,7 @@ class ObjectOptions:
     table: str = setting(
         "",
         "a table with a row an object: CSV, TSV, Parquet, .h5ad, or a table of SpatialData",
-        Flag(
+        flag=Flag(
             "--table",
             "a table with a row an object, joined by --table-key: CSV, TSV, Parquet, .h5ad",
             "FILE",
@@ -31,7 +31,7 @@ class ObjectOptions:
     table_key: str = setting(
         "",
         "the table's column of the objects' numbers; empty: CellID, label, Label, cell_id, ...",
-        Flag(
+        flag=Flag(
             "--table-key",
             "the table's column of the objects' numbers (default: CellID, label, cell_id, "
             "instance_id, object_id, whichever is there)",
@@ -41,13 +41,13 @@ class ObjectOptions:
     columns: tuple[str, ...] = setting(
         (),
         "columns of the table that are taken; empty: all, up to 128",
-        Flag("--columns", "columns of the table that are taken, as CD8,cell_type", "A,B,..."),
+        flag=Flag("--columns", "columns of the table that are taken, as CD8,cell_type", "A,B,..."),
     )
     segment_labels: bool = setting(
         False,
         "whether segments of DICOM have their SegmentLabel for a name: free text, which may say "
         "who the patient is; else the standard's words for their codes",
-        Flag(
+        flag=Flag(
             "--segment-labels",
             "call segments of DICOM by their SegmentLabel, free text that may say who the patient "
             "is (default: the standard's words for their codes)",
@@ -56,7 +56,7 @@ class ObjectOptions:
     color_by: str = setting(
         "",
         "the column that colours objects first; empty: the first of categories",
-        Flag("--color-by", "the column that colours objects first", "COLUMN"),
+        flag=Flag("--color-by", "the column that colours objects first", "COLUMN"),
     )
 
     def __post_init__(self) -> None:

@@ -24,8 +24,8 @@ from stereocell.kernels.walls import (
 from stereocell.meshes.simplify import OF_DIAGONAL, OF_SIDE, SHARPEST_DEG, STRAY
 from stereocell.objects.walls import Walls, find_faults, measure_volumes, put_on_lattice
 
-_ROUNDS = 12  # of simplifying, and of moving back
-_ANEW = 6  # of those rounds of moving, in which the way is found anew
+_ROUNDS = 12  # rounds of simplifying, and rounds of moving back
+_SEARCHES = 6  # first rounds of moving, in which the moves are found again
 _NEWTON = 4  # steps towards the volumes, at most
 _CLOSE = 5e-4  # share of a volume that may be missing
 
@@ -35,6 +35,7 @@ def simplify_walls(
     max_error_um: float,
     volumes_um3: NDArray[np.float64],
     step_um: float,
+    *,
     locked: NDArray[np.bool_] | None = None,
 ) -> tuple[Walls, bool]:
     """Return the walls with fewer triangles, and whether that came to an end.
@@ -70,7 +71,7 @@ def simplify_walls(
         )
         fewer = Walls(walls.positions, triangles[~gone], walls.sides[~gone])
         # triangles that are as they were don't meet one another
-        at_fault = find_faults(fewer, (triangles != walls.triangles).any(axis=1)[~gone])
+        at_fault = find_faults(fewer, fresh=(triangles != walls.triangles).any(axis=1)[~gone])
         if not len(at_fault):
             fewer, used = _compact(fewer)
             # twice: what smoothing took of objects of a few voxels comes back, too
@@ -94,8 +95,9 @@ def keep_volumes(
 
     And whether that came to an end; if not, they are as they were.
 
-    fixed    bool (n,), vertices that stay
-    most_um  how far a vertex may move
+    fixed        bool (n,), vertices that stay
+    most_um      how far a vertex may move
+    volumes_um3  float64 (objects + 1,), the volume that each object should have
 
     Moved is along the volumes' gradients, the least by the areas of the vertices' surroundings: a
     linear system of one unknown an object.
@@ -104,13 +106,13 @@ def keep_volumes(
     positions, past = walls.positions, walls.positions
     at_fault = np.zeros(0, np.int64)
     for turn in range(_ROUNDS):
-        if turn < _ANEW:  # what can't move makes the others move more
+        if turn < _SEARCHES:  # what can't move makes the others move more
             moved = _moved(walls, positions, volumes_um3, fixed, most_um)
             positions = put_on_lattice(moved, step_um)
         fresh = (positions != past).any(axis=1)
         fresh[at_fault] = True
         moved_now = fresh[walls.triangles].any(axis=1)
-        at_fault = find_faults(replace(walls, positions=positions), moved_now)
+        at_fault = find_faults(replace(walls, positions=positions), fresh=moved_now)
         if not len(at_fault):
             return replace(walls, positions=positions), True
         fixed[at_fault] = True

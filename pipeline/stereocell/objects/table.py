@@ -32,7 +32,7 @@ def own_columns(
 ) -> list[Column]:
     """Return what the pipeline itself knows of n objects.
 
-    facts     of each tile, with the rows of its objects
+    facts     of each tile: its objects' rows in the table, int32 (k,), and what is known of them
     channels  names of the image's channels that were measured
     """
     count = len(place.volume_um3)
@@ -107,14 +107,14 @@ def own_columns(
 
 
 def number_column(name: str, values: NDArray[np.float64], about: str) -> Column:
-    """Return a column of numbers; infinite ones are missing."""
+    """Return a column of numbers, float64 `values` (n,); infinite ones are missing."""
     with np.errstate(over="ignore"):
         narrow = np.asarray(values, np.float32)
     return Column(to_identifier(name), name, np.where(np.isfinite(narrow), narrow, np.nan), about)
 
 
 def category_column(
-    name: str, texts: Sequence[str], about: str, colors: Mapping[str, Triple] | None = None
+    name: str, texts: Sequence[str], about: str, *, colors: Mapping[str, Triple] | None = None
 ) -> Column | None:
     """Return a column of words; None: of more than MAX_CATEGORIES. An empty one is missing."""
     words = sorted({text for text in texts if text})
@@ -156,6 +156,8 @@ def choose_colors(count: int) -> list[Triple]:
 
 def hashed_colors(labels: NDArray[np.uint64]) -> NDArray[np.float32]:
     """Return a colour an object, linear RGB (n, 3), float32: neighbours seldom have the same.
+
+    labels  uint64 (n,), the objects' numbers in the label map
 
     They are pastels of many hues, so that none of them means anything.
     """

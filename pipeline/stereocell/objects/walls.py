@@ -21,6 +21,7 @@ from scipy import sparse
 from stereocell.kernels.walls import smooth_walls
 from stereocell.meshes.self_intersections import find_crossings, find_flat
 from stereocell.model.mesh import Mesh
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.volume import zyx_to_xyz
 
 # The last slices of a ball end in plates as wide as many voxels, which a filter keeps that passes
@@ -29,7 +30,7 @@ from stereocell.model.volume import zyx_to_xyz
 # Still more turns make pillows of boxes
 SMOOTHINGS = 70
 _INWARD, _OUTWARD = 0.64, -0.65  # shares of the way to the mean of the neighbours, by turns
-_ROUNDS = 12  # of putting vertices back
+_ROUNDS = 12  # rounds in which vertices are put back
 _REACH = 0.5  # voxels; farthest way of a vertex from its cube's centre, along each axis
 
 
@@ -49,9 +50,10 @@ class Walls:
 
 def extract_walls(
     labels: NDArray[np.int32],
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     step_um: float,
-    origin_um: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    origin_um: Point = (0.0, 0.0, 0.0),
 ) -> Walls:
     """Return the walls of a label map.
 
@@ -76,7 +78,7 @@ def extract_walls(
         walls = Walls(positions, *_split(positions, quads, sides))
         if fresh is not None:
             fresh |= (walls.triangles != before).any(axis=1)
-        at_fault = find_faults(walls, fresh)
+        at_fault = find_faults(walls, fresh=fresh)
         if not len(at_fault):
             return walls
         placed[at_fault] = centres[at_fault]
@@ -85,11 +87,11 @@ def extract_walls(
 
 
 def put_on_lattice(positions: NDArray[np.float64], step_um: float) -> NDArray[np.float64]:
-    """Return the points of the lattice that are nearest."""
+    """Return the points of the lattice that are nearest; positions are float64 (n, 3), um."""
     return np.round(positions / step_um) * step_um
 
 
-def find_faults(walls: Walls, fresh: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
+def find_faults(walls: Walls, *, fresh: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
     """Return the vertices (n,) of triangles without area, or that meet beside their corners.
 
     fresh  bool (m,), which triangles are looked at, and held against all; None: all
@@ -189,7 +191,7 @@ def measure_areas(walls: Walls) -> tuple[NDArray[np.int32], NDArray[np.float64]]
 def surfaces_of(walls: Walls, numbers: NDArray[np.int32]) -> Mesh:
     """Return the closed surfaces of objects as one mesh, one after the other, each by itself.
 
-    numbers  ascending; `Mesh.objects` counts in them
+    numbers  int32 (k,), ascending; `Mesh.objects` counts in them
 
     Normals are means over the areas of an object's own triangles.
     """

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.critical import find_critical
 
-MAX_SHARE = 0.03  # of an object's voxels that may change
+MAX_SHARE = 0.03  # largest share of an object's voxels that may change
 MAX_OF_SMALL = 4  # voxels that may change, of however small an object
 _ROUNDS = 60
 _AT_ONCE = 1 << 20  # places of a round

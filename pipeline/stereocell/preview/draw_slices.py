@@ -20,6 +20,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from stereocell.filters.denoise import SMOOTHING_REACH, smooth
 from stereocell.model.mesh import Mesh
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
 from stereocell.preview.views import MICROSCOPE, View
@@ -59,8 +60,8 @@ def cut_unit(
     volume: NDArray[np.uint8],
     lattice: Box,
     *,
-    first_um: tuple[float, float, float],
-    spacing_um: tuple[float, float, float],
+    first_um: Point,
+    spacing_um: Spacing,
     mesh: Mesh | None,
     sigma_um: float,
     iso_at: Callable[[Box], NDArray[np.float32]] | None,
@@ -99,9 +100,7 @@ def cut_unit(
     return slices
 
 
-def voxels_of(
-    mesh: Mesh, first_um: tuple[float, float, float], spacing_um: tuple[float, float, float]
-) -> NDArray[np.float64]:
+def voxels_of(mesh: Mesh, first_um: Point, spacing_um: Spacing) -> NDArray[np.float64]:
     """Return the vertices in voxels from the one at first_um: float64 (n, 3), (z, y, x)."""
     axes = zyx_to_xyz(np.eye(3))  # world directions of z, y, x: orthonormal, so this inverts it
     positions = mesh.positions.astype(np.float64) @ axes.T
@@ -141,7 +140,7 @@ def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:
 
 
 def paint_slices(
-    slices: Sequence[Slice], longest_px: int, shown_px: int = _SHOWN_PX
+    slices: Sequence[Slice], longest_px: int, *, shown_px: int = _SHOWN_PX
 ) -> Image.Image:
     """Return a picture of three slices: the second below the first, the third on its right.
 

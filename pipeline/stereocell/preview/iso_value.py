@@ -109,7 +109,7 @@ def preview(
         for one in tiles
     }
     found = hold_to_histogram(find_level(plan, channel, window, evidence))
-    volume = open_source(source_of(plan, channel)).read(channel.index, tile.box, plan.level)
+    volume = open_source(source_of(plan, channel=channel)).read(channel.index, tile.box, plan.level)
     field = denoise(volume, float(plan.settings.surface.smoothing_um))
     under = np.zeros((1, 1, 1), np.float32)
     if window.statistics.background is not None:
@@ -131,7 +131,9 @@ def preview(
     result = Preview(candidates, found.doubt, basis)
     picture = _compose(
         paint_slices(
-            _slices(volume.voxels, field, under, candidates, window, plan), _LONGEST_PX, _LONGEST_PX
+            _slices(volume.voxels, field, under, candidates, window, plan),
+            _LONGEST_PX,
+            shown_px=_LONGEST_PX,
         ),
         f"{channel.name}, tile {tile.id} of {plan.name}",
         result,

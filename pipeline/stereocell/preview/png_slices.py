@@ -54,7 +54,7 @@ def without_surface(settings: Settings) -> Settings:
     return replace(settings, surface=SurfaceOptions(**lengths))  # type: ignore[arg-type]
 
 
-def write_slices(plan: Plan, folder: Path, plane: str = ACQUIRED) -> Written:
+def write_slices(plan: Plan, folder: Path, *, plane: str = ACQUIRED) -> Written:
     """Write the plan's region of its one channel.
 
     folder  replaced as a whole if it holds slices

@@ -54,7 +54,7 @@ def _fault(address: str, path: str, entry: Mapping[str, Any]) -> str | None:
             while block := answer.read(_BLOCK):
                 digest.update(block)
                 count += len(block)
-            said = answer.headers.get_content_type()
+            found_type = answer.headers.get_content_type()
     except urllib.error.HTTPError as error:
         return f"answered with {error.code} {error.reason}"
     except (OSError, HTTPException, ValueError) as error:
@@ -69,7 +69,7 @@ def _fault(address: str, path: str, entry: Mapping[str, Any]) -> str | None:
     if (
         path.endswith(_STRICT)
         and not is_packed
-        and said not in (expected, "application/javascript")
+        and found_type not in (expected, "application/javascript")
     ):
-        return f"found the type {said}, which browsers don't take for {expected}"
+        return f"found the type {found_type}, which browsers don't take for {expected}"
     return None

@@ -66,7 +66,7 @@ class FolderTarget:
     """A folder of this machine: of a web server, or of a checked out `gh-pages` branch."""
 
     address = None
-    at_once = 1  # of a folder each writer clears what killed ones have left
+    at_once = 1  # files at a time: in a folder each writer clears what killed writers have left
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -84,7 +84,7 @@ class FolderTarget:
 
     def read(self, path: str) -> bytes:
         """Return a file's content."""
-        with one_line(str(self.folder / path), "a file that can be read", OutputError):
+        with one_line(str(self.folder / path), "a file that can be read", raised=OutputError):
             return self._own(path).read_bytes()
 
     def write(self, path: str, content: bytes) -> None:
@@ -94,7 +94,7 @@ class FolderTarget:
     def remove(self, path: str) -> None:
         """Remove a file, and the folders that have nothing else in them."""
         file = self._own(path)
-        with one_line(str(file), "a file that may be removed", OutputError):
+        with one_line(str(file), "a file that may be removed", raised=OutputError):
             file.unlink(missing_ok=True)
         for folder in file.relative_to(self.folder).parents[:-1]:
             with suppress(OSError):  # something else is in it
@@ -139,7 +139,7 @@ class StoreTarget:
     @contextmanager
     def _telling(self, path: str) -> Iterator[None]:
         where = f"{self.shown}/{path}".rstrip("/")
-        with one_line(where, "a place that this machine may write to", OutputError):
+        with one_line(where, "a place that this machine may write to", raised=OutputError):
             try:
                 yield
             except ImportError as error:
@@ -185,18 +185,18 @@ class StoreTarget:
     def write(self, path: str, content: bytes) -> None:
         """Put an object there: on S3 with its type, and how long it may be kept."""
         fs, base = self._storage
-        said = {}
+        headers = {}
         if self.scheme in _S3:
-            said = {
+            headers = {
                 "ContentType": media_type(PurePosixPath(path)),
                 "CacheControl": cache_control(path),
             }
             if self.is_public:
-                said["ACL"] = "public-read"
+                headers["ACL"] = "public-read"
         with self._telling(path):
-            if not said and "/" in path:
+            if not headers and "/" in path:
                 fs.makedirs(f"{base}/{path}".rpartition("/")[0], exist_ok=True)
-            fs.pipe_file(f"{base}/{path}", content, **said)
+            fs.pipe_file(f"{base}/{path}", content, **headers)
 
     def remove(self, path: str) -> None:
         """Remove an object."""

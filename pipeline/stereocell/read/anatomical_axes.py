@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.rigid_transform import Matrix, to_matrix
+from stereocell.model.spacing import Spacing
 
 _CANONICAL = np.array([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])  # A, I, L in LPS
 LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])  # (3, 3) for columns
@@ -37,7 +38,7 @@ class Canonical:
 
     order: tuple[int, int, int]
     flips: tuple[bool, bool, bool]
-    spacing_um: tuple[float, float, float]
+    spacing_um: Spacing
     placement: Matrix
 
     def apply(self, voxels: NDArray[np.generic]) -> NDArray[np.generic]:

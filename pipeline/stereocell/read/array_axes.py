@@ -28,7 +28,7 @@ def given_axes(where: str, shape: Sequence[int], given: str) -> tuple[str, ...]:
 
 
 def settle_axes(
-    where: str, shape: Sequence[int], given: str, named: Sequence[str] = ()
+    where: str, shape: Sequence[int], given: str, *, named: Sequence[str] = ()
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the axes of an array and notes about them.
 

@@ -28,7 +28,7 @@ _LISTED = 12  # arrays that a message names
 _MAX_NODES = 1000  # members of a group that are looked at
 
 
-def read_array(location: Location, store: Store, path: str, axes: str = "") -> Image:
+def read_array(location: Location, store: Store, path: str, *, axes: str = "") -> Image:
     """Return the image of the array at a path of the store, relative to the source.
 
     axes  the user's `--axes`; empty: none
@@ -39,7 +39,7 @@ def read_array(location: Location, store: Store, path: str, axes: str = "") -> I
         "_ARRAY_DIMENSIONS", ()
     )
     listed = [str(name).lower() for name in named] if isinstance(named, list | tuple) else []
-    names, notes = settle_axes(where, array.shape, axes, listed)
+    names, notes = settle_axes(where, array.shape, axes, named=listed)
     voxels = VoxelArray(array, names)
     if voxels.size("c") > MAX_CHANNELS:
         raise SourceError(
@@ -51,7 +51,7 @@ def read_array(location: Location, store: Store, path: str, axes: str = "") -> I
 
 
 def read_only_array(
-    location: Location, store: Store, group: "zarr.Group", axes: str = ""
+    location: Location, store: Store, group: "zarr.Group", *, axes: str = ""
 ) -> Image | None:
     """Return the image of the only array in a group of no OME-Zarr image.
 
@@ -68,7 +68,7 @@ def read_only_array(
         return None
     found.sort(key=lambda pair: pair[0])
     if len(found) == 1:
-        image = read_array(location, store, found[0][0], axes)
+        image = read_array(location, store, found[0][0], axes=axes)
         note = f"array {found[0][0]}, the only one of a group without `multiscales`"
         return replace(image, notes=(note, *image.notes))
     listed = ", ".join(f"{path} {node.shape}" for path, node in found[:_LISTED])

@@ -60,8 +60,8 @@ def read_image(tree: Hdf5Tree, location: Location) -> Image:
         for level in range(count)
     ]
     factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]
-    told = read_setups(location.path)
-    image = image_of(tree.where, levels, factors, None, told)
+    described = read_setups(location.path)
+    image = image_of(tree.where, levels, factors, None, described)
     return replace(image, close=tree.close)
 
 

@@ -35,13 +35,13 @@ def image_of(
     levels: Sequence[Views],
     factors: Sequence[Triple | None],
     spacing_um: Triple | None,
-    told: Mapping[int, Setup],
+    setups: Mapping[int, Setup],
 ) -> Image:
     """Return the image of a container's views, finest level first.
 
     factors     level 0's voxels per voxel, (z, y, x), of each level; None: not stated
     spacing_um  (z, y, x) of level 0; None: the setups of the XML have it, or nobody
-    told        the setups of the XML, by their indices
+    setups      those of the XML, by their indices
 
     Raises SourceError where the views have not one grid.
     """
@@ -55,14 +55,14 @@ def image_of(
                     f"{first.shape} {first.dtype}, expected one grid of three axes"
                 )
         arrays.append(VoxelArray(_Level(views), tuple("tczyx")))
-    if 0 in told and told[0].spacing_um is not None:
-        spacing_um = told[0].spacing_um
+    if 0 in setups and setups[0].spacing_um is not None:
+        spacing_um = setups[0].spacing_um
     count = len(levels[0][0])
     note = f"{count} setups of BigDataViewer: taken for channels, their registrations left out"
     return Image(
         tuple(arrays),
         grids_of([array.shape for array in arrays], spacing_um, factors),
-        tuple(told[c].name if c in told else None for c in range(count)),
+        tuple(setups[c].name if c in setups else None for c in range(count)),
         (None,) * count,
         1,
         notes=(note,) if count > 1 else (),

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from stereocell.read.spacing import Triple, um_per
 from stereocell.storage.location import is_own
 
-_MAX_FILES = 50  # of XML in the folder
+_MAX_FILES = 50  # most XML files of the folder that are looked into
 _MAX_BYTES = 16 << 20
 
 

@@ -54,7 +54,7 @@ def can_read(location: Location) -> bool:
     return True
 
 
-def read_image(location: Location, series: int = 0) -> Image:
+def read_image(location: Location, *, series: int = 0) -> Image:
     """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
     where = location.shown
     with one_line(where, "a file that a plugin of bioio reads whole"):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TAKEN = ("uint8", "uint16", "int16", "float32")  # by builds
+TAKEN = ("uint8", "uint16", "int16", "float32")  # dtypes that builds take
 _CAST = {
     "bool": "uint8",
     "int8": "int16",
@@ -44,12 +44,12 @@ def cast_note(stored: Any) -> str:
     dtype, built = np.dtype(stored), built_dtype(stored)
     if built is None or dtype.name == built.name:
         return ""
-    told = f"{CAST} {dtype.name}: read as {built.name}"
+    note = f"{CAST} {dtype.name}: read as {built.name}"
     if dtype.kind in "iu" and built.kind == "f":
         return (
-            f"{told}, which keeps 24 of {8 * dtype.itemsize} bits: whole numbers beyond "
+            f"{note}, which keeps 24 of {8 * dtype.itemsize} bits: whole numbers beyond "
             "16,777,216 are rounded"
         )
     if dtype.name == "float64":
-        return f"{told}, which keeps 7 of 16 digits"
-    return f"{told}, without loss"
+        return f"{note}, which keeps 7 of 16 digits"
+    return f"{note}, without loss"

@@ -32,7 +32,7 @@ from stereocell.storage.location import Location, require_file
 _TYPES = {"Gray8": "u1", "Gray16": "u2", "Gray32Float": "f4"}
 _OTHERS = {"V": "views", "H": "phases", "I": "illuminations", "R": "rotations", "B": "blocks"}
 _SEGMENT = struct.Struct("<16s2q")  # a segment's name, its length, and how much of it is used
-_PLACES = struct.Struct("<2q")  # of the directory of voxels, and of the metadata
+_PLACES = struct.Struct("<2q")  # places of the directory of voxels and of the metadata
 _PLACES_AT = 84  # bytes from the file's start
 _UM_PER_METER = 1e6
 _Rectangle = tuple[int, int, int, int]  # x, y, width, height
@@ -99,7 +99,7 @@ def _require_whole(path: str, where: str) -> None:
         )
 
 
-def read_image(location: Location, series: int = 0) -> Image:
+def read_image(location: Location, *, series: int = 0) -> Image:
     """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
     return read_chosen(location.shown, series, partial(_opened, location), _image)
 

@@ -15,6 +15,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.object_notes import ObjectNotes
 from stereocell.model.rigid_transform import IDENTITY, Matrix
+from stereocell.model.spacing import Point
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 from stereocell.read.acquired import Acquired
@@ -142,7 +143,7 @@ class Dataset:
     remarks: tuple[str, ...] = ()
     labels: str = ""
     objects: ObjectNotes = ObjectNotes()  # noqa: RUF009  (frozen)
-    offset_um: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    offset_um: Point = (0.0, 0.0, 0.0)
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
     _darkest: dict[int, float] = field(init=False, repr=False, default_factory=dict)
 

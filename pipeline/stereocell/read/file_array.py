@@ -106,7 +106,13 @@ class _Stream(Protocol):
 
 
 def unpack(
-    path: str, shape: Sequence[int], dtype: np.dtype[Any], packing: str, offset: int, skip: int = 0
+    path: str,
+    shape: Sequence[int],
+    dtype: np.dtype[Any],
+    packing: str,
+    offset: int,
+    *,
+    skip: int = 0,
 ) -> NDArray[Any]:
     """Return the voxels of a packed stretch of a file.
 

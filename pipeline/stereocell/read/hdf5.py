@@ -28,7 +28,7 @@ from stereocell.storage.location import Location
 _LISTED = 12  # datasets that a message names
 
 
-def read_image(location: Location, axes: str = "") -> Image:
+def read_image(location: Location, *, axes: str = "") -> Image:
     """Return the image of one dataset. Raises SourceError where it can't be read, or is unclear."""
     tree = Hdf5Tree(location, "an HDF5 file that is whole")
     try:
@@ -50,7 +50,7 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
     dataset, notes = _choose(tree, location.key)
     where = f"{location.path}:{dataset.name}"
     voxels = Hdf5Array(dataset, where)
-    names, assumed = settle_axes(where, voxels.shape, axes, _named(dataset))
+    names, assumed = settle_axes(where, voxels.shape, axes, named=_named(dataset))
     array = VoxelArray(voxels, names)
     if array.size("c") > MAX_CHANNELS:
         raise SourceError(

@@ -54,7 +54,7 @@ class Hdf5Tree:
                 raise
             raise ValueError(f"cut short at byte {cut[1]} of {cut[2]}") from None
 
-    def find(self, path: str, start: h5py.Group | None = None) -> h5py.Group | h5py.Dataset:
+    def find(self, path: str, *, start: h5py.Group | None = None) -> h5py.Group | h5py.Dataset:
         """Return a group or a dataset by its path. Raises SourceError where there is none."""
         at: Any = start if start is not None else self.root
         steps = deque(_steps(path))

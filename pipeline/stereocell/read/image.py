@@ -10,7 +10,7 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Grid
 
 Color = tuple[float, float, float]
-MAX_CHANNELS = 10_000  # of a source; more are refused
+MAX_CHANNELS = 10_000  # most channels of a source; a source with more is refused
 
 
 @dataclass(frozen=True, slots=True)

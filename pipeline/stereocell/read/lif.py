@@ -46,7 +46,7 @@ _COLORS = {
 }
 
 
-def read_image(location: Location, series: int = 0) -> Image:
+def read_image(location: Location, *, series: int = 0) -> Image:
     """Return one image; 0 is the largest volume. Raises SourceError, UsageError for no such one."""
     return read_chosen(
         location.shown,

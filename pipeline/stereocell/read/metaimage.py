@@ -62,7 +62,7 @@ def read_image(location: Location) -> Image:
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
     affine, notes = _affine(where, fields, len(shape))
     return place(where, array, axes, affine, "TransformMatrix").image(
-        NAME, notes, has_sides="TransformMatrix" in fields
+        NAME, notes=notes, has_sides="TransformMatrix" in fields
     )
 
 

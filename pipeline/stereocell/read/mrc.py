@@ -60,7 +60,9 @@ def read_image(location: Location) -> Image:
         dtype = np.dtype(np.uint8)
     array: StoredArray
     if packing:
-        array = PackedArray(shape, dtype, partial(unpack, path, shape, dtype, packing, 0, offset))
+        array = PackedArray(
+            shape, dtype, partial(unpack, path, shape, dtype, packing, 0, skip=offset)
+        )
     else:
         array = FileArray(path, shape, dtype, offset, where)
     axes = tuple("xyz"[axis - 1] for axis in order)

@@ -95,7 +95,7 @@ class N5Array:
             raise OSError(f"block {path} is cut short ({len(content)} bytes)") from None
 
 
-def read_image(location: Location, axes: str = "") -> Image:
+def read_image(location: Location, *, axes: str = "") -> Image:
     """Return the image of a dataset, a pyramid or a container. Raises SourceError."""
     if location.is_local and not os.path.isdir(location.source):
         raise SourceError(f"{location.shown}: is a file, expected a folder of N5")
@@ -108,13 +108,13 @@ def read_image(location: Location, axes: str = "") -> Image:
         return _pyramid(files, attributes, _levels(files, ""), axes)
     if "dimensions" in files.attributes("timepoint0/s0"):
         number = re.fullmatch(r"setup(\d+)", os.path.basename(location.source))
-        told = read_setups(os.path.dirname(location.source)) if location.is_local else {}
-        setup = told.get(int(number[1])) if number else None
+        described = read_setups(os.path.dirname(location.source)) if location.is_local else {}
+        setup = described.get(int(number[1])) if number else None
         return _container(files, [""], {0: setup} if setup else {})
     if "dimensions" in files.attributes("setup0/timepoint0/s0"):
         count = _count(files, "setup{}/timepoint0/s0", MAX_CHANNELS)
-        told = read_setups(location.source) if location.is_local else {}
-        return _container(files, [f"setup{index}/" for index in range(count)], told)
+        described = read_setups(location.source) if location.is_local else {}
+        return _container(files, [f"setup{index}/" for index in range(count)], described)
     found = files.datasets(_LISTED + 1)
     if len(found) == 1:
         return _pyramid(files, attributes, [(found[0], files.attributes(found[0]))], axes)
@@ -149,7 +149,7 @@ def _pyramid(
     arrays = [N5Array(files, path, attributes) for path, attributes in levels]
     named = levels[0][1].get("axes", group.get("axes"))
     listed = [str(a).lower() for a in reversed(named)] if isinstance(named, list) else []
-    names, notes = settle_axes(files.where, arrays[0].shape, axes, listed)
+    names, notes = settle_axes(files.where, arrays[0].shape, axes, named=listed)
     if any(len(array.shape) != len(names) for array in arrays):
         raise SourceError(f"{files.where}: levels: expected {len(names)} dimensions in each")
     voxels = tuple(VoxelArray(array, names) for array in arrays)
@@ -162,11 +162,11 @@ def _pyramid(
     return Image(voxels, grids, unnamed, unnamed, 1, notes=notes)
 
 
-def _container(files: N5Files, setups: Sequence[str], told: Mapping[int, Setup]) -> Image:
+def _container(files: N5Files, setups: Sequence[str], described: Mapping[int, Setup]) -> Image:
     """Return the image of BigDataViewer's container: setups are channels.
 
-    setups  the folders of the setups, each with a slash at its end
-    told    the setups of the XML, by their indices
+    setups     the folders of the setups, each with a slash at its end
+    described  the setups of the XML, by their indices
     """
     times = _count(files, f"{setups[0]}timepoint{{}}/s0", _MAX_TIMES)
     levels = _levels(files, f"{setups[0]}timepoint0")
@@ -180,7 +180,7 @@ def _container(files: N5Files, setups: Sequence[str], told: Mapping[int, Setup])
     group = files.attributes(setups[0].rstrip("/"))
     stated = _spacing(files.attributes(f"{setups[0]}timepoint0"), "zyx")
     scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
-    return image_of(files.where, views, scales, stated, told)
+    return image_of(files.where, views, scales, stated, described)
 
 
 def _dataset(files: N5Files, path: str) -> N5Array:

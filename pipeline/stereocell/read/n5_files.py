@@ -13,8 +13,8 @@ from stereocell.storage.first_bytes import pointer_words
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own, require_own_key
 
-_MAX_BYTES = 64 << 20  # of a file of attributes
-_MAX_FOLDERS = 10_000  # that a search for datasets visits
+_MAX_BYTES = 64 << 20  # most bytes of a file of attributes that are read
+_MAX_FOLDERS = 10_000  # most folders that a search for datasets visits
 _NAME = "attributes.json"
 
 

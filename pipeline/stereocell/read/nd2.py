@@ -20,7 +20,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
 _BEGIN, _END = b"\xda\xce\xbe\n", b"ND2 CHUNK MAP SIGNATURE 0000001!"
-_END_BYTES = 40  # of the signature and the place of the map of chunks, last in a file
+_END_BYTES = 40  # bytes of the signature and of the chunk map's place, last in a file
 _IN_FRAME = "CYXS"  # axes inside a frame
 
 
@@ -64,7 +64,7 @@ def _require_end(path: str, where: str) -> None:
         )
 
 
-def read_image(location: Location, series: int = 0) -> Image:
+def read_image(location: Location, *, series: int = 0) -> Image:
     """Return the image of one position; 0 is the first. Raises SourceError, UsageError."""
     return read_chosen(location.shown, series, partial(_opened, location), _image)
 

@@ -44,7 +44,7 @@ _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _MM = {"unknown": 1.0, "mm": 1.0, "meter": 1000.0, "micron": 0.001}
 _MAX_OFFSET = 1 << 28  # bytes of header and extensions; gzip must unpack them before the voxels
 _INTENT_LABEL = 1002
-_LABEL_TABLE = b"<LabelTable"  # of Connectome Workbench and TotalSegmentator
+_LABEL_TABLE = b"<LabelTable"  # element in the files of Connectome Workbench and TotalSegmentator
 _WIDER = 1.05  # factor by which slices lie further apart than pixels
 _SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
 _FAULTS = (
@@ -183,8 +183,8 @@ def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[s
     """Note the number of NaN and infinities at a time point, which this reads; it is cached."""
     _ = voxels[time, slice(0, 0), 0, 0]
     found = counts.get(time, 0)
-    told = f"{found:,} voxels are NaN or infinite: read as the smallest finite value"
-    return (told,) if found else ()
+    note = f"{found:,} voxels are NaN or infinite: read as the smallest finite value"
+    return (note,) if found else ()
 
 
 def _open(location: Location) -> Any:

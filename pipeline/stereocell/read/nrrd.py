@@ -241,7 +241,7 @@ def _array(
             f"{where}: encoding: found {encoding!r:.40}, byte skip {skip}, expected raw, gzip or "
             "bzip2: write it anew"
         )
-    load = partial(unpack, path, shape, dtype, _PACKINGS[encoding], end, skip)
+    load = partial(unpack, path, shape, dtype, _PACKINGS[encoding], end, skip=skip)
     return PackedArray(shape, dtype, load)
 
 

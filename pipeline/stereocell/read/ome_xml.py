@@ -15,7 +15,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
 
-_DEFAULT_UNIT = "\u00b5m"  # of PhysicalSizeX, Y and Z, where none is named
+_DEFAULT_UNIT = "\u00b5m"  # unit of PhysicalSizeX, Y and Z, where the file names none
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,10 +39,10 @@ from stereocell.read.zarr_store import GuardedStore, open_array, open_store, qui
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_MAX_LEVELS = 64  # of the pyramid
+_MAX_LEVELS = 64  # most levels of the pyramid
 
 
-def read_image(location: Location, axes: str = "", *, is_part: bool = False) -> Image:
+def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> Image:
     """Return the first multiscale image of a group, or a bare array (bare_zarr.py).
 
     The group may be a container of series, if it holds one image.
@@ -64,7 +64,7 @@ def read_image(location: Location, axes: str = "", *, is_part: bool = False) -> 
                 f"{where}: found a level of an OME-Zarr image, expected the image, as {image} "
                 "(--level picks the level), or its axes by --axes"
             )
-        return bare_zarr.read_array(location, store, "", axes)
+        return bare_zarr.read_array(location, store, "", axes=axes)
     metadata = node.metadata
     attributes = metadata.attributes
     ome = attributes.get("ome", attributes)
@@ -75,9 +75,9 @@ def read_image(location: Location, axes: str = "", *, is_part: bool = False) -> 
     if not isinstance(multiscales, list) or not multiscales:
         series = series_of(ome, tree)
         if len(series) == 1 and not is_part:
-            return read_image(part_of(location, series[0]), axes, is_part=True)
+            return read_image(part_of(location, series[0]), axes=axes, is_part=True)
         if multiscales is None and not is_collection(ome):
-            only = bare_zarr.read_only_array(location, store, node, axes)
+            only = bare_zarr.read_only_array(location, store, node, axes=axes)
             if only is not None:
                 return only
         raise SourceError(
@@ -222,7 +222,7 @@ def _color(text: Any) -> Color | None:
 def _level(
     location: Location, store: Store, path: str, axes: tuple[str, ...], zarr_format: Any
 ) -> VoxelArray:
-    array = open_array(location, store, path, zarr_format)
+    array = open_array(location, store, path, zarr_format=zarr_format)
     if array.ndim != len(axes):
         raise SourceError(
             f"{location.shown}: level {path!r:.80}: found {array.ndim} dimensions, "

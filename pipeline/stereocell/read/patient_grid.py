@@ -19,7 +19,7 @@ from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
 
 _SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
-_MIN_VOLUME = 0.1  # of the three unit axes' parallelepiped; below, they lie in a plane
+_MIN_VOLUME = 0.1  # least volume of the three unit axes' parallelepiped; below, they lie in a plane
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Placed:
     placement: Matrix
     notes: tuple[str, ...] = ()
 
-    def image(self, title: str, notes: Sequence[str] = (), *, has_sides: bool) -> Image:
+    def image(self, title: str, *, notes: Sequence[str] = (), has_sides: bool) -> Image:
         """Return the image of a format whose files name no channel, after more notes."""
         count = self.array.size("c")
         return Image(

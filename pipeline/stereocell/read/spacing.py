@@ -114,7 +114,7 @@ def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> t
             # In level 0's own spacing, so that a given spacing scales the shift as well.
             stated = grids[0].spacing_um or finest
             shifts = zip(grid.offset_um, grids[0].offset_um, stated, finest, strict=True)
-            origin = _triple((a - b) / said * used for a, b, said, used in shifts)
+            origin = _triple((a - b) / own * used for a, b, own, used in shifts)
         levels.append(Level(grid.shape, spacing, origin))
     return tuple(levels)
 

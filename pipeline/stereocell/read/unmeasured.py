@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.tiling import Box
 
-_SLAB_BYTES = 1 << 26  # that are read at once, where the chunks permit
+_SLAB_BYTES = 1 << 26  # bytes that are read at once, where the chunks permit
 
 
 class Searched(Protocol):

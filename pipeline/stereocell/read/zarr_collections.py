@@ -160,11 +160,13 @@ def notes_on_labels(tree: ZarrTree) -> tuple[str, ...]:
     names = [str(name) for name in listed] if isinstance(listed, list) else []
     if not names:
         return ()
-    told = [_label_image(tree, name) for name in names[:_LOOKED_AT]]
-    told += [_cut(name) for name in names[_LOOKED_AT:_SHOWN]]
+    described = [_label_image(tree, name) for name in names[:_LOOKED_AT]]
+    described += [_cut(name) for name in names[_LOOKED_AT:_SHOWN]]
     if len(names) > _SHOWN:
-        told.append(f"{len(names) - _SHOWN} more")
-    return (f"label images of it: {', '.join(told)} (--labels NAME builds the objects of one)",)
+        described.append(f"{len(names) - _SHOWN} more")
+    return (
+        f"label images of it: {', '.join(described)} (--labels NAME builds the objects of one)",
+    )
 
 
 def labels_evidence(ome: Mapping[str, Any], location: Location) -> str:

@@ -184,8 +184,8 @@ def open_array(
     location: Location,
     store: Store,
     path: str,
-    zarr_format: Any = None,
     *,
+    zarr_format: Any = None,
     title: str = "level",
     item_bytes: int | None = None,
 ) -> "zarr.Array[Any]":

@@ -125,7 +125,9 @@ def draw_image(
     for shape in shapes:
         places, depth = view.place(shape.positions)
         corners = places[shape.triangles]
-        pixel, triangle, weights = find_pixels(corners, depth[shape.triangles], view.size, nearest)
+        pixel, triangle, weights = find_pixels(
+            corners, depth[shape.triangles], view.size, nearest=nearest
+        )
         at = shape.triangles[triangle]
         shaded = np.einsum("nk,nkj->nj", weights, shape.normals[at].astype(np.float64))
         shaded = shaded @ view.axes

@@ -196,7 +196,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
         if figure is None or share is None:
             continue
         volume = load_volume(unit.directory)[inner, inner, inner]
-        picture = _inline(draw_cut(volume, facts.plan.spacing_um, share, _views(facts.plan)))
+        picture = _inline(draw_cut(volume, facts.plan.spacing_um, share, views=_views(facts.plan)))
         rows.append(
             {
                 "name": unit.channel.name,

@@ -16,6 +16,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from skimage import filters
 
+from stereocell.model.spacing import Spacing
 from stereocell.preview.draw_slices import Slice, draw_slices
 from stereocell.preview.views import MICROSCOPE, View
 from stereocell.report import charts
@@ -104,8 +105,9 @@ def find_peers(histogram: Histogram) -> tuple[float, float]:
 
 def draw_cut(
     volume: NDArray[np.uint8],
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     threshold: float,
+    *,
     views: Sequence[View] = MICROSCOPE,
 ) -> Picture:
     """Return a volume's mid-slices in which voxels below the threshold are hidden.

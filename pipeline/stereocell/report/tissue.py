@@ -41,7 +41,7 @@ def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
         return None
     require_added(plan)
     record = read_record(out / FOLDER)
-    dataset = open_source(source_of(plan, added[0]))
+    dataset = open_source(source_of(plan, channel=added[0]))
     colors = np.array([channel.color for channel in added], np.float32)
 
     def read(box: Box) -> NDArray[np.float32]:

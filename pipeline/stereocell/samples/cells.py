@@ -28,10 +28,10 @@ SUFFIX = ".ome.zarr"
 SHAPE = (44, 176, 264)  # voxels (z, y, x)
 SPACING_UM = (1.0, 0.5, 0.5)  # (z, y, x)
 CELLS = 300
-RADIUS_UM = 7.5  # of the ball that a cell stays in
+RADIUS_UM = 7.5  # um: radius of the ball that a cell stays in
 LABELS = "cells"
 TYPES = ("tumour", "T cell", "B cell", "macrophage")
-_SHARES = (0.45, 0.25, 0.18, 0.12)  # of the cells, by type
+_SHARES = (0.45, 0.25, 0.18, 0.12)  # share of the cells of each type
 NUCLEI = "DNA"
 # levels of the markers by type, in the order of TYPES; 1 is a channel's full brightness
 MARKERS = {
@@ -50,7 +50,7 @@ MARKERS = {
 }
 _FULL, _OFFSET, _NOISE = 3000.0, 120.0, 18.0  # counts
 _MEMBRANE_UM = 0.8
-_INSIDE = 0.35  # of a marker's brightness at the membrane
+_INSIDE = 0.35  # brightness of a marker inside a cell, as a share of that at the membrane
 _BLUR_UM = 0.45  # sigma
 _LLOYD = 4  # rounds
 
@@ -71,7 +71,7 @@ class CellTissue:
     levels: NDArray[np.float64]
 
 
-def write_cells(path: Path, seed: int = 1, shape: tuple[int, int, int] = SHAPE) -> None:
+def write_cells(path: Path, *, seed: int = 1, shape: tuple[int, int, int] = SHAPE) -> None:
     """Write the sample to `path` (NAME.ome.zarr), and its table to NAME.csv beside it.
 
     shape  voxels (z, y, x); the number of cells goes by the volume

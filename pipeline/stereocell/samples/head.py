@@ -99,7 +99,7 @@ class HeadPhantom:
 
 
 def make_head(
-    shape: tuple[int, int, int] = SHAPE, noise: float = 0.05, *, bias: float = 0.2, seed: int = 1
+    *, shape: tuple[int, int, int] = SHAPE, noise: float = 0.05, bias: float = 0.2, seed: int = 1
 ) -> HeadPhantom:
     """Return the head in `shape` (z, y, x) voxels over the same field of view.
 

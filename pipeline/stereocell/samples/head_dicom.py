@@ -45,7 +45,7 @@ ISOCENTRE_MM = (3.0, -12.0, 21.0)  # LPS of the middle of the grid
 SLICE_THICKNESS_MM = 5.0  # differs from the spacing of this series
 
 
-def write_head(path: Path, seed: int = 0) -> None:
+def write_head(path: Path, *, seed: int = 0) -> None:
     """Write the phantom of `seed` to the folder `path`. An existing equal sample stays.
 
     Raises UsageError for a seed below 0, OutputError where other content lies there or it can't be
@@ -53,10 +53,10 @@ def write_head(path: Path, seed: int = 0) -> None:
     """
     if seed < 0:
         raise UsageError(f"--seed: found {seed}, expected 0 or more")
-    write_dicom(path, make_head(seed=seed), seed)
+    write_dicom(path, make_head(seed=seed), seed=seed)
 
 
-def write_dicom(path: Path, head: HeadPhantom, seed: int = 0) -> None:
+def write_dicom(path: Path, head: HeadPhantom, *, seed: int = 0) -> None:
     """Write one file per sagittal slice into the folder `path`, in an order shuffled by `seed`.
 
     Raises OutputError where other content lies there or it can't be written.

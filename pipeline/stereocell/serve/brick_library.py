@@ -39,7 +39,7 @@ from stereocell.serve.brick_order import PlacedTree, place
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.json_files import read_json
 
-CODE_VERSION = 1  # of build() and encode_tree(): increase it with every change of their bytes
+CODE_VERSION = 1  # version of build() and encode_tree(): increase it when their bytes change
 MANIFEST = "manifest.json"
 _REMEDY = "run `stereocell bundle OUT`"
 _KEPT_NODES = 2_000_000  # nodes of the cached trees: some 300 MB

@@ -275,11 +275,11 @@ class BrickSession:
                 if file is None:
                     file = await self._in(self._builder, partial(self._library.open, tile, channel))
             except UnknownVolumeError as error:
-                self._tell(wanted, "unknown", str(error))
+                self._report(wanted, "unknown", str(error))
                 continue
             except (StereoCellError, OSError) as error:
                 _LOG.error("%s", error)  # for this machine's user: it may name folders
-                self._tell(wanted, "damaged", "can't be read; the server's terminal says why")
+                self._report(wanted, "damaged", "can't be read; the server's terminal says why")
                 continue
             table = file.table
             number = len(self._trees)
@@ -410,7 +410,7 @@ class BrickSession:
         counts = {"bricks": view.bricks, "bytes": view.bytes}
         self._say({"type": "done", "view": view.id, "reason": reason, **counts})
 
-    def _tell(self, volume: dict[str, str], code: str, message: str) -> None:
+    def _report(self, volume: dict[str, str], code: str, message: str) -> None:
         place = {"tile": volume["tile"], "channel": volume["channel"]}
         self._say({"type": "error", "code": code, "message": message, **place})
 

@@ -73,7 +73,7 @@ def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
     return context, ":".join(digest[i : i + 2] for i in range(0, len(digest), 2))
 
 
-def draw_qr(address: str, encoding: str = "utf-8") -> str:
+def draw_qr(address: str, *, encoding: str = "utf-8") -> str:
     """Return a QR code for a terminal, of half blocks; where its encoding lacks them, of spaces
     with escape codes for the background."""
     code = segno.make(address, error="l", micro=False)

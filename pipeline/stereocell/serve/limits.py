@@ -16,27 +16,27 @@ MAX_TREES = 1024  # trees of a connection
 MAX_CONNECTIONS = 128  # websockets of all clients
 CLIENT_SOCKETS = 64  # websockets of one address
 MESSAGES_PER_S = 100  # messages other than acks
-ACKS_PER_S = 5000  # of a connection
+ACKS_PER_S = 5000  # acks of a connection
 CONTROLS_PER_S = 20  # pings and pongs
 MAX_FRAGMENTS = 64  # frames of one message
-FRAGMENTS_S = 10.0  # from a message's first frame to its last
-HELLO_S = 10.0  # from the connection to its `hello`
-ACK_S = 60.0  # from a full window to the next ack
+FRAGMENTS_S = 10.0  # s from a message's first frame to its last
+HELLO_S = 10.0  # s from the connection to its `hello`
+ACK_S = 60.0  # s from a full window to the next ack
 _REASON_BYTES = 120  # RFC 6455: a close frame has room for 123
 
 # A request
 TARGET_BYTES = 8 << 10  # bytes of its path
 HEAD_BYTES = 16 << 10  # bytes of its head
-MAX_HEADERS = 100  # of a request
-HEAD_S = 10.0  # for the head of an HTTP request, and before it for the TLS handshake
+MAX_HEADERS = 100  # headers of a request
+HEAD_S = 10.0  # s for the head of an HTTP request, and before it for the TLS handshake
 STALL_S = 60.0  # longest time in which no byte of an answer is sent
 LINGER_S = 1.0  # time in which a refused client may still send, so that it reads the answer
 
 # A client, identified by its address: one for this machine, one for all behind the same router
-CONNECTIONS = 400  # of all clients: each may have a file open, and 1024 descriptors are usual
-CLIENT_CONNECTIONS = 200  # of one client
-REQUESTS_PER_S = 500  # in the long run
-REQUESTS_AT_ONCE = 20_000  # at once: a bundle has thousands of files
+CONNECTIONS = 400  # sockets of all clients: each may open a file; 1024 descriptors are usual
+CLIENT_CONNECTIONS = 200  # connections of one client
+REQUESTS_PER_S = 500  # requests of a client, in the long run
+REQUESTS_AT_ONCE = 20_000  # requests of a client in a burst: a bundle has thousands of files
 _KNOWN = 1024  # addresses without a connection whose requests are remembered
 
 STOP_S = 8.0  # for transfers that run when the server is stopped

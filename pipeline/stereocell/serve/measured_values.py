@@ -24,7 +24,7 @@ from stereocell.serve.headers import policy
 from stereocell.storage.file_list import find_faults, read_list
 
 VALUES_HEADER = {"Stereocell-Values": "version=1"}  # announces /values to a page
-_LIST = "files.json"  # of the stage
+_LIST = "files.json"  # the stage's list of files
 _KEPT_FILES = 32
 _LONGEST = 200  # characters of `at`
 _HEADERS = {"Cache-Control": "no-store", **policy("application/json")}
@@ -72,7 +72,7 @@ class MeasuredValues:
             return self._files[key][1]
         path = f"tiles/{volume.tile}/{volume.channel}.vdb"
         listed = read_list(self._stage / _LIST, "").get(path)
-        if listed != named or find_faults(self._stage, {path: named}, self._stage / _LIST):
+        if listed != named or find_faults(self._stage, {path: named}, since=self._stage / _LIST):
             return None
         values = VdbValues(self._stage / path, MEASURED_NAME)
         self._files[key] = named["sha256"], values

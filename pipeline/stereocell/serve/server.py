@@ -193,7 +193,7 @@ class BundleServer:
         if self.for_program:
             _print_json({"invitation": invitation})
             return
-        code = draw_qr(invitation, sys.stdout.encoding or "utf-8")
+        code = draw_qr(invitation, encoding=sys.stdout.encoding or "utf-8")
         print(explain(self.address, self.fingerprint, code), flush=True)
 
     def _tell_wait(self, transfers: int) -> None:

@@ -70,7 +70,7 @@ def is_same(file: Path, entry: Mapping[str, Any]) -> bool:
     return file.stat().st_size == entry["bytes"] and measure(file) == entry
 
 
-def find_faults(root: Path, listed: FileList, since: Path | None = None) -> dict[str, str]:
+def find_faults(root: Path, listed: FileList, *, since: Path | None = None) -> dict[str, str]:
     """Return the fault of each file of a list that has one, by path: MISSING or DAMAGED.
 
     since  the file that holds the list: a file of the right size passes where it is no newer than

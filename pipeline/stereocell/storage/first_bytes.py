@@ -43,7 +43,7 @@ _READ = (
 _LIF = re.compile(rb"\x70\0\0\0....\x2a", re.DOTALL)
 _METAIMAGE = re.compile(rb"\s*(ObjectType|Comment|NDims|ObjectSubType|TransformType)\s*=")
 _GZIP = b"\x1f\x8b"
-HEAD_BYTES = 512  # that `identify` needs
+HEAD_BYTES = 512  # bytes that `identify` needs
 TIFF_MAGIC = tuple(mark for _, mark, name, _ in _READ if name == "tiff")
 
 

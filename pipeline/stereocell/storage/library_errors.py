@@ -61,7 +61,7 @@ def _imported(module: str, name: str) -> type[BaseException] | None:
 
 @contextmanager
 def one_line(
-    where: str, expected: str, raised: type[StereoCellError] = SourceError
+    where: str, expected: str, *, raised: type[StereoCellError] = SourceError
 ) -> Iterator[None]:
     """Turn an error of a library inside the block into `raised` with a text of one line.
 
@@ -74,12 +74,12 @@ def one_line(
     except StereoCellError:
         raise
     except _faults() as error:
-        raise_if_short(error, where, raised)
+        raise_if_short(error, where, raised=raised)
         raise raised(f"{where}: {_reason(error)}; expected {expected}") from error
 
 
 def raise_if_short(
-    error: BaseException, where: str, raised: type[StereoCellError] = SourceError
+    error: BaseException, where: str, *, raised: type[StereoCellError] = SourceError
 ) -> None:
     """Raise `raised` with one line where a library's error comes from a lack of memory here.
 

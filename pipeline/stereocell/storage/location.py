@@ -50,7 +50,7 @@ _FILE_SUFFIXES = {
 _BY_CONTENT = ("dicom", "tiff", "hdf5", "nrrd", "czi", "nd2", "lif", "mrc")
 _KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf)):(.*)", re.IGNORECASE | re.DOTALL)
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
-_CONNECT_S, SILENCE_S = 15.0, 30.0  # of one request; s3fs repeats it
+_CONNECT_S, SILENCE_S = 15.0, 30.0  # limits of one request; s3fs repeats it
 _AWS_CREDENTIALS = (
     "AWS_ACCESS_KEY_ID",
     "AWS_PROFILE",
@@ -171,7 +171,7 @@ class Location:
     def _is_bdv(self) -> bool:
         """Whether a file is the XML of BigDataViewer."""
         is_named = self.source.lower().endswith(".xml")
-        return is_named and b"<SpimData" in first_bytes(self.source, 1 << 16)
+        return is_named and b"<SpimData" in first_bytes(self.source, count=1 << 16)
 
     def _is_n5(self) -> bool:
         """Whether a folder is a group or a dataset of N5: others have no `attributes.json`."""
@@ -328,7 +328,7 @@ def _split_key(text: str) -> tuple[str, str]:
     return found[1], f":/{found[2].lstrip('/')}"
 
 
-def first_bytes(path: str, count: int = HEAD_BYTES) -> bytes:
+def first_bytes(path: str, *, count: int = HEAD_BYTES) -> bytes:
     """Return the head of a regular file; nothing where it can't be read."""
     if not os.path.isfile(path):
         return b""

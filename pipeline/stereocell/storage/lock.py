@@ -68,10 +68,10 @@ def _hold(path: Path, command: str) -> tuple[int, bool]:
             if sys.platform != "win32":
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            told = _owner(file)
+            owner = _owner(file)
             os.close(file)
             raise OutputError(
-                f"{path.parent}: {told} is writing here: wait until it has ended"
+                f"{path.parent}: {owner} is writing here: wait until it has ended"
             ) from None
         # the previous holder may have removed the file in between
         with suppress(FileNotFoundError):

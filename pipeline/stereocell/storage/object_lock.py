@@ -99,8 +99,8 @@ def _create(fs: Any, path: str, shown: str, content: bytes) -> None:
         time.sleep(_SETTLE_S)
     there = _read(fs, path)
     if there is None or there[0] != content:
-        told = "another command" if there is None else in_words(there[0])
-        raise OutputError(f"{shown}: {told} is writing here: wait until it has ended")
+        owner = "another command" if there is None else in_words(there[0])
+        raise OutputError(f"{shown}: {owner} is writing here: wait until it has ended")
 
 
 def _read(fs: Any, path: str) -> tuple[bytes, float] | None:
@@ -116,5 +116,7 @@ def _is_stale(content: bytes, age_s: float) -> bool:
     with suppress(ValueError, KeyError, TypeError):
         owner = json.loads(content)
         if owner["machine"] == machine():
-            return not is_alive(int(owner["process"]), owner.get("start", "")) or age_s > STALE_S
+            return (
+                not is_alive(int(owner["process"]), start=owner.get("start", "")) or age_s > STALE_S
+            )
     return age_s > STALE_S

@@ -188,7 +188,7 @@ class Mirror:
 
     # --- upload
 
-    def upload(self, path: Path, there: Mapping[str, str] | None = None) -> None:
+    def upload(self, path: Path, *, there: Mapping[str, str] | None = None) -> None:
         """Upload a file, or a folder in place of the old one.
 
         there  objects to move into the folder: new key -> old key
@@ -237,7 +237,7 @@ class Mirror:
         from stereocell.storage.library_errors import one_line
 
         where = f"{self.place.shown}/{key}".rstrip("/")
-        with one_line(where, f"an object that can be {what}", OutputError):
+        with one_line(where, f"an object that can be {what}", raised=OutputError):
             yield
 
 

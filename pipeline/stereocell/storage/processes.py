@@ -75,8 +75,8 @@ def shortage(error: BaseException) -> str:
             or (isinstance(seen, RuntimeError | ImportError | OSError) and _SIGNS.search(text))
         ):
             limit = f"; {_allowed()}: raise the limit" if address_limit() < math.inf else ""
-            told = " ".join(text.split())[:160] or type(seen).__name__
-            return f"out of memory ({told}): try fewer --workers or a smaller --tile-size{limit}"
+            message = " ".join(text.split())[:160] or type(seen).__name__
+            return f"out of memory ({message}): try fewer --workers or a smaller --tile-size{limit}"
         seen = seen.__cause__ or seen.__context__
     return ""
 
@@ -112,7 +112,7 @@ def start_of(process: int) -> str:
     return ""
 
 
-def is_alive(process: int, start: str = "") -> bool:
+def is_alive(process: int, *, start: str = "") -> bool:
     """Return whether a process with this ID runs and, where its start is known, is the same."""
     import psutil
 

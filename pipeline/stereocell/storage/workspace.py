@@ -84,7 +84,8 @@ def making(folder: Path, final: Path) -> Iterator[None]:
     try:
         yield
         old, new = mirror._key(folder), mirror._key(final)
-        mirror.upload(final, {new + key[len(old) :]: kept for key, kept in mirror.moves.items()})
+        moved = {new + key[len(old) :]: kept for key, kept in mirror.moves.items()}
+        mirror.upload(final, there=moved)
     finally:
         mirror.making.discard(folder)
         mirror.moves = {}
@@ -143,7 +144,7 @@ def is_mirrored(path: Path) -> bool:
 
 
 @contextmanager
-def opened(address: str, command: str = "", only: str = "") -> Iterator[Path]:
+def opened(address: str, *, command: str = "", only: str = "") -> Iterator[Path]:
     """Yield the folder of this machine that stands for an OUT at an address.
 
     command  writes into OUT, which is held for it; empty: all of OUT is fetched

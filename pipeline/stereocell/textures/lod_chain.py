@@ -22,6 +22,7 @@ from stereocell.meshes.small_bodies import SmallBodies
 from stereocell.meshes.validity import Topology, find_topology
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Lod, Mesh, Quality
+from stereocell.model.spacing import Spacing
 from stereocell.model.timing import Clock
 from stereocell.textures.texture_lod import Texturer
 
@@ -42,7 +43,7 @@ def make_levels(
     fine: Mesh,
     planes: tuple[Plane, ...],
     *,
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     lod: LodOptions,
     clock: Clock,
     box: Box | None = None,

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, Flag, length_um, setting
+from stereocell.model.spacing import Spacing
 
 TEXTURES = tuple(2**k for k in range(6, 14))  # allowed largest edges of a map, in texels
 MAX_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
@@ -23,7 +24,7 @@ class UnwrapOptions:
     maps: bool = setting(
         False,
         "whether coarser levels get UVs and baked maps, 4 to 6 times as large",
-        Flag(
+        flag=Flag(
             "--maps",
             "coarser levels get UVs and baked maps of normals, occlusion and paint, for DCC tools "
             "(default: normals and values at vertices alone)",
@@ -56,7 +57,7 @@ class UnwrapOptions:
                 f"from {TEXTURES[0]} to {TEXTURES[-1]}"
             )
 
-    def resolved(self, spacing_um: tuple[float, float, float]) -> "UnwrapOptions":
+    def resolved(self, spacing_um: Spacing) -> "UnwrapOptions":
         """Return the options with every `auto` replaced by a length.
 
         Raises UsageError for a length that doesn't fit the voxels.

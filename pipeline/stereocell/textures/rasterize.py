@@ -49,6 +49,7 @@ def find_pixels(
     corners: NDArray[np.float64],
     depth: NDArray[np.float64],
     size: tuple[int, int],
+    *,
     nearest: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Return the visible points of triangles in a view.

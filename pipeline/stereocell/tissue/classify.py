@@ -22,6 +22,7 @@ from scipy import ndimage
 from sklearn.cluster import KMeans  # type: ignore[import-untyped]
 from sklearn.mixture import GaussianMixture  # type: ignore[import-untyped]
 
+from stereocell.model.spacing import Spacing
 from stereocell.tissue.bias_field import BiasField, fit_bias_field, flat_field
 from stereocell.tissue.brain_mask import find_brain, find_foreground
 from stereocell.tissue.potts_prior import apply_potts_prior
@@ -67,9 +68,7 @@ class Tissue:
     bic: dict[int, float]
 
 
-def learn_tissue(
-    voxels: NDArray[Any], spacing_um: tuple[float, float, float], options: TissueOptions
-) -> Tissue:
+def learn_tissue(voxels: NDArray[Any], spacing_um: Spacing, *, options: TissueOptions) -> Tissue:
     """Return the tissue classes of a volume.
 
     voxels      (z, y, x), any number type
@@ -103,8 +102,8 @@ def learn_tissue(
     bic, has_modes = {}, {}
     for k, field in fields.items():
         bic[k], has_modes[k] = _score(sampled, field.log_at(indices), k, independent)
-    told = [k for k in counts if has_modes[k]] or list(counts)[:1]
-    count = min(told, key=lambda k: bic[k])
+    separated = [k for k in counts if has_modes[k]] or list(counts)[:1]
+    count = min(separated, key=lambda k: bic[k])
     field = fields[count]
     corrected = sampled / np.exp(field.log_at(indices))[:, None]
     mixture = _fit(corrected, count)

@@ -14,12 +14,14 @@ of MR images of the brain", IEEE Trans. Medical Imaging 18, 1999. doi:10.1109/42
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.spacing import Spacing
+
 
 def apply_potts_prior(
     log_likelihood: NDArray[np.float32],
     mask: NDArray[np.bool_],
     *,
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     strength: float,
     rounds: int,
 ) -> NDArray[np.float32]:

@@ -37,12 +37,12 @@ from stereocell.transfer.shapes2d import NAME
 
 BLURS = np.geomspace(0.3, 8.0, 14)  # sigma of an edge, in finest voxels
 NOISES = (1.0, 1.5)  # x a material's noise, which a bias field widens
-MIN_CONTRAST = 0.06  # of the window, between two materials
-OVER_NOISE = 1.1  # x the noise, to an arc's apex
-MIN_SEEN = 0.02  # of an edge's voxels above the noise, to be told
-MIN_SHARE = 0.05  # of what all boundaries explain, to one of them
+MIN_CONTRAST = 0.06  # least difference between two materials, as a share of the window
+OVER_NOISE = 1.1  # least height of an arc's apex, in noise
+MIN_SEEN = 0.02  # least share of an edge's voxels above the noise; below, it is not looked for
+MIN_SHARE = 0.05  # least share that a boundary has of the voxels that all boundaries explain
 MIN_MISSED = 0.05  # more squares left over without a boundary that passes over a third material
-MIN_VOXELS = 2e-5  # of all, to a boundary: a ball of 40 voxels in 256^3 has twice as many
+MIN_VOXELS = 2e-5  # least share of all voxels: a ball of 40 voxels in 256^3 has twice as many
 MIN_COUNT = 20.0  # voxels: cells of fewer weigh no more, as nothing is quite as ideal
 MAX_BOUNDARIES = 6
 CLEAR = 2.0  # sigmas of noise that a shape keeps from a material's value
@@ -96,20 +96,28 @@ class SuggestedShapes:
         return self.transfer_2d.functions.get(NAME, ())
 
 
-def suggest(fine: NDArray[np.int64], spacing_um: Ratios = EVEN) -> SuggestedShapes:
-    """Return shapes on the boundaries of a channel; `fine`: counts, see choose_gradient_max."""
+def suggest(fine: NDArray[np.int64], *, spacing_um: Ratios = EVEN) -> SuggestedShapes:
+    """Return shapes on the boundaries of a channel.
+
+    fine        int64 (FINE_ROWS, COLUMNS), counts of voxels by gradient and value; see
+                choose_gradient_max
+    spacing_um  (z, y, x); only its ratios count
+    """
     gradient_max = choose_gradient_max(fine)
-    found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um)
+    found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um=spacing_um)
     shapes = suggest_shapes(found)
     functions = {NAME: shapes} if shapes else {}
     return SuggestedShapes(TransferFunctions2d(gradient_max, functions), found.reason)
 
 
 def find_boundaries(
-    counts: NDArray[np.int64], gradient_max: float, spacing_um: Ratios = EVEN
+    counts: NDArray[np.int64], gradient_max: float, *, spacing_um: Ratios = EVEN
 ) -> Boundaries:
-    """Return materials and boundaries of a histogram, int (rows, columns); see
-    transfer/joint_histogram.py.
+    """Return materials and boundaries of a histogram.
+
+    counts        int64 (rows, columns), voxels by gradient magnitude and value; see count_joint
+    gradient_max  magnitude that the last row stands for
+    spacing_um    (z, y, x); only its ratios count
 
     Same histogram, same answer. A constant volume, or one of a single material, has no boundaries.
     """

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from stereocell.model.channel import (
     LOW_CONFIDENCE,
     Appearance,
+    SurfaceConfidence,
     SurfaceLevel,
-    SurfaceVerdict,
     TransferFunctions2d,
 )
 from stereocell.model.lattice_field import LatticeField
@@ -62,8 +62,11 @@ def find_statistics(
 ) -> ChannelStatistics:
     """Return window and histogram of a channel's voxels; a constant channel's window is 1 wide.
 
-    `window`, where it is known, is not sought. The voxels are left in another order: a sorted copy
-    would be what the memory of a small build peaks at.
+    voxels  any shape, any number type, voxel values
+    window  lowest and highest voxel value, where they are known; None: they are found
+
+    The voxels are left in another order: a sorted copy would be what the memory of a small build
+    peaks at.
     """
     percentiles = (options.low_percentile, options.high_percentile)
     voxels = voxels.reshape(-1)
@@ -104,9 +107,9 @@ def make_appearance(
         iso_value = level.iso + below
         # where nothing tells a surface from noise, peaks of the histogram are noise too
         threshold = statistics.threshold
-    verdict: SurfaceVerdict = "none" if level is None else "clear"
+    surface: SurfaceConfidence = "none" if level is None else "clear"
     if level is not None and confidence < LOW_CONFIDENCE:
-        verdict = "unsure"
+        surface = "unsure"
         doubt = (
             f"unsure surface: at {level.words} with a confidence of {confidence:.2f}; "
             f"below {LOW_CONFIDENCE:g} about half of such surfaces are right"
@@ -117,7 +120,7 @@ def make_appearance(
         statistics.window,
         iso_value,
         confidence,
-        verdict,
+        surface,
         {},
         threshold=None if threshold is None else threshold.value,
         surface_reason=doubt,
@@ -126,7 +129,7 @@ def make_appearance(
     functions = make_transfer_functions(
         np.asarray(statistics.histogram),
         appearance.iso_normalized,
-        appearance.threshold_normalized,
+        threshold_normalized=appearance.threshold_normalized,
         has_magnitudes=modality == "MR",
     )
     if modality == "CT":

@@ -16,22 +16,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
 ROWS, COLUMNS = 64, 256  # gradient magnitudes, values of 8 bits
 STEEPEST = 3**0.5  # the largest step there is: all of the window along each axis
-FINE_ROWS = 1024  # of 0..STEEPEST, before gradient_max is known: half a step of 8 bits each
-ENERGY_SHARE = 0.995  # of the squared steps lies below gradient_max
-SMALLEST_MAX = 0.05  # 13 steps of 8 bits: below it, rows would be finer than what is told apart
+FINE_ROWS = 1024  # rows over 0..STEEPEST, before gradient_max is known: half a step of 8 bits each
+ENERGY_SHARE = 0.995  # share of the squared steps that lies below gradient_max
+SMALLEST_MAX = 0.05  # share of the window: 13 steps of 8 bits; below, rows are too fine to differ
 SAMPLE_EDGE = (16, 128, 128)  # voxels (z, y, x) of a block, where not all of a region is counted
 
 
-def find_steps(
-    voxels: NDArray[np.uint8], spacing_um: tuple[float, float, float]
-) -> NDArray[np.float32]:
+def find_steps(voxels: NDArray[np.uint8], spacing_um: Spacing) -> NDArray[np.float32]:
     """Return the gradient magnitude at all voxels but the outermost, as 8-bit values: 255 is 1.
 
-    uint8 (z, y, x) to float32 (z - 2, y - 2, x - 2).
+    voxels      uint8 (z, y, x)
+    spacing_um  (z, y, x); only its ratios count
+    result      float32 (z - 2, y - 2, x - 2)
     """
     finest = min(spacing_um)
     inner = (slice(1, -1),) * 3
@@ -49,7 +50,7 @@ def find_steps(
 
 def count_joint(
     voxels: NDArray[np.uint8],
-    spacing_um: tuple[float, float, float],
+    spacing_um: Spacing,
     *,
     gradient_max: float,
     rows: int = ROWS,
@@ -77,8 +78,10 @@ def count_joint(
 def choose_gradient_max(fine: NDArray[np.int64]) -> float:
     """Return the step that a channel's last row is to stand for, rounded up to 3 digits.
 
-    `fine`: counts of FINE_ROWS x COLUMNS over 0..STEEPEST. Nearly all of the squared steps lie
-    below it: voxels without a boundary, which are most, weigh nothing, and a few hot ones little.
+    fine  int64 (FINE_ROWS, COLUMNS), counts over 0..STEEPEST
+
+    Nearly all of the squared steps lie below it: voxels without a boundary, which are most, weigh
+    nothing, and a few hot ones little.
     """
     steps = np.linspace(0, STEEPEST, len(fine))
     energy = np.cumsum(fine.sum(axis=1) * steps**2)
@@ -86,8 +89,12 @@ def choose_gradient_max(fine: NDArray[np.int64]) -> float:
     return float(np.ceil(1000 * max(found, SMALLEST_MAX) - 1e-9) / 1000)
 
 
-def rebin(fine: NDArray[np.int64], gradient_max: float, rows: int = ROWS) -> NDArray[np.int64]:
-    """Return the counts of FINE_ROWS over 0..STEEPEST as those of `rows` over 0..gradient_max."""
+def rebin(fine: NDArray[np.int64], gradient_max: float, *, rows: int = ROWS) -> NDArray[np.int64]:
+    """Return the counts of FINE_ROWS over 0..STEEPEST as those of `rows` over 0..gradient_max.
+
+    fine    int64 (FINE_ROWS, COLUMNS)
+    result  int64 (rows, COLUMNS)
+    """
     steps = np.linspace(0, STEEPEST, len(fine))
     row = np.minimum(steps / gradient_max * (rows - 1) + 0.5, rows - 1).astype(np.intp)
     counts = np.zeros((rows, fine.shape[1]), np.int64)
@@ -107,7 +114,9 @@ def log_scaled(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
 def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
     """Return voxels as the 8-bit volumes hold them: the window's ends are 0 and 255.
 
-    Any real dtype and shape (z, ...) to uint8 of that shape; `window` in voxel values.
+    voxels  any real dtype and shape (z, ...), voxel values
+    window  lowest and highest voxel value
+    result  uint8, of the same shape
     """
     low, high = window
     result = np.empty(voxels.shape, np.uint8)

@@ -16,15 +16,15 @@ THRESHOLD = "threshold"  # name of the function of channels that have a threshol
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
 NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them
-FAINT = 1e-2  # of the peak's count: noise that is rarer is left, dim materials are there, too
+FAINT = 1e-2  # share of the peak's count: rarer noise is left, since dim materials are as rare
 MAX_SHIFT = 1.5  # x the level, to which noise may push the start of the opacity
 
 
 def make_transfer_functions(
     histogram: NDArray[np.int64],
     iso_normalized: float | None,
-    threshold_normalized: float | None = None,
     *,
+    threshold_normalized: float | None = None,
     has_magnitudes: bool = False,
 ) -> dict[str, OpacityPoints]:
     """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
@@ -107,7 +107,7 @@ def _noise_beyond(below: NDArray[np.int64]) -> float:
     return float(np.log(smooth[last] / (FAINT * peak))) * (last - before) / fall
 
 
-def evaluate(points: OpacityPoints, size: int = 256) -> NDArray[np.float32]:
+def evaluate(points: OpacityPoints, *, size: int = 256) -> NDArray[np.float32]:
     """Return the opacity at `size` intensities from 0 to 1, linear between the points.
 
     points  (intensity, opacity) pairs, rising, 0..1; outside them the opacity is constant

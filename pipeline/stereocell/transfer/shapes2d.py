@@ -20,11 +20,11 @@ from stereocell.model.channel import (
 )
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS
 
-NAME = "arcs"  # of the function that is proposed, beside those of transfer.NAMES
-MAX_SHAPES = 32  # of one function: more neither fit a link nor a person's eye
+NAME = "arcs"  # name of the proposed function, beside those of transfer.NAMES
+MAX_SHAPES = 32  # most shapes of one function: more neither fit a link nor a person's eye
 
 
-def evaluate2d(shapes: Shapes, size: tuple[int, int] = (ROWS, COLUMNS)) -> NDArray[np.uint8]:
+def evaluate2d(shapes: Shapes, *, size: tuple[int, int] = (ROWS, COLUMNS)) -> NDArray[np.uint8]:
     """Return the table of a function, uint8 RGBA (rows, columns, 4), straight alpha.
 
     Row j stands for the gradient magnitude j / (rows - 1), column k for the value k / (columns -

@@ -11,7 +11,7 @@ from pxr import Usd, UsdShade
 from stereocell.formats.gltf import Material
 from stereocell.model.channel import (
     OpacityPoints,
-    SurfaceVerdict,
+    SurfaceConfidence,
     TransferFunctions2d,
     normalized,
 )
@@ -68,7 +68,7 @@ class ComposedAppearance:
     window: tuple[float, float]
     volume_window: tuple[float, float]
     iso_value: float | None
-    surface: SurfaceVerdict
+    surface: SurfaceConfidence
     chosen: str
     transfer_functions: dict[str, OpacityPoints]
     transfer_2d: TransferFunctions2d
@@ -151,7 +151,7 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         # only stages of other programs lack it
         _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).Get() else window,
         _number(prim, "stereocell:isoValue"),
-        _surface_verdict(prim, "stereocell:surfaceVerdict"),
+        _surface_confidence(prim, "stereocell:surfaceVerdict"),
         chosen,
         functions,
         TransferFunctions2d(functions=shapes, **read_numbers(prim)),
@@ -184,14 +184,14 @@ def _number(prim: Usd.Prim, name: str) -> float | None:
     return None if value is None else shortest(value)
 
 
-def _surface_verdict(prim: Usd.Prim, name: str) -> SurfaceVerdict:
+def _surface_confidence(prim: Usd.Prim, name: str) -> SurfaceConfidence:
     value = prim.GetAttribute(name).Get()
     if value is None:  # only stages of other programs lack it
         return "clear"
-    for verdict in get_args(SurfaceVerdict):
-        if value == verdict:
-            return verdict
-    known = ", ".join(get_args(SurfaceVerdict))
+    for confidence in get_args(SurfaceConfidence):
+        if value == confidence:
+            return confidence
+    known = ", ".join(get_args(SurfaceConfidence))
     raise StageError(f"{prim.GetPath()}.{name}: {value!r}, expected one of {known}")
 
 

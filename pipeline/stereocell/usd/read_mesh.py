@@ -24,8 +24,8 @@ _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolati
 def read_mesh(
     mesh: UsdGeom.Mesh,
     to_world: NDArray[np.float64],
-    shown: Collection[str] = (),
     *,
+    shown: Collection[str] = (),
     is_edited: bool = False,
 ) -> Mesh | None:
     """Return the mesh in world um, at the default time; None where it has no faces.

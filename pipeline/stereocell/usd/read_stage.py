@@ -51,7 +51,7 @@ from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice
 from stereocell.usd.written_files import AsWritten
 
-_SIDE_DIGITS = 9  # of the unit vectors to a patient's sides: finer than any scanner states them
+_SIDE_DIGITS = 9  # decimals of the unit vectors to a patient's sides: scanners state fewer
 _FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 
@@ -235,7 +235,7 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 @contextmanager
 def loaded(
-    stage: Usd.Stage, tile_id: str, as_written: AsWritten | None = None
+    stage: Usd.Stage, tile_id: str, *, as_written: AsWritten | None = None
 ) -> Iterator[tuple[Usd.Prim, TileChoice]]:
     """Yield a tile's prim with its payload loaded, and its selected variants.
 
@@ -273,7 +273,7 @@ def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileCh
         stage.Unload(path)
 
 
-def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[ComposedLod]:
+def read_lods(tile: Usd.Prim, channel_id: str, *, finest: int = 0) -> Iterator[ComposedLod]:
     """Yield a loaded tile's levels of detail of one channel from `finest` on; none: no surface.
 
     Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
@@ -289,7 +289,7 @@ def read_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Iterator[Comp
         try:
             surface = surface_of(prim)
             fed = vertex_values_of(surface)
-            mesh = read_mesh(UsdGeom.Mesh(prim), matrix, fed, is_edited=shape != built)
+            mesh = read_mesh(UsdGeom.Mesh(prim), matrix, shown=fed, is_edited=shape != built)
         except StageError as error:
             raise StageError(f"{error}{_edit_advice(level) if levels else ''}") from error
         mesh = mesh and without_hidden(mesh, prim)
@@ -340,7 +340,7 @@ def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
     found = None
     if prim is not None:
         fed = vertex_values_of(surface_of(prim))
-        found = read_mesh(UsdGeom.Mesh(prim), np.eye(4), fed, is_edited=True)
+        found = read_mesh(UsdGeom.Mesh(prim), np.eye(4), shown=fed, is_edited=True)
     if found is None:
         raise StageError(f"{tile.GetPath()}/{channel_id}: lod{level} has no mesh any more")
     return found

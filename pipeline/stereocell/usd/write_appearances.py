@@ -37,7 +37,7 @@ from stereocell.usd.numbers2d import write_numbers
 from stereocell.usd.write_objects import write_columns
 
 DEFAULT_FUNCTION = "default"
-ROUGHNESS = 0.5  # of all surfaces, as UsdPreviewSurface has it without a word
+ROUGHNESS = 0.5  # roughness of all surfaces: the default of UsdPreviewSurface
 
 _Types = Sdf.ValueTypeNames
 

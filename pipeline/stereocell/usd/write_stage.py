@@ -25,6 +25,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 from stereocell.model.channel import Appearance
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.rigid_transform import IDENTITY, Matrix
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tile_content import Provenance, TileContent
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing_folder
@@ -60,9 +61,9 @@ class TileExtent:
     """A tile's place, as in TileContent. All (z, y, x) in um."""
 
     id: str
-    first_um: tuple[float, float, float]
-    last_um: tuple[float, float, float]
-    spacing_um: tuple[float, float, float]
+    first_um: Point
+    last_um: Point
+    spacing_um: Spacing
 
     @classmethod
     def of(cls, tile: TileContent) -> "TileExtent":

@@ -47,7 +47,7 @@ from stereocell.usd.written_files import AsWritten
 
 USDZ_NAME = "specimen.usdz"
 SIZE_M = 0.15  # m, the specimen's longest edge
-MAX_TRIANGLES = 200_000  # of all meshes together
+MAX_TRIANGLES = 200_000  # most triangles of all meshes together
 
 _LAYER = "specimen.usdc"
 # zip: bytes of a local header without its name, of an extra field's header; its ID for padding
@@ -67,8 +67,8 @@ class _Part:
 def write_usdz(
     stage_path: Path,
     path: Path,
-    as_written: AsWritten | None = None,
     *,
+    as_written: AsWritten | None = None,
     level: int | None = None,
     tiles: Collection[str] = (),
     channels: Collection[str] = (),
@@ -115,7 +115,7 @@ def _choose_level(stage: Usd.Stage, channels: Collection[str], as_written: AsWri
     """Return the finest level within MAX_TRIANGLES, else the coarsest; None: there is no mesh."""
     counts: list[list[int]] = []
     for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
-        with loaded(stage, name, as_written) as (tile, _):
+        with loaded(stage, name, as_written=as_written) as (tile, _):
             counts.append(
                 [_count_triangles(tile, channels, level) for level in lod_levels(tile) or [0]]
             )

@@ -50,10 +50,10 @@ def digest_of(listed: FileList) -> str:
     return hashlib.sha256(encode(listed)).hexdigest()[:20]
 
 
-def find_damage(root: Path, listed: FileList, since: Path | None = None) -> dict[str, str]:
+def find_damage(root: Path, listed: FileList, *, since: Path | None = None) -> dict[str, str]:
     """Return the fault of each file of a list that has one, by path: as `file_list.find_faults`, or
     CHANGED or DOUBTFUL for a layer."""
-    faults = find_faults(root, listed, since)
+    faults = find_faults(root, listed, since=since)
     return {
         path: _name_fault(root / path, listed[path]) if fault == DAMAGED else fault
         for path, fault in faults.items()
@@ -73,7 +73,7 @@ def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
 
 def is_kept(root: Path, listed: FileList, since: Path) -> bool:
     """Return whether every file of a list is unchanged or a layer that may have been edited."""
-    return set(find_damage(root, listed, since).values()) <= {CHANGED, DOUBTFUL}
+    return set(find_damage(root, listed, since=since).values()) <= {CHANGED, DOUBTFUL}
 
 
 @dataclass(slots=True)
@@ -128,5 +128,5 @@ class AsWritten:
         elif fault == DOUBTFUL:
             raise StageError(f"{file}: {fault}: remove it and {REMEDY}; {ADVICE}")
         else:
-            said = f"damaged, not the bytes that {FILES} says"
-            raise StageError(f"{file}: {said}: remove it and {REMEDY}")
+            problem = f"damaged, not the bytes that {FILES} says"
+            raise StageError(f"{file}: {problem}: remove it and {REMEDY}")

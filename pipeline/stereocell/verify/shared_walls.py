@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.mesh import Mesh
 
-_ODD = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)  # of no meaning, as in xxHash
+_ODD = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)  # odd factors, as in xxHash
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,7 @@ export function axesOf(sides: Sides | undefined): readonly Axis[] {
 }
 
 const SVG = "http://www.w3.org/2000/svg";
-/** Of the drawing, in its own units. */
+/** Half the drawing's edge, in its own units. */
 const HALF = 40;
 const LENGTH = 26;
 const LETTER = 33;

@@ -50,7 +50,7 @@ const BETWEEN_MS = 200;
 /** Without a change until a picture is made, ms. */
 const REST_MS = 1200;
 const POSTER_PX = 960;
-/** Of light, a pixel: a picture of fewer is noise. */
+/** Least light samples of a pixel: a picture with fewer is noise. */
 const MIN_SAMPLES = 64;
 /** Digits of what is told: more are noise of the camera. */
 const DIGITS = 6;

@@ -11,7 +11,7 @@ export function fileAddress(base: string, path: string): string {
   return new URL(path + url.search, base).href;
 }
 
-/** Of a range. */
+/** HTTP status of an answer to a range. */
 const PART = 206;
 
 /** Answers of a host that may be better a moment later. */

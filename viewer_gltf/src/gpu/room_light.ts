@@ -9,7 +9,7 @@ import type { Vec3 } from "../math/vec3";
 export const KEY: Rgb = [0.66, 0.62, 0.56];
 export const FILL: Rgb = [0.08, 0.1, 0.14];
 export const SKY: Rgb = [0.33, 0.34, 0.37];
-/** What comes from below: a dark room's floor still keeps a colour from turning black. */
+/** Light from below: a dark room's floor still keeps a colour from turning black. */
 export const GROUND: Rgb = [0.13, 0.125, 0.12];
 
 /** The most of the lamp's light that a boundary in a volume throws back: as surfaces of roughness 0.5 do. */

@@ -3,9 +3,9 @@ import type { ClipPlane } from "./clip";
 import { negated, type SliceFrame } from "./slice_frame";
 import { dot, type Vec3 } from "./vec3";
 
-/** Of half a picture's longer edge: the corner ends so far before the planes, which lie in it by rounding else. */
+/** Distance from the planes to the corner's end, by half a picture's longer edge: rounding stays outside. */
 const BEFORE = 1e-5;
-/** Of the same: an eye that is nearer to a plane leaves the corner on the side where it was. */
+/** Distance by the same edge: an eye that is nearer to a plane leaves the corner on its side. */
 const LINGERS = 0.02;
 
 /**

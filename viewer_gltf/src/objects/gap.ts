@@ -6,7 +6,7 @@
  */
 import { along, type Ray, type Vec3 } from "../math/vec3";
 
-/** Of an object, however wide the gap is: as in chunks/object_gap.glsl. */
+/** Least share of an object's size that a gap leaves, as in chunks/object_gap.glsl. */
 const MIN_LEFT = 0.2;
 
 /** The middle of a row's box, and its narrowest side, um. */

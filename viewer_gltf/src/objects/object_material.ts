@@ -27,12 +27,12 @@ import objectStain from "./chunks/object_stain.glsl?raw";
 import objectTexel from "./chunks/object_texel.glsl?raw";
 import { middleOf } from "./gap";
 
-/** Of a vertex: the row of its object, in place of the glb's number in the tile. */
+/** Vertex attribute: the row of its object, in place of the glb's number in the tile. */
 export const ROW = "object_row";
-/** Of a vertex: out of its object, the same for all vertices in one place. */
+/** Vertex attribute: the direction out of its object, the same for all vertices in one place. */
 const OUTWARDS = "object_outwards";
 const FEATURE = "_feature_id_0";
-/** Of a vertex, as three's loader calls it: intensity of the stain that is painted on it. Absent: 0. */
+/** Vertex attribute, by its name in three's loader: intensity of the painted stain. Absent: 0. */
 const PAINT = "_paint";
 /** Rows in a line of a texture. */
 const LINE = 256;

@@ -10,9 +10,9 @@ const STOPS: Readonly<Record<PaletteName, string>> = {
   magma: "1c1044 3b0f70 641a80 8c2981 b73779 de4968 f7705c fe9f6d fecf92 fcfdbf",
   diverging: "313695 4575b4 74add1 abd9e9 e0f3f8 ffffbf fee090 fdae61 f46d43 d73027 a50026",
 };
-/** Of categories without colours of their own: Okabe and Ito's, without black. */
+/** Colours of categories that have none of their own: Okabe and Ito's, without black. */
 const DISTINCT = "e69f00 56b4e9 009e73 f0e442 0072b2 d55e00 cc79a7".split(" ");
-/** Of what has no value. */
+/** Colour of objects without a value. */
 export const MISSING: Rgb = [0.13, 0.13, 0.14];
 
 const stops = new Map<PaletteName, readonly Rgb[]>();

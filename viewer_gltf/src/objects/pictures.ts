@@ -104,7 +104,7 @@ export function drawHistogram(
 
 /** Rows of a legend that can be read at a time, on a plane before the eyes, too. */
 export const ROWS_OF_LEGEND = 10;
-/** Of what has none. */
+/** Legend's text for objects without a category. */
 export const NO_CATEGORY = "(none)";
 
 /** A page of a legend: indices of categories, the last of all -1 where objects have none. */

@@ -18,7 +18,7 @@ const INNER = 0.6;
 /** Time that the gaze stays on the same tiles before finer levels are fetched, s. */
 const REFINE_S = 0.25;
 
-/** Of a cone that is marched. */
+/** Widest angle of a cone that is marched. */
 const WIDEST_RAD = 1.5;
 
 const RADIANS = Math.PI / 180;

@@ -9,7 +9,7 @@ import { along, dot, type Vec3 } from "../math/vec3";
 /** Share of the picture that the specimen may fill. */
 const FILL = 0.94;
 const DEGREE = Math.PI / 180;
-/** Of the eye: to the right of straight ahead, and above. The first of each is what one expects. */
+/** Angles of the eye to the right of straight ahead, and above it. Viewers expect the first of each. */
 const ASIDE_DEG = [35, 30, 40, 25, 45, 50, 55, 60, 65, 70];
 const ABOVE_DEG = [25, 30, 20, 35, 40, 45, 50, 55];
 /** Share of the best view's coverage with which an earlier one of the lists will do. */

@@ -1,6 +1,6 @@
 /** What `?bench` in the page's address asks for. Pure. */
 
-/** Of each run, s, where the address says nothing; and at most. */
+/** Length of each run, s: without one in the address, and at most. */
 const FLIGHT_S = 4;
 const LONGEST_S = 60;
 

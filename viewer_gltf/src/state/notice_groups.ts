@@ -9,7 +9,7 @@ export type NoticeGroup = Readonly<{
 
 /** `volumes/r0_c0/CD8.ktx2: the host answers 404`, or several lines of it. */
 const OF_A_FILE = /^(\S+\.\w{2,11}): (.+)$/s;
-/** What differs from file to file: sizes, hashes, levels, the file's own name. */
+/** Parts of a notice that differ from file to file: sizes, hashes, levels, the file's own name. */
 const PARTICULARS = /\b[0-9a-f]{8,}\b|\d+/g;
 
 function faultOf(notice: string): string | null {

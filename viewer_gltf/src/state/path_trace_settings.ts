@@ -120,7 +120,7 @@ export const POST_NUMBERS = {
 /** Farthest place of a lamp, in lengths of the specimen: a hand round it reaches the lamp. */
 export const LAMP_REACH = 3;
 
-/** Of one lamp: where it is, and how strong. */
+/** Numbers of one lamp: its place, and its strength. */
 export const LAMP_NUMBERS = {
   x: { label: "Left to right", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },
   y: { label: "Down to up", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },

@@ -88,7 +88,7 @@ export type Share = Readonly<{
  * a millimetre of a specimen that is 1.2 m long in the room.
  */
 const UNITS_APART = 32;
-/** Of depth, between a translucent surface's colour and what writes its depth before. */
+/** Units of depth between a translucent surface's colour and the pass that writes its depth before. */
 const UNITS_BEHIND = 2;
 
 const NO_PART: Pick<SurfacePart, "uniforms" | "vertex" | "fragment"> = {

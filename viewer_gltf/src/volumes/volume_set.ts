@@ -28,7 +28,7 @@ import type { VolumeSource } from "./volume_source";
 import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
-/** Of each channel in a tile, where the march only stands in for paths of light. */
+/** Most bytes of a channel in a tile, where the march only stands in for paths of light. */
 const STAND_IN_BYTES = 2 ** 21;
 type MadeTable2d = Readonly<{
   shapes: Shapes;

@@ -14,6 +14,7 @@ from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.unit_files import save_unit
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Lod
+from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.model.unit import ObjectFacts, Unit
@@ -37,8 +38,8 @@ class ImageRef:
     channel: int
     level: int
     region: Box
-    spacing_um: tuple[float, float, float]
-    origin_um: tuple[float, float, float]
+    spacing_um: Spacing
+    origin_um: Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +114,7 @@ def run_objects(task: ObjectsTask) -> None:
         pieces = owned[is_piece[owned]]
         measured = [
             measure_intensities(
-                compact, read_on_labels(task.labels, task.window, image), owned, pieces
+                compact, read_on_labels(task.labels, task.window, image), owned, pieces=pieces
             )
             for image in task.images
         ]
@@ -217,7 +218,7 @@ def _paint(lods: Sequence[Lod], painted: Painted) -> tuple[Lod, ...]:
     (z0, y0, x0), (z1, y1, x1) = start.tolist(), stop.tolist()
     box = Box((z0, y0, x0), (z1, y1, x1))
     volume = open_source(image.ref).read(image.channel, box, image.level)
-    lattice = Lattice.of_whole(box, image.spacing_um, image.origin_um)
+    lattice = Lattice.of_whole(box, image.spacing_um, origin_um=image.origin_um)
     return tuple(
         replace(
             lod,

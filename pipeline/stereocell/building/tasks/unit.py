@@ -26,5 +26,5 @@ def run_unit(task: UnitTask) -> None:
     volume = source.read(task.channel, window, task.level)
     painted = None if task.painted is None else source.read(task.painted, window, task.level)
     seconds = time.perf_counter() - start
-    built = build_unit(volume, task.given, painted)
+    built = build_unit(volume, task.given, painted=painted)
     save_unit(task.directory, replace(built, seconds={"read": seconds, **built.seconds}))

@@ -174,7 +174,7 @@ def _suggest(
         fine += count_joint(
             to_eight_bits(voxels, window), spacing, gradient_max=STEEPEST, rows=FINE_ROWS
         )
-    return suggest(fine, spacing)
+    return suggest(fine, spacing_um=spacing)
 
 
 def _blocks(task: StatisticsTask, dataset: Dataset) -> Iterator[NDArray[Any]]:

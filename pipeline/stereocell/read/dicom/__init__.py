@@ -56,7 +56,7 @@ class Found:
     left_out: Counter[str]
 
 
-def read_image(location: Location, series: int = 0) -> Image:
+def read_image(location: Location, *, series: int = 0) -> Image:
     """Return one series; 0 is the largest, others count from 1 as `list_series` does.
 
     Where there are segmentations alone, 0 is the label map of all segments. Raises SourceError

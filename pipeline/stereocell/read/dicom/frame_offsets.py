@@ -15,7 +15,7 @@ from pydicom.uid import NuclearMedicineImageStorage, RTDoseStorage
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS
 
 _ALONG = 0.999  # cosine between an axial plane's normal and z
-_RECONSTRUCTED = "RECON TOMO"  # of ImageType: slices, and no projections, energies or phases
+_RECONSTRUCTED = "RECON TOMO"  # value in ImageType: slices, and no projections, energies or phases
 _STATED_ONCE = ("ImagePositionPatient", "ImageOrientationPatient")
 
 

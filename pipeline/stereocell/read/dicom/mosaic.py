@@ -33,7 +33,7 @@ _SIEMENS_TAGS: list[Any] = [
 ]
 _UIH_SLICES = 0x00651051
 _MAX_SLICES = 4096  # slices of one image
-_ALIGNED = 0.01  # of the cosine between the stated normal and the rows' and columns' own
+_MAX_COSINE_ERROR = 0.01  # largest error of the cosine of the stated and the computed normal
 
 
 class MosaicError(Exception):
@@ -94,21 +94,21 @@ def _siemens(
     header = pydicom.dcmread(path, stop_before_pixels=True, force=True, specific_tags=_SIEMENS_TAGS)
     count, normal = _private_header(header)
     count = count or int(header[_NUMBER].value if _NUMBER in header else 0)
-    told = f"of a mosaic of {count or 'several'} slices"
+    subject = f"of a mosaic of {count or 'several'} slices"
     if count < 1 or normal is None or position is None:
         raise MosaicError(
-            f"{told}, without the private header (0029,1010) that places them: export it with "
+            f"{subject}, without the private header (0029,1010) that places them: export it with "
             "private tags, or as single slices"
         )
     side = math.ceil(math.sqrt(count))
-    rows, columns = _tile(shape, side, side, count, told)
+    rows, columns = _tile(shape, side, side, count, subject)
     along_row, along_column = (np.array(direction) for direction in directions)
     gap = float(header.get("SpacingBetweenSlices") or header.get("SliceThickness") or 0)
     if (
         not 0 < gap < math.inf
-        or abs(abs(normal @ np.cross(along_row, along_column)) - 1) > _ALIGNED
+        or abs(abs(normal @ np.cross(along_row, along_column)) - 1) > _MAX_COSINE_ERROR
     ):
-        raise MosaicError(f"{told} without a direction or a distance of theirs")
+        raise MosaicError(f"{subject} without a direction or a distance of theirs")
     down, across = spacing
     first = (
         np.array(position)
@@ -148,23 +148,25 @@ def _uih(path: Path, shape: tuple[int, int]) -> Mosaic | None:
     items = header[_UIH_SLICES].value if _UIH_SLICES in header else ()
     if not isinstance(items, pydicom.Sequence) or not items:
         return None
-    told = f"of a grid of {len(items)} slices"
+    subject = f"of a grid of {len(items)} slices"
     try:
         places = np.array([item.ImagePositionPatient for item in items], np.float64)
     except DICOM_FAULTS:
-        raise MosaicError(f"{told} without their places") from None
+        raise MosaicError(f"{subject} without their places") from None
     if places.shape != (len(items), 3):
-        raise MosaicError(f"{told} without their places")
+        raise MosaicError(f"{subject} without their places")
     across = math.ceil(math.sqrt(len(items)))
-    rows, columns = _tile(shape, -(-len(items) // across), across, len(items), told)
+    rows, columns = _tile(shape, -(-len(items) // across), across, len(items), subject)
     return _mosaic(rows, columns, across, places)
 
 
-def _tile(shape: tuple[int, int], down: int, across: int, count: int, told: str) -> tuple[int, int]:
+def _tile(
+    shape: tuple[int, int], down: int, across: int, count: int, subject: str
+) -> tuple[int, int]:
     """Return the pixels (rows, columns) of a slice in a grid of so many down and across."""
     if count > _MAX_SLICES or shape[0] % down or shape[1] % across:
         raise MosaicError(
-            f"{told} in an image of {shape[0]} x {shape[1]} pixels, which they don't fill"
+            f"{subject} in an image of {shape[0]} x {shape[1]} pixels, which they don't fill"
         )
     return shape[0] // down, shape[1] // across
 

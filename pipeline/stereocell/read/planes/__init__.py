@@ -37,7 +37,7 @@ _SHOWN = 4  # names in a message
 _EVEN = 0.01  # share of a step along z by which planes may deviate
 
 
-def read_image(location: Location, series: int = 0, pattern: str = "") -> Image:
+def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Image:
     """Return one volume of the folder; 0 is the largest, others count from 1 as `list_series` does.
 
     pattern  how the names are built, as `img_c{c}_z{z}.tif`; empty: guessed
@@ -167,8 +167,8 @@ def _of_planes(location: Location, volume: Volume, first: Head, notes: list[str]
                 f"{location.shown}: found {first.words} and {len(volume.channels)} channels in the "
                 "names, expected either"
             )
-        names, colors, told = _of_samples(samples)
-        notes.append(told)
+        names, colors, description = _of_samples(samples)
+        notes.append(description)
     shape = (len(volume.times), len(names), len(volume.planes), rows, columns)
     array = PlaneArray(shape, first.dtype, partial(_load, location, volume, first), samples > 1)
     z, y, x = first.spacing_um
@@ -195,8 +195,8 @@ def _of_samples(samples: int) -> tuple[tuple[str | None, ...], tuple[Color | Non
     """Return names, colours and a note on colour pixels; alpha is left out."""
     if samples >= 3:
         alpha = "; their alpha is left out" * (samples == 4)
-        told = f"colour pixels: built as channels {', '.join(RGB_NAMES)}{alpha}"
-        return RGB_NAMES, RGB_COLORS, told
+        description = f"colour pixels: built as channels {', '.join(RGB_NAMES)}{alpha}"
+        return RGB_NAMES, RGB_COLORS, description
     return (None,), (None,), "grey pixels with alpha: the alpha is left out"
 
 
@@ -283,6 +283,6 @@ def _read_as(volume: Volume) -> str:
         parts.append(f"{len(volume.times)} points in time")
     if place.plane is not None:
         parts.append(f"{len(volume.planes)} planes ({volume.planes[0]} to {volume.planes[-1]})")
-    told = " of ".join(parts) or "one stack"
+    description = " of ".join(parts) or "one stack"
     count = len(volume.files)
-    return f"{count} file{'s' * (count != 1)}, named as {template_of(place)}, read as {told}"
+    return f"{count} file{'s' * (count != 1)}, named as {template_of(place)}, read as {description}"

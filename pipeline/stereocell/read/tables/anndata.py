@@ -26,9 +26,9 @@ from stereocell.read.tables.table import (
     named,
 )
 
-_ATTRIBUTES = "spatialdata_attrs"  # in `uns`: which label map the rows belong to
+_ATTRIBUTES = "spatialdata_attrs"  # key in `uns`: the label map that the rows belong to
 _BLOCK = 1 << 22  # values of X that are read at a time
-_MAX_VALUES = 1 << 28  # of X that are taken
+_MAX_VALUES = 1 << 28  # most values of X that are read
 
 
 class Node(Protocol):

@@ -19,7 +19,7 @@ from stereocell.read.tables.table import (
 )
 from stereocell.storage.location import Location
 
-_MAX_BYTES = 4 << 30  # of a table
+_MAX_BYTES = 4 << 30  # most bytes of a table
 _LONGEST = 1 << 17  # characters of a cell: the csv module's own limit
 _LONGEST_LINE = 1 << 24  # characters
 
@@ -66,7 +66,7 @@ def _read(text: io.TextIOWrapper, where: str, key: str, wanted: tuple[str, ...])
     point = "," if mark == ";" else "."  # where a comma is the point, it parts no cells
     labels = keys_of(where, chosen_key, cells[0])
     columns = tuple(
-        as_column(name, texts, point) for name, texts in zip(taken, cells[1:], strict=True)
+        as_column(name, texts, point=point) for name, texts in zip(taken, cells[1:], strict=True)
     )
     return Table(where, chosen_key, labels, columns, left_out)
 

@@ -28,7 +28,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _BATCH = 1 << 16  # rows
-_MAX_BYTES = 1 << 28  # of a column in a group of rows
+_MAX_BYTES = 1 << 28  # most bytes of a column in a group of rows
 _INDEX = "__index_level_"  # how pandas calls an index without a name
 
 

@@ -18,7 +18,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _EXPECTED = "a table of AnnData (obs, var, X)"
-_TEXT_BYTES = 1024  # of a text, on average in its chunk
+_TEXT_BYTES = 1024  # bytes of a text, on average in its chunk
 _LARGEST_CHUNK = 1 << 28  # bytes
 _LONGEST_TEXT = 4096  # bytes, of texts of one length
 
@@ -81,7 +81,7 @@ class _Hdf5Node:
     def find(self, name: str) -> "_Hdf5Node | None":
         if not isinstance(self._node, h5py.Group) or name not in self._node:
             return None
-        return _Hdf5Node(self._tree, self._tree.find(name, self._node))
+        return _Hdf5Node(self._tree, self._tree.find(name, start=self._node))
 
     def read(self, key: Any) -> NDArray[Any]:
         where = f"{self._tree.where}:{self._node.name}"

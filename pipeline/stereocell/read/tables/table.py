@@ -12,12 +12,12 @@ from stereocell.model.errors import SourceError
 
 # Columns of objects' numbers, as MCMICRO, scikit-image, Cellpose, Xenium, SpatialData call them
 KEYS = ("CellID", "label", "cell_id", "instance_id", "object_id", "ObjectNumber", "id")
-MAX_COLUMNS = 128  # that are taken without being named
+MAX_COLUMNS = 128  # most columns that are taken where none are named
 MAX_NAMES = 100_000  # columns of a file
 MAX_ROWS = 1 << 24
 _LONGEST = 200  # characters of a category
 _SHOWN = 8  # names that a message lists
-_MAX_DIGITS = 20  # of a number of 64 bits
+_MAX_DIGITS = 20  # highest power of ten: numbers of 64 bits have up to 20 digits
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ def named(names: Sequence[str]) -> list[str]:
     return [clean(name) or f"column {place}" for place, name in enumerate(names, start=1)]
 
 
-def as_column(name: str, texts: Sequence[str], point: str = ".") -> TableColumn:
+def as_column(name: str, texts: Sequence[str], *, point: str = ".") -> TableColumn:
     """Return a column of texts, as numbers where all that are there are numbers.
 
     point  what stands before a number's fraction

@@ -28,7 +28,7 @@ function shownKeys(keys: readonly string[]): readonly string[] {
   return keys.length > 3 ? [keys[0], "…", keys[keys.length - 1]] : keys;
 }
 
-/** Of more keys one looks for some. */
+/** Most keys that are listed without a search field. */
 const MANY = 15;
 
 /** The rows that a few letters leave, each a key's and its label's; all of them where nothing is sought. */

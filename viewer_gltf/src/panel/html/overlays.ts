@@ -73,7 +73,7 @@ export class Notices {
   }
 }
 
-/** What comes of going near, or of waiting, by how volumes show. */
+/** Text on the result of going near, or of waiting, by the mode that shows volumes. */
 const THEN: Readonly<Partial<Record<Mode, string>>> = {
   disc: ", go near for volumes",
   tile: ", go near for volumes",

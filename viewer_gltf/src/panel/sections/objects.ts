@@ -503,5 +503,5 @@ export function largestWall(
   return `${table.title(other)}, ${numberText(largest)} ${unitText("um2")}`;
 }
 
-/** Of a column that does not colour. */
+/** View of a column that does not colour: grey. */
 const GREY = { palette: "cividis", span: [254, 255], isLog: false } as const;

@@ -9,7 +9,7 @@ import type { Size3 } from "../../bundle/ktx2";
 import type { Box } from "../../math/box";
 import type { Vec3 } from "../../math/vec3";
 
-/** Of the grid: at a byte each for what is open and what is lit, 512 KiB of the GPU's memory. */
+/** Most cells of the grid: with a byte for openness and one for light, 512 KiB of the GPU's memory. */
 export const MAX_CELLS = 64 ** 3;
 /** Cells beyond the volumes' box, so that a sample at its face looks up what lies before it. */
 const MARGIN = 1;

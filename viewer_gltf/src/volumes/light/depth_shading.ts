@@ -26,7 +26,7 @@ import { type Cut, type Grid, gridRound, type TileMatter } from "./coarse_matter
 import type { CoarseTexels } from "./coarse_texels";
 import { type Shading, ShadingClient } from "./shading_client";
 
-/** Of the coarse levels of all volumes together. */
+/** Most texels in the coarse levels of all volumes together. */
 const MAX_TEXELS = 2 ** 23;
 /** As far as the meshes' occlusion looks: so many of the coarsest voxel spacing. */
 const REACH_VOXELS = 8;

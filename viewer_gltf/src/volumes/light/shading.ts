@@ -9,7 +9,7 @@
 import type { Size3 } from "../../bundle/ktx2";
 import type { Vec3 } from "../../math/vec3";
 
-/** Of 26 directions on a sphere, those along axes, edges and corners: Lebedev's, of degree 7. */
+/** Weights of 26 directions on a sphere, along axes, edges and corners: Lebedev's, of degree 7. */
 const WEIGHTS = [0, 1 / 21, 4 / 105, 9 / 280] as const;
 /** The share of the surroundings that a point before a flat wall sees, a cell away: it counts as open. */
 const OPEN = 0.72;

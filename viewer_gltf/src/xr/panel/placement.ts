@@ -10,7 +10,7 @@ const DEG = Math.PI / 180;
  * and neck go without thinking. While the panel is open the button hangs under it.
  */
 const BELOW = -30 * DEG;
-/** Of the panel behind a specimen on a table, which it stands above: before it, it would hide it. */
+/** Pitch of the panel above and behind a specimen on a table: in front, it would hide the specimen. */
 const OVER_TABLE = -5 * DEG;
 /** A head that looks steeper, radians, up or down, has no clear heading. */
 const STEEP = 75 * DEG;
