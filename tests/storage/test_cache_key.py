@@ -17,20 +17,21 @@ from stereocell.building.tasks import evidence, unit, window
 from stereocell.bundle import write as bundle_writer
 from stereocell.read.open_dataset import READERS
 from stereocell.report import page
-from stereocell.storage import assets, cache_key, source_code
+from stereocell.storage import assets, cache_key, message_texts, source_code
 
 ROOT = Path(__file__).parents[2]
-ZARR, TIFF = READERS["ome-zarr"].module, READERS["tiff"].module
+ZARR, TIFF, DICOM = (READERS[name].module for name in ("ome-zarr", "tiff", "dicom"))
 MAKERS = {
     "window": (window, ZARR),
     "evidence": (evidence, ZARR),
     "unit": (unit, ZARR),
     "unit of a TIFF": (unit, TIFF),
+    "unit of DICOM": (unit, DICOM),
     "stage": (stage_tasks,),
     "bundle": (bundle_writer,),
     "report": (page,),
 }
-UNITS = {"unit", "unit of a TIFF"}
+UNITS = {"unit", "unit of a TIFF", "unit of DICOM"}
 TASKS = UNITS | {"window", "evidence"}
 
 
@@ -111,9 +112,9 @@ PACKAGE = "pipeline/stereocell"
         ("filters/denoise.py", TASKS | {"stage", "bundle", "report"}),
         ("isosurface/level_evidence.py", {"evidence", "window", "report"}),
         ("transfer/boundaries.py", {"window", "report"}),
-        ("read/ome_zarr.py", TASKS - {"unit of a TIFF"}),
+        ("read/ome_zarr.py", {"window", "evidence", "unit"}),
         ("read/tiff/ome.py", {"unit of a TIFF"}),
-        ("read/dicom/frame.py", set()),
+        ("read/dicom/frame.py", {"unit of DICOM"}),
         ("read/nifti.py", set()),
         ("formats/exr.py", {"stage", "bundle"}),
         ("formats/gltf.py", {"bundle"}),
@@ -137,6 +138,36 @@ def test_an_asset_changes_the_keys_of_what_is_made_of_it(
     assert changed(before, copy, file, lambda text: f"{text}\n# changed\n") == reached
 
 
+@pytest.mark.parametrize(
+    ("file", "old", "new", "reached"),
+    [
+        ("read/dataset.py", '"chunks that are whole"', '"whole chunks"', set()),
+        ("read/dataset.py", '"its index 0"', '"the index 0"', set()),
+        ("building/unit_files.py", '"damaged, not the bytes', '"damaged, other bytes', set()),
+        (
+            "building/unit_files.py",
+            '"lod{level}.npz"',
+            '"level{level}.npz"',
+            UNITS | {"stage", "report"},
+        ),
+        ("read/spacing.py", '"centimeter"', '"centimetre"', TASKS | {"report"}),
+        # a result says why it has no surface, or no maps
+        ("building/unit.py", '"no voxel crosses the iso-value"', '"nothing crosses it"', UNITS),
+        (
+            "textures/unwrap.py",
+            " charts, too many",
+            " charts: too many",
+            UNITS | {"bundle", "report"},
+        ),
+    ],
+)
+def test_texts_count_where_a_result_may_hold_them(
+    copy: Path, before: dict[str, str], file: str, old: str, new: str, reached: set[str]
+) -> None:
+    found = changed(before, copy, f"{PACKAGE}/{file}", lambda text: text.replace(old, new))
+    assert found == reached
+
+
 @pytest.mark.slow
 def test_comments_and_docstrings_change_no_key(copy: Path, before: dict[str, str]) -> None:
     """In all modules at once: a comment above, one in each body, another docstring."""
@@ -152,6 +183,14 @@ def test_comments_and_docstrings_change_no_key(copy: Path, before: dict[str, str
     assert after == before
 
 
+HELPER = """
+def _why(n):
+    hint = f"{n} of them" if n else ""
+    return f"found {hint}" + ", expected 2"
+def g():"""
+OTHER_HELPER = HELPER.replace("of them", "such").replace("expected", "not")
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -164,6 +203,16 @@ def test_comments_and_docstrings_change_no_key(copy: Path, before: dict[str, str
         ('log.info("done")', 'log.info("ready")'),
         ('warnings.warn("old", stacklevel=2)', 'warnings.warn("older", stacklevel=2)'),
         ('x = setting(1, "what it does")', 'x = setting(1, "what it is for")'),
+        ('with one_line(where, "whole"): read()', 'with one_line(where, "all of it"): read()'),
+        ('def f(): return SourceError(f"{a}: b")', 'def f(): return SourceError(f"c {a}")'),
+        ('assert a, "b"', 'assert a, "c"'),
+        ("def f():\n    b = 'c'\n    raise E(b)", "def f():\n    b = 'd'\n    raise E(b)"),
+        (f"{HELPER}\n    raise E(_why(1))", f"{OTHER_HELPER}\n    raise E(_why(1))"),
+        (
+            f"{HELPER}\n    b = _why(1)\n    if b: raise E(b)",
+            f"{OTHER_HELPER}\n    b = _why(1)\n    if b: raise E(b)",
+        ),
+        ('_A = "a"\ndef f(): raise E(_A)', '_A = "b"\ndef f(): raise E(_A)'),
     ],
 )
 def test_words_for_people_change_no_code(old: str, new: str) -> None:
@@ -186,6 +235,72 @@ def test_words_for_people_change_no_code(old: str, new: str) -> None:
 )
 def test_code_changes_the_code(old: str, new: str) -> None:
     assert code(old) != code(new)
+
+
+# what may hold the text "a" beside a message
+HOLDERS = [
+    "b = {0}",
+    "def f():\n    b = {0}\n    g(b)\n    raise E(b)",
+    "def f():\n    b = {0}\n    if b == c: g()\n    raise E(b)",
+    "def f():\n    b = c[{0}]\n    raise E(b)",
+    "def f():\n    b = g({0})\n    raise E(b)",
+    "def f():\n    b = [{0}]\n    raise E(b)",
+    "def f():\n    b = {0} if c else d\n    return b",
+    "def f():\n    b = {0}\n    if b: g()\n    return lambda: b",
+    "def f():\n    global b\n    b = {0}\n    raise E(b)",
+    "def f():\n    class C:\n        b = {0}\n    raise E(b)",
+    "b = {0}\ndef f(): raise E(b)",
+    "_b = {0}\ndef f(): raise E(_b)\ndef g(): return _b",
+    "_b = {0}\ndef f(): raise E(_b)\ndef g(): return getattr(c, '_b')",
+    "def b(): return {0}\ndef f(): raise E(b())",
+    "def _b(): return {0}",
+    "def _b(): return {0} if _b() else _b()",
+    "def _b(): return {0}\ndef f(): raise E(_b())\ndef g(): return _b()",
+    "def _b(c):\n    if c == {0}: return ''\n    return 'd'\ndef f():\n    if d := _b(): raise d",
+    "def _b():\n    d = {0}\n    return d == c and c\ndef f():\n    if d := _b(): raise d",
+    "@route\ndef _b(): return {0}\ndef f(): raise E(_b())",
+    "class C(Base):\n    def _b(self): return {0}\n    def f(self): raise E(self._b())",
+    "def f(): raise NoSurfaceError({0})",
+    "def f():\n    b = {0}\n    raise NoSurfaceError(b)",
+    "def f(): return Message({0})",
+]
+
+
+@pytest.mark.parametrize("holder", HOLDERS)
+def test_a_text_that_more_than_a_message_may_hold_counts(holder: str) -> None:
+    assert code(holder.replace("{0}", '"a"')) != code(holder.replace("{0}", '"b"'))
+
+
+def test_whether_a_text_of_a_message_is_empty_counts() -> None:
+    holder = "def f():\n    b = {0}\n    if b: raise E(b)"
+    assert code(holder.replace("{0}", '"a"')) == code(holder.replace("{0}", '"b"'))
+    assert code(holder.replace("{0}", '"a"')) != code(holder.replace("{0}", '""'))
+
+
+@pytest.mark.slow
+def test_no_module_uses_a_private_text_of_another() -> None:
+    """Else the uses in its own module would not be all."""
+    held, foreign = set(), set()
+    for file in (ROOT / PACKAGE).rglob("*.py"):
+        finder, tree = message_texts._Finder(), ast.parse(file.read_bytes())
+        nodes = list(ast.walk(tree))
+        functions = (ast.FunctionDef, ast.AsyncFunctionDef)
+        defined = {node.name for node in nodes if isinstance(node, functions)}
+        defined |= {
+            node.attr if isinstance(node, ast.Attribute) else node.id
+            for node in nodes
+            if isinstance(node, ast.Attribute | ast.Name) and isinstance(node.ctx, ast.Store)
+        }
+        finder.visit(tree)
+        names = {name for scope, name in finder.held_by_messages() if scope == 0}
+        held |= {name for name in names if message_texts._is_private(name)}
+        for node in nodes:
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("stereocell"):
+                foreign |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.Attribute) and node.attr not in defined:
+                foreign.add(node.attr)
+    assert held
+    assert not held & foreign
 
 
 def code(text: str) -> str:
@@ -226,6 +341,6 @@ def test_what_is_imported_is_declared() -> None:
     for file in (ROOT / "pipeline" / "stereocell").rglob("*.py"):
         for name in cache_key._needs(file)[1]:
             top = name.split(".")[0]
-            if top not in sys.stdlib_module_names and top != "stereocell":
+            if top not in {*sys.stdlib_module_names, "stereocell"}:
                 owners = {canonicalize_name(package.name) for package in installed[top]}
                 assert owners & declared, f"{file.name} imports {top}"
