@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from importlib.metadata import packages_distributions, requires
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 from packaging.requirements import Requirement
@@ -15,7 +16,7 @@ from packaging.utils import canonicalize_name
 from stereocell.building import stage_tasks
 from stereocell.building.tasks import evidence, unit, window
 from stereocell.bundle import write as bundle_writer
-from stereocell.read.open_dataset import READERS
+from stereocell.read.open_dataset import OTHER, READERS
 from stereocell.report import page
 from stereocell.storage import assets, cache_key, message_texts, source_code
 
@@ -316,6 +317,55 @@ def test_only_libraries_that_can_change_a_byte_are_in_a_unit_s_key() -> None:
     assert not others & named
 
 
+@pytest.mark.parametrize(
+    ("library", "readers"),
+    [
+        ("pylibCZIrw", {"czi"}),
+        ("liffile", {"lif"}),
+        ("nd2", {"nd2"}),
+        ("hdf5plugin", {"hdf5", "ims", "bdv"}),
+        ("imagecodecs", {"tiff", "planes"}),
+        ("python-gdcm", {"dicom"}),
+        ("pylibjpeg-openjpeg", {"dicom"}),
+        ("pyjpegls", {"dicom"}),
+        ("bioio_*", {"bioio"}),
+    ],
+)
+def test_what_decodes_for_a_reader_is_in_its_key_alone(library: str, readers: set[str]) -> None:
+    modules = {name: reader.module for name, reader in READERS.items()} | {"bioio": OTHER.module}
+    found = {
+        name
+        for name, module in modules.items()
+        if library in dict(cache_key._reach(module, cache_key.NEUTRAL)[1])
+    }
+    assert found == readers
+    assert library not in dict(cache_key._reach(unit.__name__, cache_key.NEUTRAL)[1])
+
+
+def test_another_version_of_a_decoder_or_its_lack_makes_another_key(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def of_readers() -> dict[str, str]:
+        cache_key._reach.cache_clear()
+        cache_key._digest.cache_clear()
+        return {name: cache_key.key_of("", reader.module) for name, reader in READERS.items()}
+
+    installed, there = cache_key._distributions(), of_readers()
+
+    class Older:
+        metadata: ClassVar = {"Name": "liffile", "Version": "1"}
+
+    for changed_one in ({"liffile": (Older(),)}, {}):
+        known = {name: one for name, one in installed.items() if name != "liffile"} | changed_one
+        monkeypatch.setattr(cache_key, "_distributions", lambda known=known: known)
+        now = of_readers()
+        assert {name for name in there if now[name] != there[name]} == {"lif"}
+        there["lif"] = now["lif"]
+    assert "liffile" not in cache_key.libraries_of(READERS["lif"].module)
+    monkeypatch.undo()
+    assert of_readers()["lif"] != there["lif"]
+
+
 def test_modules_that_are_left_out_exist() -> None:
     for part in cache_key.NEUTRAL:
         assert f"stereocell.{part}" in cache_key._modules(), part
@@ -333,6 +383,9 @@ def test_packages_are_found_as_python_finds_them() -> None:
         assert {package.name for package in found[top]} == set(names), top
 
 
+BESIDE = {"bioio", "bioio_base"}  # a user has them beside StereoCell (read/bioio_image.py)
+
+
 @pytest.mark.slow
 def test_what_is_imported_is_declared() -> None:
     """A package that comes along with another one is gone when that one does without it."""
@@ -341,6 +394,6 @@ def test_what_is_imported_is_declared() -> None:
     for file in (ROOT / "pipeline" / "stereocell").rglob("*.py"):
         for name in cache_key._needs(file)[1]:
             top = name.split(".")[0]
-            if top not in {*sys.stdlib_module_names, "stereocell"}:
+            if top not in {*sys.stdlib_module_names, "stereocell", *BESIDE}:
                 owners = {canonicalize_name(package.name) for package in installed[top]}
                 assert owners & declared, f"{file.name} imports {top}"
