@@ -16,7 +16,7 @@ from packaging.utils import canonicalize_name
 from stereocell.building import stage_tasks
 from stereocell.building.tasks import evidence, unit, window
 from stereocell.bundle import write as bundle_writer
-from stereocell.read.open_dataset import OTHER, READERS
+from stereocell.read.readers import OTHER, READERS
 from stereocell.report import page
 from stereocell.storage import assets, cache_key, message_texts, source_code
 
@@ -137,6 +137,31 @@ def test_an_asset_changes_the_keys_of_what_is_made_of_it(
     copy: Path, before: dict[str, str], file: str, reached: set[str]
 ) -> None:
     assert changed(before, copy, file, lambda text: f"{text}\n# changed\n") == reached
+
+
+ROW = '    "mrc": Reader('
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("read/readers.py", ROW, '    "new": Reader("stereocell.read.new", "New"),\n' + ROW),
+        ("read/readers.py", '"OME-Zarr"', '"Zarr"'),
+        ("read/file_kind.py", '"nifti": _Kind(("nifti",),', '"nifti": _Kind(("nifti", "new"),'),
+        ("read/remarks.py", "building the first alone", "the first is built"),
+    ],
+)
+def test_what_chooses_a_reader_or_tells_of_it_changes_no_key(
+    copy: Path, before: dict[str, str], file: str, old: str, new: str
+) -> None:
+    found = changed(before, copy, f"{PACKAGE}/{file}", lambda text: text.replace(old, new, 1))
+    assert found == set()
+
+
+def test_the_reader_is_in_the_key() -> None:
+    """By its name, since two may import each other."""
+    of_readers = [cache_key.key_of("", reader.module) for reader in (*READERS.values(), OTHER)]
+    assert len(set(of_readers)) == len(READERS) + 1
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,22 @@
 """The name of a cached result: a hash of its input, its settings and the code that makes it.
 
-The code is found from the imports, starting at the result's maker: a manual list would become
-outdated. The walk leaves out modules that can't change a byte of a result (NEUTRAL): those that
-open and write files or distribute tasks, and those that make a plan, whose values are part of each
-result's content. In all others, comments, docstrings and texts of messages don't count. A library
-counts by its version where a module of the walk imports it, at its top or in a function, and so do
-those that it loads by itself (BEHIND); one that isn't installed counts as absent.
+The code is found from the imports, starting at the result's makers: a manual list would become
+outdated. A module that is imported by name (`import_module`) is a choice, and no part of the walk:
+its caller puts what was chosen into the key. So the reader of a source is a maker of its own, and
+other formats' readers don't count, nor does the table that they are chosen from.
+
+What counts
+- The makers' names, and of each module of the walk the syntax tree.
+- Shipped files that they find by a literal name.
+- The version of each library that they import, at their top or in a function, and of those that it
+  loads by itself (BEHIND). One that isn't installed counts as absent.
+
+What doesn't
+- NEUTRAL modules, which can't change a byte of a result: those that open and write files or
+  distribute tasks, those that make a plan, whose values are part of each result's content, and
+  those that choose a source's reader, refuse a source, or tell of it.
+- Comments, docstrings, comments of settings, log lines, and texts of messages
+  (message_texts.py).
 """
 
 import hashlib
@@ -35,6 +46,9 @@ NEUTRAL = (
     "building.plan",
     "building.plan_file",
     "building.out_folder",
+    "read.readers",
+    "read.file_kind",
+    "read.remarks",
 )
 # import name of a library -> those of the libraries that it loads by itself; `*`: any ending
 BEHIND = {
@@ -74,7 +88,7 @@ def _name(maker: ModuleType | str) -> str:
 @cache
 def _digest(module: str) -> str:
     files, libraries = _reach(module, NEUTRAL)
-    digest = hashlib.sha256(json.dumps(libraries).encode())
+    digest = hashlib.sha256(json.dumps([module, libraries]).encode())
     for file in files:
         content = file.read_bytes()
         digest.update(read_source(content).code.encode() if file.suffix == ".py" else content)
