@@ -29,7 +29,7 @@ import stereocell
 from stereocell import samples
 from stereocell.cli import __main__ as cli
 from stereocell.model.errors import UsageError
-from stereocell.read import open_dataset
+from stereocell.read import readers
 from stereocell.report import phase as drawing
 from stereocell.samples.head import make_head
 from stereocell.samples.head_dicom import write_dicom
@@ -255,8 +255,8 @@ def test_the_reader_that_is_shown_reads(tmp_path: Path, monkeypatch: pytest.Monk
     np.save(tmp_path / "f.npy", body)
     monkeypatch.setattr(Location, "format", property(lambda location: "npy"))
     monkeypatch.setitem(sys.modules, "npy_reader", SimpleNamespace(read_image=names["read_image"]))
-    reader = open_dataset.Reader("npy_reader", "NumPy")
-    monkeypatch.setitem(open_dataset.READERS, "npy", reader)
+    reader = readers.Reader("npy_reader", "NumPy")
+    monkeypatch.setitem(readers.READERS, "npy", reader)
     dataset = stereocell.open_volume(tmp_path / "f.npy", spacing_um=(0.5, 0.2, 0.2))
     assert (dataset.read(0, dataset.levels[0].box, 0).voxels == body).all()
     np.save(tmp_path / "f.npy", body[0])

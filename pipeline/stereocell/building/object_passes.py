@@ -37,7 +37,7 @@ from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted
 from stereocell.model.object_notes import ObjectNotes
-from stereocell.read.open_dataset import reader_of
+from stereocell.read.readers import reader_of
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 from stereocell.storage.location import Location

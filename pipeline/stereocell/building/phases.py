@@ -43,8 +43,8 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
-from stereocell.read.cast import CAST
-from stereocell.read.open_dataset import READERS
+from stereocell.read.readers import READERS
+from stereocell.read.remarks import CAST
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of, libraries_of

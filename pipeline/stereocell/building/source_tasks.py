@@ -9,7 +9,7 @@ from stereocell.building.plan import Plan
 from stereocell.engine.run import Engine
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
-from stereocell.read.open_dataset import reader_of
+from stereocell.read.readers import reader_of
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -31,7 +31,7 @@ from stereocell.engine.run import console
 from stereocell.formats.ome_zarr_write import write_probabilities
 from stereocell.model.errors import OutputError, SourceError, UsageError
 from stereocell.model.version import GENERATOR
-from stereocell.read.open_dataset import reader_of
+from stereocell.read.readers import reader_of
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.json_files import write_json

@@ -1,6 +1,7 @@
 """Readers: a source becomes a lazy dataset of voxels (z, y, x), with all lengths in um."""
 
 from stereocell.read.dataset import ChannelInfo, Dataset, Level
-from stereocell.read.open_dataset import list_series, open
+from stereocell.read.open_dataset import open
+from stereocell.read.readers import list_series
 
 __all__ = ["ChannelInfo", "Dataset", "Level", "list_series", "open"]

@@ -8,7 +8,6 @@ References: https://bioio-devs.github.io/bioio/
 """
 
 import re
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -45,11 +44,12 @@ def can_read(location: Location) -> bool:
     if not location.is_local or find_spec("bioio") is None:
         return False
     require_file(location)
-    refused = import_module("bioio_base.exceptions").UnsupportedFileFormatError
+    from bioio_base.exceptions import UnsupportedFileFormatError
+
     with one_line(location.shown, "a file that a plugin of bioio reads"):
         try:
             _open(location)
-        except refused:
+        except UnsupportedFileFormatError:
             return False
     return True
 
@@ -80,7 +80,9 @@ def list_series(location: Location) -> tuple[str, ...]:
 
 
 def _open(location: Location) -> Any:
-    return import_module("bioio").BioImage(location.path)
+    import bioio
+
+    return bioio.BioImage(location.path)
 
 
 def _candidates(image: Any) -> list[Candidate]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TAKEN = ("uint8", "uint16", "int16", "float32")  # dtypes that builds take
+TAKEN = ("uint8", "uint16", "int16", "float32")  # by builds
 _CAST = {
     "bool": "uint8",
     "int8": "int16",
@@ -30,26 +30,7 @@ def built_dtype(stored: Any) -> np.dtype[Any] | None:
     return None if name is None else np.dtype(name)
 
 
-CAST = "voxels are"  # how the note on a cast begins
-
-
 def cast(voxels: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return voxels of any shape in `dtype`; numbers beyond float32 become infinite."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.ascontiguousarray(voxels, dtype=dtype)
-
-
-def cast_note(stored: Any) -> str:
-    """Return a sentence on what the cast changes; empty: nothing is cast."""
-    dtype, built = np.dtype(stored), built_dtype(stored)
-    if built is None or dtype.name == built.name:
-        return ""
-    note = f"{CAST} {dtype.name}: read as {built.name}"
-    if dtype.kind in "iu" and built.kind == "f":
-        return (
-            f"{note}, which keeps 24 of {8 * dtype.itemsize} bits: whole numbers beyond "
-            "16,777,216 are rounded"
-        )
-    if dtype.name == "float64":
-        return f"{note}, which keeps 7 of 16 digits"
-    return f"{note}, without loss"

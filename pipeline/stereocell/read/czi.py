@@ -44,7 +44,8 @@ class _File:
     def __init__(self, location: Location, stack: ExitStack) -> None:
         self.where = location.shown
         require_file(location)
-        library = extras.load("pylibCZIrw.czi", "czi", self.where, "CZI")
+        with extras.required("czi", self.where, "CZI"):
+            import pylibCZIrw.czi as library
         with one_line(self.where, "a CZI file that is whole"):
             path = os.path.realpath(location.path)
             _require_whole(path, self.where)

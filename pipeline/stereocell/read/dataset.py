@@ -21,6 +21,7 @@ from stereocell.model.volume import Volume
 from stereocell.read.acquired import Acquired
 from stereocell.read.cast import built_dtype, cast
 from stereocell.read.fingerprint import fingerprint_of
+from stereocell.read.remarks import choice_notes
 from stereocell.read.spacing import Level
 from stereocell.read.unmeasured import least_finite, share_of_gaps
 from stereocell.storage.library_errors import one_line
@@ -154,12 +155,7 @@ class Dataset:
     @property
     def notes(self) -> tuple[str, ...]:
         """Changes to the source and parts left out, a sentence each, for the user."""
-        notes = list(self.remarks)
-        if self.images > 1:
-            notes.append(f"{self.images} images in the source; building the first alone")
-        if self.time_points > 1:
-            notes.append(f"{self.time_points} points in time; building --time {self.time}")
-        return tuple(notes)
+        return (*self.remarks, *choice_notes(self.images, self.time_points, self.time))
 
     @cached_property
     def fingerprint(self) -> str:

@@ -10,7 +10,6 @@ import re
 from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack
-from importlib import import_module
 from itertools import islice
 from typing import Any
 
@@ -165,7 +164,7 @@ def require_readable(dataset: h5py.Dataset, where: str) -> None:
 def _has_plugins() -> bool:
     """Register the filters of hdf5plugin; False: it isn't installed."""
     try:
-        import_module("hdf5plugin")
+        import hdf5plugin  # noqa: F401
     except ImportError:
         return False
     return True

@@ -42,3 +42,10 @@ class Image:
     objects: ObjectNotes = ObjectNotes()  # noqa: RUF009  (frozen)
     notes: tuple[str, ...] = ()
     notes_at: Callable[[int], tuple[str, ...]] | None = None
+
+
+def printable(name: str) -> str:
+    """Return a name without unprintable characters (controls, NUL, line ends)."""
+    if name.isprintable():
+        return name
+    return " ".join("".join(c if c.isprintable() else " " for c in name).split())

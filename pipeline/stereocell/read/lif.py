@@ -65,7 +65,8 @@ def list_series(location: Location) -> tuple[str, ...]:
 def _images(location: Location, stack: ExitStack) -> tuple[list[Any], list[Candidate]]:
     """Return the images of the file, and what a list says of each."""
     require_file(location)
-    library = extras.load("liffile", "lif", location.shown, "LIF")
+    with extras.required("lif", location.shown, "LIF"):
+        import liffile as library
     with one_line(location.shown, "a LIF file that is whole"):
         path = os.path.realpath(location.path)
         _require_whole(path, location.shown)

@@ -30,7 +30,8 @@ class _File:
     def __init__(self, location: Location, stack: ExitStack) -> None:
         self.where = location.shown
         require_file(location)
-        library = extras.load("nd2", "nd2", self.where, "ND2")
+        with extras.required("nd2", self.where, "ND2"):
+            import nd2 as library
         path = os.path.realpath(location.path)
         _require_end(path, self.where)
         with one_line(self.where, "an ND2 file that is whole"):

@@ -1,18 +1,32 @@
 """The name of a cached result: a hash of its input, its settings and the code that makes it.
 
-The code is found from the imports, starting at the result's maker: a manual list would become
-outdated. The walk leaves out modules that can't change a byte of a result (NEUTRAL): those that
-open and write files or distribute tasks, and those that make a plan, whose values are part of each
-result's content. In all others, comments, docstrings and texts of messages don't count. A library
-counts by its version where a module of the walk imports it.
+The code is found from the imports, starting at the result's makers: a manual list would become
+outdated. A module that is imported by name (`import_module`) is a choice, and no part of the walk:
+its caller puts what was chosen into the key. So the reader of a source is a maker of its own, and
+other formats' readers don't count, nor does the table that they are chosen from.
+
+What counts
+- The makers' names, and of each module of the walk the syntax tree.
+- Shipped files that they find by a literal name.
+- The version of each library that they import, at their top or in a function, and of those that it
+  loads by itself (BEHIND). One that isn't installed counts as absent.
+
+What doesn't
+- NEUTRAL modules, which can't change a byte of a result: those that open and write files or
+  distribute tasks, those that make a plan, whose values are part of each result's content, and
+  those that choose a source's reader, refuse a source, or tell of it.
+- Comments, docstrings, comments of settings, log lines, and texts of messages
+  (message_texts.py).
 """
 
 import hashlib
 import json
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from fnmatch import filter as matching
 from functools import cache
 from importlib.metadata import Distribution, distributions
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -32,7 +46,18 @@ NEUTRAL = (
     "building.plan",
     "building.plan_file",
     "building.out_folder",
+    "read.readers",
+    "read.file_kind",
+    "read.remarks",
 )
+# import name of a library -> those of the libraries that it loads by itself; `*`: any ending
+BEHIND = {
+    "bioio": ("bioio_*",),
+    "pydicom": ("gdcm", "jpeg_ls", "openjpeg", "pylibjpeg"),  # read/dicom/stored_values.py
+    "tifffile": ("imagecodecs",),
+    "zarr": ("numcodecs",),
+}
+ABSENT = ""  # version of a library that isn't installed
 _PACKAGE = Path(__file__).parents[1]
 _NAME = _PACKAGE.name
 
@@ -49,11 +74,11 @@ def key_of(content: Any, *makers: ModuleType | str) -> str:
 
 
 def libraries_of(*makers: ModuleType | str) -> dict[str, str]:
-    """Return the version of each library that the makers' code imports, by name."""
+    """Return the version of each installed library that the makers' code imports, by name."""
     found: dict[str, str] = {}
     for maker in makers:
         found |= dict(_reach(_name(maker), ())[1])
-    return found
+    return {name: version for name, version in found.items() if version != ABSENT}
 
 
 def _name(maker: ModuleType | str) -> str:
@@ -63,7 +88,7 @@ def _name(maker: ModuleType | str) -> str:
 @cache
 def _digest(module: str) -> str:
     files, libraries = _reach(module, NEUTRAL)
-    digest = hashlib.sha256(json.dumps(libraries).encode())
+    digest = hashlib.sha256(json.dumps([module, libraries]).encode())
     for file in files:
         content = file.read_bytes()
         digest.update(read_source(content).code.encode() if file.suffix == ".py" else content)
@@ -91,10 +116,16 @@ def _reach(
             assets, imports = _needs(file)
             found.update(dict.fromkeys(assets))
             waiting += imports
-    known = _distributions()
-    tops = foreign - sys.stdlib_module_names
-    versions = {_version(package) for top in tops for package in known[top]}
+    versions = {pair for top in foreign - sys.stdlib_module_names for pair in _versions(top)}
     return tuple(sorted(found)), tuple(sorted(versions))
+
+
+def _versions(top: str) -> Iterator[tuple[str, str]]:
+    """Yield (library, version) of what has an import name, and of what it loads by itself."""
+    known = _distributions()
+    behind = (matching(known, pattern) or [pattern] for pattern in BEHIND.get(top, ()))
+    for name in chain([top], *behind):
+        yield from map(_version, known[name]) if name in known else [(name, ABSENT)]
 
 
 @cache

@@ -28,7 +28,7 @@ _MAGIC = (
     (b"GIF8", "a GIF image"),
     (b"BM", "a BMP image"),
 )
-# where a format's mark lies, the mark -> the format (open_dataset.READERS), and words for it
+# where a format's mark lies, the mark -> the format (readers.READERS), and words for it
 _READ = (
     (128, b"DICM", "dicom", "a DICOM file"),  # goes first: its preamble may begin a TIFF
     *((0, mark, "tiff", "a TIFF file") for mark in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
@@ -52,7 +52,7 @@ class Content:
     """What a file is.
 
     words     as `a zip archive (unzip it)`, with the way out where there is one
-    format    one that is read (open_dataset.READERS); empty: none is known
+    format    one that is read (readers.READERS); empty: none is known
     is_known  False: the words only say how it begins
     """
 

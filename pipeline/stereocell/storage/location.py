@@ -136,7 +136,7 @@ class Location:
 
     @property
     def format(self) -> str | None:
-        """The name of the format (open_dataset.READERS); None: neither name nor content fits one.
+        """The name of the format (readers.READERS); None: neither name nor content fits one.
 
         Planes are a folder of images without DICOM; DICOM is any other folder on this machine, and
         a file with DICOM's first bytes.

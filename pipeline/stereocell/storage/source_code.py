@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from stereocell.kernels.cache_place import find_home
+from stereocell.storage import message_texts
 from stereocell.storage.assets import find_asset
+from stereocell.storage.message_texts import is_log_line, without_messages
 
 _FINDER = find_asset.__name__
-_LOG_METHODS = {"print", "log", "debug", "info", "warning", "warn", "error"}
-_LOG_OBJECTS = {"console", "logger", "logging", "log", "warnings"}
 _MAX_SOURCES = 2000  # sources that are kept; beyond, those alone that this process has read
 
 
@@ -65,9 +65,10 @@ _new: set[str] = set()  # of these, what is kept nowhere
 
 @cache
 def _place() -> Path | None:
-    """Return the file of what was found by this very module; None: there is no place for it."""
+    """Return the file of what was found by this very code; None: there is no place for it."""
     home = find_home()
-    finder = hashlib.sha256(Path(__file__).read_bytes() + sys.version.encode()).hexdigest()[:12]
+    code = b"".join(Path(file).read_bytes() for file in (__file__, message_texts.__file__))
+    finder = hashlib.sha256(code + sys.version.encode()).hexdigest()[:12]
     return home and home / f"sources-{finder}.json"
 
 
@@ -88,7 +89,7 @@ def _parsed(content: bytes) -> Source:
     tree = ast.parse(content)
     assets = tuple(_assets(tree)) if _FINDER.encode() in content else ()
     imports = tuple(_imports(tree.body))
-    bare = _Bare(has_settings=b"setting" in content).visit(tree)
+    bare = _Bare(has_settings=b"setting" in content).visit(without_messages(tree))
     return Source(hashlib.sha256(ast.dump(bare).encode()).hexdigest(), assets, imports)
 
 
@@ -137,36 +138,15 @@ class _Bare(ast.NodeTransformer):
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
         """Remove docstrings (any lone constant), prints and log lines."""
-        match node.value:
-            case ast.Constant():
-                return None
-            case ast.Call(func=ast.Name(id="print")):
-                return None
-            case ast.Call(func=ast.Attribute(value=ast.Name(id=owner), attr=method)) if (
-                owner in _LOG_OBJECTS and method in _LOG_METHODS
-            ):
-                return None
+        if isinstance(node.value, ast.Constant) or is_log_line(node):
+            return None
         return self.generic_visit(node)
 
     def visit_Pass(self, node: ast.Pass) -> None:
         """Remove statements without effect."""
-
-    def visit_Raise(self, node: ast.Raise) -> ast.AST:
-        """Remove an error's text; keep its class and the statement."""
-        return _Wordless().visit(node)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """Remove the comment of a setting, which follows its default."""
         if isinstance(node.func, ast.Name) and node.func.id == "setting":
             node.args, node.keywords = node.args[:1], []
         return self.generic_visit(node)
-
-
-class _Wordless(ast.NodeTransformer):
-    """Removes the texts from an expression."""
-
-    def visit_Constant(self, node: ast.Constant) -> ast.AST:
-        return ast.Constant(None) if isinstance(node.value, str) else node
-
-    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
-        return ast.Constant(None)

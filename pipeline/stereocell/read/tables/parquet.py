@@ -35,7 +35,8 @@ _INDEX = "__index_level_"  # how pandas calls an index without a name
 def read_parquet(location: Location, key: str, wanted: tuple[str, ...]) -> Table:
     """Return a table of Parquet. Raises SourceError."""
     where = location.shown
-    parquet = extras.load("pyarrow.parquet", "tables", where, "Parquet")
+    with extras.required("tables", where, "Parquet"):
+        import pyarrow.parquet as parquet
     with one_line(where, "a Parquet file that is whole"), open(location.source, "rb") as source:
         try:
             return _read(parquet, source, where, key, wanted)

@@ -1,0 +1,35 @@
+"""What a user is note of how a source is read; no result holds it."""
+
+from typing import Any
+
+import numpy as np
+
+from stereocell.read.cast import built_dtype
+
+CAST = "voxels are"  # how the note on a cast begins
+
+
+def cast_note(stored: Any) -> str:
+    """Return a sentence on what the cast changes; empty: nothing is cast."""
+    dtype, built = np.dtype(stored), built_dtype(stored)
+    if built is None or dtype.name == built.name:
+        return ""
+    note = f"{CAST} {dtype.name}: read as {built.name}"
+    if dtype.kind in "iu" and built.kind == "f":
+        return (
+            f"{note}, which keeps 24 of {8 * dtype.itemsize} bits: whole numbers beyond "
+            "16,777,216 are rounded"
+        )
+    if dtype.name == "float64":
+        return f"{note}, which keeps 7 of 16 digits"
+    return f"{note}, without loss"
+
+
+def choice_notes(images: int, time_points: int, time: int) -> tuple[str, ...]:
+    """Return a sentence each on what else than what is read a source holds."""
+    notes = []
+    if images > 1:
+        notes.append(f"{images} images in the source; building the first alone")
+    if time_points > 1:
+        notes.append(f"{time_points} points in time; building --time {time}")
+    return tuple(notes)
