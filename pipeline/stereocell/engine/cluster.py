@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from stereocell.model.errors import StereoCellError
-from stereocell.read.open_dataset import OTHER, READERS
+from stereocell.read.readers import OTHER, READERS
 from stereocell.storage.cache_key import key_of, libraries_of
 
 # tasks whose code must be equal on all workers, as that of the readers; by name, since this package

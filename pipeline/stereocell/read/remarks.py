@@ -1,4 +1,4 @@
-"""What a user is note of how a source is read; no result holds it."""
+"""Notes to the user on how a source is read; no result holds them."""
 
 from typing import Any
 
