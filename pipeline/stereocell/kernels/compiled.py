@@ -17,7 +17,7 @@ from stereocell.kernels.cache_place import cache_folder
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CONFIG: Any = numba.config
-# without wrappers that nobody calls, of which a third of the compiling was
+# wrappers for programs in C, which call none of them, would be compiled as well
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
@@ -37,4 +37,4 @@ def kernel(function: F) -> F:
 
 def part(function: F) -> F:
     """Compile a small function into each kernel that calls it."""
-    return numba.njit(forceinline=True, no_cpython_wrapper=True, **_OPTIONS)(function)
+    return numba.njit(forceinline=True, **_OPTIONS)(function)
