@@ -19,6 +19,7 @@ from stereocell.kernels.half_edges import (
     sum_gains,
     sum_normals,
 )
+from stereocell.kernels.triangles import doubled_area
 from support.meshes import SOUND, ball, enclosed_volume, joined, moved
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
@@ -116,3 +117,7 @@ def test_renumbered_triangles_have_the_same_corners_in_order() -> None:
     np.testing.assert_array_equal(used[own], triangles)
     used, own = renumber_corners(triangles[:0], 12)
     assert (len(used), own.shape) == (0, (0, 3))
+
+
+def test_a_part_of_kernels_is_called_from_python_too() -> None:
+    assert doubled_area(np.eye(3), 0, 1, 2) == (1.0, 1.0, 1.0)
