@@ -1,11 +1,13 @@
 """plan.json: what the dataclasses say and what the schema says are the same."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 
 from stereocell.building.channels import Channel
+from stereocell.building.phases import provenance
 from stereocell.building.plan import Plan
 from stereocell.storage.assets import schema_path
+from support.plans import plan_of
 
 
 def test_the_schema_has_the_plan_s_fields() -> None:
@@ -14,3 +16,13 @@ def test_the_schema_has_the_plan_s_fields() -> None:
     assert list(schema["properties"]) == schema["required"] == own
     channel = schema["properties"]["channels"]["items"]
     assert list(channel["properties"]) == [field.name for field in fields(Channel)]
+
+
+def test_results_name_the_libraries_of_their_own_reader_and_of_no_other() -> None:
+    def named(*formats: str) -> set[str]:
+        return set(provenance(replace(plan_of(), formats=formats))["libraries"])
+
+    assert {"numpy", "usd-core", "zarr"} <= named("ome-zarr")
+    others = {"nibabel", "pydicom", "tifffile", "mrcfile", "pynrrd", "liffile", "nd2", "bioio"}
+    assert not others & named("ome-zarr")
+    assert {"nibabel", "pydicom"} & named("ome-zarr", "nifti") == {"nibabel"}

@@ -96,6 +96,7 @@ def plans(draw: st.DrawFn) -> Plan:
             channels=channels,
             level=chosen,
             settings=wanted,
+            formats=["ome-zarr"],
         )
     except (UsageError, SourceError) as error:  # told, in one line, before anything is written
         assert "\n" not in str(error)  # noqa: PT017

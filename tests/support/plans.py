@@ -37,6 +37,7 @@ def plan_of(
         channels=channels,
         level=level,
         settings=settings,
+        formats=["ome-zarr"],
     )
 
 

@@ -263,6 +263,7 @@ def with_copies(out):
         channels=channels,
         level=(0, "asked for"),
         settings=settings,
+        formats=["ome-zarr"],
     )
     OutFolder(out).save_plan(plan)
     copy = out / "stage" / "tiles" / "r0_c0" / "CD31_closed.stl"

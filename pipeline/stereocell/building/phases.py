@@ -43,7 +43,7 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
-from stereocell.read.readers import READERS
+from stereocell.read.readers import format_of, module_of, reader_of
 from stereocell.read.remarks import CAST
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.atomic_write import write_bytes
@@ -132,6 +132,7 @@ def settle(source: str, settings: Settings) -> Plan:
         placement=dataset.placement,
         has_sides=dataset.has_sides,
         labels=labels,
+        formats={format_of(location), *(format_of(one.ref.source) for one in labels)},
     )
     for one in plan.labels:
         # what can't be read, or isn't there, is told before the build
@@ -169,14 +170,19 @@ def _require_labels(settings: Settings) -> None:
 def provenance(plan: Plan) -> dict[str, Any]:
     """Return the provenance that results carry: settings and versions, no paths, no identities."""
     settings = _without_places(to_dict(plan.settings))
-    readers = [reader.module for reader in READERS.values()]
+    # by the plan's formats, since the sources may be gone when a stage is written; an added
+    # channel's source lies in OUT
+    readers = {
+        *map(module_of, plan.formats),
+        *(reader_of(c.source) for c in plan.channels if c.source),
+    }
     return {
         "generator": GENERATOR,
         "fingerprint": plan.fingerprint,
         "level": plan.level,
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
-        "libraries": libraries_of(window, evidence, solids, unit, stage_tasks, *readers),
+        "libraries": libraries_of(window, evidence, solids, unit, stage_tasks, *sorted(readers)),
         **_added(plan),
     }
 

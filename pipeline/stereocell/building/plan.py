@@ -6,7 +6,7 @@ It holds everything that later phases need, with every `auto` resolved; plan.jso
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Protocol
 
@@ -55,6 +55,7 @@ class Plan:
     has_sides   whether the source states where the patient's left, back and head are: then the
                 specimen's place is the patient's world (read/anatomical_axes.py)
     labels      label maps whose objects are built, channels beside `channels`
+    formats     which formats the source and the label maps have, sorted (readers.format_of)
     """
 
     source: str
@@ -73,6 +74,7 @@ class Plan:
     placement: Matrix = IDENTITY
     has_sides: bool = False
     labels: tuple[Labels, ...] = ()
+    formats: tuple[str, ...] = ()
 
     @property
     def repair(self) -> RepairOptions:
@@ -193,6 +195,7 @@ def make_plan(
     channels: Sequence[Channel],
     level: tuple[int, str],
     settings: Settings,
+    formats: Collection[str],
     modality: str = "",
     placement: Matrix = IDENTITY,
     has_sides: bool = False,
@@ -245,6 +248,7 @@ def make_plan(
         placement=placement,
         has_sides=has_sides,
         labels=tuple(labels),
+        formats=tuple(sorted(formats)),
     )
 
 

@@ -84,9 +84,19 @@ OTHER = Reader(
 )
 
 
+def format_of(source: str | Path) -> str:
+    """Return the format of a source: a key of READERS, or `other`, by its name and first bytes."""
+    return Location.of(source).format or "other"
+
+
 def reader_of(source: str | Path) -> str:
     """Return the dotted name of the module that reads a source."""
-    return READERS.get(Location.of(source).format or "", OTHER).module
+    return module_of(format_of(source))
+
+
+def module_of(format: str) -> str:
+    """Return the dotted name of the module that reads a format, as `format_of` gives it."""
+    return READERS.get(format, OTHER).module
 
 
 def find_reader(source: str | Path) -> tuple[Location, Reader]:
