@@ -3,9 +3,12 @@
 import json
 from dataclasses import fields, replace
 
+import jsonschema
+
 from stereocell.building.channels import Channel
 from stereocell.building.phases import provenance
 from stereocell.building.plan import Plan
+from stereocell.building.plan_file import from_json, to_json
 from stereocell.storage.assets import schema_path
 from support.plans import plan_of
 
@@ -13,9 +16,17 @@ from support.plans import plan_of
 def test_the_schema_has_the_plan_s_fields() -> None:
     schema = json.loads(schema_path("plan.schema.json").read_bytes())
     own = ["format", "version", *(field.name for field in fields(Plan))]
-    assert list(schema["properties"]) == schema["required"] == own
+    assert list(schema["properties"]) == own
+    assert schema["required"] == [name for name in own if name != "formats"]
     channel = schema["properties"]["channels"]["items"]
     assert list(channel["properties"]) == [field.name for field in fields(Channel)]
+
+
+def test_a_plan_of_the_version_before_its_formats_were_in_it_is_read() -> None:
+    content = to_json(plan_of())
+    del content["formats"]
+    jsonschema.validate(content, json.loads(schema_path("plan.schema.json").read_bytes()))
+    assert from_json(content) == replace(plan_of(), formats=())
 
 
 def test_results_name_the_libraries_of_their_own_reader_and_of_no_other() -> None:
