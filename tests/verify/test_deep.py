@@ -437,6 +437,8 @@ def test_a_bundle_of_another_layer_is_told_from_the_stage_s_in_lines(
     found = failures(out)
     assert found.keys() == {MANIFEST}
     assert "F: transfer_functions is ['default', 'mine'" in found[MANIFEST]
+    remedy = f"; the bundle is of {layer.name}: check it with --stage LAYER"
+    assert found[MANIFEST].endswith(remedy)
     assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
 
 

@@ -43,6 +43,7 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
+from stereocell.read.image import printable
 from stereocell.read.readers import format_of, module_of, reader_of
 from stereocell.read.remarks import CAST
 from stereocell.storage.assets import viewer_dist
@@ -352,6 +353,7 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
                 parts=parts,
                 report_line=_print_line,
             )
+            phase.about = "" if stage is None else f"of {printable(path.name)}"
     remove(out_folder.parts_dir)
     if viewer is None and not phase.is_up_to_date:
         console.print(

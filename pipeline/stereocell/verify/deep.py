@@ -64,15 +64,17 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
                 f"{labels.name} against source",
                 partial(compare_objects, out_folder, plan, labels, engine),
             )
-    yield _line("manifest against stage", lambda: _compare_manifest(exported, bundle))
-    yield _line("bundle against stage", lambda: _compare_bundle(exported, bundle, engine))
+    of_layer = "" if stage else out_folder.phases().get("bundle", {}).get("about", "")
+    remedy = of_layer and f"; the bundle is {of_layer}: check it with --stage LAYER"
+    yield _line("manifest against stage", lambda: _compare_manifest(exported, bundle), remedy)
+    yield _line("bundle against stage", lambda: _compare_bundle(exported, bundle, engine), remedy)
 
 
-def _line(name: str, run: Callable[[], str]) -> CheckLine:
+def _line(name: str, run: Callable[[], str], remedy: str = "") -> CheckLine:
     try:
         return CheckLine(name, True, run())
     except StereoCellError as error:
-        return CheckLine(name, False, _one_line(error))
+        return CheckLine(name, False, _one_line(error) + remedy)
 
 
 def _one_line(error: StereoCellError) -> str:
