@@ -42,7 +42,7 @@ describeInChromium("the editor of value and gradient", () => {
   }
 
   it("shows boundaries by the bundle's shapes, which mouse and finger draw, and a link brings back", async () => {
-    await stand.open("&mode=all#v=1&c=Balls");
+    await stand.open("&mode=all#v=1&c=Balls&depth=0");
     await stand.viewer.still();
     const flat = await picture();
     expect([asked("transfer2d.json"), asked("histogram2d.ktx2")]).toEqual([0, 0]);

@@ -135,7 +135,7 @@ describeInChromium("surface or volume", () => {
   it("takes another colour in the same frame, surface and volume", async () => {
     const { page } = stand.viewer;
     await addClock(page);
-    await stand.open(`&mode=disc${NEAR}&disc=${DISC_DEG}&quality=high#v=1&c=Balls`);
+    await stand.open(`&mode=disc${NEAR}&disc=${DISC_DEG}&quality=high#v=1&c=Balls&depth=0`);
     await stand.viewer.settled();
     await stand.viewer.recolor("Balls", "#ff0000");
     expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);
@@ -155,7 +155,7 @@ describeInChromium("surface or volume", () => {
   it("is drawn with less while frames are late, and as well as can be at rest", async () => {
     const { page } = stand.viewer;
     await addClock(page);
-    await stand.open(`&mode=all${NEAR}&quality=auto`);
+    await stand.open(`&mode=all${NEAR}&quality=auto#v=1&depth=0`);
     await stand.viewer.settled();
     const settings = async () => (await stand.viewer.snapshot()).settings;
     const best = await settings();

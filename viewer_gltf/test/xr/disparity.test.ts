@@ -28,7 +28,7 @@ describeInChromium("in stereo", () => {
 
   it("surfaces hide volumes, and volumes veil surfaces, for both eyes", async () => {
     await addHeadset(stand.viewer.page);
-    await stand.open("&mode=all&quality=high");
+    await stand.open("&mode=all&quality=high#v=1&depth=0");
     await stand.viewer.showOnly();
     await stand.viewer.showAs("Block", "volume");
     await stand.viewer.show("Block", false);
@@ -112,7 +112,7 @@ describeInChromium("in stereo", () => {
   for (const [as, query] of sweep(drawn, ([as]) => as === "volume")) {
     it(`a ball's middle lies where both eyes should see it, as a ${as}`, async () => {
       await addHeadset(stand.viewer.page);
-      await stand.open(`${query}&quality=high#v=1&c=Balls`);
+      await stand.open(`${query}&quality=high#v=1&c=Balls&depth=0`);
       await stand.viewer.enterStereo();
       await stand.viewer.settled();
 

@@ -83,7 +83,7 @@ export function throughCells(
 
 function addTile(through: Float32Array, grid: Grid, tile: TileMatter): void {
   const { edge, low } = grid;
-  const [nx, ny, nz] = grid.size;
+  const [nx, ny] = grid.size;
   const m = tile.toTexture;
   const tables = tile.channels.map(({ opacities }) =>
     Float32Array.from(
@@ -91,60 +91,139 @@ function addTile(through: Float32Array, grid: Grid, tile: TileMatter): void {
       (a) => (1 - Math.min(a / 255, MAX_OPACITY)) ** (edge / tile.voxel_um),
     ),
   );
-  const texels = tile.channels.map((each) => each.texels);
+  const isDimming = dimmingTexels(tile, tables);
+  const clearAt = clearnessOf(tile, tables);
   const [sx, sy, sz] = tile.size;
   const [wx, wy, wz] = tile.whole;
   const [lowX, lowY, lowZ] = tile.low;
   const [highX, highY, highZ] = tile.high;
   const share = 1 / ASIDE.length ** 3;
-  for (let z = 0; z < nz; z++) {
-    for (const dz of ASIDE) {
-      const pz = low[2] + (z + 0.5 + dz) * edge;
-      for (let y = 0; y < ny; y++) {
-        for (const dy of ASIDE) {
-          const py = low[1] + (y + 0.5 + dy) * edge;
-          const u0 = m[4] * py + m[8] * pz + m[12];
-          const v0 = m[5] * py + m[9] * pz + m[13];
-          const w0 = m[6] * py + m[10] * pz + m[14];
-          const row = (z * ny + y) * nx;
-          for (let x = 0; x < nx; x++) {
-            for (const dx of ASIDE) {
-              const px = low[0] + (x + 0.5 + dx) * edge;
-              const u = m[0] * px + u0;
-              if (u < lowX || u >= highX) continue;
-              const v = m[1] * px + v0;
-              if (v < lowY || v >= highY) continue;
-              const w = m[2] * px + w0;
-              if (w < lowZ || w >= highZ) continue;
-              // between texels, whose middles lie at a half; beyond the last that one's own
-              const tx = Math.min(sx - 1, Math.max(0, u * wx - 0.5));
-              const ty = Math.min(sy - 1, Math.max(0, v * wy - 0.5));
-              const tz = Math.min(sz - 1, Math.max(0, w * wz - 0.5));
-              const [i, j, k] = [Math.trunc(tx), Math.trunc(ty), Math.trunc(tz)];
-              const [fx, fy, fz] = [tx - i, ty - j, tz - k];
-              const at = (k * sy + j) * sx + i;
-              const right = i + 1 < sx ? 1 : 0;
-              const down = j + 1 < sy ? sx : 0;
-              const back = k + 1 < sz ? sx * sy : 0;
-              let clear = 1;
-              for (let c = 0; c < tables.length; c++) {
-                const t = texels[c];
-                const a = t[at] + fx * (t[at + right] - t[at]);
-                const b = t[at + down] + fx * (t[at + down + right] - t[at + down]);
-                const there = at + back;
-                const d = t[there] + fx * (t[there + right] - t[there]);
-                const e = t[there + down] + fx * (t[there + down + right] - t[there + down]);
-                const near = a + fy * (b - a);
-                const value = near + fz * (d + fy * (e - d) - near);
-                clear *= tables[c][Math.round(value)];
-              }
-              through[row + x] -= share * (1 - clear);
-            }
-          }
-        }
+  const places = [0, 1, 2].map((axis) =>
+    Float64Array.from(
+      { length: ASIDE.length * grid.size[axis] },
+      (_, i) => low[axis] + (Math.floor(i / ASIDE.length) + 0.5 + ASIDE[i % ASIDE.length]) * edge,
+    ),
+  );
+  const [xs, ys, zs] = places;
+  // a function of its own: one that is called often is compiled sooner than a loop that is long
+  const addRow = (row: number, u0: number, v0: number, w0: number) => {
+    if (m[1] === 0 && (v0 < lowY || v0 >= highY)) return; // beside the tile all along
+    if (m[2] === 0 && (w0 < lowZ || w0 >= highZ)) return;
+    for (let i = 0; i < xs.length; i++) {
+      const u = m[0] * xs[i] + u0;
+      if (u < lowX || u >= highX) continue;
+      const v = m[1] * xs[i] + v0;
+      if (v < lowY || v >= highY) continue;
+      const w = m[2] * xs[i] + w0;
+      if (w < lowZ || w >= highZ) continue;
+      // between texels, whose middles lie at a half; beyond the last that one's own
+      const tx = Math.min(sx - 1, Math.max(0, u * wx - 0.5));
+      const ty = Math.min(sy - 1, Math.max(0, v * wy - 0.5));
+      const tz = Math.min(sz - 1, Math.max(0, w * wz - 0.5));
+      const at = (Math.trunc(tz) * sy + Math.trunc(ty)) * sx + Math.trunc(tx);
+      if (isDimming[at] === 1) {
+        through[row + Math.floor(i / ASIDE.length)] -= share * (1 - clearAt(tx, ty, tz));
       }
     }
+  };
+  zs.forEach((pz, k) => {
+    ys.forEach((py, j) => {
+      const u0 = m[4] * py + m[8] * pz + m[12];
+      const v0 = m[5] * py + m[9] * pz + m[13];
+      const w0 = m[6] * py + m[10] * pz + m[14];
+      const [y, z] = [Math.floor(j / ASIDE.length), Math.floor(k / ASIDE.length)];
+      addRow((z * ny + y) * nx, u0, v0, w0);
+    });
+  });
+}
+
+/** The light that all channels let through at a place between texels. */
+function clearnessOf(
+  { channels, size: [sx, sy, sz] }: TileMatter,
+  tables: readonly Float32Array[],
+): (x: number, y: number, z: number) => number {
+  return (x, y, z) => {
+    const i = Math.trunc(x);
+    const j = Math.trunc(y);
+    const k = Math.trunc(z);
+    const fx = x - i;
+    const fy = y - j;
+    const fz = z - k;
+    const at = (k * sy + j) * sx + i;
+    const right = i + 1 < sx ? 1 : 0;
+    const down = j + 1 < sy ? sx : 0;
+    const there = at + (k + 1 < sz ? sx * sy : 0);
+    let clear = 1;
+    for (let c = 0; c < tables.length; c++) {
+      const t = channels[c].texels;
+      const a = t[at] + fx * (t[at + right] - t[at]);
+      const b = t[at + down] + fx * (t[at + down + right] - t[at + down]);
+      const d = t[there] + fx * (t[there + right] - t[there]);
+      const e = t[there + down] + fx * (t[there + down + right] - t[there + down]);
+      const near = a + fy * (b - a);
+      const value = near + fz * (d + fy * (e - d) - near);
+      clear *= tables[c][Math.round(value)];
+    }
+    return clear;
+  };
+}
+
+/** 1 where between a texel and the next ones along the axes some channel may take light: mostly none does. */
+function dimmingTexels(
+  { channels, size: [sx, sy, sz] }: TileMatter,
+  tables: readonly Float32Array[],
+): Uint8Array {
+  const found = new Uint8Array(sx * sy * sz);
+  channels.forEach(({ texels }, c) => {
+    const next = nextDimming(tables[c]);
+    if (next[0] > 255) return;
+    for (let k = 0, at = 0; k < sz; k++) {
+      const back = k + 1 < sz ? sx * sy : 0;
+      for (let j = 0; j < sy; j++, at += sx) {
+        markRow(found, texels, next, at, sx, j + 1 < sy ? sx : 0, back);
+      }
+    }
+  });
+  return found;
+}
+
+/** The same of a row: by the least and the most of each texel and its neighbours, `down` and `back` from it. */
+function markRow(
+  found: Uint8Array,
+  texels: Uint8Array,
+  next: Uint16Array,
+  from: number,
+  count: number,
+  down: number,
+  back: number,
+): void {
+  let least = 0;
+  let most = 0;
+  for (let x = count - 1; x >= 0; x--) {
+    const at = from + x;
+    const a = texels[at];
+    const b = texels[at + down];
+    const c = texels[at + back];
+    const d = texels[at + down + back];
+    const low = Math.min(a, b, c, d);
+    const high = Math.max(a, b, c, d);
+    const isLast = x === count - 1;
+    if (next[isLast ? low : Math.min(low, least)] <= (isLast ? high : Math.max(high, most))) {
+      found[at] = 1;
+    }
+    least = low;
+    most = high;
   }
+}
+
+/** By intensity the next one, or itself, that takes light; 256: there is none. */
+function nextDimming(table: Float32Array): Uint16Array {
+  const next = new Uint16Array(256);
+  for (let v = 255, last = 256; v >= 0; v--) {
+    if (table[v] < 1) last = v;
+    next[v] = last;
+  }
+  return next;
 }
 
 /** What is cut away lets all light through. */

@@ -29,13 +29,14 @@ export function openness(through: Float32Array, size: Size3, radius: number): Fl
   const padded = [1, Math.SQRT2, Math.sqrt(3)].map((length) => {
     const cells = new Float32Array(plane * (nz + 2 * pad)).fill(1);
     for (let z = 0, from = 0; z < nz; z++) {
-      for (let y = 0; y < ny; y++) {
+      for (let y = 0; y < ny; y++, from += nx) {
         const to = (z + pad) * plane + (y + pad) * row + pad;
-        for (let x = 0; x < nx; x++, from++) cells[to + x] = through[from] ** length;
+        copyRow(cells, to, through, from, nx, length);
       }
     }
     return cells;
   });
+  const isDimmed = dimmedWithin(through, size, Math.floor(radius));
   const seen = new Float32Array(through.length);
   for (let dz = -1; dz <= 1; dz++) {
     for (let dy = -1; dy <= 1; dy++) {
@@ -45,25 +46,14 @@ export function openness(through: Float32Array, size: Size3, radius: number): Fl
         const length = Math.sqrt(kind);
         const cells = padded[kind - 1];
         const step = dz * plane + dy * row + dx;
-        const count = Math.floor(radius / length);
         // a hit counts by how near the cell's front is
-        const near = Float32Array.from({ length: count }, (_, k) =>
+        const near = Float32Array.from({ length: Math.floor(radius / length) }, (_, k) =>
           Math.max(0, 1 - ((k + 0.5) * length) / radius),
         );
-        const weight = WEIGHTS[kind];
         for (let z = 0, to = 0; z < nz; z++) {
-          for (let y = 0; y < ny; y++) {
-            let at = (z + pad) * plane + (y + pad) * row + pad;
-            for (let x = 0; x < nx; x++, at++, to++) {
-              let left = 1;
-              let hidden = 0;
-              for (let k = 0, there = at + step; k < count; k++, there += step) {
-                const clear = cells[there];
-                hidden += near[k] * left * (1 - clear);
-                left *= clear;
-              }
-              seen[to] += weight * (1 - hidden);
-            }
+          for (let y = 0; y < ny; y++, to += nx) {
+            const at = (z + pad) * plane + (y + pad) * row + pad;
+            seeRow(seen, to, nx, isDimmed, cells, at, step, near, WEIGHTS[kind]);
           }
         }
       }
@@ -71,6 +61,66 @@ export function openness(through: Float32Array, size: Size3, radius: number): Fl
   }
   for (let i = 0; i < seen.length; i++) seen[i] = Math.min(1, seen[i] / OPEN);
   return seen;
+}
+
+/** The share of light that goes a way through each cell of a row, in edges. */
+function copyRow(
+  cells: Float32Array,
+  to: number,
+  through: Float32Array,
+  from: number,
+  count: number,
+  length: number,
+): void {
+  for (let x = 0; x < count; x++) {
+    const clear = through[from + x];
+    cells[to + x] = clear === 1 ? 1 : clear ** length; // most are, and powers take long
+  }
+}
+
+/** Add what the cells of a row see in one direction. */
+function seeRow(
+  seen: Float32Array,
+  to: number,
+  count: number,
+  isDimmed: Uint8Array,
+  cells: Float32Array,
+  at: number,
+  step: number,
+  near: Float32Array,
+  weight: number,
+): void {
+  for (let x = 0; x < count; x++) {
+    let left = 1;
+    let hidden = 0;
+    if (isDimmed[to + x] === 1) {
+      for (let k = 0, there = at + x + step; k < near.length; k++, there += step) {
+        const clear = cells[there];
+        hidden += near[k] * left * (1 - clear);
+        left *= clear;
+      }
+    }
+    seen[to + x] += weight * (1 - hidden);
+  }
+}
+
+/** 1 where a cell that takes light lies within so many cells along each axis: elsewhere nothing is hidden. */
+function dimmedWithin(through: Float32Array, size: Size3, reach: number): Uint8Array {
+  let found = new Uint8Array(through.length);
+  for (let i = 0; i < found.length; i++) found[i] = through[i] === 1 ? 0 : 1;
+  let stride = 1;
+  for (const count of size) {
+    const spread = new Uint8Array(found.length);
+    for (let from = 0; from < found.length; from++) {
+      if (found[from] === 0) continue;
+      const at = Math.floor(from / stride) % count;
+      const last = Math.min(count - 1, at + reach);
+      for (let k = Math.max(0, at - reach); k <= last; k++) spread[from + (k - at) * stride] = 1;
+    }
+    found = spread;
+    stride *= count;
+  }
+  return found;
 }
 
 /**
@@ -103,7 +153,8 @@ export function lampLight(through: Float32Array, size: Size3, towards: Vec3): Fl
         const high = (1 - fi) * at(a, b + 1) + fi * at(a + 1, b + 1);
         const coming = (1 - fj) * low + fj * high;
         const cell = start + i * strides[p] + j * strides[q];
-        const half = through[cell] ** (length / 2);
+        const clear = through[cell];
+        const half = clear === 1 ? 1 : clear ** (length / 2);
         lit[cell] = coming * half;
         leaving[j * np + i] = coming * half * half;
       }
