@@ -15,7 +15,7 @@ describeInChromium("undo and redo", () => {
   const axes = () => page().locator(".orientation-mark").getAttribute("aria-label");
 
   beforeAll(async () => {
-    await stand.open("&mode=disc#v=1&depth=0");
+    await stand.open("&mode=disc");
     await stand.viewer.settled();
   });
 

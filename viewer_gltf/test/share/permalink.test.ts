@@ -141,7 +141,7 @@ describeInChromium("the share link", () => {
 
   it("opens when pasted over another view of the same page", async () => {
     await stand.open();
-    expect(await hash()).toBe("");
+    expect((await stand.viewer.snapshot()).state.discRadius_deg).not.toBe(33);
     await page().evaluate(() => {
       location.hash = "#v=1&disc=33";
     });

@@ -80,7 +80,7 @@ describeInChromium("volumes", () => {
 
   it("come coarse first: all tiles show before any of them is whole", async () => {
     const release = await holdBack(FINEST);
-    await stand.open("&mode=all#v=1&depth=0");
+    await stand.open("&mode=all");
     const total = stand.manifest.tiles.length * stand.manifest.channels.length;
     await expect.poll(async () => areAt(await volumes(), FIRST), PATIENT).toBe(true);
     expect(await volumes()).toHaveLength(total);

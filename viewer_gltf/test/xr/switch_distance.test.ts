@@ -12,7 +12,7 @@ describeInChromium("nearer and farther on the split screen", () => {
 
   it("goes from surfaces to volumes, and back", async () => {
     const { page } = stand.viewer;
-    await stand.open(`&mode=disc&switch=${SWITCH_M}&disc=20&quality=low#v=1&depth=0`);
+    await stand.open(`&mode=disc&switch=${SWITCH_M}&disc=20&quality=low`);
     await page.keyboard.press("j"); // what is looked at is not chosen
     await page.keyboard.press("P");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);

@@ -4,6 +4,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, afterEach, beforeAll, inject } from "vitest";
 import type { Manifest } from "../../../src/bundle/generated/bundle";
+import { IS_EXHAUSTIVE } from "../exhaustive";
 import { type FixtureOptions, writeFixture } from "../fixture/bundle";
 import type { Browser } from "./chromium";
 import { Host } from "./host";
@@ -25,7 +26,12 @@ export type Stand = Readonly<{
   host: Host;
   /** A page, not opened yet. Tests have it one after another: only a test can leave traces in it. */
   viewer: ViewerPage;
-  /** Open the bundle in it, seen from the front; `query` goes behind the bundle's address. */
+  /**
+   * Open the bundle in it, seen from the front; `query` goes behind the bundle's address.
+   *
+   * The fixture has no depth shading unless its link says `depth=`: it takes a third of the time until
+   * volumes are drawn. Built bundles have it, as they have for users; in exhaustive runs all have it.
+   */
   open: (query?: string) => Promise<void>;
 }>;
 
@@ -53,6 +59,7 @@ export type StandOptions = Readonly<{
 export function prepareStand(options: StandOptions): Stand {
   const { bundle: given, fixture, viewport, pixelRatio, hasTouch, mounts } = options;
   const { isBlind, hasRests, sharesPage = false } = options;
+  const hasDepthShading = given !== undefined || IS_EXHAUSTIVE;
   let folder: string | undefined;
   let bundle: string;
   let manifest: Manifest;
@@ -131,7 +138,8 @@ export function prepareStand(options: StandOptions): Stand {
     open: (query = "") => {
       const quality = query.includes("&quality=") ? "" : "&quality=low";
       const view = query.includes("&view=") ? "" : "&view=front"; // where points are known to show
-      const [, search, hash] = /^([^#]*)(.*)$/.exec(query) ?? [];
+      const [, search, link = ""] = /^([^#]*)(.*)$/.exec(query) ?? [];
+      const hash = hasDepthShading || link.includes("&depth=") ? link : `${link || "#v=1"}&depth=0`;
       return viewer.open(`${host.address}/app/?bundle=../bundle/${search}${view}${quality}${hash}`);
     },
   };
