@@ -1,6 +1,7 @@
 """The command `stereocell`: one subcommand per phase, and one that runs them all."""
 
 import argparse
+import gc
 import os
 import re
 import sys
@@ -15,6 +16,7 @@ from stereocell.engine.interrupts import Terminated, answering_sigterm
 from stereocell.model.errors import StereoCellError, UsageError
 from stereocell.storage.processes import require_address_space, shortage
 
+_GARBAGE_AFTER = 20_000  # new containers; at 700, as in Python, a tenth of a short command
 _BELOW_ZERO = re.compile(r"-\.?\d")  # no flag of ours has a digit there
 EXIT_CODES = """exit codes:
   0    done; `view`, `serve`: stopped
@@ -27,6 +29,7 @@ EXIT_CODES = """exit codes:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
+    gc.set_threshold(_GARBAGE_AFTER, *gc.get_threshold()[1:])
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # characters that its encoding lacks are escaped
             stream.reconfigure(errors="backslashreplace")
