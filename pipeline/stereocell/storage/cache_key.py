@@ -102,16 +102,19 @@ def _reach(
     """Return our files that a module needs, its own included, and (library, version) pairs."""
     found: dict[Path, None] = {}
     foreign: set[str] = set()
+    seen = {_NAME}  # the package's own names are for its users; no result depends on them
     waiting = [module]
     while waiting:
         name = waiting.pop()
-        if name == _NAME or _is_below(name, left_out):
-            continue  # the package's own names are for its users; no result depends on them
-        if name.split(".")[0] != _NAME:
-            foreign.add(name.split(".")[0])
+        if name in seen:
+            continue
+        seen.add(name)
+        top = name.partition(".")[0]
+        if top != _NAME:
+            foreign.add(top)
             continue
         file = _modules().get(name)  # None for the name of something inside a module
-        if file is not None and file not in found:
+        if file is not None and file not in found and not _is_below(name, left_out):
             found[file] = None
             assets, imports = _needs(file)
             found.update(dict.fromkeys(assets))
