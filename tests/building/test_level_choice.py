@@ -1,4 +1,4 @@
-"""Which rung of a ladder has the surface where that of many solids is asked for."""
+"""Which rung of a ladder has the surface where that of many components is asked for."""
 
 import pytest
 

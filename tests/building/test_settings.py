@@ -122,7 +122,7 @@ def test_missing_file_is_named(tmp_path: Path) -> None:
 def test_auto_lengths_follow_the_spacing() -> None:
     resolved = settings_module.SurfaceOptions().resolved((5.0, 2.0, 2.0))
     assert (resolved.smoothing_um, resolved.max_alpha_um) == (2.0, 10.0)
-    assert resolved.alpha_um == "auto"  # by the channel's solids
+    assert resolved.alpha_um == "auto"  # by the channel's components
     with pytest.raises(UsageError, match="alpha_um is -1"):
         settings_module.SurfaceOptions(alpha_um=-1.0).resolved((1.0, 1.0, 1.0))
 

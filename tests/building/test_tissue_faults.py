@@ -186,7 +186,7 @@ def fork_and_run() -> None:
         "tissue.onnx_classifier",
         "building.tasks.window",
         "building.tasks.evidence",
-        "building.tasks.solids",
+        "building.tasks.components",
         "building.tasks.unit",
         "building.stage_tasks",
         "bundle.write",

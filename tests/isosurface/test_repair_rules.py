@@ -1,4 +1,4 @@
-"""A channel's own lengths: by the first paper's rule, from the solids in all its tiles."""
+"""A channel's own lengths: by the first paper's rule, from the components in all its tiles."""
 
 from dataclasses import asdict, replace
 

@@ -38,7 +38,7 @@ _SEED = 5
 _LEFT_OUT = ("alphawrap", "__main__")
 # what commands tell on the way, on stderr: "units: 1/4 r0_c0/F", "plan: 0.2 s"
 _PROGRESS = re.compile(
-    r"(plan|windows|evidence|solids|objects|iso-values|units|stage|bundle|report|check|tissue|source)\b"
+    r"(plan|windows|evidence|components|objects|iso-values|units|stage|bundle|report|check|tissue|source)\b"
 )
 _REFUSAL = "stereocell: "
 _FAILED = re.compile(r"^\w+: \d+ of \d+ failed$")
@@ -65,7 +65,7 @@ def import_all() -> None:
         if not module.name.endswith(_LEFT_OUT):
             importlib.import_module(module.name)
     from stereocell.building import stage_tasks
-    from stereocell.building.tasks import evidence, extents, objects, solids, unit, window
+    from stereocell.building.tasks import components, evidence, extents, objects, unit, window
     from stereocell.storage import cache_key
 
     for maker in (
@@ -73,7 +73,7 @@ def import_all() -> None:
         evidence,
         extents,
         objects,
-        solids,
+        components,
         unit,
         stage_tasks,
     ):  # looked up once a process, at the cost of seconds

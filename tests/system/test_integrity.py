@@ -157,7 +157,7 @@ def _change_a_digit(file: Path) -> None:
 @pytest.mark.parametrize(
     "name",
     sweep(
-        [f"window-{F}-*.json", f"r0_c0/{F}/solids-*.json", "survey.json"],
+        [f"window-{F}-*.json", f"r0_c0/{F}/components-*.json", "survey.json"],
         kept=[f"window-{F}-*.json", "survey.json"],
     ),
 )

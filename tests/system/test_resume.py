@@ -122,14 +122,14 @@ def test_cut_file_is_made_again(out: Path, built: Path, name: str) -> None:
     ("name", "content"),
     sweep(
         product(
-            ["survey.json", "done.json", "evidence", "solids", "window", "phases.json"],
+            ["survey.json", "done.json", "evidence", "components", "window", "phases.json"],
             ["{}", "{ not JSON"],
         ),
         kept=[
             ("survey.json", "{}"),
             ("done.json", "{ not JSON"),
             ("evidence", "{ not JSON"),
-            ("solids", "{}"),
+            ("components", "{}"),
             ("window", "{}"),
             ("phases.json", "{ not JSON"),
         ],
@@ -140,7 +140,7 @@ def test_damaged_json_is_made_again_by_a_build_and_named_by_the_phase(
 ) -> None:
     places = {
         "evidence": next((out / "units").rglob("evidence-*.json")),
-        "solids": next((out / "units").rglob("solids-*.json")),
+        "components": next((out / "units").rglob("components-*.json")),
         "window": next((out / "units").glob("window-*.json")),
         "phases.json": out / "phases.json",
     }

@@ -1,8 +1,8 @@
 """Survey the channels: the window and the level of each, one for all its tiles.
 
 Three passes go before the units. Windows: each channel's window, background and scale. Evidence:
-each tile's sums, which add up to the channel's levels. Solids: what lies above the chosen level,
-which decides how the surface is cleaned. The result, survey.json, steers the units.
+each tile's sums, which add up to the channel's levels. Components: what lies above the chosen
+level, which decides how the surface is cleaned. The result, survey.json, steers the units.
 """
 
 import math
@@ -16,12 +16,12 @@ import numpy as np
 
 from stereocell.building.channels import Channel
 from stereocell.building.level_choice import (
+    Components,
     Found,
-    Solids,
+    check_components,
     choose_rung,
     find_level,
     given_level,
-    hold_to_solids,
     level_of_tile,
 )
 from stereocell.building.out_folder import OutFolder
@@ -36,8 +36,8 @@ from stereocell.building.source_tasks import (
 )
 from stereocell.building.survey_file import (
     AGAIN,
+    COMPONENTS,
     EVIDENCE,
-    SOLIDS,
     WINDOW,
     ChannelSurvey,
     Curve,
@@ -45,11 +45,11 @@ from stereocell.building.survey_file import (
     TileIso,
     save_survey,
 )
+from stereocell.building.tasks import components as components_maker
 from stereocell.building.tasks import evidence as evidence_maker
-from stereocell.building.tasks import solids as solids_maker
 from stereocell.building.tasks import window as window_maker
+from stereocell.building.tasks.components import ComponentsTask, write_components
 from stereocell.building.tasks.evidence import EvidenceFiles, EvidenceTask, write_evidence
-from stereocell.building.tasks.solids import SolidsTask, write_solids
 from stereocell.building.tasks.window import (
     StatisticsTask,
     Window,
@@ -111,21 +111,21 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
         )
         for channel in plan.channels
     }
-    solids = [
-        _solids(out_folder, plan, engine, found, rung)
+    components = [
+        _components(out_folder, plan, engine, found, rung)
         for rung in range(max((len(one.rungs) for one in found.values()), default=0))
     ]
     for channel in plan.channels:
         one = found[channel.id]
         of_rungs = [
-            {tile.id: rung[tile.id, channel.id].read()["solids"] for tile in plan.tiles}
-            for rung in solids[: len(one.rungs)]
+            {tile.id: rung[tile.id, channel.id].read()["components"] for tile in plan.tiles}
+            for rung in components[: len(one.rungs)]
         ]
         chosen = choose_rung(of_rungs) if len(of_rungs) > 1 else 0
         if of_rungs:
             inside[channel.id] = sum(one["voxels"] for one in of_rungs[chosen].values())
         if one.is_fixed and of_rungs:
-            one = hold_to_solids(plan, one, of_rungs[chosen])
+            one = check_components(plan, one, of_rungs[chosen])
         iso = {
             tile.id: level_of_tile(
                 plan,
@@ -136,7 +136,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
                     what: result[tile.id, channel.id].file
                     for what, result in (
                         ("evidence", evidence),
-                        ("solids", solids[chosen] if of_rungs else {}),
+                        ("components", components[chosen] if of_rungs else {}),
                     )
                     if (tile.id, channel.id) in result
                 },
@@ -183,7 +183,7 @@ def _of_channel(
     found: Found,
     chosen: int,
     iso: dict[str, TileIso],
-    solids: Solids,
+    components: Components,
     file: str,
 ) -> ChannelSurvey:
     level = found.rungs[chosen] if found.rungs else None
@@ -208,13 +208,13 @@ def _of_channel(
         doubt=found.doubt,
         modality="" if channel.source else plan.modality,
     )
-    most_faces = max((one["kept_faces"] for one in solids.values()), default=0)
+    most_faces = max((one["kept_faces"] for one in components.values()), default=0)
     return ChannelSurvey(
         statistics,
         file,
         iso,
         choose_repair(
-            solids.values(),
+            components.values(),
             plan.repair,
             surface=plan.settings.surface,
             spacing_um=plan.spacing_um,
@@ -314,12 +314,12 @@ def _evidence(
     )  # fmt: skip
 
 
-def _solids(
+def _components(
     out_folder: OutFolder, plan: Plan, engine: Engine, found: Mapping[str, Found], rung: int
 ) -> dict[tuple[str, str], _Result]:
-    """Return the sums over the solids of each tile, of the channels that have such a rung."""
+    """Return the sums over the components of each tile, of the channels that have such a rung."""
 
-    def task_of(tile: Tile, channel: Channel) -> tuple[SolidsTask, list[Any]] | None:
+    def task_of(tile: Tile, channel: Channel) -> tuple[ComponentsTask, list[Any]] | None:
         one = found[channel.id]
         if rung >= len(one.rungs):
             return None
@@ -327,7 +327,7 @@ def _solids(
         if iso is None:
             return None
         surface = plan.settings.surface
-        task = SolidsTask(
+        task = ComponentsTask(
             source_of(plan, channel=channel),
             plan.level_of(channel),
             channel.index,
@@ -347,7 +347,8 @@ def _solids(
 
     return _by_tile(
         out_folder, plan, engine,
-        task_of=task_of, name="solids", write=write_solids, schema=SOLIDS, maker=solids_maker,
+        task_of=task_of, name="components", write=write_components, schema=COMPONENTS,
+        maker=components_maker,
     )  # fmt: skip
 
 

@@ -18,21 +18,21 @@ from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, LADDER, RUN
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Tile
 
-APART_SHARE = 0.25  # share of all voxels inside: a rung whose largest solids hold less has many
-# the same where many solids may touch: the share, and the least number of solids
+APART_SHARE = 0.25  # share of all voxels inside: a rung whose largest components hold less has many
+# the same where many components may touch: the share, and the least number of components
 JOINED_SHARE, MANY = 2 / 3, 30
-Solids = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
+Components = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What is known of a channel's level before its solids are.
+    """What is known of a channel's level before its components are.
 
     window    of the channel
     levels    what its tiles add up to; None where there is no evidence
     evidence  each tile's; empty for shares of tissue, whose level is known
     rungs     the levels that may have the surface: the given one, or clear ones; the first is
-              taken, unless its solids speak against it
+              taken, unless its components speak against it
     doubt     why there is none
     is_fixed  whether all tiles have the same level, whatever they hold: a given one, or a mask's
     """
@@ -111,19 +111,19 @@ def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
     return None if given is None else parse_level(f"--iso-value {channel.name}", given)
 
 
-def choose_rung(of_rungs: Sequence[Solids]) -> int:
-    """Return the first rung whose solids are many.
+def choose_rung(of_rungs: Sequence[Components]) -> int:
+    """Return the first rung whose components are many.
 
     Where none has many, cells that touch are joined at every level: then the rung whose largest
-    solids hold the least, if that is under JOINED_SHARE and there are MANY; else the outermost.
+    components hold the least, if that is under JOINED_SHARE and there are MANY; else the outermost.
 
     of_rungs  the ComponentSums of each tile at each rung, outermost first
     """
     shares: list[float] = []
-    for solids in of_rungs:
+    for components in of_rungs:
         # over the tiles: what fills all of them is the largest in each
         voxels, largest, count = (
-            sum(one[key] for one in solids.values()) for key in ("voxels", "largest", "count")
+            sum(one[key] for one in components.values()) for key in ("voxels", "largest", "count")
         )
         if largest < APART_SHARE * voxels:
             return len(shares)
@@ -132,21 +132,21 @@ def choose_rung(of_rungs: Sequence[Solids]) -> int:
     return best if shares and shares[best] < JOINED_SHARE else 0
 
 
-def hold_to_solids(plan: Plan, found: Found, solids: Solids) -> Found:
-    """Return what is known of a level with its solids: one that parts nothing has no surface.
+def check_components(plan: Plan, found: Found, components: Components) -> Found:
+    """Return what is known of a level with its components: one that parts nothing has no surface.
 
-    solids  the ComponentSums of each tile at the level that is taken
+    components  the ComponentSums of each tile at the level that is taken
     """
-    if not found.rungs or not solids:
+    if not found.rungs or not components:
         return found
-    inside = sum(one["voxels"] for one in solids.values())
+    inside = sum(one["voxels"] for one in components.values())
     if 0 < inside < sum(math.prod(tile.box.shape) for tile in plan.tiles):
         return found
     return _without_surface(found, "above" if inside else "below")
 
 
 def hold_to_histogram(found: Found) -> Found:
-    """Return the same before there are solids: exact but for a few hot voxels."""
+    """Return the same before there are components: exact but for a few hot voxels."""
     if not found.is_fixed or not found.rungs or found.levels is None:
         return found
     value = _value_of(found.rungs[0])

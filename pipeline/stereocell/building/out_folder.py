@@ -123,7 +123,7 @@ class OutFolder:
         return self.out / "units" / f"notes-{labels_id}-{fingerprint[:12]}.json"
 
     def tile_result(self, what: str, tile_id: str, channel_id: str, key: str) -> Path:
-        """Return the path of what a pass before the units found of one tile: evidence, solids."""
+        """Return the path of what the pass `what` before the units found of one tile."""
         return self.out / "units" / tile_id / channel_id / f"{what}-{key}.json"
 
     def unit_dir(self, tile_id: str, channel_id: str, key: str) -> Path:

@@ -33,7 +33,7 @@ from stereocell.building.plan_notes import told_in_vain, told_of_gaps
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
 from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
 from stereocell.building.survey_file import appearance_to_json, read_survey
-from stereocell.building.tasks import evidence, solids, unit, window
+from stereocell.building.tasks import components, evidence, unit, window
 from stereocell.building.unit_files import load_objects
 from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
@@ -183,7 +183,9 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "level": plan.level,
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
-        "libraries": libraries_of(window, evidence, solids, unit, stage_tasks, *sorted(readers)),
+        "libraries": libraries_of(
+            window, evidence, components, unit, stage_tasks, *sorted(readers)
+        ),
         **_added(plan),
     }
 

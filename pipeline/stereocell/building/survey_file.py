@@ -20,7 +20,7 @@ from stereocell.transfer.channel_statistics import ChannelStatistics
 
 # The files that the first pass leaves beside survey.json, and the remedy for a damaged one
 WINDOW = "units.schema.json#Window"
-EVIDENCE, SOLIDS = "units.schema.json#Evidence", "units.schema.json#Solids"
+EVIDENCE, COMPONENTS = "units.schema.json#Evidence", "units.schema.json#Components"
 AGAIN = "run `stereocell units OUT` again"
 
 

@@ -18,7 +18,7 @@ from stereocell.storage.cache_key import key_of, libraries_of
 _TASKS = (
     "stereocell.building.tasks.window",
     "stereocell.building.tasks.evidence",
-    "stereocell.building.tasks.solids",
+    "stereocell.building.tasks.components",
     "stereocell.building.tasks.unit",
     "stereocell.building.stage_tasks",
 )

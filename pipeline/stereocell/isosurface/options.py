@@ -32,7 +32,7 @@ CRITERIA = {
     "pekar-area": Criterion(lambda total, area: area),
 }
 RUNGS = {"outer": 0, "inner": 1, "third": 2}  # names of the ladder's levels, outermost first
-APART = "apart"  # the first rung whose solids are many: that of cells in their tissue
+APART = "apart"  # the first rung whose components are many: that of cells in their tissue
 SCOPES = ("channel", "tile")
 
 
@@ -79,7 +79,7 @@ class IsoValueOptions:
     rung: str = setting(
         "outer",
         f"which clear level has the surface: {', '.join(RUNGS)}; {APART}: the first whose largest "
-        "solids hold under a quarter of all, or the least of it where cells touch",
+        "components hold under a quarter of all, or the least of it where cells touch",
     )
     bins: int = setting(256, "levels that a criterion of edges tries")
     clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out there")
@@ -118,7 +118,8 @@ class SurfaceOptions:
 
     smoothing_um: float | str = setting(AUTO, "sigma of the Gaussian; auto: the finest spacing")
     alpha_um: float | str = setting(
-        AUTO, "radius of the ball that closes gaps; auto: by the channel's solids, see max_alpha_um"
+        AUTO,
+        "radius of the ball that closes gaps; auto: by the channel's components, see max_alpha_um",
     )
     max_alpha_um: float | str = setting(
         AUTO, "what auto alpha may reach; auto: 2 coarsest spacings"
@@ -138,7 +139,7 @@ class SurfaceOptions:
     min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
     max_fragment_um: float | str = setting(
         AUTO,
-        "fragments up to this go as well if they are under half the mean of the channel's solids, "
+        "fragments up to this go as well if they are under half the mean of the channel's components, "
         "by diagonal or by triangles; auto: 6 coarsest spacings; 0: none do",
     )
     max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")

@@ -15,8 +15,8 @@ from PIL import Image, ImageDraw
 from stereocell.building.channel_survey import evidence_task, statistics_task
 from stereocell.building.channels import Channel
 from stereocell.building.level_choice import (
+    Components,
     Found,
-    Solids,
     choose_rung,
     find_level,
     given_level,
@@ -214,12 +214,12 @@ def _choose_rung(
         return next(iter(found.rungs), None)
     values = field - under if found.subtracts else field
     least = float(plan.settings.surface.min_diagonal_um)
-    solids: list[Solids] = [
+    components: list[Components] = [
         {"": asdict(sum_components(values > rung.value, plan.spacing_um, least))}
         for rung in found.rungs
         if isinstance(rung, Level)
     ]
-    return found.rungs[choose_rung(solids)]
+    return found.rungs[choose_rung(components)]
 
 
 def _candidates(

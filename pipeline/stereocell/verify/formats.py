@@ -19,7 +19,7 @@ from stereocell.building import unit_files
 from stereocell.building.input_unchanged import require_added
 from stereocell.building.out_folder import SURVEY, OutFolder
 from stereocell.building.phase import digest_of_manifest
-from stereocell.building.survey_file import EVIDENCE, SOLIDS, WINDOW
+from stereocell.building.survey_file import COMPONENTS, EVIDENCE, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.bundle.write import FILES, MANIFEST
 from stereocell.bundle.write_objects import hash_parts
@@ -143,7 +143,7 @@ def _spoilt_survey(out_folder: OutFolder) -> list[str]:
         return [_fault_of(out_folder, out_folder.survey_file)]
     channels = survey["channels"].values()
     files = {channel["statistics_file"]: WINDOW for channel in channels}
-    schemas = {"evidence": EVIDENCE, "solids": SOLIDS}
+    schemas = {"evidence": EVIDENCE, "components": COMPONENTS}
     for channel in channels:
         for tile in channel["iso"].values():
             files |= {file: schemas[what] for what, file in tile["files"].items()}

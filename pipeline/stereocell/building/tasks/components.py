@@ -1,4 +1,4 @@
-"""Sum up the solids of one (tile, channel) at its level, on a worker. Picklable."""
+"""Sum up the components of one (tile, channel) at its level, on a worker. Picklable."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,12 +14,12 @@ from stereocell.storage.json_files import write_sealed
 
 
 @dataclass(frozen=True, slots=True)
-class SolidsTask:
+class ComponentsTask:
     """One tile of a channel.
 
     iso              the tile's level, above the background, voxel values
     background       near the tile, voxel values; None: none is subtracted
-    min_diagonal_um  smaller solids are left out
+    min_diagonal_um  smaller components are left out
     """
 
     ref: SourceRef
@@ -32,8 +32,8 @@ class SolidsTask:
     min_diagonal_um: float
 
 
-def write_solids(task_and_file: tuple[SolidsTask, Path]) -> None:
-    """Sum up a tile's solids and write the sums."""
+def write_components(task_and_file: tuple[ComponentsTask, Path]) -> None:
+    """Sum up a tile's components and write the sums."""
     task, file = task_and_file
     volume = open_source(task.ref).read(task.channel, task.box, task.level)
     field = denoise(volume, task.smoothing_um)
@@ -41,4 +41,4 @@ def write_solids(task_and_file: tuple[SolidsTask, Path]) -> None:
         field -= task.background.at(task.box)
     inside = field > np.float32(task.iso)
     found = sum_components(inside, volume.spacing_um, task.min_diagonal_um)
-    write_sealed(file, {"solids": asdict(found)})
+    write_sealed(file, {"components": asdict(found)})
