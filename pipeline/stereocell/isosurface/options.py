@@ -139,8 +139,8 @@ class SurfaceOptions:
     min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
     max_fragment_um: float | str = setting(
         AUTO,
-        "fragments up to this go as well if they are under half the mean of the channel's components, "
-        "by diagonal or by triangles; auto: 6 coarsest spacings; 0: none do",
+        "fragments up to this go as well if they are under half the mean of the channel's "
+        "components, by diagonal or by triangles; auto: 6 coarsest spacings; 0: none do",
     )
     max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")
     wrap: str = setting(
