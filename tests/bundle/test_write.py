@@ -3,20 +3,24 @@
 import hashlib
 import json
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import zstandard
 from jsonschema import Draft202012Validator
+from scipy.spatial import cKDTree
 
 from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
+from stereocell.formats.gltf import AMBIENT_SHARE
 from stereocell.formats.tiles3d import content_hash
 from stereocell.model.errors import OutputError, StageError, StereoCellError
+from stereocell.model.mesh import Baked
 from stereocell.storage.assets import schema_path
 from support import spheres
 from support.bundles import TILES, channel, files, load, volumes, write_tiles
-from support.glbs import decoded_positions_m, read
+from support.glbs import decoded_colors, decoded_positions_m, read
 
 
 @pytest.fixture(scope="module")
@@ -164,6 +168,31 @@ def test_coarse_lod_has_the_baked_normal_map_and_the_coarsest_is_bare(bundle):
         bare, _ = read((bundle / f"channels/CD31/r0_c0/lod{level}.glb").read_bytes())
         assert "images" not in bare
         assert "TEXCOORD_0" not in bare["meshes"][0]["primitives"][0]["attributes"]
+
+
+def test_coarsest_keeps_the_occlusion_of_its_map_at_its_vertices(tmp_path):
+    """Else a tile would brighten where the view goes away from it: finer levels are dark there."""
+    tile = spheres.tile(0)
+    (red, *others) = tile.channels
+    left_is_hidden = np.full((32, 32), 255, np.uint8)
+    left_is_hidden[:, :16] = 51
+    baked = Baked(left_is_hidden, texel_um=0.5, charts=1)
+    lods = (*red.lods[:-1], replace(red.lods[-1], baked=baked))
+    tile = replace(tile, channels=(replace(red, lods=lods), *others))
+    write_bundle(write_tiles(tmp_path / "s", [tile]), tmp_path / "b", None, run=Engine(0).run)
+
+    data = (tmp_path / "b/channels/CD31/r0_c0/lod2.glb").read_bytes()
+    document, _ = read(data)
+    assert "images" not in document
+    mesh = lods[-1].mesh
+    places, where = np.unique(mesh.positions, axis=0, return_inverse=True)
+    # at the map's ends and at the poles, vertices of one place find other texels
+    openness = np.bincount(where.ravel(), np.where(mesh.uvs[:, 0] < 0.5, 0.2, 1.0))
+    openness /= np.bincount(where.ravel())
+    _, nearest = cKDTree(places).query(decoded_positions_m(data) * 1e6)
+    expected = 255 * (1 - AMBIENT_SHARE * (1 - openness[nearest]))
+    assert np.abs(decoded_colors(data)[:, 0] - expected).max() <= 1
+    assert np.ptp(expected) > 50
 
 
 @pytest.mark.exhaustive  # whole builds are compared by every run: tests/system/test_build.py

@@ -80,3 +80,9 @@ def decoded_positions_m(data):
     offsets = arrays[document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
     scale, translation = np.float32(node["scale"]), np.float32(node["translation"])
     return offsets.astype(np.float32) * scale + translation
+
+
+def decoded_colors(data):
+    """Factors of the base colour at the vertices, uint8 (n, 3)."""
+    document, arrays = read(data)
+    return arrays[document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]][:, :3]

@@ -277,6 +277,22 @@ def with_vertex_values(mesh: Mesh, maps: ComposedMaps | MadeMaps) -> Mesh:
     return mesh
 
 
+def with_vertex_occlusion(lod: ComposedLod) -> Mesh:
+    """Return a level's mesh with the occlusion of its map at its vertices, if it has such a map.
+
+    Vertices of one place, which charts have split, get the mean of what each finds in the map.
+    """
+    maps = lod.images or lod.maps
+    if maps.occlusion is None or lod.mesh.openness is not None:
+        return lod.mesh
+    mesh = with_vertex_values(lod.mesh, replace(maps, normal=None, color=None))
+    if mesh.openness is None:
+        return mesh
+    _, place, count = np.unique(mesh.positions, axis=0, return_inverse=True, return_counts=True)
+    mean = np.bincount(place.ravel(), mesh.openness) / count
+    return replace(mesh, openness=mean[place.ravel()].astype(np.float32))
+
+
 def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
     """Return the mesh and its defects; it is welded where seams of UVs or normals cut it open."""
     defects = find_defects(mesh, planes=planes)

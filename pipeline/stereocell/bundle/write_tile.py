@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pxr import Usd
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from stereocell.bundle.edited_meshes import shown_lods
+from stereocell.bundle.edited_meshes import shown_lods, with_vertex_occlusion
 from stereocell.bundle.windowed_voxels import read_windowed
 from stereocell.bundle.write_transfer2d import count_tile
 from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
@@ -262,16 +262,18 @@ def _bare(lod: ComposedLod) -> ComposedLod:
     """Return the coarsest level without what only shows from near: it is what all wait for first.
 
     Of the sample's coarsest levels, maps, their UVs and the vertices that charts had split were
-    five sixths of the bytes. Its lattice is that of all levels: on a longer step positions would
-    take a third less, and stand apart from a finer neighbour's by up to three quarters of a voxel.
+    five sixths of the bytes. Its occlusion goes from the map to the vertices, where the finest
+    level has it: a tile doesn't brighten from level to level. Its lattice is that of all levels: on
+    a longer step positions would take a third less, and stand apart from a finer neighbour's by up
+    to three quarters of a voxel.
     """
+    mesh = with_vertex_occlusion(lod)
     maps = replace(lod.maps, normal=None, occlusion=None)
     images = lod.images and replace(lod.images, normal=None, occlusion=None)
-    lod = replace(lod, maps=maps, images=images)
+    lod = replace(lod, mesh=mesh, maps=maps, images=images)
     if maps.color is not None or (images is not None and images.color is not None):
         return lod
-    mesh = replace(lod.mesh, uvs=None, tangents=None)
-    return replace(lod, mesh=_welded(mesh))
+    return replace(lod, mesh=_welded(replace(mesh, uvs=None, tangents=None)))
 
 
 def _welded(mesh: Mesh) -> Mesh:

@@ -9,6 +9,7 @@ the stage's images, boxes and errors of the tilesets with the surfaces and the s
 import io
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
 
+from stereocell.bundle.edited_meshes import with_vertex_occlusion
 from stereocell.formats.gltf import AMBIENT_SHARE
 from stereocell.formats.gltf_decode import Drawn, read_glb
 from stereocell.formats.ktx2 import encode_color_map, encode_normal_map, encode_occlusion_map
@@ -124,8 +126,13 @@ def _compare_boxes(
 
 
 def _compare_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[float, list[str]]:
-    """Return the largest distance of a vertex from its place (lattice steps), and the problems."""
+    """Return the largest distance of a vertex from its place (lattice steps), and the problems.
+
+    is_last  whether it is the coarsest of several: without maps, its occlusion is at its vertices
+    """
     problems = []
+    if is_last and "occlusionTexture" not in drawn.maps:
+        lod = replace(lod, mesh=with_vertex_occlusion(lod))
     triangles = lod.mesh.triangles
     if len(drawn.triangles) != len(triangles):
         return 0.0, [f"{len(drawn.triangles)} triangles, the stage has {len(triangles)}"]
