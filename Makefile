@@ -292,8 +292,13 @@ bench-threshold: setup ## The adaptive threshold, Otsu's and Li's on the head ph
 bench-tissue: setup ## Tissue classes and multi-Otsu on the head phantom
 	$(BIN)/python tests/bench/tissue.py
 
-bench-unit: setup ## A whole unit, and meshes of the same solids by the paper's chain, VTK and zmesh
-	$(BIN)/python tests/bench/unit.py
+# peers have a folder of their own: nothing else needs them
+UNIT := out/bench-unit
+bench-unit: setup ## A whole unit, and meshes of the same solids by the paper's chain, VTK, gltfpack and zmesh
+	@test -d $(UNIT)/peers || { mkdir -p $(UNIT) && $(BIN)/uv pip install --quiet --no-deps \
+	  --python $(BIN)/python --target $(UNIT)/peers zmesh==1.15.0; } || rm -rf $(UNIT)/peers
+	@test -d $(UNIT)/node_modules || npm install --silent --prefix $(UNIT) gltfpack@1.3.0 || true
+	PYTHONPATH=$(UNIT)/peers GLTFPACK=$(UNIT)/node_modules/.bin $(BIN)/python tests/bench/unit.py
 
 # the peer has a folder of its own: nothing else needs it
 CELLS := out/bench-cells

@@ -2,16 +2,19 @@
 
 Ours: the whole unit (8-bit volume, four sound levels, distances, occlusion) from voxels, and the
 first paper's part alone (iso-surface, filter, closed wrap, simplification). Peers: the paper's
-chain (seedchain.cpp, CGAL), VTK's FlyingEdges with pyvista's decimation, and zmesh (which igneous
-meshes with) on the same solids as labels; those that aren't installed are skipped by a line. All
-start from the smoothed volume but the whole unit, in one process, by turns, medians of --rounds.
-Peers are asked for as many faces as our part has; of the unit lod0 is measured, which is finer.
-Bytes are those of our .glb encoder, for all.
+chain (seedchain.cpp, CGAL), VTK's FlyingEdges with pyvista's decimation and gltfpack, and zmesh
+(which igneous meshes with) on the same solids as labels; those that aren't installed are skipped by
+a line. All start from the smoothed volume but the whole unit, in one process, by turns, medians of
+--rounds. Peers are asked for as many faces as our part has; of the unit lod0 is measured, which is
+finer. Bytes are those of our .glb encoder, and gltfpack's own where it is in the row's name.
 """
 
 import argparse
 import importlib.util
+import os
+import shutil
 import statistics
+import subprocess
 import tempfile
 import time
 from collections.abc import Callable
@@ -22,6 +25,7 @@ from typing import Any
 import cc3d
 import numpy as np
 import pyvista as pv
+import trimesh
 from wrap import (
     ALPHA,
     SAMPLES,
@@ -100,6 +104,16 @@ def to_mesh(poly: Any) -> Mesh:
     return Mesh(positions, poly.regular_faces.astype(np.uint32), np.zeros_like(positions))
 
 
+def pack(mesh: Mesh, program: str, folder: Path) -> int:
+    """Return the bytes of what gltfpack makes of a mesh, compressed as it can best."""
+    source, packed = folder / "peer.glb", folder / "packed.glb"
+    smooth = trimesh.Trimesh(mesh.positions, mesh.triangles, process=False)
+    _ = smooth.vertex_normals  # ours have normals, too
+    smooth.export(source, include_normals=True)
+    subprocess.run([program, "-cc", "-i", source, "-o", packed], check=True, capture_output=True)
+    return packed.stat().st_size
+
+
 def label_meshes(zmesh: Any, given: Input, faces: int) -> Mesh:
     """Return zmesh's meshes of the solids as labels, joined."""
     labels = cc3d.connected_components(given.field > np.float32(given.iso), connectivity=26)
@@ -128,8 +142,10 @@ def timed(make: Callable[[], Mesh]) -> Run:
     return run
 
 
-def runs_of(volume: Volume, given: Input, binary: Path | None, folder: Path) -> dict[str, Run]:
-    """Return what is compared, by name."""
+def runs_of(
+    volume: Volume, given: Input, binary: Path | None, folder: Path, sizes: dict[str, int]
+) -> dict[str, Run]:
+    """Return what is compared, by name. Rows that make files of their own put them into `sizes`."""
     runs = {
         "ours, whole unit": timed(lambda: whole_unit(volume, given)),
         "ours, paper's part": timed(lambda: wrap(given)),
@@ -147,10 +163,25 @@ def runs_of(volume: Volume, given: Input, binary: Path | None, folder: Path) -> 
 
         runs["paper's chain"] = paper
     runs["FlyingEdges, pyvista"] = timed(lambda: decimated(given, faces))
+    gltfpack = find_gltfpack()
+    if gltfpack is not None:
+        name, program = "the same, gltfpack", gltfpack
+
+        def packed() -> Mesh:
+            mesh = decimated(given, faces)
+            sizes[name] = pack(mesh, program, folder)
+            return mesh
+
+        runs[name] = timed(packed)
     if importlib.util.find_spec("zmesh"):
         zmesh = importlib.import_module("zmesh")
         runs["zmesh"] = timed(lambda: label_meshes(zmesh, given, faces))
     return runs
+
+
+def find_gltfpack() -> str | None:
+    """Return the program, from the folder that GLTFPACK names, or from PATH."""
+    return shutil.which("gltfpack", path=os.environ.get("GLTFPACK")) or shutil.which("gltfpack")
 
 
 def size_of(mesh: Mesh) -> int:
@@ -161,8 +192,13 @@ def size_of(mesh: Mesh) -> int:
     return len(glb.data)
 
 
-def compare(name: str, given: Input, runs: dict[str, Run], rounds: int) -> None:
-    """Print a row for each: seconds, faces, bytes, distances both ways, faults."""
+def compare(
+    name: str, given: Input, runs: dict[str, Run], rounds: int, sizes: dict[str, int]
+) -> None:
+    """Print a row for each: seconds, faces, bytes, distances both ways, faults.
+
+    sizes  bytes of the rows that make files of their own
+    """
     seconds: dict[str, list[float]] = {label: [] for label in runs}
     meshes: dict[str, Mesh] = {}
     for _ in range(rounds):
@@ -175,9 +211,10 @@ def compare(name: str, given: Input, runs: dict[str, Run], rounds: int) -> None:
     for label, mesh in meshes.items():
         target = Nearest(mesh, SAMPLES)
         there, back = measure_spread(reference, target), measure_spread(target, everything)
+        size = sizes.get(label) or size_of(mesh)
         print(
             f"  {label:<21} {statistics.median(seconds[label]):7.2f} s  {len(mesh.triangles):8d} "
-            f"faces  {size_of(mesh) / 1e3:7.0f} kB  iso to mesh {there.mean:.3f} / {there.p95:.3f}"
+            f"faces  {size / 1e3:7.0f} kB  iso to mesh {there.mean:.3f} / {there.p95:.3f}"
             f"  mesh to iso {back.mean:.3f} / {back.p95:.3f}  {find_defects(mesh).total} faults",
             flush=True,
         )
@@ -193,12 +230,16 @@ def main() -> None:
     z, y, x = (int(n) for n in given.shape.split(","))
     if not importlib.util.find_spec("zmesh"):
         print("bench-unit: zmesh skipped: pip install zmesh (GPL-3.0)")
+    if find_gltfpack() is None:
+        print("bench-unit: gltfpack skipped: npm install gltfpack (MIT)")
     with tempfile.TemporaryDirectory() as name:
         binary = build_chain(Path(name))
         for label, volume, grid, error in volumes((z, y, x)):
             if label.startswith(given.only):
                 one = prepare(label, volume, grid, error)
-                compare(label, one, runs_of(volume, one, binary, Path(name)), given.rounds)
+                sizes: dict[str, int] = {}
+                runs = runs_of(volume, one, binary, Path(name), sizes)
+                compare(label, one, runs, given.rounds, sizes)
 
 
 if __name__ == "__main__":
