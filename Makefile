@@ -292,20 +292,20 @@ bench-threshold: setup ## The adaptive threshold, Otsu's and Li's on the head ph
 bench-tissue: setup ## Tissue classes and multi-Otsu on the head phantom
 	$(BIN)/python tests/bench/tissue.py
 
-# peers have a folder of their own: nothing else needs them
-UNIT := out/bench-unit
+# peers have folders of their own: nothing else needs them; without them benchmarks say so
+PEERS := out/bench-peers
+ZMESH = test -d $(PEERS)/python || { mkdir -p $(PEERS) && $(BIN)/uv pip install --quiet --no-deps \
+  --python $(BIN)/python --target $(PEERS)/python zmesh==1.15.0; } || rm -rf $(PEERS)/python
+GLTFPACK = test -d $(PEERS)/node_modules || { mkdir -p $(PEERS) \
+  && npm install --silent --prefix $(PEERS) gltfpack@1.3.0; } || rm -rf $(PEERS)/node_modules
 bench-unit: setup ## A whole unit, and meshes of the same solids by the paper's chain, VTK, gltfpack and zmesh
-	@test -d $(UNIT)/peers || { mkdir -p $(UNIT) && $(BIN)/uv pip install --quiet --no-deps \
-	  --python $(BIN)/python --target $(UNIT)/peers zmesh==1.15.0; } || rm -rf $(UNIT)/peers
-	@test -d $(UNIT)/node_modules || npm install --silent --prefix $(UNIT) gltfpack@1.3.0 || true
-	PYTHONPATH=$(UNIT)/peers GLTFPACK=$(UNIT)/node_modules/.bin $(BIN)/python tests/bench/unit.py
+	@$(ZMESH)
+	@$(GLTFPACK)
+	PYTHONPATH=$(PEERS)/python GLTFPACK=$(PEERS)/node_modules/.bin $(BIN)/python tests/bench/unit.py
 
-# the peer has a folder of its own: nothing else needs it
-CELLS := out/bench-cells
 bench-cells: setup ## Closed surfaces of touching cells, ours and zmesh's  (ARGS=--large: some 1500 cells)
-	@test -d $(CELLS)/peers || { mkdir -p $(CELLS) && $(BIN)/uv pip install --quiet --no-deps \
-	  --python $(BIN)/python --target $(CELLS)/peers zmesh==1.15.0; } || rm -rf $(CELLS)/peers
-	PYTHONPATH=$(CELLS)/peers $(WITH_ARGS) $(BIN)/python tests/bench/cells.py $(CELLS) ARGS
+	@$(ZMESH)
+	PYTHONPATH=$(PEERS)/python $(WITH_ARGS) $(BIN)/python tests/bench/cells.py out/bench-cells ARGS
 
 bench-wrap: setup ## Closing on voxels against the first paper's chain on triangles (CGAL, g++)
 	$(BIN)/python tests/bench/wrap.py

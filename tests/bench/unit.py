@@ -229,7 +229,7 @@ def main() -> None:
     given = parser.parse_args()
     z, y, x = (int(n) for n in given.shape.split(","))
     if not importlib.util.find_spec("zmesh"):
-        print("bench-unit: zmesh skipped: pip install zmesh (GPL-3.0)")
+        print("bench-unit: zmesh skipped: pip install zmesh (LGPL-3.0)")
     if find_gltfpack() is None:
         print("bench-unit: gltfpack skipped: npm install gltfpack (MIT)")
     with tempfile.TemporaryDirectory() as name:

@@ -145,7 +145,7 @@ def check_components(plan: Plan, found: Found, components: Components) -> Found:
     return _without_surface(found, "above" if inside else "below")
 
 
-def hold_to_histogram(found: Found) -> Found:
+def check_histogram(found: Found) -> Found:
     """Return the same before there are components: exact but for a few hot voxels."""
     if not found.is_fixed or not found.rungs or found.levels is None:
         return found

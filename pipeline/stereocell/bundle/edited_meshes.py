@@ -281,6 +281,8 @@ def with_vertex_occlusion(lod: ComposedLod) -> Mesh:
     """Return a level's mesh with the occlusion of its map at its vertices, if it has such a map.
 
     Vertices of one place, which charts have split, get the mean of what each finds in the map.
+    The values are the mesh's `openness`, float32 (n,), 0..1. Raises StageError where the map can't
+    be read.
     """
     maps = lod.images or lod.maps
     if maps.occlusion is None or lod.mesh.openness is not None:

@@ -17,10 +17,10 @@ from stereocell.building.channels import Channel
 from stereocell.building.level_choice import (
     Components,
     Found,
+    check_histogram,
     choose_rung,
     find_level,
     given_level,
-    hold_to_histogram,
 )
 from stereocell.building.open_source import open_source
 from stereocell.building.other_levels import ends_of, find_other_levels, take
@@ -108,7 +108,7 @@ def preview(
         one.id: measure_evidence(evidence_task(plan, one, channel=channel, window=window))
         for one in tiles
     }
-    found = hold_to_histogram(find_level(plan, channel, window, evidence))
+    found = check_histogram(find_level(plan, channel, window, evidence))
     volume = open_source(source_of(plan, channel=channel)).read(channel.index, tile.box, plan.level)
     field = denoise(volume, float(plan.settings.surface.smoothing_um))
     under = np.zeros((1, 1, 1), np.float32)
