@@ -95,7 +95,8 @@ def test_a_copy_that_simplification_spoilt_stays_unsimplified(
     def spoil(mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float) -> Simplified:
         spoilt = Mesh(mesh.positions, mesh.triangles[1:], mesh.normals)
         topology = find_topology(spoilt.triangles, len(spoilt.positions))
-        return Simplified(spoilt, topology, np.arange(len(mesh.positions)), 0, 0)
+        everywhere = np.ones(len(mesh.positions), bool)
+        return Simplified(spoilt, topology, np.flatnonzero(everywhere), everywhere, 0, 0)
 
     simple = close(distance, REGION)
     monkeypatch.setattr(closed_copy, "simplify_without_defects", spoil)

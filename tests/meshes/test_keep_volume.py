@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from stereocell.meshes import keep_volume
-from stereocell.meshes.keep_volume import FineVolumes
-from stereocell.meshes.simplify_valid import simplify_without_defects
-from stereocell.meshes.validity import Defects, border, find_defects
+from stereocell.meshes.keep_volume import Earlier, FineVolumes
+from stereocell.meshes.simplify_valid import Simplifier, simplify_without_defects
+from stereocell.meshes.validity import Defects, border, find_defects, label_components
 from stereocell.model.mesh import Mesh
 from support.meshes import ball, crowd, enclosed_volume, joined, kinds, moved, turned
 
@@ -117,3 +117,33 @@ def test_body_that_lacks_volume_is_named_by_its_own_volume_whether_a_cut_opens_i
             assert (found.lacks[own] == told[-1]).all()
     assert told[:2] == [True, True]
     assert told[-2:] == [False, False]
+
+
+def test_bodies_that_did_not_change_keep_their_moves_and_are_not_looked_at_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fine = joined(crowd(), moved(ball(5.0, 60), (40.0, 0.0, 0.0)))
+    volumes, simplifier = FineVolumes(fine, ()), Simplifier(fine, ())
+    before = simplifier.simplify(ERROR)
+    first = volumes.keep(before.mesh, before.vertices, max_move_um=ERROR)
+    chosen = np.zeros(label_components(fine.triangles, len(fine.positions)).max() + 1, bool)
+    chosen[-1] = True
+    after = simplifier.simplify(ERROR / 4, chosen)
+    is_far = after.mesh.positions[:, 0] > 30
+    np.testing.assert_array_equal(after.changed, is_far)
+    looked_at = []
+
+    def count_fresh(*given: Any, fresh: Any, **named: Any) -> Defects:
+        looked_at.append(fresh.sum())
+        return find_defects(*given, fresh=fresh, **named)
+
+    monkeypatch.setattr(keep_volume, "find_defects", count_fresh)
+    earlier = Earlier(first, before.vertices, after.changed)
+    second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
+    assert looked_at[0] == is_far[after.mesh.triangles[:, 0]].sum()
+    assert len(looked_at) == 1
+    was_far = before.mesh.positions[:, 0] > 30
+    np.testing.assert_array_equal(second.mesh.positions[~is_far], first.mesh.positions[~was_far])
+    assert second.defects.total == 0
+    assert find_defects(second.mesh).total == 0
+    assert enclosed_volume(second.mesh) > 0.995 * enclosed_volume(fine)

@@ -5,13 +5,14 @@ import pytest
 from scipy import ndimage
 
 from stereocell.isosurface.extract import extract_surface
+from stereocell.meshes import simplify_valid
 from stereocell.meshes.simplify import simplify
-from stereocell.meshes.simplify_valid import simplify_without_defects
-from stereocell.meshes.validity import find_defects
+from stereocell.meshes.simplify_valid import Simplifier, simplify_without_defects
+from stereocell.meshes.validity import find_defects, label_components
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
-from support.meshes import ball, kinds, turned
+from support.meshes import ball, crowd, joined, kinds, moved, turned
 
 SHAPE = (32, 32, 32)
 
@@ -48,6 +49,18 @@ def test_body_that_is_inside_out_is_given_up() -> None:
     np.testing.assert_array_equal(done.mesh.triangles, turned(ball()).triangles)
 
 
+def test_bodies_that_cross_as_they_are_given_are_given_up_at_once() -> None:
+    """Balls of locked vertices that grow round each of so many crossings would take minutes."""
+    fine = joined(crowd(), moved(ball(5.0, 60), (14.0, 0.0, 0.0)), moved(ball(), (40.0, 0.0, 0.0)))
+    assert len(find_defects(fine).crossings) > 500
+    done = simplify_without_defects(fine, (), max_error_um=0.5)
+    assert done.fallbacks > 1
+    is_far = done.mesh.positions[:, 0] > 30
+    alone = simplify_without_defects(moved(ball(), (40.0, 0.0, 0.0)), (), max_error_um=0.5)
+    count = is_far[done.mesh.triangles[:, 0]].sum()
+    assert count == pytest.approx(len(alone.mesh.triangles), rel=0.05)  # by rounding
+
+
 def test_simplified_ball_is_one_body_and_says_so() -> None:
     done = simplify_without_defects(ball(), (), max_error_um=0.5)
     assert (done.simplified_again, done.fallbacks) == (0, 0)
@@ -64,3 +77,44 @@ def test_one_frayed_body_of_many_crossings_is_sound_as_a_whole(error_um: float) 
     found = simplify_without_defects(mesh, (), max_error_um=error_um)
     assert found.simplified_again > 0
     assert not find_defects(found.mesh).total
+
+
+@pytest.mark.slow
+def test_where_very_many_cross_the_error_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Locks would come to nearly all of it, round by round, and at last it would stay as it was."""
+    fine = sponge(2)
+    monkeypatch.setattr(simplify_valid, "COSTLY", 10)
+    many = simplify_without_defects(fine, (), max_error_um=4.0)
+    half = simplify(fine, 2.0), simplify(fine, 0.5)
+    assert kinds(find_defects(many.mesh)) == set()
+    assert many.fallbacks == 0
+    assert len(half[0].triangles) < len(many.mesh.triangles) < 1.1 * len(half[1].triangles)
+    monkeypatch.setattr(simplify_valid, "HALVINGS", 0)
+    at_once = simplify_without_defects(fine, (), max_error_um=4.0)
+    assert at_once.fallbacks > 0
+    assert kinds(find_defects(at_once.mesh)) == set()
+
+
+def test_some_bodies_get_another_error_and_the_others_stay() -> None:
+    fine = joined(crowd(), moved(ball(5.0, 60), (40.0, 0.0, 0.0)))
+    simplifier = Simplifier(fine, ())
+    first = simplifier.simplify(0.6)
+    assert first.changed.all()
+    chosen = np.zeros(label_components(fine.triangles, len(fine.positions)).max() + 1, bool)
+    chosen[-1] = True
+    second = simplifier.simplify(0.1, chosen)
+    by_itself = moved(ball(5.0, 60), (40.0, 0.0, 0.0))
+    alone = simplify_without_defects(by_itself, (), max_error_um=0.1)
+    was, now = (each.mesh.triangles[:, 0] for each in (first, second))
+    is_second = [each.mesh.positions[:, 0] > 30 for each in (first, second)]
+    assert second.changed[is_second[1]].all()
+    assert not second.changed[~is_second[1]].any()
+    count = is_second[1][now].sum()
+    assert count == pytest.approx(len(alone.mesh.triangles), rel=0.05)  # by rounding
+    assert count > 2 * is_second[0][was].sum()
+    others = [
+        each.vertices[each.mesh.triangles[~some[each.mesh.triangles[:, 0]]]]
+        for each, some in zip((first, second), is_second, strict=True)
+    ]
+    np.testing.assert_array_equal(*others)
+    assert kinds(find_defects(second.mesh)) == set()

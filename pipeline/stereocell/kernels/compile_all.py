@@ -87,9 +87,10 @@ def compile_of_meshes() -> None:
     sum_gains(at, triangles, labels, bodies, sum_normals(at, triangles))
     bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)
     order_triangles(triangles, order_vertices(at))
-    left = collapse(at, triangles, flags, bits, errors, 3.0, 0.9)
+    nothing = np.zeros((0, 2), np.int32)
+    left, _, _ = collapse(at, triangles, flags, bits, errors, 3.0, 0.9, nothing)
     flip_edges(at, left, flags, bits, errors, 0.9)
-    orders, nothing = find_orders(triangles, 4), np.zeros((0, 2), np.int32)
+    orders = find_orders(triangles, 4)
     collapse_walls(at, triangles, flags, errors, 3.0, 0.9, orders, nothing)
     thin_rim(at, triangles, np.zeros(4, np.int8), np.zeros(4, np.uint8), flags, 0.1, 0.9)
 

@@ -53,11 +53,28 @@ class Kept:
     defects  those that are left
     lacks    bool (n,), vertices of bodies whose volume is still off by more than MAX_VOLUME_ERROR;
              none is named where MANY cross
+    moves    float64 (n, 3), of the vertices
+    share    float64 (n,), of the whole move, by which each vertex moves
     """
 
     mesh: Mesh
     defects: Defects
     lacks: NDArray[np.bool_]
+    moves: Points
+    share: Points
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """A level that got its volumes, of which other bodies were simplified otherwise since.
+
+    vertices  int64 (n,), the number that each vertex has in the fine mesh, ascending
+    changed   bool (k,), vertices of the new level of those other bodies
+    """
+
+    kept: Kept
+    vertices: NDArray[np.int64]
+    changed: NDArray[np.bool_]
 
 
 class FineVolumes:
@@ -105,12 +122,14 @@ class FineVolumes:
         *,
         max_move_um: float,
         topology: Topology | None = None,
+        earlier: Earlier | None = None,
     ) -> Kept:
         """Return a level with the fine bodies' volumes.
 
         vertices     int64 (n,), the number that each vertex has in the fine mesh
         max_move_um  largest distance of a move
         topology     of the level; None: it is found
+        earlier      what was found already, of all bodies but those that have changed
         """
         planes = self._planes
         topology = topology or find_topology(mesh.triangles, len(mesh.positions))
@@ -121,7 +140,14 @@ class FineVolumes:
         whole = _fade(mesh, topology, planes, FADE * max_move_um)
         share, size = whole.copy(), np.bincount(label, minlength=count)
         fresh = np.ones(len(triangles), bool)
+        if earlier is not None:
+            same = np.flatnonzero(~earlier.changed)
+            place = np.searchsorted(earlier.vertices, vertices[same])
+            share[same] = earlier.kept.share[place]
+            fresh = np.asarray(earlier.changed[triangles].any(axis=1))
         moves = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
+        if earlier is not None:
+            moves[same] = earlier.kept.moves[place]
         placed: Mesh | None = None
         faulty, are_many = np.zeros(0, np.int64), False
         for number in range(TRIES + 2):
@@ -153,11 +179,7 @@ class FineVolumes:
         assert placed is not None
         missing = wanted - self._measure(start + moves, triangles, label, count)
         lacks = (np.abs(missing) > MAX_VOLUME_ERROR * self._solid[of_fine]) & (not are_many)
-        return Kept(placed, defects, lacks[label])
-
-    def find_bodies(self, chosen: NDArray[np.int64], among: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which fine vertices `among` (n,) are of a body that `chosen` (k,) are of."""
-        return np.isin(self._label[among], self._label[chosen])
+        return Kept(placed, defects, lacks[label], moves, share)
 
     def _find_moves(
         self,

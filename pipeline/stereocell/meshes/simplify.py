@@ -24,6 +24,9 @@ STRAY = 3.0  # errors; largest distance of a vertex from the result
 SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle, unless those around are sharper
 FLIP_DEG = 25.0  # degrees; edges of sharper triangles flip
 
+Moves = NDArray[np.int32]  # (n, 2), what was done: a vertex, and the one onto which it moved
+NOTHING: Moves = np.zeros((0, 2), np.int32)
+
 
 def simplify(mesh: Mesh, max_error_um: float, *, planes: tuple[Plane, ...] = ()) -> Mesh:
     """Return the mesh with as few triangles as the error allows; boundary vertices stay.
@@ -43,17 +46,18 @@ def simplify(mesh: Mesh, max_error_um: float, *, planes: tuple[Plane, ...] = ())
     locked = np.zeros(len(mesh.positions), bool)
     bodies = label_bodies(np.ascontiguousarray(mesh.triangles, np.int32), len(mesh.positions))
     errors = find_errors(mesh, max_error_um, bodies)
-    left = simplify_part(mesh, mesh.triangles, errors, locked=locked, planes=planes)
-    return compact(mesh, left)
+    corners, left, _ = simplify_part(
+        mesh, mesh.triangles, errors, locked=locked, planes=planes, past=NOTHING
+    )
+    return compact(mesh, corners[left])
 
 
 def find_errors(
-    mesh: Mesh, max_error_um: float | NDArray[np.float64], bodies: tuple[NDArray[np.int32], int]
+    mesh: Mesh, max_error_um: float, bodies: tuple[NDArray[np.int32], int]
 ) -> NDArray[np.float64]:
     """Return the error that each vertex may have (n,), um: less on bodies that are small for it.
 
-    max_error_um  of all, or of each (n,)
-    bodies        body of each vertex, int32 (n,), and the number of bodies: see `label_bodies`
+    bodies  body of each vertex, int32 (n,), and the number of bodies: see `label_bodies`
     """
     labels, count = bodies
     sides = measure_boxes(mesh.positions.astype(np.float64), labels, count)
@@ -68,21 +72,27 @@ def simplify_part(
     *,
     locked: NDArray[np.bool_],
     planes: tuple[Plane, ...],
-) -> NDArray[np.uint32]:
-    """Return fewer triangles in place of those of some whole bodies, uint32 (k, 3).
+    past: Moves,
+) -> tuple[NDArray[np.uint32], NDArray[np.bool_], Moves]:
+    """Return the triangles of some whole bodies simplified, uint32 (m, 3), and which are left.
+
+    And the moves that did it.
 
     triangles  uint32 (m, 3), by the mesh's vertices
     errors     float64 (n,), see `find_errors`
     locked     bool (n,), vertices that stay
+    past       the bodies' moves before more vertices were locked, made again but around these
     """
     used, own = renumber(triangles, len(mesh.positions))
     if not len(used):
-        return triangles
+        return triangles, np.zeros(0, bool), NOTHING
     at = mesh.positions[used].astype(np.float64)
     at -= (at.min(axis=0) + at.max(axis=0)) / 2
     bits = find_planes(mesh.positions[used], planes)
     sharpest, sharp = np.cos(np.radians([SHARPEST_DEG, FLIP_DEG])).tolist()
-    left = collapse(
+    number = np.zeros(len(mesh.positions), np.int32)
+    number[used] = np.arange(len(used), dtype=np.int32)
+    corners, left, moves = collapse(
         at,
         own.astype(np.int32),
         locked[used],
@@ -90,9 +100,12 @@ def simplify_part(
         errors[used],
         STRAY,
         sharpest,
+        number[past],
     )
-    flip_edges(at, left, locked[used], bits, errors[used], sharp)
-    return used[left].astype(np.uint32)
+    kept = corners[left]
+    flip_edges(at, kept, locked[used], bits, errors[used], sharp)
+    corners[left] = kept
+    return used.astype(np.uint32)[corners], left, used.astype(np.int32)[moves]
 
 
 def find_planes(positions: NDArray[np.float32], planes: tuple[Plane, ...]) -> NDArray[np.uint8]:

@@ -3,25 +3,29 @@
 Simplification keeps topology and does not fold triangles over, but sees only the triangles around
 a vertex: walls that are near each other may come to cross. Around each defect the vertices of the
 given surface are locked, in a ball that grows with every try, and the bodies with defects are
-simplified again. A body that still has defects after ROUNDS keeps the surface it had before.
+simplified again: as before, but around what is locked now. A body that still has defects after
+ROUNDS keeps the surface it had before. Where MANY of a body's vertices cross, as in a sponge, locks
+would come to nearly all of it: its error is halved, up to HALVINGS times.
 """
 
 from dataclasses import dataclass
-from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from stereocell.kernels.half_edges import measure_sides
-from stereocell.meshes.simplify import find_errors, renumber, simplify_part
+from stereocell.meshes.simplify import NOTHING, Moves, find_errors, renumber, simplify_part
 from stereocell.meshes.validity import Defects, Topology, find_defects, find_topology
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
 ROUNDS = 12  # most rounds in which defective bodies are simplified again
 GROWTH = 2.0  # factor by which the ball of locked vertices grows with each try in a place
-HAIR = 1e-6  # share by which a ball is larger than the way to its nearest vertex
+MANY = 0.05  # share of a body's vertices in defects, and their number
+COSTLY = 10_000
+HALVINGS = 3
+AT_A_TIME = 1000  # balls; all of their vertices take much memory
 LOCKED_EVERY = 8  # every 8th vertex of a body that is inside out is locked first, then more of them
 
 Triangles = NDArray[np.uint32]
@@ -32,7 +36,8 @@ class Simplified:
     """The result.
 
     topology          of the mesh
-    vertices          int64 (k,), the number that each vertex has in the given mesh
+    vertices          int64 (k,), the number that each vertex has in the given mesh, ascending
+    changed           bool (k,), those of bodies that were simplified in this call
     simplified_again  bodies
     fallbacks         bodies that stayed as they were
     """
@@ -40,71 +45,144 @@ class Simplified:
     mesh: Mesh
     topology: Topology
     vertices: NDArray[np.int64]
+    changed: NDArray[np.bool_]
     simplified_again: int
     fallbacks: int
 
 
 def simplify_without_defects(
-    mesh: Mesh,
-    planes: tuple[Plane, ...],
-    *,
-    max_error_um: float | NDArray[np.float64],
-    topology: Topology | None = None,
+    mesh: Mesh, planes: tuple[Plane, ...], *, max_error_um: float
 ) -> Simplified:
-    """Return the mesh simplified and without defects; its boundary edges stay.
+    """Return the mesh simplified and without defects; its boundary edges stay. See `Simplifier`."""
+    return Simplifier(mesh, planes).simplify(max_error_um)
 
-    mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)
-    planes        the cut planes, where the mesh may be open
-    max_error_um  see `simplify`; of all vertices, or of each (n,), alike in a body
-    topology      of the mesh; None: it is found
+
+class Simplifier:
+    """Simplifies the bodies of a mesh, all of them and then some with another error.
+
+    mesh      positions float32 (n, 3) in um, triangles uint32 (m, 3)
+    planes    the cut planes, where the mesh may be open
+    topology  of the mesh; None: it is found
 
     A mesh that has defects itself keeps the bodies with defects.
     """
-    topology = topology or find_topology(mesh.triangles, len(mesh.positions))
-    body = topology.bodies[0]
-    tries = np.zeros(len(mesh.positions), np.int64)  # a vertex that was locked once stays
-    body_of = body[mesh.triangles[:, 0]]
-    tree: cKDTree | None = None
 
-    errors = find_errors(mesh, max_error_um, topology.bodies)
+    def __init__(
+        self, mesh: Mesh, planes: tuple[Plane, ...], topology: Topology | None = None
+    ) -> None:
+        vertices = len(mesh.positions)
+        self._mesh, self._planes = mesh, planes
+        self._bodies = (topology or find_topology(mesh.triangles, vertices)).bodies
+        self._body_of = self._bodies[0][mesh.triangles[:, 0]]
+        # of the given triangles: their corners now, and which are left
+        self._corners, self._left = mesh.triangles.copy(), np.ones(len(mesh.triangles), bool)
+        self._moves = NOTHING
+        self._errors = np.zeros(vertices)
+        self._tries = np.zeros(vertices, np.int8)  # a vertex that was locked once stays
+        self._redone, self._kept = np.zeros((2, self._bodies[1]), bool)
 
-    def again(triangles: Triangles) -> Triangles:
-        return simplify_part(mesh, triangles, errors, locked=tries > 0, planes=planes)
+    def simplify(self, max_error_um: float, bodies: NDArray[np.bool_] | None = None) -> Simplified:
+        """Return the mesh simplified and without defects; its boundary edges stay.
 
-    triangles = again(mesh.triangles)
-    fresh = np.ones(len(triangles), bool)
-    redone: set[int] = set()
-    kept: set[int] = set()
-    for number in count():
-        used, own = renumber(triangles, len(mesh.positions))
-        draft = Mesh(mesh.positions[used], own, mesh.normals[used])
-        found = find_topology(own, len(used))
-        defects = find_defects(draft, planes=planes, fresh=fresh, topology=found)
-        worst = set(body[used[defects.vertices(own)]].tolist()) - kept
-        if not worst:
-            break
-        chosen = np.zeros(int(body.max()) + 1, bool)
-        chosen[sorted(worst)] = True
-        part = mesh.triangles[chosen[body_of]]
-        if number < ROUNDS:
-            redone |= worst
-            # few places are asked for: a balanced tree takes three times as long to make
-            tree = tree or cKDTree(mesh.positions, balanced_tree=False, compact_nodes=False)
-            tries[_around(tree, draft, defects, tries)] += 1
-            turned = body[used[own[defects.inside_out, 0]]]
-            tries[_some_of(body, turned, max(1, LOCKED_EVERY >> number))] += 1
-            part = again(part)
-        else:
-            kept |= worst
-        stays = ~chosen[body[triangles[:, 0]]]
-        rest, before = triangles[stays], triangles[~stays]
-        triangles = np.concatenate([rest, part])
-        faulty = np.zeros(len(mesh.positions), bool)
-        faulty[used[defects.vertices(own)]] = True
-        # what was found sound in the draft before, and is there still, need not be looked at again
-        fresh = np.asarray(faulty[triangles].any(axis=1))
-        fresh[len(rest) :] |= ~_are_among(part, before)
-    return Simplified(draft, found, used, len(redone - kept), len(kept))
+        max_error_um  see `simplify`
+        bodies        bool (b,), those that are simplified; the others are as in the call before,
+                      unless these come to cross them. None: all
+        """
+        mesh, (body, count) = self._mesh, self._bodies
+        chosen = np.ones(count, bool) if bodies is None else bodies
+        changed, halvings, rounds = chosen.copy(), np.zeros(count, np.int64), 0
+        tree: cKDTree | None = None
+        here = chosen[body]
+        self._errors[here] = find_errors(mesh, max_error_um, self._bodies)[here]
+        self._tries[here] = 0
+        self._redone[chosen] = self._kept[chosen] = False
+        fresh = self._simplify_again(chosen)
+        if bodies is None:
+            fresh[:] = True
+        while True:
+            used, own = renumber(self._corners[self._left], len(mesh.positions))
+            draft = Mesh(mesh.positions[used], own, mesh.normals[used])
+            found = find_topology(own, len(used))
+            defects = find_defects(
+                draft, planes=self._planes, fresh=fresh[self._left], topology=found
+            )
+            at_fault = used[defects.vertices(own)]
+            hits, size = (np.bincount(body[some], minlength=count) for some in (at_fault, used))
+            worst = (hits > 0) & ~self._kept
+            if not worst.any():
+                break
+            many = worst & (hits > np.maximum(MANY * size, COSTLY))
+            ended = worst & (rounds == ROUNDS) | many & (halvings == HALVINGS)
+            # what crosses as it was given can't be mended
+            given = (self._corners == mesh.triangles).all(axis=1)[self._left]
+            as_given = defects.crossings[given[defects.crossings].all(axis=1)]
+            ended[body[used[own[as_given, 0]]]] = True
+            ended &= worst
+            faulty = np.zeros(len(mesh.positions), bool)
+            faulty[at_fault] = True
+            # what was found sound in the draft before, and is there still, need not be looked at
+            fresh = np.asarray(faulty[self._corners].any(axis=1))
+            if ended.any():
+                self._kept |= ended
+                chosen = ended
+                fresh |= self._put_back(chosen)
+            elif many.any():
+                chosen = many
+                halvings[chosen] += 1
+                self._errors[chosen[body]] /= 2
+                fresh |= self._simplify_again(chosen)
+            else:
+                chosen = worst
+                # few places are asked for: a balanced tree takes three times as long to make
+                tree = tree or cKDTree(mesh.positions, balanced_tree=False, compact_nodes=False)
+                self._tries[_around(tree, draft, defects, self._tries)] += 1
+                turned = body[used[own[defects.inside_out, 0]]]
+                self._tries[_some_of(body, turned, max(1, LOCKED_EVERY >> rounds))] += 1
+                fresh |= self._simplify_again(chosen, but_around_locks=True)
+                rounds += 1
+            self._redone |= chosen
+            changed |= chosen
+        again, fallbacks = int((self._redone & ~self._kept).sum()), int(self._kept.sum())
+        return Simplified(draft, found, used, changed[body[used]], again, fallbacks)
+
+    def _simplify_again(
+        self, chosen: NDArray[np.bool_], *, but_around_locks: bool = False
+    ) -> NDArray[np.bool_]:
+        """Simplify the chosen bodies (b,); return which of all triangles are other now (m,).
+
+        but_around_locks  as they were simplified before, but for what is locked now
+        """
+        part = self._mesh.triangles[chosen[self._body_of]]
+        past = self._moves[chosen[self._bodies[0][self._moves[:, 0]]]]
+        corners, left, moves = simplify_part(
+            self._mesh,
+            part,
+            self._errors,
+            locked=self._tries > 0,
+            planes=self._planes,
+            past=past if but_around_locks else NOTHING,
+        )
+        return self._put(chosen, corners, left, moves)
+
+    def _put_back(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Give the chosen bodies (b,) the triangles that they had; see above."""
+        part = self._mesh.triangles[chosen[self._body_of]]
+        return self._put(chosen, part, np.ones(len(part), bool), NOTHING)
+
+    def _put(
+        self,
+        chosen: NDArray[np.bool_],
+        corners: Triangles,
+        left: NDArray[np.bool_],
+        moves: Moves,
+    ) -> NDArray[np.bool_]:
+        rows = np.flatnonzero(chosen[self._body_of])
+        other = np.zeros(len(self._corners), bool)
+        other[rows] = ~self._left[rows] | (corners != self._corners[rows]).any(axis=1)
+        self._corners[rows], self._left[rows] = corners, left
+        stay = ~chosen[self._bodies[0][self._moves[:, 0]]]
+        self._moves = np.concatenate([self._moves[stay], moves])
+        return other
 
 
 def _some_of(body: NDArray[np.int32], chosen: NDArray[np.int32], every: int) -> NDArray[np.int64]:
@@ -116,47 +194,34 @@ def _some_of(body: NDArray[np.int32], chosen: NDArray[np.int32], every: int) -> 
     return vertices[place % every == 0]
 
 
-def _are_among(triangles: Triangles, others: Triangles) -> NDArray[np.bool_]:
-    """Return which triangles, wound alike, are among the others, bool (m,)."""
-    count = int(max(triangles.max(initial=0), others.max(initial=0))) + 1
-    (a, b, c), (d, e, f) = _least_first(triangles), _least_first(others)
-    keys, known = a * count + b, d * count + e
-    order = np.argsort(known)
-    place = np.minimum(np.searchsorted(known, keys, sorter=order), len(others) - 1)
-    # where an edge has several triangles one of them may be missed: it is looked at once more
-    found = order[place]
-    return np.asarray((known[found] == keys) & (f[found] == c))
-
-
-def _least_first(triangles: Triangles) -> NDArray[np.int64]:
-    """Return the corners, int64 (3, m), turned so that the least comes first."""
-    first = triangles.argmin(axis=1)
-    turn = (first[:, None] + np.arange(3)) % 3
-    return np.take_along_axis(triangles, turn, axis=1).astype(np.int64).T
-
-
 def _around(
-    tree: cKDTree, draft: Mesh, defects: Defects, tries: NDArray[np.int64]
+    tree: cKDTree, draft: Mesh, defects: Defects, tries: NDArray[np.int8]
 ) -> NDArray[np.int64]:
     """Return the tree's vertices in balls around the defects; a ball grows with each try there."""
     at = draft.positions.astype(np.float64)
-    first, second, whole = (
+    one, other, whole = (
         at[draft.triangles[some]]
         for some in (*defects.crossings.T, np.concatenate([defects.degenerate, defects.walls]))
     )
     edges = at[np.concatenate([defects.open, defects.non_manifold_edges])]
     vertices = at[defects.non_manifold_vertices]
     # two triangles can meet only where their boxes do
-    lows = [np.maximum(first.min(axis=1), second.min(axis=1)), edges.min(axis=1), vertices]
-    highs = [np.minimum(first.max(axis=1), second.max(axis=1)), edges.max(axis=1), vertices]
+    lows = [np.maximum(one.min(axis=1), other.min(axis=1)), edges.min(axis=1), vertices]
+    highs = [np.minimum(one.max(axis=1), other.max(axis=1)), edges.max(axis=1), vertices]
     lows, highs = [*lows, whole.min(axis=1)], [*highs, whole.max(axis=1)]
     start, end = np.concatenate(lows), np.concatenate(highs)
     if not len(start):
         return np.zeros(0, np.int64)
     side = np.median(measure_sides(at, np.ascontiguousarray(draft.triangles, np.int32)))
     size = np.maximum(np.linalg.norm(end - start, axis=1) / 2, float(side) / 4)
-    away, nearest = tree.query((start + end) / 2)
-    # at least one vertex, or the next try would equal this one
-    radius = np.maximum(size * GROWTH ** tries[nearest], (1 + HAIR) * away)
-    found = tree.query_ball_point((start + end) / 2, radius)
-    return np.unique(np.concatenate([np.asarray(each, np.int64) for each in found]))
+    nearest = tree.query((start + end) / 2)[1]
+    # a ball for each vertex that is the nearest one, not for each defect: those may be very many
+    places, which = np.unique(nearest, return_inverse=True)
+    radius = np.zeros(len(places))
+    np.maximum.at(radius, which, size * GROWTH ** tries[nearest].astype(np.float64))
+    found = np.zeros(tree.n, bool)
+    for first in range(0, len(places), AT_A_TIME):
+        some = slice(first, first + AT_A_TIME)
+        for ball in tree.query_ball_point(tree.data[places[some]], radius[some]):
+            found[ball] = True
+    return np.flatnonzero(found)

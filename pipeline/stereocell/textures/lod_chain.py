@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.half_edges import measure_sharpest
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
-from stereocell.meshes.keep_volume import Box, FineVolumes, Kept
+from stereocell.meshes.keep_volume import Box, Earlier, FineVolumes, Kept
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
-from stereocell.meshes.simplify_valid import Simplified, simplify_without_defects
+from stereocell.meshes.simplify_valid import Simplified, Simplifier
 from stereocell.meshes.small_bodies import SmallBodies
 from stereocell.meshes.validity import Topology, find_topology
 from stereocell.model.lattice import Plane
@@ -129,27 +129,32 @@ def _simplify(
     topology  of that
     number    of each of its vertices in the fine mesh
     """
-    errors = np.full(len(mesh.positions), error_um)
+    simplifier = Simplifier(mesh, planes, topology)
+    with clock("simplify"):
+        simplified = simplifier.simplify(error_um)
+    count = len(simplified.mesh.triangles)
+    most, earlier = max(MAX_HEAVIER * count, count + MAX_MORE), None
     best: tuple[Simplified, Kept] | None = None
-    most = np.inf  # triangles
     for finer in (*FINER, None):
-        with clock("simplify"):
-            simplified = simplify_without_defects(
-                mesh, planes, max_error_um=errors, topology=topology
-            )
-        count = len(simplified.mesh.triangles)
-        if best is not None and count > most:
-            break
-        most = min(most, max(MAX_HEAVIER * count, count + MAX_MORE))
         with clock("volume kept"):
             own = number[simplified.vertices]
             kept = volumes.keep(
-                simplified.mesh, own, max_move_um=error_um, topology=simplified.topology
+                simplified.mesh,
+                own,
+                max_move_um=error_um,
+                topology=simplified.topology,
+                earlier=earlier,
             )
         best = simplified, kept
         if finer is None or not kept.lacks.any():
             break
-        errors[volumes.find_bodies(own[kept.lacks], number)] = finer * error_um
+        lacking = np.zeros(topology.bodies[1], bool)
+        lacking[topology.bodies[0][simplified.vertices[kept.lacks]]] = True
+        with clock("simplify"):
+            simplified = simplifier.simplify(finer * error_um, lacking)
+        if len(simplified.mesh.triangles) > most:
+            break
+        earlier = Earlier(kept, own, simplified.changed)
     assert best is not None
     return best
 
