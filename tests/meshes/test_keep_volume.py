@@ -147,3 +147,17 @@ def test_bodies_that_did_not_change_keep_their_moves_and_are_not_looked_at_again
     assert second.defects.total == 0
     assert find_defects(second.mesh).total == 0
     assert enclosed_volume(second.mesh) > 0.995 * enclosed_volume(fine)
+
+
+def test_defects_of_bodies_that_did_not_change_are_told_of_again() -> None:
+    one = ball(5.0, 60)
+    fine = joined(one, moved(one, (6.0, 0.0, 0.0)), moved(one, (40.0, 0.0, 0.0)))
+    volumes, simplifier = FineVolumes(fine, ()), Simplifier(fine, ())
+    before = simplifier.simplify(ERROR)
+    first = volumes.keep(before.mesh, before.vertices, max_move_um=ERROR)
+    after = simplifier.simplify(ERROR / 4, np.array([False, False, True]))
+    earlier = Earlier(first, before.vertices, after.changed)
+    second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
+    assert first.defects.total > 0
+    assert second.defects.counts == first.defects.counts
+    assert after.fallbacks == 2

@@ -118,3 +118,13 @@ def test_some_bodies_get_another_error_and_the_others_stay() -> None:
     ]
     np.testing.assert_array_equal(*others)
     assert kinds(find_defects(second.mesh)) == set()
+
+
+def test_bodies_that_cross_as_they_are_given_are_given_up_with_every_error() -> None:
+    fine = joined(ball(5.0, 60), moved(ball(5.0, 60), (6.0, 0.0, 0.0)))
+    simplifier = Simplifier(fine, ())
+    assert simplifier.simplify(0.6).fallbacks == 2
+    for error in (0.3, 0.002, 0.0):
+        again = simplifier.simplify(error, np.array([True, True]))
+        assert again.fallbacks == 2
+        np.testing.assert_array_equal(again.mesh.triangles, fine.triangles)

@@ -76,6 +76,11 @@ class Earlier:
     vertices: NDArray[np.int64]
     changed: NDArray[np.bool_]
 
+    @property
+    def at_fault(self) -> NDArray[np.int64]:
+        """Return the vertices of its defects, int64 (n,), numbered as in the fine mesh."""
+        return self.vertices[self.kept.defects.vertices(self.kept.mesh.triangles)]
+
 
 class FineVolumes:
     """The volumes of a fine mesh's bodies, for levels of which each vertex is one of it.
@@ -144,7 +149,9 @@ class FineVolumes:
             same = np.flatnonzero(~earlier.changed)
             place = np.searchsorted(earlier.vertices, vertices[same])
             share[same] = earlier.kept.share[place]
-            fresh = np.asarray(earlier.changed[triangles].any(axis=1))
+            # what was at fault is told of again
+            was_faulty = np.isin(vertices, earlier.at_fault)
+            fresh = np.asarray((earlier.changed | was_faulty)[triangles].any(axis=1))
         moves = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
         if earlier is not None:
             moves[same] = earlier.kept.moves[place]

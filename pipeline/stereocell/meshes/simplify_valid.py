@@ -79,6 +79,7 @@ class Simplifier:
         self._moves = NOTHING
         self._errors = np.zeros(vertices)
         self._tries = np.zeros(vertices, np.int8)  # a vertex that was locked once stays
+        self._faulty = np.zeros(vertices, bool)  # vertices of the last draft's defects
         self._redone, self._kept = np.zeros((2, self._bodies[1]), bool)
 
     def simplify(self, max_error_um: float, bodies: NDArray[np.bool_] | None = None) -> Simplified:
@@ -96,7 +97,7 @@ class Simplifier:
         self._errors[here] = find_errors(mesh, max_error_um, self._bodies)[here]
         self._tries[here] = 0
         self._redone[chosen] = self._kept[chosen] = False
-        fresh = self._simplify_again(chosen)
+        fresh = self._simplify_again(chosen) | self._are_faulty()
         if bodies is None:
             fresh[:] = True
         while True:
@@ -109,6 +110,8 @@ class Simplifier:
             at_fault = used[defects.vertices(own)]
             hits, size = (np.bincount(body[some], minlength=count) for some in (at_fault, used))
             worst = (hits > 0) & ~self._kept
+            self._faulty[:] = False
+            self._faulty[at_fault] = True
             if not worst.any():
                 break
             many = worst & (hits > np.maximum(MANY * size, COSTLY))
@@ -118,10 +121,8 @@ class Simplifier:
             as_given = defects.crossings[given[defects.crossings].all(axis=1)]
             ended[body[used[own[as_given, 0]]]] = True
             ended &= worst
-            faulty = np.zeros(len(mesh.positions), bool)
-            faulty[at_fault] = True
             # what was found sound in the draft before, and is there still, need not be looked at
-            fresh = np.asarray(faulty[self._corners].any(axis=1))
+            fresh = self._are_faulty()
             if ended.any():
                 self._kept |= ended
                 chosen = ended
@@ -144,6 +145,10 @@ class Simplifier:
             changed |= chosen
         again, fallbacks = int((self._redone & ~self._kept).sum()), int(self._kept.sum())
         return Simplified(draft, found, used, changed[body[used]], again, fallbacks)
+
+    def _are_faulty(self) -> NDArray[np.bool_]:
+        """Return which of all triangles touch a defect of the last draft (m,)."""
+        return np.asarray(self._faulty[self._corners].any(axis=1))
 
     def _simplify_again(
         self, chosen: NDArray[np.bool_], *, but_around_locks: bool = False
