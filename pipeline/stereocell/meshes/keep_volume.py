@@ -15,6 +15,7 @@ Between near walls a body may have no room: it lacks volume, and textures/lod_ch
 the level less.
 """
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -157,7 +158,7 @@ class FineVolumes:
             moves[same] = earlier.kept.moves[place]
         placed: Mesh | None = None
         faulty, are_many = np.zeros(0, np.int64), False
-        for number in range(TRIES + 2):
+        for number in itertools.count():  # from TRIES on a body at least stays each time
             # bit by bit where nothing moves: a sum would lose the sign of a zero
             positions = np.where(moves == 0, mesh.positions, (start + moves).astype(np.float32))
             if placed is not None:
@@ -175,7 +176,7 @@ class FineVolumes:
                 break
             before = share.copy()
             are_many |= number == 0 and len(faulty) > max(MANY * len(start), COSTLY)
-            if are_many or number == TRIES:
+            if are_many or number >= TRIES:
                 share[worst[label]] = 0.0
             else:
                 share[faulty] *= np.where(share[faulty] > MIN_WAY * whole[faulty], SHORTENING, 0.0)
