@@ -5,12 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
+from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import keep_volume
 from stereocell.meshes.keep_volume import Earlier, FineVolumes
 from stereocell.meshes.simplify_valid import Simplifier, simplify_without_defects
 from stereocell.meshes.validity import Defects, border, find_defects, label_components
+from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
+from stereocell.model.tiling import Box
 from support.meshes import ball, crowd, enclosed_volume, joined, kinds, moved, turned
 
 ERROR = 0.6
@@ -161,3 +165,24 @@ def test_defects_of_bodies_that_did_not_change_are_told_of_again() -> None:
     assert first.defects.total > 0
     assert second.defects.counts == first.defects.counts
     assert after.fallbacks == 2
+
+
+def shells(seed: int) -> Mesh:
+    """Walls within walls, bent, a voxel or two apart."""
+    at = np.stack(np.indices((28,) * 3), -1).astype(float)
+    bent = 5 * ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=(28,) * 3), 2)
+    away = np.linalg.norm(at - 14, axis=-1) + bent
+    distance = np.clip((np.abs(away / 4 % 1 - 0.5) - 0.2) * 4, -2, 2).astype(np.float32)
+    return extract_surface(distance, Lattice.of_whole(Box((0, 0, 0), (28,) * 3), (1.0,) * 3))
+
+
+@pytest.mark.parametrize("seed", [19, 21])
+def test_what_crosses_a_body_that_stays_stays_as_well(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keep_volume, "TRIES", 0)
+    simple = simplify_without_defects(shells(seed), (), max_error_um=1.0)
+    found = FineVolumes(shells(seed), ()).keep(simple.mesh, simple.vertices, max_move_um=1.0)
+    assert find_defects(found.mesh).total == 0
+    moved_to = simple.mesh.positions + found.moves
+    np.testing.assert_allclose(found.mesh.positions, moved_to, atol=1e-5)

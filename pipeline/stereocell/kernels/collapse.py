@@ -253,7 +253,15 @@ def collapse_in_place(
         u, v = past[i, 0], past[i, 1]
         size, chosen, start = 0, -1, leaving[u]
         h = start
-        while size < MAX_NEIGHBOURS:
+        if stays[u] or differs[u] or differs[v]:
+            differs[u] = differs[v] = True
+            while True:
+                differs[edges[ahead(h)]] = True
+                h = edges[behind(h) + TWIN]
+                if h == start:
+                    break
+            continue
+        while True:  # as long as it was then: at most MAX_NEIGHBOURS
             ring[size], onward[size], out[size] = edges[ahead(h)], edges[behind(h)], h
             if ring[size] == v:
                 chosen = h
@@ -261,11 +269,6 @@ def collapse_in_place(
             h = edges[behind(h) + TWIN]
             if h == start:
                 break
-        if stays[u] or differs[u] or differs[v]:
-            differs[u] = differs[v] = True
-            for j in range(size):
-                differs[ring[j]] = True
-            continue
         strayed = at[u, 3] + _distance_after(at, u, v, ring, onward, size)
         _move_onto(u, v, chosen, strayed, out, size, at, quadrics, edges, leaving, is_left)
         made[steps, 0], made[steps, 1] = u, v

@@ -115,7 +115,7 @@ class Simplifier:
             if not worst.any():
                 break
             many = worst & (hits > np.maximum(MANY * size, COSTLY))
-            ended = worst & (rounds == ROUNDS) | many & (halvings == HALVINGS)
+            ended = (worst & (rounds == ROUNDS)) | (many & (halvings == HALVINGS))
             # what crosses as it was given can't be mended
             given = (self._corners == mesh.triangles).all(axis=1)[self._left]
             as_given = defects.crossings[given[defects.crossings].all(axis=1)]
