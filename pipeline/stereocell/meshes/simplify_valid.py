@@ -220,7 +220,8 @@ def _around(
     side = np.median(measure_sides(at, np.ascontiguousarray(draft.triangles, np.int32)))
     size = np.maximum(np.linalg.norm(end - start, axis=1) / 2, float(side) / 4)
     nearest = tree.query((start + end) / 2)[1]
-    # a ball for each vertex that is the nearest one, not for each defect: those may be very many
+    # a ball for each vertex that is the nearest one, not for each defect: those may be very many;
+    # it holds that vertex at least
     places, which = np.unique(nearest, return_inverse=True)
     radius = np.zeros(len(places))
     np.maximum.at(radius, which, size * GROWTH ** tries[nearest].astype(np.float64))
