@@ -5,14 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import dask
 import pytest
 
 from stereocell.engine import run
-from stereocell.engine.cluster import ClusterError
-from stereocell.engine.run import _AHEAD, Engine, TasksFailedError, _outcome_of
+from stereocell.engine.cluster_tasks import _outcome_of
+from stereocell.engine.run import Engine, TasksFailedError
 from support.server.timeouts import PATIENCE_S
-from support.worker_tasks import die, double, read_variable
+from support.worker_tasks import double, read_variable
 
 
 @pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
@@ -74,64 +73,6 @@ def test_workers_start_where_the_name_of_the_temporary_folder_is_too_long_for_a_
     assert (ended.stdout, ended.returncode) == ("[2, 4]\n", 0), ended.stderr
 
 
-@pytest.mark.slow
-def test_few_tasks_wait_at_a_time_however_many_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    engine, open_ = Engine(1), []
-    try:
-        assert engine.run("first", double, [("a", 1), ("b", 2)]) == [2, 4]
-        client = engine._client
-        submit = client.submit
-
-        def count(*arguments: object, **how: object) -> object:
-            open_.append(len(client.futures))
-            return submit(*arguments, **how)
-
-        monkeypatch.setattr(client, "submit", count)
-        numbers = range(10, 10 + 5 * _AHEAD)
-        doubled = engine.run("many", double, [(str(n), n) for n in numbers])
-    finally:
-        engine.close()
-    assert doubled == [2 * n for n in numbers]
-    assert len(open_) == len(numbers)
-    assert max(open_) <= _AHEAD + 2
-
-
-@pytest.mark.slow
-def test_killed_worker_is_said_in_words_and_the_others_finish() -> None:
-    # as on a machine so busy that a new worker takes longer than distributed waits for one
-    dask.config.set({"distributed.deploy.lost-worker-timeout": "1ms"})
-    engine = Engine(2)
-    try:
-        with pytest.raises(TasksFailedError) as raised:
-            engine.run("bad", die, [(f"t{n}", n) for n in range(4)])
-    finally:
-        engine.close()
-    (line,) = str(raised.value).splitlines()
-    assert line.startswith("t1: its worker process was killed each time")
-    assert "fewer --workers" in line
-
-
-class Restarting:
-    """A client, or its cluster, one of whose workers is being started anew while it closes."""
-
-    def __init__(self, cluster: "Restarting | None" = None) -> None:
-        self.cluster, self.status, self.closings = cluster, "running", 0
-
-    def close(self, timeout: float) -> None:
-        self.closings += 1
-        raise AssertionError("can only join a started process")
-
-
-def test_a_worker_that_starts_anew_does_not_keep_the_engine_from_closing() -> None:
-    cluster = Restarting()
-    client = Restarting(cluster)
-    engine = Engine(2)
-    engine._client = client
-    engine.close()
-    assert (client.closings, cluster.closings) == (1, 1)
-    assert client.status == "closed"
-
-
 class Gone:
     """A client and a task of its whose workers are gone: before the task ended, or after."""
 
@@ -154,59 +95,6 @@ def test_workers_that_are_gone_are_not_waited_for_for_ever(ended: bool) -> None:
     result, failure = _outcome_of(Gone(ended), Gone(ended))
     assert result is None
     assert "its workers are gone and did not come back" in str(failure)
-
-
-def test_workers_that_do_not_answer_are_said_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    def never(**_: object) -> None:
-        raise TimeoutError  # as distributed does, without a word
-
-    monkeypatch.setattr("distributed.Client", never)
-    with pytest.raises(ClusterError, match="--workers: the processes did not answer within 300 s"):
-        Engine(2).run("slow", double, [("a", 1), ("b", 2)])
-
-
-# A main thread that fails, and SIGTERM while it ends its workers
-_STOPPED_AT_ITS_END = """
-import asyncio, os, signal, sys
-from distributed import LocalCluster
-from stereocell.engine.interrupts import answering_sigterm
-from stereocell.engine.run import Engine
-
-closed, left = LocalCluster._close, [signal.SIGTERM]
-
-async def close(self, *given, **named):
-    while left:
-        os.kill(os.getpid(), left.pop())
-        await asyncio.sleep(0.5)
-    await closed(self, *given, **named)
-
-LocalCluster._close = close
-
-def work():
-    engine = Engine(1)
-    try:
-        engine.run("numbers", abs, [("a", 1), ("b", -2)])
-        raise TypeError("of the main thread")
-    finally:
-        engine.close()
-
-if __name__ == "__main__":
-    try:
-        with answering_sigterm():
-            work()
-    except KeyboardInterrupt:
-        sys.exit(143)
-"""
-
-
-@pytest.mark.slow
-def test_a_command_that_is_stopped_while_it_ends_its_workers_comes_to_an_end(
-    tmp_path: Path,
-) -> None:
-    (tmp_path / "stopped.py").write_text(_STOPPED_AT_ITS_END)
-    command = [sys.executable, str(tmp_path / "stopped.py")]
-    ended = subprocess.run(command, timeout=PATIENCE_S, check=False, capture_output=True, text=True)
-    assert ended.returncode == 143, ended.stderr
 
 
 def test_a_log_says_how_long_the_others_take_at_the_pace_so_far(

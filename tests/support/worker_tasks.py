@@ -1,6 +1,8 @@
 """Tasks for worker processes, which import them by name."""
 
 import os
+import time
+from pathlib import Path
 
 from stereocell.model.errors import SourceError
 
@@ -21,3 +23,30 @@ def die(value: int) -> int:
 
 def read_variable(name: str) -> str | None:
     return os.environ.get(name)
+
+
+def die_beside_others(task: tuple[Path, int]) -> int:
+    """Kill this process at task 3, the first time that it runs."""
+    folder, number = task
+    died = folder / "died"
+    if number == 3 and not died.exists():
+        died.write_text(str(number))
+        os._exit(9)
+    return number
+
+
+class Unpicklable(Exception):
+    """An error whose pickled form can't be read back: its class wants two arguments."""
+
+    def __init__(self, first: str, second: str) -> None:
+        super().__init__(f"{first} {second}")
+
+
+def fail_unpicklably(_: int) -> None:
+    raise Unpicklable("it has", "two arguments")
+
+
+def wait_for_ever(begun: Path) -> None:
+    begun.touch()
+    while True:
+        time.sleep(60)

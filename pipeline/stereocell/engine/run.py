@@ -1,15 +1,15 @@
 """Run a function over many tasks: inline, on worker processes of this machine, or on a cluster.
 
-The last two share one path, the `distributed` client. A cluster is a scheduler at an address:
-`dask scheduler` and `dask worker` by hand, or started by dask-jobqueue or dask-kubernetes. Its
-workers must see OUT and the input under the same paths, and run the same StereoCell.
+Processes of this machine take their tasks over pipes (`worker_pool`). A cluster is a Dask scheduler
+at an address: `dask scheduler` and `dask worker` by hand, or started by dask-jobqueue or
+dask-kubernetes. Its workers must see OUT and the input under the same paths, and run the same
+StereoCell.
 """
 
-import logging
-import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,10 +23,11 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from stereocell.engine.cluster import ClusterError, able, join
-from stereocell.engine.interrupts import children_ignore_interrupts, interrupts_put_off
+from stereocell.engine.cluster import able, join
+from stereocell.engine.cluster_tasks import run_on_cluster
+from stereocell.engine.interrupts import interrupts_put_off
 from stereocell.engine.object_store_tasks import carried, forget_scratch
-from stereocell.engine.workers import choose_start
+from stereocell.engine.worker_pool import Outcome, WorkerPool
 from stereocell.kernels.cache_place import are_compiled, compile_in_process
 from stereocell.model.duration import in_words
 from stereocell.model.errors import StereoCellError
@@ -35,13 +36,8 @@ from stereocell.storage.processes import shortage
 T = TypeVar("T")
 R = TypeVar("R")
 
-_START_S = 300  # s for workers of this machine to start: it may be busy
-_END_S = 30  # s for workers to end
-_LOOK_S, _LOOKS = 15, 12  # s between looks for workers, and looks until they count as gone
-_POLL_S = 0.05  # s between looks at finished tasks
+_END_S = 30  # s for a cluster's client to close
 _PACE_S = 10  # s that tasks have run before their pace is told
-_AHEAD = 64  # tasks that wait for a worker
-_GONE = "its workers are gone and did not come back: the same command goes on from here"
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -62,7 +58,8 @@ class Engine:
         self.workers = workers
         self._scheduler = scheduler
         self._shared = shared
-        self._client: Any = None
+        self._client: Any = None  # of the cluster
+        self._pool: WorkerPool | None = None
 
     def run(
         self, label: str, function: Callable[[T], R], tasks: Sequence[tuple[str, T]]
@@ -97,179 +94,65 @@ class Engine:
             raise TasksFailedError("\n".join(lines))
         return [results[place] for place in range(len(tasks))]
 
-    def _outcomes(
-        self, function: Callable[[T], R], tasks: Sequence[T]
-    ) -> Iterator[tuple[int, Any, BaseException | None]]:
+    def _outcomes(self, function: Callable[[T], R], tasks: Sequence[T]) -> Iterator[Outcome]:
         if not self._scheduler and (self.workers == 0 or len(tasks) < 2):
             for place, task in enumerate(tasks):
                 try:
                     result = function(task)
-                except Exception as error:  # as on a worker: a unit's failure doesn't end the build
+                except Exception as error:  # a failed unit doesn't end the build, as on a worker
                     yield place, None, error
                 else:
                     yield place, result, None
             return
-        client = self._start(function)
         work, settle = carried(function)
+        for place, answer, error in self._outcomes_of_workers(function, work, tasks):
+            yield place, None if error else settle(answer), error
+
+    def _outcomes_of_workers(
+        self, function: Callable[[T], R], work: Callable[[T], Any], tasks: Sequence[T]
+    ) -> Iterator[Outcome]:
+        """Run the tasks on the cluster, or on processes of this machine.
+
+        function  the task by itself
+        work      the same, with what a worker needs around it
+        """
         if self._scheduler:
-            work = able(work, self._shared)
-        left, futures = iter(range(len(tasks))), {}
-
-        def submit() -> Any:
-            for place in left:
-                future = client.submit(work, tasks[place], pure=False)
-                futures[future] = place
-                return future
-            return None
-
-        suspects = []
-        for future in _as_they_end(client, submit):
-            place = futures.pop(future)
-            result, failure = _outcome_of(client, future)
-            if _is_killed(failure):
-                suspects.append(place)
-            else:
-                yield place, None if failure else settle(result), failure
-            future.release()
-        for place in (*futures.values(), *left):
-            yield place, None, ClusterError(_GONE)
-        # a killed worker fails all tasks that waited on it: each runs once more, alone, and only
-        # the task that kills its worker fails again
-        for place in sorted(suspects):
-            future = client.submit(work, tasks[place], pure=False)
-            result, failure = _outcome_of(client, future)
-            yield place, None if failure else settle(result), failure
-            future.release()
-
-    def _start(self, function: Callable[[T], R]) -> Any:
-        if self._client is None and self._scheduler:
-            self._client = join(self._scheduler, self._shared)
-        elif self._client is None:
-            import dask
-            from distributed import Client
-            from distributed.gc import disable_gc_diagnosis
-
-            # distributed drops a killed worker for good where a busy machine needs over 15 s for it
-            dask.config.set({"distributed.deploy.lost-worker-timeout": f"{_START_S}s"})
+            if self._client is None:
+                self._client = join(self._scheduler, self._shared)
+            return run_on_cluster(self._client, able(work, self._shared), tasks)
+        if self._pool is None:
             if not are_compiled():  # each worker would do it, for half a minute
                 console.print("compiling loops, once on this machine", markup=False)
                 compile_in_process()
-            with children_ignore_interrupts(), _started_in_time():
-                choose_start(function)
-                # units hold arrays of known size; distributed needs no spilling
-                self._client = Client(
-                    n_workers=self.workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address=":0",
-                    memory_limit=0,
-                    silence_logs=logging.CRITICAL,
-                    timeout=_START_S,
-                )
-            # its callback stays installed, and Python loses a Ctrl-C that arrives in a callback
-            disable_gc_diagnosis()
-        return self._client
+            plain = function.func if isinstance(function, partial) else function
+            self._pool = WorkerPool(self.workers, plain.__module__)
+        return self._pool.run(work, tasks)
 
     def close(self) -> None:
-        """Stop the workers of this machine, or leave the cluster, which runs on.
+        """End the workers of this machine, or leave the cluster, which runs on.
 
         A Ctrl-C or SIGTERM meanwhile is raised afterwards. A client that is only half closed would
         close itself as Python ends, and wait for ten minutes for a thread that has ended.
         """
+        pool, self._pool = self._pool, None
         client, self._client = self._client, None
+        if pool is not None:
+            pool.close()
         if client is None:
             return
-        cluster = client.cluster  # None for a cluster that was running before: it stays
         try:
-            if cluster is None:
-                forget_scratch(client)
+            forget_scratch(client)
         finally:
             with interrupts_put_off():
-                for one in (client, cluster):
-                    if one is not None:
-                        # distributed asserts that a worker has started, also of one that takes the
-                        # place of a killed one at this very moment
-                        with suppress(TimeoutError, AssertionError):
-                            one.close(timeout=_END_S)
+                with suppress(TimeoutError):
+                    client.close(timeout=_END_S)
                 client.status = "closed"
-
-
-@contextmanager
-def _started_in_time() -> Iterator[None]:
-    """Raise ClusterError in place of distributed's TimeoutError, which has no text."""
-    try:
-        yield
-    except TimeoutError:
-        raise ClusterError(
-            f"--workers: the processes did not answer within {_START_S} s: wait until this machine "
-            "is less busy, or try fewer --workers; 0 needs none"
-        ) from None
-
-
-def _as_they_end(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
-    """Yield the futures that `submit` returns, in the order of completion, until it returns None.
-
-    Few more tasks than workers wait at a time: each takes memory of the scheduler. The iterator
-    ends early once the workers have been absent for long.
-    """
-    from distributed import as_completed
-
-    ended = as_completed()
-    looked, missed, waiting, most = -math.inf, 0, 0, 0
-    while missed < _LOOKS:
-        if time.monotonic() - looked > _LOOK_S:
-            threads = 0
-            with suppress(Exception):  # the scheduler is gone: its futures report it
-                threads = sum(client.nthreads().values())
-            looked, missed = time.monotonic(), 0 if threads else missed + 1
-            most = max(_AHEAD, 2 * threads)
-        while waiting < most and (future := submit()) is not None:
-            ended.add(future)
-            waiting += 1
-        if waiting == 0:
-            return
-        if ended.has_ready():
-            waiting -= 1
-            yield next(ended)
-        else:
-            time.sleep(_POLL_S)
-
-
-def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:
-    """Wait for a task; return its result and None, or None and the error.
-
-    A lost scheduler is such an error, and so are workers that stay away.
-    """
-    from distributed import CancelledError
-
-    missed = 0
-    while missed < _LOOKS:
-        try:
-            failure: BaseException | None = future.exception(timeout=_LOOK_S)
-            # may wait again: a result that was lost with its worker is computed anew
-            return (None, failure) if failure else (future.result(timeout=_LOOK_S), None)
-        except CancelledError:
-            gone = "the cluster's scheduler is gone: the same command goes on from here"
-            return None, ClusterError(gone)
-        except TimeoutError:
-            missed = 0 if client.scheduler_info()["workers"] else missed + 1
-    return None, ClusterError(_GONE)
-
-
-def _is_killed(error: BaseException | None) -> bool:
-    """Return whether a task's worker died under it in each of distributed's four tries."""
-    return type(error).__name__ == "KilledWorker"
 
 
 def _in_words(error: BaseException) -> str:
     words = " ".join(str(error).split())
     if isinstance(error, StereoCellError):
         return words
-    if _is_killed(error):
-        return (
-            "its worker process was killed each time, most likely for want of memory: try fewer "
-            "--workers or a smaller --tile-size"
-        )
     return shortage(error) or f"{type(error).__name__}: {words}"
 
 

@@ -1,0 +1,61 @@
+"""Run tasks in a worker process: its side of the pipe.
+
+The process starts with the function `serve`. This module imports little, because a worker that
+starts from nothing imports it before anything else.
+"""
+
+import os
+import pickle
+import signal
+import threading
+from multiprocessing import connection, parent_process
+from multiprocessing.connection import Connection
+from typing import Any
+
+READY = "ready"  # the first answer of a worker: it has started
+
+
+def serve(pipe: "Connection[Any, Any]") -> None:
+    """Run the tasks that arrive on a pipe, one after another, until its other end is closed.
+
+    A request is the pickled (function, task). The answer is (result, None) or (None, error).
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        pipe.send(READY)
+        while True:
+            pipe.send_bytes(_answer(pipe.recv_bytes()))
+    except (EOFError, OSError):  # the command has closed its end, or has ended
+        return
+
+
+def _answer(request: bytes) -> bytes:
+    """Return the pickled answer to a request; an error of the task is an answer, too."""
+    try:
+        function, task = pickle.loads(request)
+        return pickle.dumps((function(task), None))
+    except Exception as error:  # the command decides what a task's error means
+        return _pickled_error(error)
+
+
+def _pickled_error(error: Exception) -> bytes:
+    """Return an error in pickled form. One that can't be pickled becomes a RuntimeError."""
+    try:
+        answer = pickle.dumps((None, error))
+        pickle.loads(answer)
+    except Exception:  # pickling runs code of the error's class, which may raise anything
+        text = f"{type(error).__name__}: {error}"
+        answer = pickle.dumps((None, RuntimeError(text)))
+    return answer
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as the command's process has ended, also in the middle of a task.
+
+    A killed command can't stop its workers, and their results would appear after its end.
+    """
+    parent = parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
