@@ -14,20 +14,18 @@ ways have not the same bytes, or the gaze has missed a tile.
 import shutil
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import make_sample
-from phases import MB, OFTEN_S, Cost, run_phases
+from phases import MB, Cost, run_phases
 
 from stereocell.formats.vdb import MEASURED_NAME
 from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.storage.json_files import read_json
+from support.clusters import running_cluster
 from support.digests import digests_of
 
 GRID, TILE = (5, 2), (194, 512, 512)
@@ -36,38 +34,14 @@ CLUSTER_WORKERS = 2
 COMPARED = ("stage", "bundle")
 
 
-@contextmanager
-def cluster(folder: Path) -> Iterator[tuple[Path, list[psutil.Process]]]:
-    """Yield the file of a Dask scheduler of this machine, and its workers."""
-    file = folder / "scheduler.json"
-    file.unlink(missing_ok=True)
-    told = ["--scheduler-file", str(file), "--no-dashboard"]
-    started = [_start("scheduler", "--port", "0", *told)]
-    started += [
-        _start("worker", *told, "--nthreads", "1", "--no-nanny") for _ in range(CLUSTER_WORKERS)
-    ]
-    try:
-        while not file.exists():
-            time.sleep(OFTEN_S)
-        yield file, [psutil.Process(process.pid) for process in started[1:]]
-    finally:
-        for process in started:
-            process.terminate()
-            process.wait()
-
-
-def _start(kind: str, *told: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "dask", kind, *told]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-
 def build(source: Path, out: Path, grid: tuple[int, int], way: str) -> dict[str, Cost]:
     """Build OUT in one of the ways; return what each phase took."""
     columns, rows = grid
     plan = [str(source), "--preset", "cycif", "--level", "0", "--grid", f"{columns}x{rows}"]
     if way == "cluster":
-        with cluster(out.parent) as (file, workers):
-            return run_phases(out, plan, ["--scheduler", str(file)], workers)
+        with running_cluster(out.parent, CLUSTER_WORKERS) as cluster:
+            workers = [psutil.Process(process.pid) for process in cluster.workers]
+            return run_phases(out, plan, ["--scheduler", cluster.file], workers)
     return run_phases(out, plan, ["--workers", way], [])
 
 

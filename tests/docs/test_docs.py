@@ -198,14 +198,15 @@ def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() ->
 
 @pytest.mark.slow
 def test_other_programs_are_those_that_other_tests_run() -> None:
-    """`dask` by engine/test_cluster.py, `pip install` of a wheel by system/test_wheel.py.
+    """Other tests run `dask`, `mkdir`, `python` and `export` (docs/test_cluster_page.py), and
+    `pip install` of a wheel (system/test_wheel.py).
 
-    `uvx` and `pipx` would install it all anew from an index; each here only asks for help.
+    `uvx` and `pipx` would install everything again from an index; each here only asks for help.
     """
     found = {line for page in PAGES for block in blocks(page, "sh") for line in block.splitlines()}
     others = {line.split()[0] for line in found if line.strip() and line.lstrip()[0] != "#"}
     others -= {"stereocell", ".venv/bin/stereocell", "make"}
-    assert others == {"dask", "pip", "uvx", "pipx"}
+    assert others == {"dask", "export", "mkdir", "pip", "python", "uvx", "pipx"}
     told = " ".join(line for line in found if line.startswith("dask "))
     for command in ("scheduler", "worker"):
         takes = subprocess.run(

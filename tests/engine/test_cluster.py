@@ -1,6 +1,7 @@
 """A cluster that others have started does the work of `--workers`, to the same bytes."""
 
 import hashlib
+import json
 import os
 import signal
 import subprocess
@@ -10,7 +11,9 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import dask
 import pytest
+from distributed import LocalCluster
 
 from stereocell.cli.__main__ import main
 from stereocell.engine.cluster import ClusterError, able, join
@@ -19,50 +22,33 @@ from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.claim import LOCK
 from stereocell.storage.lock import alone_in
 from support import ctrl_c, phantoms
+from support.clusters import running_cluster
 from support.exhaustive import examples
 from support.object_store import ObjectStore, serving
 from support.server.timeouts import PATIENCE_S
 from support.validators import make_assets
 
 GRID = "2x1"
-Cluster = tuple[str, ObjectStore]
+Joined = tuple[str, ObjectStore]  # a scheduler file, and a store that the workers reach, too
 
-# where workers find the tests' functions, and what these import
 ROOT = Path(__file__).parents[2]
+# Workers import the tests' functions, and what these import.
 PATHS = os.pathsep.join([str(ROOT), str(ROOT / "tests"), str(ROOT / "pipeline")])
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Joined]:
     """The scheduler file of workers, which stand in another folder, and an object store."""
     folder = tmp_path_factory.mktemp("cluster")
     (folder / "objects").mkdir()
-    file = folder / "scheduler.json"
     with serving(folder / "objects") as store, pytest.MonkeyPatch.context() as patch:
         for name, value in store.environment.items():
             patch.setenv(name, value)
         store.files().mkdir("bucket")
-        told = ["--scheduler-file", str(file), "--no-dashboard"]
-        processes = [_start("scheduler", "--port", "0", *told, cwd=folder)]
-        try:
-            lone = ("worker", "--nthreads", "1", "--no-nanny")  # a nanny is a process of its own
-            processes += [_start(*lone, *told, cwd=folder) for _ in range(examples(2, 1))]
-            end = time.monotonic() + 60
-            while not file.exists() and time.monotonic() < end:
-                time.sleep(0.05)
-            yield str(file), store
-        finally:
-            for process in reversed(processes):
-                process.kill()
-                process.wait()
-
-
-def _start(*arguments: str, cwd: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "dask", *arguments]
-    quiet = subprocess.DEVNULL
-    # workers find what is to be run in this file
-    environment = {**os.environ, "PYTHONPATH": PATHS}
-    return subprocess.Popen(command, cwd=cwd, env=environment, stdout=quiet, stderr=quiet)
+        with running_cluster(
+            folder, examples(2, 1), {**os.environ, "PYTHONPATH": PATHS}
+        ) as started:
+            yield started.file, store
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +86,7 @@ def is_result(key: str) -> bool:
 
 @pytest.mark.slow
 def test_a_cluster_builds_the_same_bytes_as_one_process(
-    cluster: Cluster,
+    cluster: Joined,
     volume: Path,
     alone: dict[str, str],
     tmp_path: Path,
@@ -113,7 +99,7 @@ def test_a_cluster_builds_the_same_bytes_as_one_process(
 
 @pytest.mark.exhaustive
 def test_a_cluster_reads_from_and_writes_to_an_object_store(
-    cluster: Cluster, volume: Path, alone: dict[str, str]
+    cluster: Joined, volume: Path, alone: dict[str, str]
 ) -> None:
     scheduler, store = cluster
     print(f"object store: {store.kind}")
@@ -131,8 +117,8 @@ def test_a_cluster_reads_from_and_writes_to_an_object_store(
 
 
 @pytest.mark.slow
-def test_a_cluster_that_does_not_see_out_is_refused(cluster: Cluster, tmp_path: Path) -> None:
-    with pytest.raises(ClusterError, match=r"worker tcp://.* on .*: does not see /nowhere/.lock;"):
+def test_a_cluster_that_does_not_see_out_is_refused(cluster: Joined, tmp_path: Path) -> None:
+    with pytest.raises(ClusterError, match=r"worker tls://.* on .*: does not see /nowhere/.lock;"):
         join(cluster[0], Path("/nowhere/.lock"))
     join(cluster[0], tmp_path).close()
 
@@ -147,16 +133,16 @@ def test_a_cluster_that_does_not_see_out_is_refused(cluster: Cluster, tmp_path: 
     ],
 )
 def test_workers_that_would_make_other_bytes_are_refused(
-    cluster: Cluster, monkeypatch: pytest.MonkeyPatch, name: str, ours: object, said: str
+    cluster: Joined, monkeypatch: pytest.MonkeyPatch, name: str, ours: object, said: str
 ) -> None:
     monkeypatch.setattr(f"stereocell.engine.cluster.{name}", ours)
-    with pytest.raises(ClusterError, match=rf"worker tcp://.* {said}"):
+    with pytest.raises(ClusterError, match=rf"worker tls://.* {said}"):
         join(cluster[0], None)
 
 
 @pytest.mark.slow
 def test_a_worker_that_came_later_is_held_to_the_same(
-    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cluster: Joined, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     engine = Engine(0, cluster[0], tmp_path)
     try:
@@ -189,7 +175,7 @@ def write_when(task: tuple[Path, Path, Path]) -> None:
 
 @pytest.mark.slow
 def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
-    cluster: Cluster, tmp_path: Path
+    cluster: Joined, tmp_path: Path
 ) -> None:
     out, begun, told = tmp_path / "out", tmp_path / "begun", tmp_path / "told"
 
@@ -219,34 +205,75 @@ def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
 def test_a_cluster_whose_workers_are_all_killed_is_not_waited_for_for_ever(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stereocell.engine.run._LOOK_S", 0.5)
-    monkeypatch.setattr("stereocell.engine.run._LOOKS", 3)
-    file = tmp_path / "scheduler.json"
-    told = ["--scheduler-file", str(file), "--no-dashboard"]
-    processes = [_start("scheduler", "--port", "0", *told, cwd=tmp_path)]
-    # without a nanny: it would start a worker that was killed again
-    worker = _start("worker", "--nthreads", "1", "--no-nanny", *told, cwd=tmp_path)
+    monkeypatch.setattr("stereocell.engine.cluster_tasks._LOOK_S", 0.5)
+    monkeypatch.setattr("stereocell.engine.cluster_tasks._LOOKS", 3)
     begun = tmp_path / "begun"
 
-    def kill() -> None:
+    def kill(worker: "subprocess.Popen[bytes]") -> None:
         while not begun.exists():
             time.sleep(0.05)
         worker.kill()
 
-    threading.Thread(target=kill).start()
-    try:
-        while not file.exists():
-            time.sleep(0.05)
-        engine = Engine(0, str(file), tmp_path)
+    with running_cluster(tmp_path, 1, {**os.environ, "PYTHONPATH": PATHS}) as started:
+        threading.Thread(target=kill, args=started.workers).start()
+        engine = Engine(0, started.file, tmp_path)
         never = tmp_path / "never"
         tasks = [(name, (begun, never, tmp_path / name)) for name in "ab"]
         with pytest.raises(TasksFailedError, match="a, b: its workers are gone and did not come"):
             engine.run("none", write_when, tasks)
         engine.close()
-    finally:
-        for process in (*processes, worker):
-            process.kill()
-            process.wait()
+
+
+@pytest.mark.slow
+def test_a_client_without_the_key_can_run_nothing_on_a_cluster_with_tls(cluster: Joined) -> None:
+    address = json.loads(Path(cluster[0]).read_text("utf-8"))["address"]
+    assert address.startswith("tls://127.0.0.1:")
+    for stranger in (address, address.replace("tls://", "tcp://")):
+        # an own process: this one has the certificates
+        script = (
+            "import os, sys; from distributed import Client; "
+            "Client(sys.argv[1], timeout=3).run_on_scheduler(os.getpid)"
+        )
+        plain = {name: value for name, value in os.environ.items() if "DASK" not in name}
+        refused = subprocess.run(
+            [sys.executable, "-c", script, stranger],
+            env=plain,
+            capture_output=True,
+            check=False,
+            timeout=PATIENCE_S,
+        )
+        assert refused.returncode == 1
+
+
+@pytest.mark.slow
+def test_a_command_without_certificates_is_told_where_to_name_them(cluster: Joined) -> None:
+    names = ["ca-file", *(f"{role}.cert" for role in ("scheduler", "worker", "client"))]
+    nothing = dict.fromkeys((f"distributed.comm.tls.{name}" for name in names), None)
+    with (
+        dask.config.set({**nothing, "distributed.comm.require-encryption": None}),
+        pytest.raises(ClusterError, match=r"this command has none; expected .* DASK_CONFIG"),
+    ):
+        join(cluster[0], None)
+
+
+@pytest.mark.slow
+def test_a_cluster_without_tls_is_joined_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with (
+        dask.config.set({"distributed.comm.require-encryption": False}),
+        LocalCluster(
+            n_workers=1,
+            processes=False,
+            protocol="tcp",
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+        ) as opened,
+    ):
+        engine = Engine(0, opened.scheduler_address, tmp_path)
+        assert engine.run("good", str, [("a", 1), ("b", 2)]) == ["1", "2"]
+        engine.close()
+    assert "cluster: it has no certificates (TLS), so everybody" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x"])

@@ -22,7 +22,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -32,6 +32,7 @@ import psutil
 
 from stereocell.storage.claim import LOCK
 from support import phantoms
+from support.clusters import running_cluster
 from support.digests import digests_of
 from support.object_store import ObjectStore, serving
 from support.worker_processes import workers_of
@@ -154,14 +155,16 @@ class Torture:
         """
         is_cluster = kind in ("scheduler", "cluster worker")
         environment = {**os.environ, **self.place.environment}
-        with _cluster(self.folder, environment) if is_cluster else nullcontext() as cluster:
+        with (
+            running_cluster(self.folder, 2, environment) if is_cluster else nullcontext() as cluster
+        ):
             build = self._start(["--scheduler", cluster.file] if cluster else self._own_workers())
             if not self._await_moment(build, phase):
                 build.wait(PATIENCE_S)
                 self._require_ended(build)
                 return False
             if cluster:
-                kill_session(cluster.scheduler if kind == "scheduler" else cluster.workers[0])
+                (cluster.scheduler if kind == "scheduler" else cluster.workers[0]).kill()
             elif kind == "worker":
                 workers = _await_workers_of(build)
                 if not workers:
@@ -342,40 +345,6 @@ def _await_workers_of(build: subprocess.Popen[bytes]) -> list[psutil.Process]:
                 return workers
         time.sleep(0.02)
     return []
-
-
-@dataclass(frozen=True)
-class _Cluster:
-    scheduler: subprocess.Popen[bytes]
-    workers: list[subprocess.Popen[bytes]]
-    file: str
-
-
-@contextmanager
-def _cluster(folder: Path, environment: dict[str, str]) -> Iterator[_Cluster]:
-    """A `dask scheduler` with two workers."""
-    file = folder / "scheduler.json"
-    file.unlink(missing_ok=True)
-    told = ["--scheduler-file", str(file), "--no-dashboard"]
-    processes = []
-    # without a nanny: it would start a worker that was killed again
-    for kind, more in (
-        ("scheduler", ["--port", "0"]),
-        *[("worker", ["--nthreads", "1", "--no-nanny"])] * 2,
-    ):
-        command = [sys.executable, "-m", "dask", kind, *more, *told]
-        processes.append(
-            subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True, **QUIET)
-        )
-    try:
-        end = time.monotonic() + 60
-        while not file.exists() and time.monotonic() < end:
-            time.sleep(0.05)
-        yield _Cluster(processes[0], processes[1:], str(file))
-    finally:
-        for process in processes:
-            kill_session(process)
-            process.wait()
 
 
 def main(kills: int, seed: int) -> None:

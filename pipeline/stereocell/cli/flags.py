@@ -102,7 +102,7 @@ def declare_workers(parser: argparse.ArgumentParser) -> None:
         "--scheduler",
         default="",
         metavar="ADDRESS|FILE",
-        help="a running Dask cluster instead: tcp://host:8786, or its scheduler file",
+        help="a running Dask cluster instead: tls://host:8786, or its scheduler file",
     )
 
 

@@ -29,7 +29,11 @@ _ANSWER_S = 8  # s for a scheduler to answer
 _WORKER_S = 20  # s for its first worker to appear
 _MAX_BYTES = 1 << 20  # largest size of a scheduler file in bytes
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+")
-_EXPECTED = "expected the address of a Dask scheduler, as tcp://host:8786, or its scheduler file"
+_TLS_HELP = (
+    "expected certificates in Dask's configuration, and DASK_CONFIG to name its file (see "
+    "docs/cluster.md)"
+)
+_EXPECTED = "expected the address of a Dask scheduler, as tls://host:8786, or its scheduler file"
 
 
 class ClusterError(StereoCellError):
@@ -39,12 +43,14 @@ class ClusterError(StereoCellError):
 def join(scheduler: str, shared: Path | None) -> Any:
     """Return a client of a cluster.
 
-    scheduler  address, as `tcp://host:8786`, or the path of a scheduler file
+    scheduler  address, as `tls://host:8786`, or the path of a scheduler file
     shared     a file that all workers must see, or None
 
-    Raises ClusterError where the scheduler doesn't answer, or where the workers lack StereoCell,
-    would write other bytes than this process (another version of StereoCell or of a library, other
-    code), or don't see the file.
+    A scheduler with TLS (`tls://`) takes the certificates of Dask's configuration.
+
+    Raises ClusterError where the scheduler doesn't answer or refuses us, or where the workers lack
+    StereoCell, would write other bytes than this process (another version of StereoCell or of a
+    library, other code), or don't see the file.
     """
     is_file = Path(scheduler).is_file()
     address = _address_in(Path(scheduler)) if is_file else scheduler
@@ -54,15 +60,27 @@ def join(scheduler: str, shared: Path | None) -> Any:
 
     try:
         client = Client(address, timeout=_ANSWER_S)
-    except (OSError, OverflowError, ValueError, TypeError, KeyError) as error:
-        reason = str(error).splitlines()[0] if str(error) else "it does not answer"
-        raise ClusterError(f"--scheduler {scheduler}: {reason}; {_EXPECTED}") from None
+    except (OSError, OverflowError, ValueError, TypeError, KeyError, RuntimeError) as error:
+        raise ClusterError(f"--scheduler {scheduler}: {_reason(error)}") from None
     try:
         _require_able(client, scheduler, shared)
     except BaseException:
         client.close()
         raise
     return client
+
+
+def is_open_to_all(client: Any) -> bool:
+    """Return whether a cluster's scheduler takes orders from everybody who reaches its port."""
+    return not str(client.scheduler.address).startswith("tls://")
+
+
+def _reason(error: Exception) -> str:
+    """Return a line on why a scheduler can't be joined, and what to do."""
+    text = str(error).splitlines()[0] if str(error) else "it does not answer"
+    if isinstance(error, TypeError) and "ssl_context" in text:  # as Dask says it
+        return f"it admits only clients with a certificate, and this command has none; {_TLS_HELP}"
+    return f"{text}; {_EXPECTED}"
 
 
 def _address_in(file: Path) -> str:

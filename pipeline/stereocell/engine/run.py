@@ -23,7 +23,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from stereocell.engine.cluster import able, join
+from stereocell.engine.cluster import able, is_open_to_all, join
 from stereocell.engine.cluster_tasks import run_on_cluster
 from stereocell.engine.interrupts import interrupts_put_off
 from stereocell.engine.object_store_tasks import carried, forget_scratch
@@ -38,6 +38,11 @@ R = TypeVar("R")
 
 _END_S = 30  # s for a cluster's client to close
 _PACE_S = 10  # s that tasks have run before their pace is told
+
+_OPEN_CLUSTER = (
+    "cluster: it has no certificates (TLS), so everybody who reaches its ports can run code as the "
+    "user of its workers: see docs/cluster.md"
+)
 
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -119,6 +124,8 @@ class Engine:
         if self._scheduler:
             if self._client is None:
                 self._client = join(self._scheduler, self._shared)
+                if is_open_to_all(self._client):
+                    console.print(_OPEN_CLUSTER, markup=False)
             return run_on_cluster(self._client, able(work, self._shared), tasks)
         if self._pool is None:
             if not are_compiled():  # each worker would do it, for half a minute

@@ -1,0 +1,95 @@
+"""A Dask cluster for tests: it listens on loopback only, and admits nobody without its key."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import dask
+import pytest
+import trustme
+
+from support.server.timeouts import PATIENCE_S
+
+# the dashboard, too: `--no-dashboard` leaves its pages of numbers open to the network
+_ON_LOOPBACK = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A running `dask scheduler` and its workers."""
+
+    file: str  # path of the scheduler file
+    scheduler: subprocess.Popen[bytes]
+    workers: list[subprocess.Popen[bytes]]
+
+
+def write_tls(folder: Path) -> dict[str, object]:
+    """Write certificates into a folder; return the settings of Dask that use them."""
+    authority = trustme.CA()
+    authority.cert_pem.write_to_path(folder / "authority.pem")
+    own = folder / "key.pem"
+    authority.issue_cert("dask.test").private_key_and_cert_chain_pem.write_to_path(own)
+    comm = "distributed.comm"
+    return {
+        f"{comm}.require-encryption": True,
+        f"{comm}.tls.ca-file": str(folder / "authority.pem"),
+        **{f"{comm}.tls.{role}.cert": str(own) for role in ("scheduler", "worker", "client")},
+    }
+
+
+def as_variables(settings: Mapping[str, object]) -> dict[str, str]:
+    """Return the environment that gives settings to Dask, as its documentation names them."""
+    return {
+        "DASK_" + name.upper().replace(".", "__").replace("-", "_"): str(value)
+        for name, value in settings.items()
+    }
+
+
+@contextmanager
+def running_cluster(
+    folder: Path, workers: int, environment: Mapping[str, str] | None = None
+) -> Iterator[Cluster]:
+    """Run a scheduler and workers of one thread, with TLS, which this process has joined, too.
+
+    The folder is theirs; what they do with it is written there. Commands that this process starts
+    within the block have the certificates by their environment.
+    """
+    file = folder / "scheduler.json"
+    file.unlink(missing_ok=True)
+    settings = write_tls(folder)
+    tls = as_variables(settings)
+    given = {**(os.environ if environment is None else environment), **tls}
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in tls.items():
+            patch.setenv(name, value)
+        with dask.config.set(settings):
+            processes = [_start(folder, given, "scheduler", "--port", "0", "--protocol", "tls")]
+            try:
+                # without a nanny, which would start a killed worker again
+                lone = ("worker", "--nthreads", "1", "--no-nanny")
+                processes += [_start(folder, given, *lone) for _ in range(workers)]
+                end = time.monotonic() + PATIENCE_S
+                while not file.exists() and time.monotonic() < end:
+                    time.sleep(0.02)
+                yield Cluster(str(file), processes[0], processes[1:])
+            finally:
+                for process in reversed(processes):
+                    process.kill()
+                    process.wait()
+
+
+def _start(folder: Path, environment: Mapping[str, str], *words: str) -> subprocess.Popen[bytes]:
+    told = ["--scheduler-file", str(folder / "scheduler.json"), *_ON_LOOPBACK]
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *words, *told],
+        cwd=folder,
+        env=environment,
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
