@@ -110,8 +110,8 @@ class Engine:
                     yield place, result, None
             return
         work, settle = carried(function)
-        for place, answer, error in self._outcomes_of_workers(function, work, tasks):
-            yield place, None if error else settle(answer), error
+        for place, answer, failure in self._outcomes_of_workers(function, work, tasks):
+            yield place, None if failure else settle(answer), failure
 
     def _outcomes_of_workers(
         self, function: Callable[[T], R], work: Callable[[T], Any], tasks: Sequence[T]
