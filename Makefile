@@ -33,7 +33,28 @@ else
 $(error SAMPLE is $(SAMPLE), expected cycif, brain-cells, mri or cells)
 endif
 
+# A value as one word of bash, for shells that make starts while it reads: no variable of make is
+# in their environment
+define newline
+
+
+endef
+quoted = $$'$(subst $(newline),\n,$(subst ',\',$(subst \,\\,$(1))))'
+
+# .venv belongs to the version of Python that made it. A PYTHON of another version gets its own
+# folder, as .venv-3.13, so that neither environment is used or overwritten in place of the other
 VENV := .venv
+ifneq ($(PYTHON),python3)
+ifeq ($(origin VENV),file)
+VERSION := $(shell $(call quoted,$(PYTHON)) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
+ifeq ($(filter 2.% 3.%,$(VERSION)),)
+$(error PYTHON is $(PYTHON), which does not run, expected a Python of 3.11 or newer, as PYTHON=python3.13)
+endif
+ifneq ($(filter-out .venv/lib/python$(VERSION),$(wildcard .venv/lib/python3.*)),)
+VENV := .venv-$(VERSION)
+endif
+endif
+endif
 BIN := $(VENV)/bin
 RUN := $(BIN)/stereocell
 WITH_ARGS := $(BIN)/python pipeline/with_args.py
@@ -62,7 +83,7 @@ help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: $(READY) $(KERNELS_READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+)
+setup: $(READY) $(KERNELS_READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+; PYTHON=python3.13: .venv-3.13 beside .venv)
 
 $(READY): requirements.lock pyproject.toml
 	@"$$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -119,11 +140,6 @@ demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells, mri 
 
 # Make can't have a space, `%` or `:` in the name of a file. So it finds a phase's file through a link
 # to OUT, in a folder by a checksum of OUT's name; there are a link to INPUT and what was asked for, too
-define newline
-
-
-endef
-quoted = $$'$(subst $(newline),\n,$(subst ',\',$(subst \,\\,$(1))))'
 PLACE := out/.make/$(firstword $(shell printf %s $(call quoted,$(OUT)) | sha256sum))
 ifneq ($(filter plan units stage bundle report,$(MAKECMDGOALS)),)
 ifeq ($(INPUT),)
@@ -345,4 +361,4 @@ lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	  --no-emit-index-url --no-header --no-annotate --group dev pyproject.toml -o requirements.lock
 
 clean: ## Remove .venv, the viewer's packages and build, and out/
-	rm -rf $(VENV) $(VIEWER)/node_modules $(VIEWER)/dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
