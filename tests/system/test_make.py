@@ -237,6 +237,31 @@ def test_programs_and_folders_have_names_too(checkout: Path, make: Make) -> None
     assert not (checkout / "pwned").exists()
 
 
+def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Make) -> None:
+    name = 'it\'s $(touch pwned) "py"; x'
+    (checkout / ".venv").unlink()
+
+    def environment(version: str) -> str:
+        (checkout / name).write_text(f"#!/bin/sh\necho {version}\n")
+        (checkout / name).chmod(0o755)
+        told = make("--eval=told:; @echo $(VENV)", "told", PYTHON=f"./{name}")
+        assert (told.returncode, told.stderr) == (0, "")
+        return told.stdout.strip()
+
+    assert environment("3.13") == ".venv"  # there is none yet
+    (checkout / ".venv" / "lib" / "python3.13").mkdir(parents=True)
+    assert [environment(version) for version in ("3.13", "3.12", "3.9")] == [
+        ".venv",
+        ".venv-3.12",
+        ".venv-3.9",
+    ]
+    told = make("--eval=told:; @echo $(VENV)", "told", PYTHON="python3")
+    assert told.stdout.strip() == ".venv"  # the default takes it as it is
+    refused = make("setup", PYTHON="./missing")
+    assert "PYTHON is ./missing, which does not run, expected a Python of 3.11" in refused.stderr
+    assert not (checkout / "pwned").exists()
+
+
 @pytest.mark.slow
 def test_a_build_by_a_hard_name(
     checkout: Path, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
