@@ -347,8 +347,14 @@ bench-fps: setup ## Frames a second of the viewer in headless Chromium, volumes 
 	@if [ -z "$$CHROMIUM" ]; then echo "bench-fps: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else out="$$PWD/out" && cd $(VIEWER) && npm run --silent bench-fps -- "$$out/bench-fps" "$$out/head-512/bundle"; fi
 
-wheel: setup ## A wheel and an sdist with the built viewer in them: out/wheel
+wheel: setup out/wheel/constraints.txt ## A wheel and an sdist with the built viewer in them: out/wheel
 	$(BIN)/hatchling build -t wheel -t sdist -d out/wheel
+
+# The versions that the tests run with, for `pip install --constraint`. The hashes are left out: with
+# them pip would want one of the wheel itself
+out/wheel/constraints.txt: requirements.lock
+	@mkdir -p $(@D)
+	sed -n '/^[A-Za-z0-9]/s/ *\\$$//p' $< > $@
 
 docs: $(READY) ## The documentation as a site: out/docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
