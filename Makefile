@@ -77,7 +77,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -225,6 +225,21 @@ AGAIN := $(if $(CI),|| $(BIN)/pytest --last-failed --last-failed-no-failures non
 test-python: setup
 	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
 	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
+
+# CI has no time for all tests with two versions of Python, so that the newest one gets a few: the
+# files that libraries read and write, a full disk, and the wheel by itself from a build to a .glb.
+# pyenv's Python is found even where its plain name is not switched on
+NEWEST := 3.13
+test-newest: setup ## A few tests with Python 3.13, where it is installed (all: make test PYTHON=python3.13)
+	@for each in python$(NEWEST) "$${PYENV_ROOT:-$$HOME/.pyenv}"/versions/$(NEWEST).*/bin/python$(NEWEST); do \
+	  if "$$each" -c '' 2>/dev/null; then exec $(MAKE) --no-print-directory test-newest-here PYTHON="$$each"; fi; \
+	done; echo "test-newest: skipped: python$(NEWEST) is not installed"
+
+# Tests of another Python run beside these: the list of those that failed is theirs alone
+test-newest-here: setup
+	$(BEHIND) $(BIN)/pytest -p no:cacheprovider $(addprefix tests/,$(NEWEST_TESTS))
+NEWEST_TESTS := $(patsubst %,read/test_%.py,tiff bare_zarr zarr_collections number_types n5) \
+  storage/test_full_disk.py system/test_empty_environment.py
 
 test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test

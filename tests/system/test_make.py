@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -260,6 +261,25 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
     refused = make("setup", PYTHON="./missing")
     assert "PYTHON is ./missing, which does not run, expected a Python of 3.11" in refused.stderr
     assert not (checkout / "pwned").exists()
+
+
+def test_the_newest_python_is_found_at_pyenv_or_said_to_be_missing(
+    checkout: Path, make: Make
+) -> None:
+    for name in ("requirements.lock", "pyproject.toml", "viewer_gltf"):
+        (checkout / name).symlink_to(ROOT / name)
+    set_: dict[str, Any] = {"NEWEST": "3.99", "environment": {"PYENV_ROOT": str(checkout)}}
+    missing = make("test-newest", **set_)
+    told = "test-newest: skipped: python3.99 is not installed\n"
+    assert (missing.returncode, missing.stdout, missing.stderr) == (0, told, "")
+    python = checkout / "versions" / "3.99.1" / "bin" / "python3.99"
+    python.parent.mkdir(parents=True)
+    python.write_text("#!/bin/sh\necho 3.99\n")
+    python.chmod(0o755)
+    found = make("-n", "test-newest", **set_)
+    assert (found.returncode, found.stderr) == (0, "")
+    assert ".venv-3.99/bin/pytest" in found.stdout
+    assert not list(checkout.parent.rglob("pwned"))
 
 
 @pytest.mark.slow
