@@ -46,12 +46,9 @@ quoted = $$'$(subst $(newline),\n,$(subst ',\',$(subst \,\\,$(1))))'
 VENV := .venv
 ifneq ($(PYTHON),python3)
 ifeq ($(origin VENV),file)
-VERSION := $(shell $(call quoted,$(PYTHON)) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
-ifeq ($(filter 2.% 3.%,$(VERSION)),)
-$(error PYTHON is $(PYTHON), which does not run, expected a Python of 3.11 or newer, as PYTHON=python3.13)
-endif
+VERSION := $(filter 2.% 3.%,$(shell $(call quoted,$(PYTHON)) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null))
 ifneq ($(filter-out .venv/lib/python$(VERSION),$(wildcard .venv/lib/python3.*)),)
-VENV := .venv-$(VERSION)
+VENV := .venv-$(or $(VERSION),missing)
 endif
 endif
 endif
@@ -86,8 +83,9 @@ help: ## Show this help
 setup: $(READY) $(KERNELS_READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+; PYTHON=python3.13: .venv-3.13 beside .venv)
 
 $(READY): requirements.lock pyproject.toml
-	@"$$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	  { echo "setup: $$PYTHON is $$("$$PYTHON" --version), expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
+	@"$$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || \
+	  { found=$$("$$PYTHON" --version 2>/dev/null); \
+	    echo "setup: $$PYTHON is $${found:-not installed}, expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
 	test -x $(BIN)/python || "$$PYTHON" -m venv $(VENV)
 	@# uv takes a fifth of pip's time; pip does it where uv can't, as behind an index that only pip knows
 	@sed -n '/^uv==/,/[^\\]$$/p' requirements.lock > $(VENV)/uv.lock

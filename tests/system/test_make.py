@@ -258,8 +258,13 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
     ]
     told = make("--eval=told:; @echo $(VENV)", "told", PYTHON="python3")
     assert told.stdout.strip() == ".venv"  # the default takes it as it is
+    for file in ("requirements.lock", "pyproject.toml"):
+        (checkout / file).touch()
     refused = make("setup", PYTHON="./missing")
-    assert "PYTHON is ./missing, which does not run, expected a Python of 3.11" in refused.stderr
+    assert refused.stderr.splitlines()[0] == (
+        "setup: ./missing is not installed, expected 3.11 or newer (PYTHON=... names another)"
+    )
+    assert not list(checkout.glob(".venv-*"))
     assert not (checkout / "pwned").exists()
 
 
