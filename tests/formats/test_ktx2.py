@@ -8,7 +8,8 @@ import zstandard
 from PIL import Image
 
 from stereocell.filters.min_max_bricks import mip_levels
-from stereocell.formats.ktx2 import encode_2d, encode_3d, encode_normal_map
+from stereocell.formats.basis_textures import encode_normal_map
+from stereocell.formats.ktx2 import encode_2d, encode_3d
 from support.ktx2_parser import parse
 
 

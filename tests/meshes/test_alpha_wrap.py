@@ -40,8 +40,8 @@ def test_missing_package_is_named_with_its_remedy(
     out = tmp_path / "out"
     assert main(["plan", _source(tmp_path), "-o", str(out), "--wrap", "alpha-wrap"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "no_such_wrapper is missing" in line
-    assert line.endswith("expected pip install 'pymeshlab>=2025.7'")
+    assert "--wrap 'alpha-wrap' takes the package no_such_wrapper" in line
+    assert line.endswith("pip install 'stereocell[alpha-wrap]'")
     assert not out.exists()
 
 

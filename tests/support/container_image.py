@@ -38,7 +38,7 @@ COMPILERS = (
 PROGRAMS = ("sh", "mkdir", "rm", "chmod")
 PIP = """#!/bin/sh
 for word do shift; [ "$word" = --no-cache-dir ] || set -- "$@" "$word"; done
-exec {uv} pip "$@" --no-binary meshoptimizer --offline --quiet --only-binary :all: --constraint {lock} --python {python}
+exec {uv} pip "$@" --offline --quiet --only-binary :all: --constraint {lock} --python {python}
 """
 
 

@@ -3,7 +3,7 @@
 import json
 import struct
 
-import meshoptimizer
+import meshopt
 import numpy as np
 
 _NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -31,18 +31,13 @@ def read(data):
         dtype = types[accessor["componentType"]]
         if view["mode"] == "TRIANGLES":
             assert stored[0] == 0xE1
-            # the package decodes into 32-bit indices whatever they are meant to become
-            arrays.append(meshoptimizer.decode_index_buffer(view["count"], 4, stored))
+            arrays.append(meshopt.decode_index_buffer(stored, view["count"], view["byteStride"]))
         else:
             assert stored[0] == 0xA0  # version 0 of the vertex codec: all that the extension knows
-            row = np.dtype([("row", dtype, view["byteStride"] // np.dtype(dtype).itemsize)])
-            rows = meshoptimizer.decode_vertex_buffer(
-                view["count"], view["byteStride"], stored, dtype=row
+            rows = meshopt.decode_vertex_buffer(
+                stored, view["count"], view["byteStride"], view.get("filter")
             )
-            decoded = np.ascontiguousarray(rows["row"])
-            if view.get("filter") == "OCTAHEDRAL":
-                decoded = meshoptimizer.decode_filter_oct(decoded, *decoded.shape)
-            arrays.append(decoded[:, : _NUMBERS[accessor["type"]]])
+            arrays.append(rows.view(dtype)[:, : _NUMBERS[accessor["type"]]])
     return document, arrays
 
 

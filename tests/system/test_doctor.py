@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections import namedtuple
 from importlib import metadata
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from stereocell.cli import doctor
 from stereocell.cli.__main__ import main
 
+ROOT = Path(__file__).parents[2]
 Usage = namedtuple("Usage", "total used free")
 
 
@@ -141,7 +143,12 @@ def test_a_browser_and_a_node_are_there_and_new_enough_or_not(
 def test_what_few_need_is_told_as_optional(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "find_spec", lambda module: None)
     found = {one.name: one for one in doctor.examine()}
-    for name, wanted_by in (("pymeshlab", "--wrap alpha-wrap"), ("onnxruntime", "--model")):
-        assert not found[name].ok
-        assert found[name].cost.startswith("optional, ")
-        assert wanted_by in found[name].cost
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    extras = pyproject["project"]["optional-dependencies"]
+    assert {f"extra {name}" for name in extras} == {n for n in found if n.startswith("extra ")}
+    for name in extras:
+        look = found[f"extra {name}"]
+        assert not look.ok
+        assert look.cost.startswith("optional, ")
+        assert f"pip install 'stereocell[{name}]'" in look.cost
+    assert "--maps" in found["extra maps"].cost

@@ -1,6 +1,7 @@
 """A network of the user's own: patches, blending, and what is wrong said in one line."""
 
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,6 @@ import numpy as np
 import pytest
 
 from stereocell.model.errors import SourceError, UsageError
-from stereocell.tissue import onnx_classifier as module
 from stereocell.tissue.brain_mask import find_foreground
 from stereocell.tissue.onnx_classifier import Network, apply_network
 from support.onnx_models import Shape, write_model
@@ -100,9 +100,6 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
 def test_without_onnxruntime_the_remedy_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def missing(name: str) -> None:
-        raise ImportError(name)
-
-    monkeypatch.setattr(module, "import_module", missing)
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
     with pytest.raises(UsageError, match=r"pip install 'stereocell\[onnx\]'"):
         load(write_model(tmp_path / "m.onnx"))

@@ -36,6 +36,7 @@ from stereocell.model.errors import UsageError
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.storage.cache_key import key_of
+from stereocell.textures.map_packages import unwrapper_version
 from stereocell.transfer.channel_statistics import (
     ChannelStatistics,
 )
@@ -167,6 +168,7 @@ def _unit_task(
         given.intensity_window,
         plan.settings.surface.smoothing_um,
         find_wrapper() if plan.settings.surface.wrap == "alpha-wrap" else None,
+        unwrapper_version() if plan.settings.unwrap.maps else None,
         plan.settings.surface.closed_tiles,
         [asdict(options) for options in (given.repair, plan.settings.lod)],
         given.step,

@@ -40,6 +40,7 @@ from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.model.extra_packages import version_of
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
@@ -53,10 +54,15 @@ from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import write_json
 from stereocell.storage.location import Location, require_apart
 from stereocell.storage.workspace import is_file, objects_below, remove
+from stereocell.textures.map_packages import (
+    UNWRAPPER,
+    encoder_version,
+    require_map_packages,
+)
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import write_usdz as usdz_writer
 from stereocell.usd import written_files
-from stereocell.usd.read_stage import dependencies
+from stereocell.usd.read_stage import dependencies, may_be_image
 from stereocell.usd.written_files import AsWritten
 
 
@@ -92,6 +98,8 @@ def settle(source: str, settings: Settings) -> Plan:
     options = settings.plan
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
+    if settings.unwrap.maps:
+        require_map_packages()
     _require_labels(settings)
     dataset = open_source(as_asked(location, options))
     modality = dataset.modality or options.modality
@@ -183,9 +191,10 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "level": plan.level,
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
-        "libraries": libraries_of(
-            window, evidence, components, unit, stage_tasks, *sorted(readers)
-        ),
+        "libraries": {
+            **libraries_of(window, evidence, components, unit, stage_tasks, *sorted(readers)),
+            **({UNWRAPPER: version_of(UNWRAPPER)} if plan.settings.unwrap.maps else {}),
+        },
         **_added(plan),
     }
 
@@ -331,6 +340,8 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
     out_folder = OutFolder(out)
     with phase_of(out_folder, "bundle") as phase:
         out_folder.require_finished("stage")
+        if out_folder.plan().settings.unwrap.maps:
+            require_map_packages()
         path = stage if stage is not None else out_folder.stage_file
         if not is_file(path):
             remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
@@ -339,8 +350,10 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         kept = objects_below(path.parent)
         files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
         made_of = [str(path.absolute()), states_of(files)] if kept is None else kept
+        # an image may feed a surface, and is encoded then: by this version, or not at all
+        encoder = encoder_version() if any(map(may_be_image, files)) else None
         page = [] if viewer is None else states_of(sorted(viewer.rglob("*")))
-        key = key_of([made_of, page], bundle_writer)
+        key = key_of([made_of, page, encoder], bundle_writer)
         if kept is not None and out_folder.is_begun("bundle"):
             bundle_writer.remove_half(out_folder.bundle_dir)
         bundle_writer.require_bundle(out_folder.bundle_dir)  # before the phase is recorded as begun

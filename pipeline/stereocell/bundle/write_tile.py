@@ -20,14 +20,14 @@ from stereocell.bundle.edited_meshes import shown_lods, with_vertex_occlusion
 from stereocell.bundle.windowed_voxels import read_windowed
 from stereocell.bundle.write_transfer2d import count_tile
 from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
-from stereocell.formats.gltf import Glb, Textures, encode_glb
-from stereocell.formats.gltf_features import Features
-from stereocell.formats.ktx2 import (
-    encode_3d,
+from stereocell.formats.basis_textures import (
     encode_color_map,
     encode_normal_map,
     encode_occlusion_map,
 )
+from stereocell.formats.gltf import Glb, Textures, encode_glb
+from stereocell.formats.gltf_features import Features
+from stereocell.formats.ktx2 import encode_3d
 from stereocell.formats.tiles3d import TileLod
 from stereocell.model.errors import OutputError, StageError
 from stereocell.model.mesh import Mesh

@@ -166,10 +166,14 @@ def _gpu() -> Finding:
     return _finding("GPU", bool(devices), found, cost)
 
 
-def _extra(name: str, module: str, cost: str) -> Callable[[], Finding]:
+def _extra(name: str, work: str, *modules: str) -> Callable[[], Finding]:
+    """Return a look at an extra, for `work`, which installs `modules`."""
+
     def look() -> Finding:
-        there = find_spec(module) is not None
-        return _finding(name, there, "installed" if there else "not installed", cost)
+        missing = [module for module in modules if find_spec(module) is None]
+        found = f"{', '.join(missing)} not installed" if missing else "installed"
+        cost = f"optional, {work} (pip install 'stereocell[{name}]')"
+        return _finding(f"extra {name}", not missing, found, cost)
 
     return look
 
@@ -189,24 +193,15 @@ LOOKS: tuple[Callable[[], Finding], ...] = (
     _browser,
     _node,
     _gpu,
-    _extra(
-        "pymeshlab",
-        "pymeshlab",
-        "optional, for `--wrap alpha-wrap` alone (pip install 'stereocell[alpha-wrap]')",
-    ),
-    _extra(
-        "onnxruntime",
-        "onnxruntime",
-        "optional, for `stereocell tissue --model` alone (pip install 'stereocell[onnx]')",
-    ),
-    _extra(
-        "DracoPy",
-        "DracoPy",
-        "optional, to export .precomputed and Draco's .glb (pip install 'stereocell[draco]')",
-    ),
-    _extra(
-        "imageio-ffmpeg",
-        "imageio_ffmpeg",
-        "optional, to export .mp4 and .webm (pip install 'stereocell[video]')",
-    ),
+    _extra("alpha-wrap", "for `--wrap alpha-wrap` alone", "pymeshlab"),
+    _extra("czi", "to read .czi (Zeiss)", "pylibCZIrw"),
+    _extra("draco", "to export .precomputed and Draco's .glb", "DracoPy"),
+    _extra("hdf5", "to read HDF5 packed by Blosc, zstd, LZ4 and others", "hdf5plugin"),
+    _extra("lif", "to read .lif (Leica)", "liffile"),
+    _extra("maps", "for UVs and baked maps (`--maps`) alone", "xatlas", "alktx2"),
+    _extra("nd2", "to read .nd2 (Nikon)", "nd2"),
+    _extra("notebook", "for `stereocell.show` alone", "anywidget", "IPython", "traitlets"),
+    _extra("onnx", "for `stereocell tissue --model` alone", "onnxruntime"),
+    _extra("tables", "to read tables in Parquet", "pyarrow"),
+    _extra("video", "to export .mp4 and .webm", "imageio_ffmpeg"),
 )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from stereocell.model.errors import StereoCellError
+from stereocell.model.extra_packages import MAKERS, version_of
 from stereocell.read.readers import OTHER, READERS
 from stereocell.storage.cache_key import key_of, libraries_of
 
@@ -102,10 +103,15 @@ def able(function: Callable[[T], R], shared: Path | None) -> Callable[[T], R]:
 
 @dataclass(frozen=True, slots=True)
 class _Sight:
-    """A worker: versions of StereoCell and libraries, a digest of our code, access to a file."""
+    """A worker: versions of StereoCell and libraries, a digest of our code, access to a file.
+
+    extras  versions of the packages of extras that make results; empty: not installed. A worker may
+            lack one, since few builds use it: such a build names it then
+    """
 
     host: str
     versions: tuple[tuple[str, str], ...]
+    extras: tuple[tuple[str, str], ...]
     code: str
     sees: bool = True
 
@@ -128,6 +134,10 @@ def _require_alike(who: str, worker: _Sight, ours: _Sight, shared: Path | None) 
     for name, expected in ours.versions:
         if found.get(name) != expected:
             raise ClusterError(f"{who}: has {name} {found.get(name, 'none')}, expected {expected}")
+    found = dict(worker.extras)
+    for name, expected in ours.extras:
+        if expected and found[name] not in (expected, ""):
+            raise ClusterError(f"{who}: has {name} {found[name]}, expected {expected}")
     if worker.code != ours.code:
         raise ClusterError(
             f"{who}: runs other code than this command: expected the same installation of "
@@ -147,4 +157,5 @@ def _look_at(shared: str) -> _Sight:
 def _look() -> _Sight:
     makers = (*_TASKS, *(reader.module for reader in (*READERS.values(), OTHER)))
     versions = {"StereoCell": version("stereocell"), **libraries_of(*makers)}
-    return _Sight(socket.gethostname(), tuple(versions.items()), key_of("", *makers))
+    extras = tuple((name, version_of(name)) for name in MAKERS)
+    return _Sight(socket.gethostname(), tuple(versions.items()), extras, key_of("", *makers))

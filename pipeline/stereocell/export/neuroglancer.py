@@ -35,7 +35,8 @@ from stereocell.formats.precomputed import (
     write_meshes_info,
     write_volume,
 )
-from stereocell.model.errors import StageError, UsageError
+from stereocell.model.errors import StageError
+from stereocell.model.extra_packages import import_extra
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
 
@@ -45,12 +46,7 @@ Surface = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
 def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
     """Write the folder; return a line about it. Raises UsageError without DracoPy."""
-    try:
-        import DracoPy
-    except ModuleNotFoundError:
-        raise UsageError(
-            f"{path.suffix} takes the package DracoPy: pip install 'stereocell[draco]'"
-        ) from None
+    draco = import_extra("DracoPy", extra="draco", wanted_by=path.suffix)
     path.mkdir()
     layout = find_layout(chosen) if _has_volumes(chosen) else None
     written = []
@@ -68,7 +64,7 @@ def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
         folder.mkdir(exist_ok=True)
         for segment, by_level in found.surfaces.items():
             made = [_level(parts, to_nm) for parts in by_level if parts]
-            write_mesh(folder, segment or number, _different(made), DracoPy.encode)
+            write_mesh(folder, segment or number, _different(made), draco.encode)
         if found.names:
             write_meshes_info(folder, found.names)
             written.append(f"{folder.name}: {len(found.names)} meshes")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from stereocell.formats.gltf import padded
 from stereocell.formats.meshopt import CompressedBuffers, reorder
 from stereocell.formats.plain_gltf import Buffers
-from stereocell.model.errors import UsageError
+from stereocell.model.extra_packages import import_extra
 from stereocell.model.mesh import Mesh
 
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5121, 5123, 5125, 5126
@@ -47,7 +47,7 @@ class MeshoptBuffers:
     def add_mesh(
         self, mesh: Mesh, positions: NDArray[np.float64], colors: NDArray[np.uint8] | None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        indices, order = reorder(mesh.triangles, len(positions))
+        indices, order = reorder(mesh.triangles)
         lattice = np.rint(positions[order] / self._step).astype(np.int64)
         origin = lattice.min(axis=0)
         offsets = (lattice - origin).clip(0, _STEPS - 1)
@@ -81,13 +81,8 @@ class DracoBuffers:
     extensions: tuple[str, ...] = ("KHR_draco_mesh_compression",)
 
     def __init__(self, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> None:
-        try:
-            import DracoPy
-        except ModuleNotFoundError:
-            raise UsageError(
-                "--compress draco takes the package DracoPy: pip install 'stereocell[draco]'"
-            ) from None
-        self._encode, self._decode = DracoPy.encode, DracoPy.decode
+        draco = import_extra("DracoPy", extra="draco", wanted_by="--compress draco")
+        self._encode, self._decode = draco.encode, draco.decode
         edge = float((high_m - low_m).max())
         self._origin = low_m - 0.05 * edge  # caps lie a voxel beyond the tiles
         self._range = 1.1 * edge

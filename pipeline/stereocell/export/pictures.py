@@ -11,7 +11,8 @@ import numpy as np
 
 from stereocell.export.chosen import Chosen
 from stereocell.formats.gltf import vertex_colors
-from stereocell.model.errors import OutputError, UsageError
+from stereocell.model.errors import OutputError
+from stereocell.model.extra_packages import import_extra
 from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
 
 PICTURE_TRIANGLES = 2_000_000  # more do not show on 1600 pixels
@@ -41,14 +42,9 @@ def write_picture(chosen: Chosen, path: Path, level: int) -> str:
 
 def write_turntable(chosen: Chosen, path: Path, level: int) -> str:
     """Write .mp4 or .webm; return a line about it. Raises UsageError without imageio-ffmpeg."""
-    try:
-        import imageio_ffmpeg
-    except ModuleNotFoundError:
-        raise UsageError(
-            f"{path.suffix} takes the package imageio-ffmpeg: pip install 'stereocell[video]'"
-        ) from None
+    ffmpeg = import_extra("imageio_ffmpeg", extra="video", wanted_by=path.suffix)
     shapes = list(_shapes(chosen, level))
-    size = _encode(chosen, path, shapes, imageio_ffmpeg.get_ffmpeg_exe())
+    size = _encode(chosen, path, shapes, ffmpeg.get_ffmpeg_exe())
     return f"{size[0]} x {size[1]} pixels, {_FRAMES} frames, {_FPS} a second, at lod{level}"
 
 

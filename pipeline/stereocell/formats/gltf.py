@@ -107,7 +107,7 @@ def encode_glb(
         raise ValueError(f"{name} has no triangles")
     if mesh.objects is not None:
         require_whole(mesh.objects, mesh.triangles, name, features)
-    indices, order = reorder(mesh.triangles, len(mesh.positions), objects=mesh.objects)
+    indices, order = reorder(mesh.triangles, objects=mesh.objects)
 
     steps = np.rint(mesh.positions[order].astype(np.float64) * (_METRES_PER_UM / step_m))
     lattice = steps.astype(np.int64)

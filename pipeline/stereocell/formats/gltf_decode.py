@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import meshoptimizer
+import meshopt
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +20,7 @@ _TYPES = {
     5126: np.float32,
 }
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_MAX_BYTES = 1 << 30  # bytes, most of a decoded bufferView: memory is taken before it is decoded
 _HEAD = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
 
@@ -121,17 +122,15 @@ def _decode(document: dict[str, Any], binary: bytes, index: int) -> NDArray[Any]
     view = document["bufferViews"][accessor["bufferView"]]["extensions"]["EXT_meshopt_compression"]
     start = view.get("byteOffset", 0)
     stored = binary[start : start + view["byteLength"]]
-    dtype = np.dtype(_TYPES[accessor["componentType"]])
+    count, stride = view["count"], view["byteStride"]
+    if count * stride > _MAX_BYTES:
+        raise ValueError(f"a bufferView of {count} x {stride} bytes, expected at most {_MAX_BYTES}")
+    decoded: NDArray[Any] = meshopt.decode_gltf_buffer(
+        stored, count, stride, view["mode"], view.get("filter")
+    )
     if view["mode"] == "TRIANGLES":
-        # the package decodes into 32-bit indices for both sizes of index
-        indices: NDArray[Any] = meshoptimizer.decode_index_buffer(view["count"], 4, stored)
-        return indices
-    row = np.dtype([("row", dtype, view["byteStride"] // dtype.itemsize)])
-    rows = meshoptimizer.decode_vertex_buffer(view["count"], view["byteStride"], stored, dtype=row)
-    decoded = np.ascontiguousarray(rows["row"])
-    if view.get("filter") == "OCTAHEDRAL":
-        decoded = meshoptimizer.decode_filter_oct(decoded, *decoded.shape)
-    return decoded[:, : _WIDTHS[accessor["type"]]]
+        return decoded
+    return decoded.view(_TYPES[accessor["componentType"]])[:, : _WIDTHS[accessor["type"]]]
 
 
 def _image(document: dict[str, Any], binary: bytes, texture: int) -> bytes:

@@ -1,6 +1,4 @@
-"""Write KTX 2.0 textures: 8-bit volumes and tables, and baked maps.
-
-Volumes and tables are uncompressed texels; each mip level is a zstd frame of its own.
+"""Write KTX 2.0 textures of volumes and tables: 8-bit texels, each mip level a zstd frame.
 
 No package on PyPI writes 3D KTX2. This module follows the KTX 2.0 specification (Khronos, revision
 2.0.4) as far as these textures need it: 8-bit UNORM with 1, 2 or 4 components, one layer, one face.
@@ -13,9 +11,7 @@ Only the finest level of such textures is read back; sizes are checked before me
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import alktx2
 import numpy as np
 import zstandard
 from numpy.typing import NDArray
@@ -31,7 +27,6 @@ _COMPONENTS = {vk_format: components for components, vk_format in _VK_FORMATS.it
 _CHANNEL_TYPES = (0, 1, 2, 15)  # red, green, blue, alpha
 # by dimensions: texture x to the right, y down, z out of the picture, towards the viewer
 _ORIENTATIONS = {2: "rd", 3: "rdo"}
-_ETC1S_QUALITY = 80  # quality, 1 to 100
 _ZSTD = 2
 _MAX_BYTES = 1 << 31  # most bytes of a level that is read
 _ZSTD_LEVEL = 3  # 9 made noisy 8-bit volumes 1 to 2 % smaller and took 3 to 5 times as long
@@ -82,68 +77,6 @@ def encode_2d(image: NDArray[np.uint8]) -> Ktx2:
     image  uint8 (y, x, components), row 0 first
     """
     return _encode([image[np.newaxis]], 2)
-
-
-def encode_normal_map(image: NDArray[np.uint8]) -> bytes:
-    """Return a normal map as a Basis Universal texture with mip levels.
-
-    image  uint8 (y, x, 3), tangent space
-
-    Raises ValueError unless both sides are multiples of 4 (KHR_texture_basisu). One thread encodes,
-    since the bytes depend on the number of threads. Size, mean error of the normals in degrees, and
-    time, on baked maps of smooth bodies (64 to 128 texels wide) and of noisy cells (64 to 512):
-
-        UASTC, effort 1                 14 kB  1.3     43 kB  3.7   0.04 s
-        UASTC, effort 1, lambda 2        9 kB  1.9     40 kB  4.2   0.04 s, its blocks show
-        UASTC, effort 3                 15 kB  0.8     44 kB  1.9   0.09 s
-        UASTC, effort 3, lambda 0.5     14 kB  0.9     44 kB  1.9   0.10 s  (chosen)
-        UASTC, effort 3, lambda 1       12 kB  1.1     43 kB  2.1   0.10 s
-        UASTC, effort 5, lambda 0.5      -             45 kB  1.8   0.32 s
-    """
-    return _encode_map(
-        image,
-        codec="uastc",
-        quality=100,
-        effort=3,
-        uastc_rdo_lambda=0.5,
-        uastc_rdo_dict_size=256,
-        srgb=False,
-        linear=True,
-        zstd_supercompression_level=9,
-    )
-
-
-def encode_occlusion_map(image: NDArray[np.uint8]) -> bytes:
-    """Return an ambient-occlusion map with mip levels, ETC1S.
-
-    image  uint8 (y, x, 3), grey
-
-    Raises ValueError unless both sides are multiples of 4. Occlusion varies slowly, so ETC1S's
-    blocks don't show.
-    """
-    return _encode_map(image, codec="etc1s", quality=_ETC1S_QUALITY, srgb=False, linear=True)
-
-
-def encode_color_map(image: NDArray[np.uint8]) -> bytes:
-    """Return a base-colour map with mip levels, ETC1S.
-
-    image  uint8 (y, x, 3), sRGB
-
-    Raises ValueError unless both sides are multiples of 4.
-    """
-    return _encode_map(image, codec="etc1s", quality=_ETC1S_QUALITY, srgb=True, linear=False)
-
-
-def _encode_map(image: NDArray[np.uint8], **options: Any) -> bytes:
-    height, width, components = image.shape
-    if width % 4 or height % 4 or components != 3:
-        raise ValueError(f"a baked map of {width} x {height} x {components}")
-    opaque = np.full((height, width, 1), 255, dtype=np.uint8)
-    pixels = np.concatenate([image, opaque], axis=2).tobytes()
-    data: bytes = alktx2.encode_raw_rgba_to_ktx2(
-        pixels, width, height, False, mipmaps=True, threads=1, **options
-    )
-    return data
 
 
 def _encode(levels: list[NDArray[np.uint8]], dimensions: int) -> Ktx2:

@@ -1,8 +1,8 @@
-"""Lay out the buffers of a .glb with EXT_meshopt_compression, by the library meshoptimizer."""
+"""Lay out the buffers of a .glb with EXT_meshopt_compression, by the package meshopt."""
 
 from typing import Any
 
-import meshoptimizer
+import meshopt
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,27 +11,28 @@ _VERTICES, _INDICES = 34962, 34963  # bufferView.target
 
 
 def reorder(
-    triangles: NDArray[np.uint32], vertex_count: int, *, objects: NDArray[np.int32] | None = None
+    triangles: NDArray[np.uint32], *, objects: NDArray[np.int32] | None = None
 ) -> tuple[NDArray[np.uint32], NDArray[np.intp]]:
     """Return the triangles in an order that suits the GPU's vertex cache, and the vertices to keep.
 
-    triangles     uint32 (m, 3)
-    vertex_count  number of vertices
-    objects       int32 (vertex_count,): the object of a vertex. Objects come one after another then
-    result        indices uint32 (3m,), by the kept vertices; kept vertices int64 (k,), in the order
-                  of their first use. Unused vertices are left out
+    triangles  uint32 (m, 3)
+    objects    int32, the object of each vertex. Objects come one after another then
+    result     indices uint32 (3m,), by the kept vertices; kept vertices int64 (k,), in the order of
+               their first use. Unused vertices are left out
     """
-    source = np.ascontiguousarray(triangles, dtype=np.uint32).ravel()
-    indices = np.empty_like(source)
-    meshoptimizer.optimize_vertex_cache(indices, source, len(source), vertex_count)
-    if objects is not None:
-        corners = indices.reshape(-1, 3)
-        indices = corners[np.argsort(objects[corners[:, 0]], kind="stable")].ravel()
-    used, first = np.unique(indices, return_index=True)
-    order = used[np.argsort(first)].astype(np.intp)
-    new = np.zeros(vertex_count, dtype=np.uint32)
-    new[order] = np.arange(len(order), dtype=np.uint32)
-    return new[indices], order
+    indices, order = _renumbered(np.asarray(triangles, dtype=np.uint32), is_reordered=True)
+    if objects is None:
+        return indices, order
+    corners = order[indices].reshape(-1, 3)
+    corners = corners[np.argsort(objects[corners[:, 0]], kind="stable")]
+    return _renumbered(corners.astype(np.uint32), is_reordered=False)
+
+
+def _renumbered(
+    triangles: NDArray[np.uint32], *, is_reordered: bool
+) -> tuple[NDArray[np.uint32], NDArray[np.intp]]:
+    indices, places, count = meshopt.reorder_mesh(triangles, triangles=is_reordered, optsize=False)
+    return indices, np.argsort(places)[:count]  # an unused vertex has the largest place
 
 
 class CompressedBuffers:
@@ -74,10 +75,8 @@ class CompressedBuffers:
         accessor  its glTF properties without the count
         """
         count, stride = len(values), values.itemsize * values.shape[1]
-        # The extension needs version 0 of the vertex codec. The library's default is the newest,
-        # and the version is a setting of the whole process.
-        meshoptimizer.encode_vertex_version(0)
-        encoded = meshoptimizer.encode_vertex_buffer(values, count, stride)
+        # the extension needs version 0 of the vertex codec
+        encoded = meshopt.encode_gltf_buffer(values, "ATTRIBUTES", version=0)
         view = self._add_view(encoded, "ATTRIBUTES", count, stride)
         view["byteStride"] = stride
         view["target"] = _VERTICES
@@ -87,8 +86,7 @@ class CompressedBuffers:
 
     def add_indices(self, indices: NDArray[np.uint32], vertex_count: int) -> int:
         """Store triangles' indices, uint32 (3m,); return the accessor's index."""
-        meshoptimizer.encode_index_version(1)
-        encoded = meshoptimizer.encode_index_buffer(indices, len(indices), vertex_count)
+        encoded = meshopt.encode_gltf_buffer(indices, "TRIANGLES")
         short = vertex_count <= 0xFFFF  # index 65535 itself would restart a strip
         view = self._add_view(encoded, "TRIANGLES", len(indices), 2 if short else 4)
         view["target"] = _INDICES

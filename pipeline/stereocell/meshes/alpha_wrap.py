@@ -8,28 +8,20 @@ C. Portaneri, M. Rouxel-Labbe, M. Hemmer, D. Cohen-Steiner & P. Alliez, "Alpha w
 offset", ACM Trans. Graphics 41(4), 2022. doi:10.1145/3528223.3530152
 """
 
-from importlib import import_module
-from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
-from stereocell.model.errors import UsageError
+from stereocell.model.extra_packages import import_extra, version_of
 from stereocell.model.mesh import Mesh
 
-# imported by name: a user who installs it later need not rebuild other results
 LIBRARY = "pymeshlab"
 
 
 def find_wrapper() -> str:
     """Return the version of the wrapping package. Raises UsageError if it isn't installed."""
-    try:
-        import_module(LIBRARY)
-        return version(LIBRARY)
-    except (ImportError, OSError) as error:
-        raise UsageError(
-            f"surface.wrap is 'alpha-wrap', and {LIBRARY} is missing ({error}): expected "
-            "pip install 'pymeshlab>=2025.7'"
-        ) from None
+    _import_wrapper()
+    return version_of(LIBRARY)
 
 
 def alpha_wrap(mesh: Mesh, alpha_um: float, offset_um: float) -> Mesh:
@@ -39,7 +31,7 @@ def alpha_wrap(mesh: Mesh, alpha_um: float, offset_um: float) -> Mesh:
     alpha_um   smaller gaps are bridged
     offset_um  distance of the result from the triangles
     """
-    pymeshlab = import_module(LIBRARY)
+    pymeshlab = _import_wrapper()
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(mesh.positions.astype(np.float64), mesh.triangles))
     meshes.generate_alpha_wrap(
@@ -55,3 +47,7 @@ def alpha_wrap(mesh: Mesh, alpha_um: float, offset_um: float) -> Mesh:
     )
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return Mesh(positions, triangles, (normals / np.maximum(length, 1e-30)).astype(np.float32))
+
+
+def _import_wrapper() -> Any:
+    return import_extra(LIBRARY, extra="alpha-wrap", wanted_by="surface.wrap 'alpha-wrap'")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from stereocell.api import build
 from stereocell.model.errors import UsageError
+from stereocell.model.extra_packages import import_extra
 
 if TYPE_CHECKING:
     from stereocell.notebook.widget import Viewer
@@ -56,12 +57,7 @@ def show(
 
         viewer = stereocell.show(stack, spacing_um=(0.5, 0.25, 0.25))
     """
-    try:
-        import anywidget  # noqa: F401
-    except ModuleNotFoundError:
-        raise UsageError(
-            "a notebook's viewer takes the package anywidget: pip install 'stereocell[notebook]'"
-        ) from None
+    import_extra("anywidget", extra="notebook", wanted_by="a notebook's viewer")
     from stereocell.notebook.arrays import is_array
     from stereocell.notebook.page import find_page
     from stereocell.storage.location import Location

@@ -26,8 +26,8 @@ class UnwrapOptions:
         "whether coarser levels get UVs and baked maps, 4 to 6 times as large",
         flag=Flag(
             "--maps",
-            "coarser levels get UVs and baked maps of normals, occlusion and paint, for DCC tools "
-            "(default: normals and values at vertices alone)",
+            "coarser levels get UVs and baked maps of normals, occlusion and paint, for DCC tools; "
+            "takes the extra `maps` (default: normals and values at vertices alone)",
         ),
     )
     first_lod: int = setting(1, "the finest level that gets UVs and baked maps")

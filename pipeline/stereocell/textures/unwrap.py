@@ -20,14 +20,15 @@ import ctypes
 import math
 from collections import deque
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-import xatlas
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from stereocell.model.mesh import Mesh
+from stereocell.textures.map_packages import import_unwrapper
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.tangents import make_tangents
 
@@ -36,7 +37,7 @@ from stereocell.textures.tangents import make_tangents
 # So an atlas is destroyed some unwraps later, when its workers sleep, and the last ones never: they
 # end with the process.
 ATLASES_KEPT = 4  # most atlases that wait for their workers
-_past_atlases: deque[xatlas.Atlas] = deque()
+_past_atlases: deque[Any] = deque()
 
 SHARP_DEG = 75.0  # degrees between two triangles; on coarse levels 60 are common
 MULTIPLE = 8  # texels; edges of a map are multiples of it: blocks of 4 down to mip level 1
@@ -71,7 +72,10 @@ def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
 
     mesh     positions float32 (n, 3) in um, triangles uint32 (m, 3); its normals stay
     options  resolved
+
+    Raises UsageError without xatlas, a package of the extra `maps`.
     """
+    xatlas = import_unwrapper()
     if len(mesh.triangles) > options.max_triangles:
         return f"{len(mesh.triangles):,} triangles, more than {options.max_triangles:,}"
     vertices, corners, normals = split_sharp_edges(mesh)
@@ -146,7 +150,7 @@ def _rounded(texels: int) -> int:
     return max(-(-texels // MULTIPLE), 1) * MULTIPLE
 
 
-def _retire(atlas: xatlas.Atlas) -> None:
+def _retire(atlas: Any) -> None:
     _past_atlases.append(atlas)
     if len(_past_atlases) > ATLASES_KEPT:
         _past_atlases.popleft()

@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.errors import SourceError
+from stereocell.model.extra_packages import import_extra
 from stereocell.tissue.brain_mask import find_foreground
 
 Field = NDArray[np.float32]
@@ -125,14 +126,8 @@ def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
 
 
 def _find_runtime() -> Any:
-    """Return onnxruntime, an optional package; cache keys don't follow imports by name."""
-    try:
-        return import_module("onnxruntime")
-    except ImportError:
-        raise UsageError(
-            "--model needs the package onnxruntime, which isn't installed: "
-            "pip install 'stereocell[onnx]'"
-        ) from None
+    """Return onnxruntime. Raises UsageError if it is not installed."""
+    return import_extra("onnxruntime", extra="onnx", wanted_by="--model")
 
 
 def _errors() -> tuple[type[Exception], ...]:

@@ -163,6 +163,15 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
     return sorted(file for file in files if file.is_file())
 
 
+def may_be_image(file: Path) -> bool:
+    """Return whether a file of a stage may be, or hold, an image that feeds a surface.
+
+    Layers hold none, .vdb and .exr are volumes and transfer functions, and `read_image` reads no
+    .exr.
+    """
+    return file.suffix.lower() not in (".usd", ".usda", ".usdc", ".vdb", ".exr")
+
+
 def _named_in(name: str) -> Iterator[tuple[str, str]]:
     """Yield the references of one layer: their names for messages, and the paths that USD opens."""
     try:

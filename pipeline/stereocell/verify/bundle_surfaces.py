@@ -6,23 +6,25 @@ and have the same place in the maps. Colours must agree within 1/255, maps with 
 the stage's images, boxes and errors of the tilesets with the surfaces and the stage.
 """
 
-import io
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import alktx2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 from scipy.spatial import cKDTree
 
 from stereocell.bundle.edited_meshes import with_vertex_occlusion
+from stereocell.formats.basis_textures import (
+    decode_map,
+    encode_color_map,
+    encode_normal_map,
+    encode_occlusion_map,
+)
 from stereocell.formats.gltf import AMBIENT_SHARE
 from stereocell.formats.gltf_decode import Drawn, read_glb
-from stereocell.formats.ktx2 import encode_color_map, encode_normal_map, encode_occlusion_map
 from stereocell.formats.tiles3d_walk import Content, walk
 from stereocell.model.mesh import Mesh
 from stereocell.usd.read_stage import ComposedLod
@@ -279,12 +281,6 @@ def _compare_maps(drawn: Drawn, lod: ComposedLod, is_last: bool) -> Iterator[str
         anew = encode(read_image(path))
         if anew == drawn.maps[name]:
             continue
-        found, wanted = _pixels(drawn.maps[name]), _pixels(anew)
+        found, wanted = (decode_map(map_).astype(np.float64) for map_ in (drawn.maps[name], anew))
         if found.shape != wanted.shape or np.abs(found - wanted).mean() > _MAP_DIFFERENCE:
             yield f"the map {named} is another image in the stage"
-
-
-def _pixels(ktx2: bytes) -> NDArray[np.float64]:
-    png, _ = alktx2.decode_ktx2_to_bytes(ktx2)
-    with Image.open(io.BytesIO(png)) as image:
-        return np.asarray(image.convert("RGB"), dtype=np.float64)

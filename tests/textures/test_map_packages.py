@@ -1,0 +1,104 @@
+"""The extra `maps`: builds without maps need none of it, and `--maps` names it before any work."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stereocell.building import stage_tasks
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.tasks import unit
+from stereocell.bundle import write as bundle_writer
+from stereocell.cli.__main__ import main
+from stereocell.report import page
+from stereocell.storage.cache_key import libraries_of
+from stereocell.textures import map_packages
+from stereocell.textures.map_packages import unwrapper_version
+from support.phantoms import blurred_ball, write_ome_tiff
+
+SPACING = (0.5, 0.25, 0.25)
+PACKAGES = (map_packages.UNWRAPPER, map_packages.ENCODER)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("source") / "ball.ome.tif"
+    ball = 1000 * blurred_ball((24, 40, 40), SPACING, (6.0, 5.0, 5.0), 3.0, 0.3)
+    write_ome_tiff(path, ball.astype(np.uint16), spacing=SPACING)
+    return str(path)
+
+
+def keys(out: Path) -> tuple[dict[str, str], str]:
+    """Return the names of a build's units, and that of its bundle."""
+    folder = OutFolder(out)
+    return folder.index(), str(folder.phases()["bundle"]["key"])
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_maps_without_a_package_of_theirs_are_refused_before_any_work(
+    source: str,
+    package: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    out = tmp_path / "out"
+    assert main(["build", source, "-o", str(out), "--maps"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"--maps takes the package {package}: " in line
+    assert line.endswith("pip install 'stereocell[maps]'")
+    assert not out.exists()
+
+
+def test_no_result_imports_a_package_of_maps_by_itself() -> None:
+    named = libraries_of(unit, stage_tasks, bundle_writer, page)
+    assert "numpy" in named
+    assert not {"xatlas", "alktx2"} & named.keys()
+
+
+@pytest.mark.slow
+def test_a_build_without_maps_is_the_same_where_their_packages_are_missing(
+    source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    command = ["build", source, "-o", str(out), "--workers", "1"]
+    assert main(command) == 0
+    there = keys(out)
+    for package in PACKAGES:
+        monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.setattr(map_packages, "version_of", lambda package: "")
+    assert main(command) == 0
+    assert keys(out) == there
+    assert main([*command[:3], str(tmp_path / "anew"), "--workers", "1"]) == 0
+    assert keys(tmp_path / "anew")[0] == there[0]
+    assert main(["check", "--deep", "--workers", "1", str(tmp_path / "anew")]) == 0
+
+
+@pytest.mark.slow
+def test_another_version_of_a_package_of_maps_makes_their_results_anew(
+    source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    command = ["build", source, "-o", str(out), "--workers", "1", "--maps"]
+    assert main(command) == 0
+    units, bundle = keys(out)
+    monkeypatch.setattr("stereocell.building.phases.encoder_version", lambda: "99")
+    assert main(command) == 0
+    assert keys(out)[0] == units
+    assert keys(out)[1] != bundle
+    monkeypatch.setattr("stereocell.building.passes.unwrapper_version", lambda: "99")
+    assert main(command) == 0
+    assert all(key != units[name] for name, key in keys(out)[0].items())
+
+    for package in PACKAGES:
+        monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.setattr("stereocell.building.passes.unwrapper_version", unwrapper_version)
+    capsys.readouterr()
+    for phase in ("bundle", "units"):
+        assert main([phase, str(out), "--workers", "1"]) == 2
+        assert capsys.readouterr().err.endswith("pip install 'stereocell[maps]'\n")
+    assert main(["check", "--deep", "--workers", "1", str(out)]) == 1
+    told = capsys.readouterr()
+    assert "a surface with baked maps takes the package alktx2" in told.out + told.err
