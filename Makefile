@@ -33,7 +33,25 @@ else
 $(error SAMPLE is $(SAMPLE), expected cycif, brain-cells, mri or cells)
 endif
 
+# A value as one word of bash, for shells that make starts while it reads: no variable of make is
+# in their environment
+define newline
+
+
+endef
+quoted = $$'$(subst $(newline),\n,$(subst ',\',$(subst \,\\,$(1))))'
+
+# .venv belongs to the version of Python that made it. A PYTHON of another version gets its own
+# folder, as .venv-3.13, so that neither environment is used or overwritten in place of the other
 VENV := .venv
+ifneq ($(PYTHON),python3)
+ifeq ($(origin VENV),file)
+VERSION := $(filter 2.% 3.%,$(shell $(call quoted,$(PYTHON)) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null))
+ifneq ($(filter-out .venv/lib/python$(VERSION),$(wildcard .venv/lib/python3.*)),)
+VENV := .venv-$(or $(VERSION),missing)
+endif
+endif
+endif
 BIN := $(VENV)/bin
 RUN := $(BIN)/stereocell
 WITH_ARGS := $(BIN)/python pipeline/with_args.py
@@ -56,17 +74,18 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: $(READY) $(KERNELS_READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+)
+setup: $(READY) $(KERNELS_READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+; PYTHON=python3.13: .venv-3.13 beside .venv)
 
 $(READY): requirements.lock pyproject.toml
-	@"$$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	  { echo "setup: $$PYTHON is $$("$$PYTHON" --version), expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
+	@"$$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || \
+	  { found=$$("$$PYTHON" --version 2>/dev/null); \
+	    echo "setup: $$PYTHON is $${found:-not installed}, expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
 	test -x $(BIN)/python || "$$PYTHON" -m venv $(VENV)
 	@# uv takes a fifth of pip's time; pip does it where uv can't, as behind an index that only pip knows
 	@sed -n '/^uv==/,/[^\\]$$/p' requirements.lock > $(VENV)/uv.lock
@@ -119,11 +138,6 @@ demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells, mri 
 
 # Make can't have a space, `%` or `:` in the name of a file. So it finds a phase's file through a link
 # to OUT, in a folder by a checksum of OUT's name; there are a link to INPUT and what was asked for, too
-define newline
-
-
-endef
-quoted = $$'$(subst $(newline),\n,$(subst ',\',$(subst \,\\,$(1))))'
 PLACE := out/.make/$(firstword $(shell printf %s $(call quoted,$(OUT)) | sha256sum))
 ifneq ($(filter plan units stage bundle report,$(MAKECMDGOALS)),)
 ifeq ($(INPUT),)
@@ -209,6 +223,21 @@ AGAIN := $(if $(CI),|| $(BIN)/pytest --last-failed --last-failed-no-failures non
 test-python: setup
 	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
 	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
+
+# CI has no time for all tests with two versions of Python, so that the newest one gets a few: the
+# files that libraries read and write, a full disk, and the wheel by itself from a build to a .glb.
+# pyenv's Python is found even where its plain name is not switched on
+NEWEST := 3.13
+test-newest: setup ## A few tests with Python 3.13, where it is installed (all: make test PYTHON=python3.13)
+	@for each in python$(NEWEST) "$${PYENV_ROOT:-$$HOME/.pyenv}"/versions/$(NEWEST).*/bin/python$(NEWEST); do \
+	  if "$$each" -c '' 2>/dev/null; then exec $(MAKE) --no-print-directory test-newest-here PYTHON="$$each"; fi; \
+	done; echo "test-newest: skipped: python$(NEWEST) is not installed"
+
+# Tests of another Python run beside these: the list of those that failed is theirs alone
+test-newest-here: setup
+	$(BEHIND) $(BIN)/pytest -p no:cacheprovider $(addprefix tests/,$(NEWEST_TESTS))
+NEWEST_TESTS := $(patsubst %,read/test_%.py,tiff bare_zarr zarr_collections number_types n5) \
+  storage/test_full_disk.py system/test_empty_environment.py
 
 test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test
@@ -331,8 +360,14 @@ bench-fps: setup ## Frames a second of the viewer in headless Chromium, volumes 
 	@if [ -z "$$CHROMIUM" ]; then echo "bench-fps: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else out="$$PWD/out" && cd $(VIEWER) && npm run --silent bench-fps -- "$$out/bench-fps" "$$out/head-512/bundle"; fi
 
-wheel: setup ## A wheel and an sdist with the built viewer in them: out/wheel
+wheel: setup out/wheel/constraints.txt ## A wheel and an sdist with the built viewer in them: out/wheel
 	$(BIN)/hatchling build -t wheel -t sdist -d out/wheel
+
+# The versions that the tests run with, for `pip install --constraint`. The hashes are left out: with
+# them pip would want one of the wheel itself
+out/wheel/constraints.txt: requirements.lock
+	@mkdir -p $(@D)
+	sed -n '/^[A-Za-z0-9]/s/ *\\$$//p' $< > $@
 
 docs: $(READY) ## The documentation as a site: out/docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
@@ -345,4 +380,4 @@ lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	  --no-emit-index-url --no-header --no-annotate --group dev pyproject.toml -o requirements.lock
 
 clean: ## Remove .venv, the viewer's packages and build, and out/
-	rm -rf $(VENV) $(VIEWER)/node_modules $(VIEWER)/dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis

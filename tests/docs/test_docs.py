@@ -170,7 +170,9 @@ def _runs_the_workflow(folder: Path) -> None:
     workflow = yaml.safe_load((DOCS / "examples" / "check-bundle.yml").read_text())
     job = workflow["jobs"]["check"]
     *_, install, check = job["steps"]
-    assert install["run"] == "pip install wheels/stereocell-*.whl"  # as system/test_wheel.py
+    assert (
+        install["run"] == "pip install wheels/stereocell-*.whl"
+    )  # as system/test_empty_environment.py
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     command = ["bash", "-e", "-c", check["run"]]
     answer = subprocess.run(

@@ -62,6 +62,8 @@ def test_columns_rows_and_sections_lie_along_any_axes(
     assert dataset.levels[0].spacing_um == pytest.approx((1e-3, 8e-4, 4e-4))
 
 
+# mrcfile swaps its header in a way that NumPy 2.5 deprecates
+@pytest.mark.filterwarnings("ignore:Setting the dtype on a NumPy array:DeprecationWarning")
 def test_big_endian_and_an_extended_header_are_read(tmp_path: Path) -> None:
     with mrcfile.new(tmp_path / "a.mrc") as file:
         file.set_data(f_phantom().astype(">i2"))

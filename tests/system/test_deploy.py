@@ -1,4 +1,7 @@
-"""What deploy/ says agrees with the package: nothing of it can be run here."""
+"""Files of deploy/ agree with the package, and all that name a version of Python name a tested one.
+
+No container engine is at hand. test_empty_environment.py carries out the steps of the Containerfile.
+"""
 
 import re
 import subprocess
@@ -11,6 +14,7 @@ import yaml
 from packaging.requirements import Requirement
 
 from stereocell.cli.__main__ import COMMANDS
+from support.container_image import read_steps
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"
@@ -98,7 +102,26 @@ def test_commands_in_comments_are_those_of_the_package() -> None:
     shown = re.findall(r"run --rm stereocell(?: \\\n#)?\s+(\w+)", text)
     assert shown == ["build", "check"]
     assert set(shown) <= COMMANDS.keys()
-    image = (DEPLOY / "Containerfile").read_text("utf-8")
-    assert 'ENTRYPOINT ["stereocell"]' in image
-    least = project()["requires-python"].removeprefix(">=")
-    assert f"python:{least}-slim" in image
+
+
+def test_versions_of_python_are_tested_ones() -> None:
+    prefix = "Programming Language :: Python :: 3."
+    minors = {
+        one.removeprefix(prefix) for one in project()["classifiers"] if one.startswith(prefix)
+    }
+    tested = {f"3.{minor}" for minor in minors}
+    assert project()["requires-python"].removeprefix(">=") in tested
+    base, *_ = read_steps(DEPLOY / "Containerfile")
+    image = re.fullmatch(r"docker\.io/library/python:([\d.]+)-slim", base.text)
+    assert base.instruction == "FROM"
+    assert image is not None
+    assert image[1] in tested
+    workflow = (ROOT / "docs" / "examples" / "check-bundle.yml").read_text("utf-8")
+    (of_workflow,) = re.findall(r'python-version: "([\d.]+)"', workflow)
+    assert of_workflow in tested
+    # CI's short look at the newest of them
+    newest = max(tested, key=lambda version: int(version.removeprefix("3.")))
+    assert f"\nNEWEST := {newest}\n" in (ROOT / "Makefile").read_text("utf-8")
+    assert "test-newest" in (ROOT / ".ci" / "run").read_text("utf-8")
+    table = (ROOT / "docs" / "install.md").read_text("utf-8").split("## How fast")[0]
+    assert set(re.findall(r"^\| Linux, x86-64, Python ([\d.]+) \|", table, re.MULTILINE)) == tested

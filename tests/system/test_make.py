@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -235,6 +236,55 @@ def test_programs_and_folders_have_names_too(checkout: Path, make: Make) -> None
     make("check", RUN="./show", STEREOCELL_DATA=name, CHROMIUM="$(HOME)")
     assert (checkout / "shown").read_text() == f"{name}-$(HOME)"
     assert not (checkout / "pwned").exists()
+
+
+def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Make) -> None:
+    name = 'it\'s $(touch pwned) "py"; x'
+    (checkout / ".venv").unlink()
+
+    def environment(version: str) -> str:
+        (checkout / name).write_text(f"#!/bin/sh\necho {version}\n")
+        (checkout / name).chmod(0o755)
+        told = make("--eval=told:; @echo $(VENV)", "told", PYTHON=f"./{name}")
+        assert (told.returncode, told.stderr) == (0, "")
+        return told.stdout.strip()
+
+    assert environment("3.13") == ".venv"  # there is none yet
+    (checkout / ".venv" / "lib" / "python3.13").mkdir(parents=True)
+    assert [environment(version) for version in ("3.13", "3.12", "3.9")] == [
+        ".venv",
+        ".venv-3.12",
+        ".venv-3.9",
+    ]
+    told = make("--eval=told:; @echo $(VENV)", "told", PYTHON="python3")
+    assert told.stdout.strip() == ".venv"  # the default takes it as it is
+    for file in ("requirements.lock", "pyproject.toml"):
+        (checkout / file).touch()
+    refused = make("setup", PYTHON="./missing")
+    assert refused.stderr.splitlines()[0] == (
+        "setup: ./missing is not installed, expected 3.11 or newer (PYTHON=... names another)"
+    )
+    assert not list(checkout.glob(".venv-*"))
+    assert not (checkout / "pwned").exists()
+
+
+def test_the_newest_python_is_found_at_pyenv_or_said_to_be_missing(
+    checkout: Path, make: Make
+) -> None:
+    for name in ("requirements.lock", "pyproject.toml", "viewer_gltf"):
+        (checkout / name).symlink_to(ROOT / name)
+    set_: dict[str, Any] = {"NEWEST": "3.99", "environment": {"PYENV_ROOT": str(checkout)}}
+    missing = make("test-newest", **set_)
+    told = "test-newest: skipped: python3.99 is not installed\n"
+    assert (missing.returncode, missing.stdout, missing.stderr) == (0, told, "")
+    python = checkout / "versions" / "3.99.1" / "bin" / "python3.99"
+    python.parent.mkdir(parents=True)
+    python.write_text("#!/bin/sh\necho 3.99\n")
+    python.chmod(0o755)
+    found = make("-n", "test-newest", **set_)
+    assert (found.returncode, found.stderr) == (0, "")
+    assert ".venv-3.99/bin/pytest" in found.stdout
+    assert not list(checkout.parent.rglob("pwned"))
 
 
 @pytest.mark.slow

@@ -54,7 +54,7 @@ def save_unit(directory: Path, unit: Unit) -> None:
                 # numpy's own file writer reports no full disk
                 buffer = io.BytesIO()
                 np.save(buffer, voxels)
-                (folder / name).write_bytes(buffer.getbuffer())
+                (folder / name).write_bytes(buffer.getvalue())
         for level, lod in enumerate(unit.lods):
             np.savez(lod_file(folder, level), **_arrays(lod))
         if unit.objects is not None:
