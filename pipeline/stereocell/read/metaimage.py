@@ -17,7 +17,7 @@ import numpy as np
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray
-from stereocell.read.file_array import FileArray, PackedArray, unpack
+from stereocell.read.file_array import FileArray, PackedArray, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.patient_grid import place
 from stereocell.storage.library_errors import one_line
@@ -117,7 +117,7 @@ def _array(
             raise SourceError(f"{field}: not found, expected the voxels beside the header")
         where = field
     if _flag(fields, "CompressedData", False):
-        load = partial(unpack, path, shape, dtype, "zlib", end)
+        load = partial(unpack_array, path, shape, dtype, "zlib", end)
         return PackedArray(shape, dtype, load)
     skip = (_integers(location.shown, fields, "HeaderSize") or [0])[0]
     if skip < 0:  # the voxels are the last bytes of the file

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.file_array import FileArray, PackedArray, unpack
+from stereocell.read.file_array import FileArray, PackedArray, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.patient_grid import place
 from stereocell.read.spacing import Grid, Triple, um_per
@@ -241,7 +241,7 @@ def _array(
             f"{where}: encoding: found {encoding!r:.40}, byte skip {skip}, expected raw, gzip or "
             "bzip2: write it anew"
         )
-    load = partial(unpack, path, shape, dtype, _PACKINGS[encoding], end, skip=skip)
+    load = partial(unpack_array, path, shape, dtype, _PACKINGS[encoding], end, skip=skip)
     return PackedArray(shape, dtype, load)
 
 

@@ -23,6 +23,7 @@ from stereocell.storage.location import Location
 
 MAX_PLANES = 1_000_000
 _REMOTE_BLOCK = 1 << 18  # bytes of a remote read; fsspec's default reads 5 MB ahead for every tile
+_DESCRIPTION = 270  # tag ImageDescription, one byte a character
 _MAX_TAGS = 4096  # of a directory; tifffile refuses more
 _EXPECTED = "a TIFF file, whole"
 
@@ -87,10 +88,26 @@ def require_directories(where: str, file: IO[bytes], size: int) -> None:
         if count > _MAX_TAGS:
             return  # tifffile says so
         end = offset + width + entry * count
+        if len(seen) == 1:
+            _require_description(where, size, file.read(entry * count), order, is_big=is_big)
         if end + offset_bytes > size:
             refuse_short(where, size, end + offset_bytes)
         file.seek(end)
         (offset,) = struct.unpack(order + link, file.read(offset_bytes))
+
+
+def _require_description(
+    where: str, size: int, entries: bytes, order: str, *, is_big: bool
+) -> None:
+    """Raise SourceError where the text of the first directory ends beyond the file.
+
+    tifffile leaves such a text out, and a file without its OME-XML would be read as plain TIFF.
+    """
+    form, inline = struct.Struct(order + ("HHQQ" if is_big else "HHII")), 8 if is_big else 4
+    whole = entries[: len(entries) // form.size * form.size]
+    for tag, _, count, offset in form.iter_unpack(whole):
+        if tag == _DESCRIPTION and count > inline and offset + count > size:
+            refuse_short(where, size, offset + count)
 
 
 def refuse_short(where: str, size: int, needed: int) -> NoReturn:
