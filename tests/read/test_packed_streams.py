@@ -162,7 +162,7 @@ def test_gzip_of_several_members_and_bytes_behind_it_are_read(behind: bytes, mem
 
 
 @pytest.mark.parametrize("packing", ["gzip", "zlib"])
-@pytest.mark.parametrize("size", [0, 1, 1 << 16, 3 << 20])
+@pytest.mark.parametrize("size", [0, 1, 1 << 18])
 def test_a_stream_cut_at_any_of_its_last_bytes_is_refused(packing: str, size: int) -> None:
     pack = {"gzip": gzip.compress, "zlib": zlib.compress}[packing]
     packed = pack(np.random.default_rng(1).integers(0, 4, size, np.uint8).tobytes())

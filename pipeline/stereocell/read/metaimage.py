@@ -10,6 +10,7 @@ References: https://itk.org/Wiki/ITK/MetaIO/Documentation
 
 import math
 import os
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -61,9 +62,13 @@ def read_image(location: Location) -> Image:
     array = _array(location, fields, end, (*reversed(shape), samples[0]))
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
     affine, notes = _affine(where, fields, len(shape))
-    return place(where, array, axes, affine, "TransformMatrix").image(
+    image = place(where, array, axes, affine, "TransformMatrix").image(
         NAME, notes=notes, has_sides="TransformMatrix" in fields
     )
+    beside = fields["ElementDataFile"]
+    folder = os.path.dirname(os.path.realpath(location.path))
+    voxels = () if beside.upper() == "LOCAL" else (os.path.join(folder, beside),)
+    return replace(image, files=(location.path, *voxels))
 
 
 def _header(location: Location) -> tuple[dict[str, str], int]:

@@ -125,8 +125,15 @@ def read_image(location: Location) -> Image:
         objects=notes_of_nifti(_tables(header)) if is_nifti else ObjectNotes(),
         acquired=Acquired(_image_axis(header.get_dim_info()[2] if is_nifti else None, canonical)),
         notes=tuple(notes),
+        files=tuple(_files(image)),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
+
+
+def _files(image: Any) -> set[str]:
+    """Return the paths of the file or of the pair, and of SPM's matrix beside a pair."""
+    held = [one.filename for one in image.file_map.values() if one.filename]
+    return {name for name in held if os.path.exists(name)}
 
 
 def _require_whole(image: Any, where: str) -> None:

@@ -9,7 +9,7 @@ References: TIFF 6.0 section 2, https://www.awaresystems.be/imaging/tiff/bigtiff
 
 import os
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from typing import IO, Any, NoReturn
 
@@ -137,6 +137,14 @@ def require_pages(
             end = max(a + b for a, b in zip(page.dataoffsets, page.databytecounts, strict=False))
             if end > size:
                 refuse_short(where, size, end)
+
+
+def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
+    """Return the paths of the files that hold some pages; of an address the address alone."""
+    if not location.is_local:
+        return ()
+    paths = {page.parent.filehandle.path for page in pages if page is not None}
+    return tuple(sorted({location.path, *map(str, paths)}))
 
 
 def require_series(where: str, tiff: TiffFile, series: TiffPageSeries) -> None:
