@@ -1,6 +1,7 @@
 """Errors of the format libraries on damaged, unusual or unreachable sources, as one line."""
 
 import logging
+import lzma
 import math
 import struct
 import sys
@@ -35,6 +36,7 @@ _FAULTS = (
     SystemError,
     struct.error,
     zlib.error,
+    lzma.LZMAError,
     ZstdError,
 )
 # Classes of libraries that take long to import: an error of theirs is raised once they are there

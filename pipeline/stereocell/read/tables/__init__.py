@@ -7,6 +7,7 @@ from stereocell.read.file_kind import require_kind
 from stereocell.read.tables.delimited import read_delimited
 from stereocell.read.tables.parquet import read_parquet
 from stereocell.read.tables.table import KEYS, Table, TableColumn
+from stereocell.storage.file_states import unchanged_while_read
 from stereocell.storage.first_bytes import identify, pointer_words
 from stereocell.storage.location import Location, first_bytes
 
@@ -21,9 +22,14 @@ def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Ta
     wanted  names of columns; empty: all but the key
     labels  the name of the label map, of a table that belongs to several
 
-    Raises SourceError where the table can't be read or lacks a column.
+    Raises SourceError where the table can't be read, changes meanwhile or lacks a column.
     """
     location = Location.of(place)
+    with unchanged_while_read(location, "run the same command again"):
+        return _read(location, key, wanted, labels)
+
+
+def _read(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:
     name = location.parts[-1].lower() if location.parts else ""
     if name.endswith((".csv", ".tsv", ".txt", ".parquet", ".h5ad")) and location.is_local:
         _require_sound(location, name)
