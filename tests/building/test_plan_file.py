@@ -11,11 +11,12 @@ from stereocell.building.plan import Plan
 from stereocell.building.plan_file import from_json, to_json
 from stereocell.storage.assets import schema_path
 from support.plans import plan_of
+from support.sealed_files import seal
 
 
 def test_the_schema_has_the_plan_s_fields() -> None:
     schema = json.loads(schema_path("plan.schema.json").read_bytes())
-    own = ["format", "version", *(field.name for field in fields(Plan))]
+    own = ["format", "version", *(field.name for field in fields(Plan)), "sha256"]
     assert list(schema["properties"]) == own
     assert schema["required"] == [name for name in own if name != "formats"]
     channel = schema["properties"]["channels"]["items"]
@@ -25,7 +26,7 @@ def test_the_schema_has_the_plan_s_fields() -> None:
 def test_a_plan_of_the_version_before_its_formats_were_in_it_is_read() -> None:
     content = to_json(plan_of())
     del content["formats"]
-    jsonschema.validate(content, json.loads(schema_path("plan.schema.json").read_bytes()))
+    jsonschema.validate(seal(content), json.loads(schema_path("plan.schema.json").read_bytes()))
     assert from_json(content) == replace(plan_of(), formats=())
 
 

@@ -28,10 +28,12 @@ from stereocell.report import phase as report
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.claim import LOCK
 from stereocell.tissue.classify import TissueOptions
+from stereocell.tissue.onnx_classifier import Network
 from stereocell.verify import formats as check_module
 from support import phantoms
 from support.exhaustive import sweep
 from support.onnx_models import write_model
+from support.sealed_files import seal
 
 pytestmark = pytest.mark.slow
 
@@ -123,7 +125,7 @@ def copy(out: Path, to: Path, source: Path | None = None) -> Path:
     if source is not None:
         shutil.copy(out.parent / "f.ome.tif", source)
         text = text.replace(f'"{out.parent / "f.ome.tif"}"', f'"{source}"')
-    (to / "plan.json").write_text(text)
+    (to / "plan.json").write_text(json.dumps(seal(json.loads(text))))
     out_folder = OutFolder(to)
     out_folder.save_units(out_folder.plan(), out_folder.index())
     open_source.cache_clear()
@@ -405,6 +407,30 @@ def test_a_class_named_as_a_channel_leaves_the_earlier_ones(
     assert f"has a channel '{CHANNEL}' of its own" in only_line(capfd)
     assert digests(out) == before
     assert json.loads((out / "tissue" / "tissue.json").read_text())["settings"]["classes"] == 2
+
+
+@pytest.mark.parametrize("checked", ["by the command", "by the plan"])
+def test_a_class_whose_name_no_plan_may_hold_leaves_everything_as_it_was(
+    undisturbed: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    checked: str,
+) -> None:
+    out = copy(undisturbed, tmp_path / "out")
+    before = digests(out)
+    model = write_model(tmp_path / "m.onnx", slopes=(-1.0, 1.0), names=["bone\x07", "marrow"])
+    if checked == "by the plan":  # a name that comes by another way
+        monkeypatch.setattr(
+            tissue_channels, "_load_network", lambda path: Network.load(path, path.read_bytes())
+        )
+    capfd.readouterr()
+    assert tissue(out, "--model", str(model)) == 1
+    line = only_line(capfd)
+    assert "'bone\\x07', expected" in line
+    assert "can be shown" in line
+    assert ("not written, as no command could read it" in line) == (checked == "by the plan")
+    assert digests(out) == before
 
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
 # ruff: noqa: E501  (tables of cases)
 """A build whose documents, units, stage files or bundle are spoilt, and the commands that read it."""
 
-import hashlib
-import json
 import os
 import shutil
 import struct
@@ -11,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from malformed.cases import ODD_NAMES, SPOILT_JSON, Case, Change, copied, cut, edit_json, flip, put
+from support.sealed_files import seal
 
 PLAN, SURVEY, DONE, PHASES = "plan.json", "units/survey.json", "units/done.json", "phases.json"
 MANIFEST, FILES = "bundle/manifest.json", "bundle/files.json"
@@ -112,10 +111,12 @@ def _plans() -> Iterator[Case]:
         "fingerprint odd": put("fingerprint", "\n"), "smoothing inf": put("settings", "surface", {"smoothing_um": float("inf")}),
         "smoothing 1e9": put("settings", "surface", "smoothing_um", 1e9), "LODs of 10^9": put("settings", "lod", {"levels": 10**9}),
     }.items():  # fmt: skip
-        yield _edited(name, "units", PLAN, change)
+        yield _edited(name, "units", PLAN, _sealed(change))
     for name, text in ODD_NAMES.items():
-        yield _edited(f"plan's name {name}", "report", PLAN, put("name", text))
-        yield _edited(f"channel named {name}", "units", PLAN, put("channels", 0, "name", text))
+        yield _edited(f"plan's name {name}", "report", PLAN, _sealed(put("name", text)))
+        yield _edited(
+            f"channel named {name}", "units", PLAN, _sealed(put("channels", 0, "name", text))
+        )
 
 
 def _units() -> Iterator[Case]:
@@ -128,7 +129,9 @@ def _units() -> Iterator[Case]:
     }.items():  # fmt: skip
         yield _edited(f"survey's {name}", "stage", SURVEY, _sealed(change))
     for name, key in {"escapes": "../../../bait", "empty": "", "of another": "0" * 20}.items():
-        yield _edited(f"key that {name}", "stage", DONE, lambda c, k=key: dict.fromkeys(c, k))
+        yield _edited(
+            f"key that {name}", "stage", DONE, _sealed(lambda c, k=key: dict.fromkeys(c, k))
+        )
     for file in ("unit.json", "volume.npy", "lod0.npz", "lod1.npz"):
         for way, spoil in {
             "cut": lambda p: cut(p, 0.6), "empty": lambda p: p.write_bytes(b""), "flipped": lambda p: flip(p, 3, 40), "lost": lambda p: p.unlink(),
@@ -174,10 +177,7 @@ def _sealed(change: Change) -> Change:
 
     def sealed(content: Any) -> Any:
         changed = change(content)
-        content = content if changed is None else changed
-        others = {name: value for name, value in content.items() if name != "sha256"}
-        digest = hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
-        return {**others, "sha256": digest}
+        return seal(content if changed is None else changed)
 
     return sealed
 

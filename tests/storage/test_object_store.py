@@ -29,6 +29,7 @@ from support import phantoms
 from support.digests import digests_of
 from support.faulty_object_store import before
 from support.object_store import ObjectStore, serving
+from support.sealed_files import seal
 from support.tissue_volumes import blobs
 from support.validators import make_assets
 
@@ -227,13 +228,13 @@ def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_
     before = of_parts(marks(store, out))
     phases = json.loads(fs.cat_file(f"{out}/phases.json"))
     phases["bundle"]["key"] = ""  # begun
-    fs.pipe_file(f"{out}/phases.json", json.dumps(phases).encode())
+    fs.pipe_file(f"{out}/phases.json", json.dumps(seal(phases)).encode())
     fs.rm(f"{out}/bundle/manifest.json")  # it comes last
     assert make_assets(volume, there, GRID, "--workers", "0") == 0
     assert of_parts(marks(store, out)) == before
     fs.rm(f"{out}/bundle", recursive=True)
     del phases["bundle"]
-    fs.pipe_file(f"{out}/phases.json", json.dumps(phases).encode())
+    fs.pipe_file(f"{out}/phases.json", json.dumps(seal(phases)).encode())
     fs.pipe_file(f"{out}/bundle/thesis.tex", b"years of work")
     for _ in range(2):
         capsys.readouterr()

@@ -18,6 +18,7 @@ from stereocell.engine.run import Engine
 from support import phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep
+from support.sealed_files import edit_sealed
 from support.validators import make_assets
 
 BUILD = ["--workers", "0", "--grid", "2x1"]
@@ -163,9 +164,7 @@ def test_lost_unit_alone_is_built_again(built: Path, tmp_path: Path) -> None:
                   (("r0_c1", key), ("r0_c0", out_folder.index()["r0_c0/F_x20_body"])))  # fmt: skip
     shutil.rmtree(lost)
     stamp = (kept / "unit.json").stat().st_mtime_ns
-    plan = json.loads((out / "plan.json").read_text())
-    plan["source"] = str(_source(tmp_path))
-    (out / "plan.json").write_text(json.dumps(plan))
+    edit_sealed(out / "plan.json", lambda plan: plan.update(source=str(_source(tmp_path))))
     assert main(["units", str(out), "--workers", "0", "--only", "r0_c1/F body"]) == 0
     assert (lost / "unit.json").is_file()
     assert (kept / "unit.json").stat().st_mtime_ns == stamp

@@ -173,7 +173,9 @@ def test_what_the_units_rest_on_is_named_and_found_anew(
     capfd.readouterr()
     if name == "survey.json":
         assert main(["stage", str(out), *FLAGS]) == 1
-        assert f"{file}: damaged: run `stereocell units OUT`" in capfd.readouterr().err
+        said = capfd.readouterr().err
+        assert f"{file}: damaged or changed by hand: its content has SHA-256" in said
+        assert "run `stereocell units OUT`" in said
     _go_on(out)
     assert _assets(out) == _assets(built)
 

@@ -5,6 +5,7 @@ is written under a temporary name and renamed, so a killed run resumes and a fin
 nothing.
 """
 
+import json
 import re
 import secrets
 from collections.abc import Callable, Mapping
@@ -17,20 +18,15 @@ from stereocell.building import plan as plan_module
 from stereocell.building.plan import Plan
 from stereocell.building.plan_file import from_json, to_json
 from stereocell.model.errors import OutputError, UsageError
-from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of
-from stereocell.storage.json_files import (
-    find_json,
-    read_json,
-    read_sealed,
-    write_json,
-    write_sealed,
-)
-from stereocell.storage.workspace import remove, sizes_below
+from stereocell.storage.documents import NOT_WRITTEN, SETTINGS, parse
+from stereocell.storage.json_files import find_sealed, read_sealed, sealed, write_sealed
+from stereocell.storage.workspace import is_file, remove, sizes_below
 
 SURVEY = "units.schema.json#Survey"
 _PLAN = "plan.schema.json"
-_PHASES = "units.schema.json#Phases"
+PHASES, INDEX = "units.schema.json#Phases", "units.schema.json#Index"
+PROVENANCE, PLAN_KEY = "units.schema.json#Provenance", "units.schema.json#PlanKey"
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
 
@@ -41,7 +37,8 @@ class OutFolder:
     def __init__(self, out: Path) -> None:
         self.out = out
         self.plan_file = out / "plan.json"
-        self.settings_file = out / "stereocell.toml"
+        self.settings_file = out / SETTINGS
+        self.provenance_file = out / "provenance.json"
         self.units_dir = out / "units"
         self.survey_file = self.units_dir / "survey.json"
         self.index_file = out / "units" / "done.json"
@@ -89,15 +86,22 @@ class OutFolder:
                 f"{self.out} holds a build of {_what_differs(there, plan)}: "
                 "choose another OUT or remove that folder"
             )
-        write_json(self.plan_file, to_json(self._without_place(plan)))
+        self.require_readable(plan)
+        write_sealed(self.plan_file, to_json(self._without_place(plan)))
         return True
+
+    def require_readable(self, plan: Plan) -> None:
+        """Raise OutputError where no command could read the plan once it is written."""
+        content = to_json(self._without_place(plan))
+        data = json.dumps(sealed(content)).encode()
+        from_json(parse(self.plan_file, data, _PLAN, NOT_WRITTEN), NOT_WRITTEN)
 
     def plan(self) -> Plan:
         """Return the plan. Raises OutputError if there is none or it breaks its schema."""
         remedy = "run `stereocell plan INPUT -o OUT` first"
         if self.plan_file.exists():
             remedy = f"remove it and {remedy}"
-        return self._in_place(from_json(read_json(self.plan_file, _PLAN, remedy)))
+        return self._in_place(from_json(read_sealed(self.plan_file, _PLAN, remedy)))
 
     def _without_place(self, plan: Plan) -> Plan:
         """Return a plan whose channel sources inside OUT are paths relative to OUT."""
@@ -137,28 +141,28 @@ class OutFolder:
 
     def survey(self) -> dict[str, Any]:
         """Return each channel's statistics, iso-values by tile, and appearance, by channel id."""
-        sealed = read_sealed(self.survey_file, SURVEY, _RUN_UNITS)
-        return dict(sealed["channels"])
+        found = read_sealed(self.survey_file, SURVEY, _RUN_UNITS)
+        return dict(found["channels"])
 
     def save_survey(self, content: Mapping[str, Any]) -> None:
         write_sealed(self.survey_file, {"channels": dict(content)})
 
     def index(self) -> dict[str, str]:
         """Return the key of each finished unit, by `<tile>/<channel>`. Raises OutputError."""
-        return dict(read_json(self.index_file, "units.schema.json#Index", _RUN_UNITS))
+        return read_sealed(self.index_file, INDEX, _RUN_UNITS)
 
     def save_units(self, plan: Plan, keys: Mapping[str, str]) -> None:
         """Save the units' keys, and a hash of the plan that they were built for."""
-        write_json(self.index_file, dict(keys))
-        write_bytes(self.units_plan_file, self._key(plan).encode())
+        write_sealed(self.index_file, keys)
+        write_sealed(self.units_plan_file, {"key": self._key(plan)})
 
     def _key(self, plan: Plan) -> str:
         return key_of(to_json(self._without_place(plan)), plan_module)
 
     def require_units_of(self, plan: Plan) -> None:
         """Raise OutputError unless all units of the plan are listed as built."""
-        signed = self.units_plan_file
-        if not signed.is_file() or signed.read_bytes() != self._key(plan).encode():
+        signed = find_sealed(self.units_plan_file, PLAN_KEY)
+        if signed is None or signed["key"] != self._key(plan):
             raise OutputError(
                 f"{self.out / 'units'}: not built for the plan in {self.plan_file.name}: "
                 f"{_RUN_UNITS}"
@@ -187,14 +191,28 @@ class OutFolder:
 
     def phases(self) -> dict[str, dict[str, Any]]:
         """Return the record of each phase; without a valid file no phase counts as done."""
-        return dict(find_json(self.phases_file, _PHASES) or {})
+        return find_sealed(self.phases_file, PHASES) or {}
+
+    def phases_fault(self) -> str | None:
+        """Return a line on a record of the phases that can't be trusted; None: it can, or there is
+        none yet.
+        """
+        if not is_file(self.phases_file):
+            return None
+        try:
+            read_sealed(self.phases_file, PHASES, "so no phase counts as done")
+        except OutputError as fault:
+            return str(fault)
+        return None
 
     def is_begun(self, name: str) -> bool:
         """Return whether a phase began and did not finish."""
         return not self.phases().get(name, {"key": "done"})["key"]
 
     def require_finished(self, name: str) -> None:
-        """Raise OutputError where a phase began and did not finish."""
+        """Raise OutputError where a phase began and did not finish, or nothing says whether."""
+        if is_file(self.phases_file):
+            read_sealed(self.phases_file, PHASES, f"run `stereocell {name} OUT` first")
         if self.is_begun(name):
             raise OutputError(
                 f"{self.out / name}: begun and not finished: run `stereocell {name} OUT` first"
@@ -203,7 +221,7 @@ class OutFolder:
     def save_phase(self, name: str, key: str, results: str, seconds: float, about: str) -> None:
         """Save a phase's key and a digest of its results; an empty key: it isn't finished."""
         entry = {"key": key, "results": results, "seconds": round(seconds, 2), "about": about}
-        write_json(self.phases_file, {**self.phases(), name: entry})
+        write_sealed(self.phases_file, {**self.phases(), name: entry})
 
 
 def _with_sources(plan: Plan, change: Callable[[str], str]) -> Plan:

@@ -43,6 +43,8 @@ class Phase:
 def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
     """Print and save a phase's duration; print "up to date" for a phase without work."""
     start = time.perf_counter()
+    if (fault := out_folder.phases_fault()) is not None:
+        console.print(f"{name}: {fault}", markup=False, soft_wrap=True)
     phase = Phase(out_folder, name)
     yield phase
     seconds = time.perf_counter() - start
@@ -81,9 +83,13 @@ def digest_of_bundle(out_folder: OutFolder) -> str:
 
 def digest_of_manifest(out_folder: OutFolder) -> str:
     """Return a digest of the bundle's manifest, which is in no list; empty: there is none."""
-    manifest = out_folder.bundle_dir / bundle_writer.MANIFEST
-    with cached(manifest):
-        return str(measure(manifest)["sha256"])[:20] if manifest.is_file() else ""
+    return digest_of_file(out_folder.bundle_dir / bundle_writer.MANIFEST)
+
+
+def digest_of_file(file: Path) -> str:
+    """Return a digest of a file's content; empty: there is none."""
+    with cached(file):
+        return str(measure(file)["sha256"])[:20] if file.is_file() else ""
 
 
 def digest_of_stage(out_folder: OutFolder) -> str:

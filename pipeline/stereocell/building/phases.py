@@ -31,7 +31,7 @@ from stereocell.building.phase import (
 )
 from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
 from stereocell.building.plan_notes import told_in_vain, told_of_gaps
-from stereocell.building.settings import INTENSITY, Settings, to_dict, to_toml
+from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
 from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
 from stereocell.building.survey_file import appearance_to_json, read_survey
 from stereocell.building.tasks import components, evidence, unit, window
@@ -49,11 +49,11 @@ from stereocell.read.image import printable
 from stereocell.read.readers import format_of, module_of, reader_of
 from stereocell.read.remarks import CAST
 from stereocell.storage.assets import viewer_dist
-from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.file_list import FileList
-from stereocell.storage.json_files import write_json
+from stereocell.storage.json_files import write_sealed
 from stereocell.storage.location import Location, require_apart
+from stereocell.storage.sealed_text import write_sealed_text
 from stereocell.storage.workspace import is_file, objects_below, remove
 from stereocell.textures.map_packages import (
     UNWRAPPER,
@@ -77,10 +77,11 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
     out_folder.require_name()
     with phase_of(out_folder, "plan") as phase:
         plan = settle(source, settings)
+        text = to_readable_toml(plan.settings)
         out_folder.require_writable()
         phase.is_up_to_date = not out_folder.save_plan(plan)
-        write_bytes(out_folder.settings_file, to_toml(plan.settings).encode())
-        write_json(out / "provenance.json", provenance(plan))
+        write_sealed_text(out_folder.settings_file, text)
+        write_sealed(out_folder.provenance_file, provenance(plan))
     shape = " x ".join(str(n) for n in plan.region.shape)
     console.print(
         f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
@@ -341,8 +342,10 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
     out_folder = OutFolder(out)
     with phase_of(out_folder, "bundle") as phase:
         out_folder.require_finished("stage")
-        if out_folder.plan().settings.unwrap.maps:
-            require_map_packages()
+        if is_file(out_folder.plan_file):
+            plan = out_folder.plan()  # no phase goes on beside a plan that was changed by hand
+            if plan.settings.unwrap.maps:
+                require_map_packages()
         path = stage if stage is not None else out_folder.stage_file
         if not is_file(path):
             remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"

@@ -13,6 +13,7 @@ from stereocell.model.settings import AUTO
 from stereocell.model.tiling import Box
 
 _FORMAT, _VERSION = "stereocell-plan", 1
+_AGAIN = "remove it and run `stereocell plan INPUT -o OUT`"
 
 
 @cache
@@ -32,7 +33,7 @@ def to_json(plan: Plan) -> dict[str, Any]:
     return {"format": _FORMAT, "version": _VERSION, **content}
 
 
-def from_json(content: Mapping[str, Any]) -> Plan:
+def from_json(content: Mapping[str, Any], remedy: str = _AGAIN) -> Plan:
     """Return the plan that `to_json` was given; the content has passed its schema.
 
     Raises OutputError for what no plan of ours says.
@@ -46,7 +47,7 @@ def from_json(content: Mapping[str, Any]) -> Plan:
         first = error.errors(include_url=False)[0]
         fault = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
     if fault is not None:
-        raise OutputError(f"plan.json: {fault}: remove it and run `stereocell plan INPUT -o OUT`")
+        raise OutputError(f"plan.json: {fault}: {remedy}")
     return plan
 
 

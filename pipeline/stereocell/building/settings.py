@@ -20,6 +20,7 @@ from stereocell.model.errors import UsageError
 from stereocell.model.modality import MODALITIES
 from stereocell.model.settings import AUTO, Flag, setting
 from stereocell.objects.options import ObjectOptions
+from stereocell.storage.documents import SETTINGS
 from stereocell.textures.options import UnwrapOptions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.windows import parse_window
@@ -389,6 +390,17 @@ def to_toml(settings: Settings, *, header: str = RECORD) -> str:
         for f in fields(value):
             lines.append(f"{f.name} = {_toml(getattr(value, f.name))}  # {f.metadata['comment']}")
     return "\n".join(lines) + "\n"
+
+
+def to_readable_toml(settings: Settings) -> str:
+    """Return the settings as `to_toml` does, after a check that `load` reads the same from them.
+
+    Raises UsageError where it would not.
+    """
+    text = to_toml(settings)
+    if apply(Settings(), tomllib.loads(text), SETTINGS) != settings:
+        raise UsageError(f"{SETTINGS}: would be read as other settings than those of the plan")
+    return text
 
 
 def _toml(value: Any) -> str:

@@ -35,7 +35,7 @@ from stereocell.read.readers import reader_of
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.file_states import unchanged_while_read
-from stereocell.storage.json_files import write_json
+from stereocell.storage.json_files import write_json, write_sealed
 from stereocell.storage.location import Location
 from stereocell.tissue import classify as tissue_module
 from stereocell.tissue import onnx_classifier as network_module
@@ -119,7 +119,7 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
         record = _learn(out_folder, plan, channel, options, network, settings, key)
     plan = with_tissue(plan, out, record)
     out_folder.save_plan(plan)
-    write_json(out / "provenance.json", provenance(plan))
+    write_sealed(out_folder.provenance_file, provenance(plan))
     return plan
 
 
@@ -133,9 +133,16 @@ def without_tissue(plan: Plan) -> Plan:
 
 def with_tissue(plan: Plan, out: Path, record: dict[str, Any]) -> Plan:
     """Return the plan with a channel for each class of OUT/tissue."""
-    source = str((out / FOLDER / VOXELS).resolve())
-    fingerprint = open_source(SourceRef(source, 0, ())).fingerprint
+    fingerprint = open_source(SourceRef(_source_in(out), 0, ())).fingerprint
     _require_free([one["name"] for one in record["classes"]], plan)
+    return _with_classes(plan, _source_in(out), fingerprint, record)
+
+
+def _source_in(out: Path) -> str:
+    return str((out / FOLDER / VOXELS).resolve())
+
+
+def _with_classes(plan: Plan, source: str, fingerprint: str, record: dict[str, Any]) -> Plan:
     added = []
     for index, one in enumerate(record["classes"]):
         red, green, blue = one["color"]
@@ -152,7 +159,13 @@ def _load_network(path: Path) -> Network:
             content = path.read_bytes()
         except OSError as error:
             raise SourceError(f"{path}: {error.strerror}, expected an ONNX model") from None
-    return Network.load(path, content)
+    network = Network.load(path, content)
+    for name in network.classes:
+        if not name.isprintable():
+            raise SourceError(
+                f"{path}: names of classes: found {name!r:.80}, expected names that can be shown"
+            )
+    return network
 
 
 def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
@@ -223,6 +236,8 @@ def _learn(
         "libraries": libraries_of(tissue_module, network_module),
     }
     shape = dataset.levels[plan.level].shape
+    # before anything is written; the fingerprint is that of no volume
+    out_folder.require_readable(_with_classes(plan, _source_in(out_folder.out), "0" * 64, record))
     with replacing_folder(out_folder.out / FOLDER) as folder:
         write_probabilities(
             folder / VOXELS,

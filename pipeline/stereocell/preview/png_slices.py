@@ -6,7 +6,6 @@
 The window is found as in a build, so that 0 and 255 mean the same here as there.
 """
 
-import json
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +33,7 @@ from stereocell.preview.cut_planes import (
 )
 from stereocell.preview.views import views_of
 from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.json_files import write_json
 
 INDEX = "slices.json"
 FORMAT, VERSION = "stereocell-slices", 2
@@ -79,7 +79,7 @@ def write_slices(plan: Plan, folder: Path, *, plane: str = ACQUIRED) -> Written:
         for name, picture in zip(names, cut.planes, strict=True):
             Image.fromarray(to_bytes(picture, window)).save(new / name)
         content = _describe(plan, cut, window, names)
-        (new / INDEX).write_bytes((json.dumps(content, indent=1) + "\n").encode())
+        write_json(new / INDEX, content)
     return Written(count, cut.view.name, _line(plan, cut))
 
 

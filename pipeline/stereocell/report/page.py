@@ -41,7 +41,7 @@ from stereocell.report.texture_facts import compare, sum_up_maps
 from stereocell.report.texture_similarity import CLOSE_PX, ERROR_PX
 from stereocell.report.thresholds import draw_cut, draw_threshold
 from stereocell.report.tissue import TissueFacts, find_tissue
-from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.sealed_text import write_sealed_text
 from stereocell.textures.unwrap import mip_levels_apart
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
@@ -59,7 +59,7 @@ def write_report(out: Path) -> None:
     """
     out_folder = OutFolder(out)
     facts = gather(out_folder)
-    write_bytes(out_folder.report_file, render(out_folder, facts).encode())
+    write_sealed_text(out_folder.report_file, render(out_folder, facts))
 
 
 def render(out_folder: OutFolder, facts: Facts) -> str:

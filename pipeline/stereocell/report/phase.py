@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.phase import digest_of, phase_of
+from stereocell.building.phase import digest_of_file, phase_of
 from stereocell.building.phases import provenance
 from stereocell.report import page
 from stereocell.storage.cache_key import key_of
@@ -22,5 +22,5 @@ def run_report(out: Path) -> None:
         others = {name: entry for name, entry in out_folder.phases().items() if name != "report"}
         content = [out_folder.index(), out_folder.survey(), provenance(plan), others]
         key = key_of([content, page.TEMPLATE.read_text("utf-8")], page)
-        if not phase.is_done(key, partial(digest_of, [out_folder.report_file])):
+        if not phase.is_done(key, partial(digest_of_file, out_folder.report_file)):
             page.write_report(out)

@@ -4,6 +4,7 @@ Temporary names are never used twice, and a worker of a command that has ended r
 worker that was cut off, for example because its scheduler was killed, can't damage a build that
 went on without it. The next writer removes its temporary files.
 
+A document of a build is parsed before it takes its place, by the code that reads it: documents.py.
 With OUT on object storage, the file is then uploaded: see workspace.py.
 """
 
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from stereocell.model.errors import OutputError
 from stereocell.storage.claim import require_asked
+from stereocell.storage.documents import require_readable
 from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import making, upload
 
@@ -25,7 +27,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path with the suffix of `path`; at the end, it takes the place of `path`.
 
     If the body raises, nothing is left behind. Raises OutputError where the system refuses
-    (rights, space).
+    (rights, space), and for a document that no command could read.
     """
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
     require_asked()
@@ -37,6 +39,7 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
             with temporary.open("rb+") as file:
                 os.fsync(file.fileno())
+            require_readable(path, temporary)
             require_asked()
             os.replace(temporary, path)
             upload(path)

@@ -1,5 +1,7 @@
 """JSON files of ours: checked against their schema, with errors of one line; written whole.
 
+A document is checked by the same code when it is written and when it is read: see documents.py.
+
 A sealed file has a hash of its other content, `sha256`: a schema can't detect a changed digit of a
 number, and the build would go on with it.
 """
@@ -7,24 +9,15 @@ number, and the build would go on with it.
 import hashlib
 import json
 from collections.abc import Mapping
-from functools import cache
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import best_match
-
 from stereocell.model.errors import OutputError
-from stereocell.storage.assets import schema_path
 from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.documents import NOT_WRITTEN, parse
 from stereocell.storage.workspace import fetch
 
 _SEAL = "sha256"
-# Schemas and hashes of documents that fitted: a unit's record is read with each of its files, and
-# the schema took up to 20 ms of each time, a fifth of a small build
-_fitting: set[tuple[str, bytes]] = set()
-_MAX_FITTING = 100_000
 
 
 def read_json(path: Path, schema: str | None, remedy: str) -> Any:
@@ -38,37 +31,11 @@ def read_json(path: Path, schema: str | None, remedy: str) -> Any:
     fetch(path)
     try:
         data = path.read_bytes()
-        content = json.loads(data, parse_constant=_refuse, parse_float=_finite)
     except FileNotFoundError:
         raise OutputError(f"{path} is missing: {remedy}") from None
     except OSError as error:
         raise OutputError(f"{path}: can't be read ({error.strerror})") from None
-    except (ValueError, RecursionError) as error:  # of deeply nested lists
-        raise OutputError(f"{path}: damaged, no JSON ({error}): {remedy}") from None
-    if schema is None:
-        return content
-    document = (schema, hashlib.sha256(data).digest())
-    if document in _fitting:
-        return content
-    fault = best_match(_validator(schema).iter_errors(content))
-    if fault is not None:
-        reason = fault.message if len(fault.message) < 200 else f"{fault.message[:200]}..."
-        raise OutputError(f"{path}: {fault.json_path}: {reason}: {remedy}")
-    if len(_fitting) == _MAX_FITTING:
-        _fitting.clear()
-    _fitting.add(document)
-    return content
-
-
-def _refuse(name: str) -> None:
-    raise ValueError(f"{name} is no number of JSON")
-
-
-def _finite(text: str) -> float:
-    number = float(text)
-    if not isfinite(number):
-        raise ValueError(f"{text:.20} is beyond all numbers")
-    return number
+    return parse(path, data, schema, remedy)
 
 
 def find_json(path: Path, schema: str) -> Any:
@@ -80,22 +47,46 @@ def find_json(path: Path, schema: str) -> Any:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write `content` to `path` as JSON, whole or not at all. Raises OutputError."""
-    write_bytes(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
+    """Write `content` to `path` as JSON, whole or not at all.
+
+    Raises OutputError, also where it breaks the schema of a document of that name.
+    """
+    try:
+        text = json.dumps(content, indent=1, allow_nan=False)
+    except ValueError as error:  # numbers that JSON has not
+        raise OutputError(f"{path}: {error}: {NOT_WRITTEN}") from None
+    write_bytes(path, f"{text}\n".encode())
+
+
+def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content with its hash."""
+    return {**content, _SEAL: _digest_of(content)}
 
 
 def write_sealed(path: Path, content: Mapping[str, Any]) -> None:
-    """Write `content` to `path` as sealed JSON, whole or not at all. Raises OutputError."""
-    write_json(path, {**content, _SEAL: _digest_of(content)})
+    """Write `content` to `path` as sealed JSON. Raises OutputError as `write_json` does."""
+    write_json(path, sealed(content))
 
 
 def read_sealed(path: Path, schema: str, remedy: str) -> dict[str, Any]:
     """Return the content of sealed JSON, without its hash. Raises OutputError as `read_json` does,
-    and where the hash differs.
+    and where the hash differs or is missing.
     """
+    found = read_json(path, None, remedy)
+    if isinstance(found, dict) and found and _SEAL not in found:
+        raise OutputError(
+            f"{path}: has no hash of its content, expected {_SEAL!r}: it is of an earlier version, "
+            f"or was written by hand: {remedy}"
+        )
+    if isinstance(found, dict) and isinstance(expected := found.get(_SEAL), str):
+        digest = _digest_of({name: value for name, value in found.items() if name != _SEAL})
+        if expected != digest:
+            raise OutputError(
+                f"{path}: damaged or changed by hand: its content has SHA-256 {digest[:12]}, "
+                f"expected {expected[:12]}: {remedy}"
+            )
     content = dict(read_json(path, schema, remedy))
-    if content.pop(_SEAL) != _digest_of(content):
-        raise OutputError(f"{path}: damaged: {remedy}")
+    del content[_SEAL]
     return content
 
 
@@ -114,12 +105,3 @@ def _digest_of(content: Mapping[str, Any]) -> str:
 def compact_json(content: Any) -> bytes:
     """Return JSON without spaces, half the bytes, for files that a phone downloads."""
     return (json.dumps(content, separators=(",", ":"), ensure_ascii=False) + "\n").encode()
-
-
-@cache
-def _validator(schema: str) -> Draft202012Validator:
-    name, _, definition = schema.partition("#")
-    content = json.loads(schema_path(name).read_bytes())
-    if definition:
-        content = {"$defs": content["$defs"], "$ref": f"#/$defs/{definition}"}
-    return Draft202012Validator(content)

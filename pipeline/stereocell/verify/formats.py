@@ -17,7 +17,7 @@ from typing import Any
 
 from stereocell.building import unit_files
 from stereocell.building.input_unchanged import require_added
-from stereocell.building.out_folder import SURVEY, OutFolder
+from stereocell.building.out_folder import INDEX, SURVEY, OutFolder
 from stereocell.building.phase import digest_of_manifest
 from stereocell.building.survey_file import COMPONENTS, EVIDENCE, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
@@ -40,11 +40,16 @@ from stereocell.usd.read_stage import dependencies
 from stereocell.usd.validate import validate_stage, validate_usdz
 from stereocell.usd.write_tile import closed_file, has_mesh
 from stereocell.usd.write_usdz import USDZ_NAME
+from stereocell.verify.build_records import (
+    check_plan,
+    check_records,
+    check_report,
+    find_index_faults,
+)
 
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
 _MAX_SHOWN = 3  # problems printed in one line
 _NODE_TIMEOUT_S = 1200.0  # s for one script over all files
-_PLAN = "plan.schema.json"
 _BUNDLE = "bundle.schema.json"
 _RUN_BUNDLE = "run `stereocell bundle OUT`"
 _Check = tuple[str, Callable[[], str]]
@@ -83,14 +88,17 @@ def check(out: Path) -> Iterator[CheckLine]:
 
 def _checks_of_build(out: Path) -> list[_Check]:
     out_folder = OutFolder(out)
+    has_plan, has_report = is_file(out_folder.plan_file), is_file(out_folder.report_file)
     return [
-        ("plan", lambda: _check_json(out / "plan.json", _PLAN, "run `stereocell plan`")),
+        ("plan", lambda: check_plan(out_folder)),
+        *([("records", lambda: check_records(out_folder))] if has_plan else []),
         *([("tissue", lambda: _check_tissue(out))] if (out / FOLDER).exists() else []),
         *([("units", lambda: _check_units(out_folder))] if out_folder.index_file.exists() else []),
         ("stage hashes", lambda: _check_stage_hashes(out_folder)),
         ("stage", lambda: _check_stage(out)),
         ("stage files", lambda: _check_stage_files(out)),
         ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
+        *([("report", lambda: check_report(out_folder))] if has_report else []),
     ]
 
 
@@ -123,8 +131,9 @@ def _check_tissue(out: Path) -> str:
 
 def _check_units(out_folder: OutFolder) -> str:
     """Check the units' files against the hashes in unit.json, and the survey behind them."""
-    problems, files = _spoilt_survey(out_folder), 0
-    for name, key in out_folder.index().items():
+    problems, files = [*find_index_faults(out_folder), *_spoilt_survey(out_folder)], 0
+    index = find_sealed(out_folder.index_file, INDEX) or {}
+    for name, key in index.items():
         tile_id, channel_id = name.split("/")
         folder = out_folder.unit_dir(tile_id, channel_id, key)
         files += len(sizes_below(folder))
@@ -133,7 +142,7 @@ def _check_units(out_folder: OutFolder) -> str:
             for file, fault in unit_files.find_damage(folder).items()
         ]
     _raise_on_all(problems, "remove what is damaged and run `stereocell units OUT`")
-    return f"{files} files of {len(out_folder.index())} units"
+    return f"{files} files of {len(index)} units"
 
 
 def _spoilt_survey(out_folder: OutFolder) -> list[str]:
@@ -437,7 +446,7 @@ def _check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
             expected = measure(bundle / FILES)
         if entry != expected:
             problems.append(f"{reference['path']}: a reference to it has another hash")
-    if out_folder is not None and not problems and not _is_own_manifest(out_folder):
+    if out_folder is not None and not _is_own_manifest(out_folder):
         problems.append(f"{MANIFEST}: not the bytes that were written")
     _raise_on_all(sorted(problems), f"remove what is damaged and {_RUN_BUNDLE}")
     return f"{len(listed)} files, {len(references)} references"

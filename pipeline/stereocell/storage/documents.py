@@ -1,0 +1,125 @@
+"""The documents of a build: which schema each JSON file has, and the one place that checks them.
+
+`atomic_write` calls `require_readable` before a document takes its place, and `read_json` parses by
+the same code. So a command that would write a document that no command can read fails in one line,
+and leaves what was there. A reader that knows more rules than a schema, as that of plan.json, is
+also asked by the writer of that file.
+"""
+
+import hashlib
+import json
+import re
+import tomllib
+from functools import cache
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import best_match
+
+from stereocell.model.errors import OutputError
+from stereocell.storage.assets import schema_path
+
+# name of a document -> its schema, a file of schemas/ with `#Name` for one of its definitions;
+# None: its reader checks it by rules of its own, and here it must be JSON
+SCHEMAS: dict[str, str | None] = {
+    r"plan\.json": "plan.schema.json",
+    r"provenance\.json": "units.schema.json#Provenance",
+    r"phases\.json": "units.schema.json#Phases",
+    r"plan\.key": "units.schema.json#PlanKey",
+    r"survey\.json": "units.schema.json#Survey",
+    r"done\.json": "units.schema.json#Index",
+    r"unit\.json": "units.schema.json#Unit",
+    r"seconds\.json": "units.schema.json#Seconds",
+    r"stage\.json": "units.schema.json#StageTile",
+    r"window-.*\.json": "units.schema.json#Window",
+    r"evidence-.*\.json": "units.schema.json#Evidence",
+    r"components-.*\.json": "units.schema.json#Components",
+    r"extents-.*\.json": "units.schema.json#Extents",
+    r"notes-.*\.json": "units.schema.json#Notes",
+    r"tissue\.json": "tissue.schema.json",
+    r"manifest\.json": "bundle.schema.json",
+    r"volumes\.json": "volumes.schema.json",
+    r"transfer2d\.json": "transfer2d.schema.json",
+    r"objects\.json": "objects.schema.json",
+    r"slices\.json": "slices.schema.json",
+    r"(files|tile|tileset|finer.*|.*_level|stereocell-published)\.json": None,
+}
+SETTINGS = "stereocell.toml"
+NOT_WRITTEN = "not written, as no command could read it"
+# Schemas and hashes of documents that fitted: a unit's record is read with each of its files, and
+# the schema took up to 20 ms of each time, a fifth of a small build
+_fitting: set[tuple[str, bytes]] = set()
+_MAX_FITTING = 100_000
+
+
+def require_readable(path: Path, written: Path) -> None:
+    """Raise OutputError where the content of `written` can't be read once it lies at `path`.
+
+    Only documents of a build are looked at, by the name of `path`.
+    """
+    if path.name == SETTINGS:
+        try:
+            tomllib.loads(written.read_bytes().decode())
+        except ValueError as error:
+            raise OutputError(f"{path}: no TOML ({error}): {NOT_WRITTEN}") from None
+    elif _is_document(path.name):
+        parse(path, written.read_bytes(), schema_of(path.name), NOT_WRITTEN)
+
+
+@cache
+def _is_document(name: str) -> bool:
+    return any(re.fullmatch(pattern, name) for pattern in SCHEMAS)
+
+
+def schema_of(name: str) -> str | None:
+    """Return the schema of a document by its file's name; None: it has none."""
+    return next((schema for one, schema in SCHEMAS.items() if re.fullmatch(one, name)), None)
+
+
+def parse(path: Path, data: bytes, schema: str | None, remedy: str) -> Any:
+    """Return the content of a JSON document that fits `schema`; None: of any JSON.
+
+    path    the document's place, for messages
+    remedy  the user's next step, for messages
+
+    Raises OutputError; its text names file, field and remedy.
+    """
+    try:
+        content = json.loads(data, parse_constant=_refuse, parse_float=_finite)
+    except (ValueError, RecursionError) as error:  # of deeply nested lists
+        raise OutputError(f"{path}: damaged, no JSON ({error}): {remedy}") from None
+    if schema is None:
+        return content
+    document = (schema, hashlib.sha256(data).digest())
+    if document in _fitting:
+        return content
+    fault = best_match(_validator(schema).iter_errors(content))
+    if fault is not None:
+        reason = fault.message if len(fault.message) < 200 else f"{fault.message[:200]}..."
+        raise OutputError(f"{path}: {fault.json_path}: {reason}: {remedy}")
+    if len(_fitting) == _MAX_FITTING:
+        _fitting.clear()
+    _fitting.add(document)
+    return content
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is no number of JSON")
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not isfinite(number):
+        raise ValueError(f"{text:.20} is beyond all numbers")
+    return number
+
+
+@cache
+def _validator(schema: str) -> Draft202012Validator:
+    name, _, definition = schema.partition("#")
+    content = json.loads(schema_path(name).read_bytes())
+    if definition:
+        content = {"$defs": content["$defs"], "$ref": f"#/$defs/{definition}"}
+    return Draft202012Validator(content)

@@ -1,0 +1,182 @@
+"""Each record of a build holds a hash, and is checked by the same code when written and read."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.cli.__main__ import main
+from stereocell.model.errors import OutputError
+from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.documents import SCHEMAS, SETTINGS, schema_of
+from stereocell.storage.json_files import write_json
+from stereocell.verify.formats import check
+from support import phantoms
+
+RECORDS = ("plan.json", "provenance.json", SETTINGS, "phases.json", "report/index.html")
+OF_UNITS = ("units/plan.key", "units/done.json", "units/survey.json")
+# commands that read OUT, and would build from it
+COMMANDS = (
+    ["units"],
+    ["units", "--only", "r0_c0/F"],
+    ["stage"],
+    ["bundle"],
+    ["report"],
+    ["tissue"],
+)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sealed")
+    source = phantoms.write_ome_tiff(
+        folder / "f.ome.tif", phantoms.f_phantom()[None], "CZYX", names=["F"]
+    )
+    build = ["build", str(source), "-o", str(folder / "out"), "--workers", "0", "--grid", "1x1"]
+    assert main(build) == 0
+    return folder / "out"
+
+
+@pytest.fixture
+def out(built: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(built, tmp_path / "out")
+
+
+def _faults(out: Path) -> str:
+    return "\n".join(line.detail for line in check(out) if not line.ok)
+
+
+def _change(file: Path) -> None:
+    """Change the last digit or letter of a file that stands before its last 160 bytes."""
+    data = bytearray(file.read_bytes())
+    place = next(
+        k for k in range(max(len(data) - 160, len(data) // 2), 0, -1) if data[k : k + 1].isalnum()
+    )
+    data[place] = ord("1") if data[place] != ord("1") else ord("2")
+    file.write_bytes(data)
+
+
+def _answer(capfd: pytest.CaptureFixture[str]) -> str:
+    said = capfd.readouterr().err
+    assert "Traceback" not in said
+    (line,) = [line for line in said.splitlines() if line.startswith("stereocell: ")]
+    return line
+
+
+def test_every_file_of_a_build_is_held_by_a_hash(built: Path, tmp_path: Path) -> None:
+    names = {f.relative_to(built).as_posix() for f in built.rglob("*") if f.is_file()}
+    # results rest on neither: the second only says which tiles of the stage need no work
+    names = {name for name in names if not name.endswith(("seconds.json", "stage.json"))}
+    lists = {"stage/files.json", "bundle/files.json", "bundle/manifest.json"}
+    lists |= {name for name in names if name.endswith("unit.json")}
+    for changed in ({*RECORDS, *OF_UNITS}, lists, names - {*RECORDS, *OF_UNITS} - lists):
+        out = shutil.copytree(built, tmp_path / f"out {len(changed)}")
+        for name in changed:
+            _change(out / name)
+        told = _faults(out)
+        assert {name for name in changed if Path(name).name not in told} == set()
+    assert _faults(built) == ""
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_changed_record_is_named_with_what_was_found_and_expected(out: Path, name: str) -> None:
+    _change(out / name)
+    told = _faults(out)
+    assert f"{out / name}: damaged or changed by hand: its content has SHA-256 " in told
+    assert ", expected " in told
+    assert "run `stereocell" in told
+
+
+def _thicker(file: Path) -> None:
+    """Double the spacing along z, as a person who believes the plan to be a setting."""
+    plan = json.loads(file.read_bytes())
+    plan["spacing_um"][0] *= 2
+    file.write_text(json.dumps(plan, indent=1))
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_no_phase_builds_from_a_plan_that_was_edited_by_hand(
+    out: Path, capfd: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    _thicker(out / "plan.json")
+    before = {f: f.read_bytes() for f in out.rglob("*") if f.is_file()}
+    assert main([command[0], str(out), *command[1:]]) == 1
+    line = _answer(capfd)
+    assert f"{out / 'plan.json'}: damaged or changed by hand" in line
+    assert "remove it and run `stereocell plan INPUT -o OUT`" in line
+    assert {f: f.read_bytes() for f in out.rglob("*") if f.is_file()} == before
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_plan_of_an_earlier_version_is_answered_by_the_remedy(
+    out: Path, built: Path, capfd: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    plan = json.loads((out / "plan.json").read_bytes())
+    del plan["sha256"]
+    (out / "plan.json").write_text(json.dumps(plan))
+    assert main([command[0], str(out), *command[1:]]) == 1
+    line = _answer(capfd)
+    assert "plan.json: has no hash of its content" in line
+    assert "of an earlier version" in line
+    (out / "plan.json").unlink()  # the remedy
+    assert main(["plan", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]) == 0
+    assert (out / "plan.json").read_bytes() == (built / "plan.json").read_bytes()
+
+
+def test_phases_that_were_changed_by_hand_are_named_and_done_again(
+    out: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    _change(out / "phases.json")
+    assert main(["bundle", str(out), "--workers", "0"]) == 1
+    assert "run `stereocell stage OUT` first" in _answer(capfd)
+    assert main(["stage", str(out), "--workers", "0"]) == 0
+    assert "phases.json: damaged or changed by hand" in capfd.readouterr().err
+    assert main(["bundle", str(out), "--workers", "0"]) == 0
+    assert "damaged" not in capfd.readouterr().err
+
+
+def test_units_of_another_plan_are_not_taken_for_those_of_this_one(
+    out: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    _change(OutFolder(out).units_plan_file)
+    assert main(["stage", str(out), "--workers", "0"]) == 1
+    assert "not built for the plan in plan.json: run `stereocell units OUT`" in _answer(capfd)
+
+
+# --- one rule for writing and reading
+
+
+def test_every_json_file_of_a_build_has_a_row_in_the_table_of_documents(built: Path) -> None:
+    for file in [*built.rglob("*.json"), built / "units" / "plan.key"]:
+        schema_of(file.name)
+        write_bytes(file, file.read_bytes())  # as it is, it may be written
+
+
+def _a_name(pattern: str) -> str:
+    return pattern.replace("\\", "").replace(".*", "x")
+
+
+@pytest.mark.parametrize("pattern", [one for one, schema in SCHEMAS.items() if schema])
+@pytest.mark.parametrize(
+    "write", [write_json, lambda file, c: write_bytes(file, json.dumps(c).encode())]
+)
+def test_document_that_no_command_could_read_is_not_written(
+    tmp_path: Path, pattern: str, write: Callable[[Path, object], None]
+) -> None:
+    file = tmp_path / _a_name(pattern)
+    file.write_text("as it was")
+    with pytest.raises(OutputError, match="not written, as no command could read it"):
+        write(file, {"of": "another kind"})
+    assert file.read_text() == "as it was"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_settings_and_numbers_that_no_reader_takes_are_not_written(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="no TOML"):
+        write_bytes(tmp_path / SETTINGS, b"[plan\n")
+    with pytest.raises(OutputError, match="not written"):
+        write_json(tmp_path / "seconds.json", {"meshes": float("nan")})
+    assert list(tmp_path.iterdir()) == []
