@@ -8,6 +8,7 @@ from stereocell.read.tables.delimited import read_delimited
 from stereocell.read.tables.parquet import read_parquet
 from stereocell.read.tables.table import KEYS, Table, TableColumn
 from stereocell.storage.first_bytes import identify, pointer_words
+from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location, first_bytes
 
 __all__ = ["KEYS", "Table", "TableColumn", "read_table"]
@@ -24,6 +25,11 @@ def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Ta
     Raises SourceError where the table can't be read or lacks a column.
     """
     location = Location.of(place)
+    with library_boundary(location.shown, "a table that is whole"):
+        return _read(location, key, wanted, labels)
+
+
+def _read(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:
     name = location.parts[-1].lower() if location.parts else ""
     if name.endswith((".csv", ".tsv", ".txt", ".parquet", ".h5ad")) and location.is_local:
         _require_sound(location, name)
