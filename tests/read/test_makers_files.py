@@ -187,7 +187,7 @@ def test_an_nd2_without_its_end_is_cut_short(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("suffix", "library"), [("czi", "pylibCZIrw.czi"), ("lif", "liffile"), ("nd2", "nd2")]
+    ("suffix", "library"), [("czi", "pylibCZIrw"), ("lif", "liffile"), ("nd2", "nd2")]
 )
 def test_without_its_extra_a_format_says_how_to_get_it(
     tmp_path: Path, suffix: str, library: str, monkeypatch: pytest.MonkeyPatch

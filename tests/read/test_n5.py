@@ -220,6 +220,8 @@ def test_a_bomb_unpacks_no_further_than_its_block(tmp_path: Path) -> None:
         ("dataType", "object", "dataType"),
         ("compression", {"type": "jpeg"}, "compression 'jpeg'"),
         ("pixelResolution", {"dimensions": "wide", "unit": "nm"}, "--spacing-um"),
+        ("pixelResolution", {"dimensions": [10**400] * 3, "unit": "nm"}, "found inf um"),
+        ("downsamplingFactors", [10**400] * 3, "found inf um"),
     ],
 )
 def test_fields_out_of_order_are_named(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stereocell.read.spacing import Triple, um_per
+from stereocell.read.stated_numbers import numbers_of
 
 _SIZES = ("resolution", "spacing", "voxel_size", "voxel_spacing", "pixel_size", "pixelSize")
 _UNITS = ("units", "unit")
@@ -52,7 +53,4 @@ def _text(value: Any) -> str:
 
 
 def _numbers(value: Any) -> list[float]:
-    try:
-        return [float(number) for number in np.ravel(value)] if value is not None else []
-    except (TypeError, ValueError):
-        return []
+    return numbers_of(np.ravel(value)) if value is not None else []

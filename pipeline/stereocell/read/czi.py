@@ -2,14 +2,14 @@
 
 It is Zeiss's own library, under LGPL-3.0. czifile (BSD) asks for Python 3.12, and composes
 a mosaic whole, not a window of it; bioio-czi stands on this one. The finest level alone is read.
-Scenes are series.
+Scenes are series. The library decodes in C++, so it runs in a child process
+(storage/child_process.py); voxels come back through a pipe.
 
 References: https://zeiss.github.io/libczi/
 """
 
-import os
 import re
-import struct
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
@@ -21,45 +21,42 @@ from numpy.typing import NDArray
 from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
 from stereocell.read import extras
+from stereocell.read.czi_file import CziFacts, CziFile, Rectangle
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import Grid, Triple
+from stereocell.storage.child_process import Child
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
 _TYPES = {"Gray8": "u1", "Gray16": "u2", "Gray32Float": "f4"}
 _OTHERS = {"V": "views", "H": "phases", "I": "illuminations", "R": "rotations", "B": "blocks"}
-_SEGMENT = struct.Struct("<16s2q")  # a segment's name, its length, and how much of it is used
-_PLACES = struct.Struct("<2q")  # places of the directory of voxels and of the metadata
-_PLACES_AT = 84  # bytes from the file's start
 _UM_PER_METER = 1e6
-_Rectangle = tuple[int, int, int, int]  # x, y, width, height
 
 
 class _File:
-    """An open file: its bounds, scenes and metadata."""
+    """A file that is open in a child process: its bounds, scenes and metadata."""
 
     def __init__(self, location: Location, stack: ExitStack) -> None:
         self.where = location.shown
         require_file(location)
-        with extras.required("czi", self.where, "CZI"):
-            import pylibCZIrw.czi as library
+        extras.require_installed("pylibCZIrw", "czi", self.where, "CZI")
         with one_line(self.where, "a CZI file that is whole"):
-            path = os.path.realpath(location.path)
-            _require_whole(path, self.where)
-            self.czi = stack.enter_context(library.open_czi(path))
-            self.bounds: dict[str, tuple[int, int]] = dict(self.czi.total_bounding_box)
-            self.types: list[str] = [str(kind) for _, kind in sorted(self.czi.pixel_types.items())]
-            scenes = sorted(self.czi.scenes_bounding_rectangle.items())
-            self.metadata = _parsed(self.czi.raw_metadata)
+            self._child = stack.enter_context(Child(CziFile, location.path, self.where))
+            facts: CziFacts = self._child.call("facts")
+            self.metadata = _parsed(facts.metadata)
+        self.bounds, self.types = facts.bounds, facts.types
         x, y = self.bounds.get("X", (0, 0)), self.bounds.get("Y", (0, 0))
         all_of_it = (x[0], y[0], x[1] - x[0], y[1] - y[0])
-        self.scenes: list[tuple[int | None, _Rectangle]] = [
-            (index, (box.x, box.y, box.w, box.h)) for index, box in scenes
-        ] or [(None, all_of_it)]
+        self.scenes: Sequence[tuple[int | None, Rectangle]] = facts.scenes or [(None, all_of_it)]
         self.spacing = _spacing(self.metadata)
+
+    def read(self, window: Rectangle, plane: dict[str, int], scene: int | None) -> NDArray[Any]:
+        """Return the pixels of a window of a plane. Raises SourceError, ChildError."""
+        voxels: NDArray[Any] = self._child.call("read", window, plane, scene)
+        return voxels
 
     def size(self, axis: str) -> int:
         low, high = self.bounds.get(axis, (0, 1))
@@ -75,29 +72,6 @@ class _File:
             )
             for _, (_, _, width, height) in self.scenes
         ]
-
-
-def _require_whole(path: str, where: str) -> None:
-    """Raise SourceError where the directory or the metadata, mostly written last, are not there."""
-    size = os.path.getsize(path)
-    with open(path, "rb") as file:
-        file.seek(_PLACES_AT)
-        head = file.read(_PLACES.size)
-        needed = _PLACES_AT + _PLACES.size
-        if len(head) == _PLACES.size:
-            needed = 0
-            for place in _PLACES.unpack(head):
-                if place <= 0:
-                    continue
-                file.seek(place)
-                segment = file.read(_SEGMENT.size)
-                length = _SEGMENT.unpack(segment)[2] if len(segment) == _SEGMENT.size else 0
-                needed = max(needed, place + _SEGMENT.size + max(0, length))
-    if needed > size:
-        raise SourceError(
-            f"{where}: cut short at byte {size} of {needed} or more, expected a CZI file that is "
-            "whole (copy or download it again)"
-        )
 
 
 def read_image(location: Location, *, series: int = 0) -> Image:
@@ -140,8 +114,7 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
         plane = {axis: first[axis] + at for axis, at in zip("TCZ", place, strict=True)}
         y, x = top + rows.start, left + columns.start
         roi = (x, y, columns.stop - columns.start, rows.stop - rows.start)
-        voxels: NDArray[Any] = file.czi.read(roi=roi, plane=plane, scene=scene)
-        return voxels[..., 0]
+        return file.read(roi, plane, scene)
 
     array = VoxelArray(PlaneArray(shape, np.dtype(_TYPES[found[0]]), read), tuple("tczyx"))
     names, colors = _channels(file.metadata, shape[1])

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 from stereocell.model.errors import SourceError
 
@@ -12,7 +13,17 @@ def required(extra: str, where: str, title: str) -> Iterator[None]:
     try:
         yield
     except ImportError:
-        raise SourceError(
-            f'{where}: {title}: its library is not installed, expected: pip install "stereocell'
-            f'[{extra}]"'
-        ) from None
+        raise _missing(extra, where, title) from None
+
+
+def require_installed(library: str, extra: str, where: str, title: str) -> None:
+    """Raise as `required` where a library can't be found, without importing it: a child will."""
+    if find_spec(library) is None:
+        raise _missing(extra, where, title)
+
+
+def _missing(extra: str, where: str, title: str) -> SourceError:
+    return SourceError(
+        f'{where}: {title}: its library is not installed, expected: pip install "stereocell'
+        f'[{extra}]"'
+    )

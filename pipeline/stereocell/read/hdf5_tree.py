@@ -3,6 +3,9 @@
 HDF5 looks for the file of an external link, of external storage and of a virtual dataset in
 several places, the working folder among them. So links are followed here, one by one; a dataset
 whose voxels lie in other files is refused.
+
+HDF5's own filters run here. Those of hdf5plugin decode in many libraries of C, which trust their
+input, so they run in a child process (read/hdf5_windows.py).
 """
 
 import os
@@ -16,6 +19,7 @@ from typing import Any
 import h5py
 
 from stereocell.model.errors import SourceError
+from stereocell.read.hdf5_windows import PluginWindows, has_plugins
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file, require_own
 
@@ -24,6 +28,7 @@ _MAX_NODES = 20_000  # groups and datasets that a search visits
 _LISTED = 12  # names in a message
 _NUMBERS = "biuf"  # kinds of dtype
 _CUT = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")  # in HDF5's words
+_FIRST_PLUGIN = 256  # number of a filter; smaller ones are of HDF5 itself
 _EXTRA = 'pip install "stereocell[hdf5]"'
 
 
@@ -136,8 +141,9 @@ class Hdf5Array:
     """
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:
-        require_readable(dataset, where)
-        self._dataset = dataset
+        self._windows: Any = dataset
+        if require_readable(dataset, where):
+            self._windows = PluginWindows(dataset)
         self.shape: tuple[int, ...] = dataset.shape
         self.dtype = dataset.dtype
         self.chunks: tuple[int, ...] = dataset.chunks or (
@@ -146,11 +152,15 @@ class Hdf5Array:
         )
 
     def __getitem__(self, key: Any) -> Any:
-        return self._dataset[key]
+        return self._windows[key]
 
 
-def require_readable(dataset: h5py.Dataset, where: str) -> None:
-    """Raise SourceError where a dataset's voxels can't be had from its own file."""
+def require_readable(dataset: h5py.Dataset, where: str) -> bool:
+    """Return whether a dataset's voxels are packed by a filter that is not of HDF5 itself.
+
+    Raises SourceError where they can't be had from its own file.
+    """
+    is_plugin = False
     if dataset.external or dataset.is_virtual:
         raise SourceError(
             f"{where}: its voxels lie in other files (external or virtual storage), expected them "
@@ -159,22 +169,15 @@ def require_readable(dataset: h5py.Dataset, where: str) -> None:
     creation = dataset.id.get_create_plist()
     for index in range(creation.get_nfilters()):
         code, _, _, name = creation.get_filter(index)
-        if not (h5py.h5z.filter_avail(code) or (_has_plugins() and h5py.h5z.filter_avail(code))):
+        is_plugin = is_plugin or (code >= _FIRST_PLUGIN and code != h5py.h5z.FILTER_LZF)
+        if not (h5py.h5z.filter_avail(code) or (has_plugins() and h5py.h5z.filter_avail(code))):
             shown = name.decode("ascii", "replace").strip().split(";")[0]
             title = shown if shown.isprintable() and shown else "unknown"
             raise SourceError(
                 f"{where}: filter {title:.40} (number {code}): not installed, "
                 f"expected gzip, LZF or szip, or {_EXTRA}"
             )
-
-
-def _has_plugins() -> bool:
-    """Register the filters of hdf5plugin; False: it isn't installed."""
-    try:
-        import hdf5plugin  # noqa: F401
-    except ImportError:
-        return False
-    return True
+    return is_plugin
 
 
 def attribute(node: h5py.Group | h5py.Dataset, name: str) -> Any:

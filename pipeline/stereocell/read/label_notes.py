@@ -10,6 +10,7 @@ from typing import Any
 
 from stereocell.model.color import linear_color
 from stereocell.model.object_notes import ObjectNotes
+from stereocell.read.stated_numbers import number_of
 
 _MAX_LABELS = 1_000_000  # objects of which notes are taken
 _MAX_XML = 1 << 22  # bytes of a header extension that is parsed
@@ -31,7 +32,7 @@ def notes_of_ngff(image_label: Any) -> ObjectNotes:
             if isinstance(value, str):
                 found.columns.setdefault(_cut(key), {})[label] = _cut(value)
             elif isinstance(value, bool | int | float):
-                found.columns.setdefault(_cut(key), {})[label] = float(value)
+                found.columns.setdefault(_cut(key), {})[label] = number_of(value)
     return found
 
 

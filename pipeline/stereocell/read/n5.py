@@ -32,6 +32,7 @@ from stereocell.read.n5_blocks import unpack_block
 from stereocell.read.n5_files import N5Files
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import Triple
+from stereocell.read.stated_numbers import numbers_of
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
@@ -204,10 +205,7 @@ def _factors(
         every = group.get(name)
         if stated is None and isinstance(every, list) and index < len(every):
             stated = every[index]
-    try:
-        found = [float(value) for value in stated or ()]
-    except (TypeError, ValueError):
-        return None
+    found = numbers_of(stated)
     along = dict(zip(reversed(axes), found, strict=False))
     if len(found) == 3:
         along = dict(zip(reversed([a for a in axes if a in "zyx"]), found, strict=True))
@@ -222,7 +220,7 @@ def _spacing(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | Non
         listed = transform.get("axes")
         named = [str(axis) for axis in listed] if isinstance(listed, list) else []
         if set("zyx") <= set(named) and math.prod(named.count(a) for a in "zyx") == 1:
-            return spacing_of(_floats(transform["scale"]), transform.get("units"), named)
+            return spacing_of(numbers_of(transform["scale"]), transform.get("units"), named)
     sizes: Any = attributes.get("pixelResolution", attributes.get("resolution"))
     unit: Any = None
     if isinstance(sizes, Mapping):
@@ -230,14 +228,7 @@ def _spacing(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | Non
     unit = unit or attributes.get("units", attributes.get("unit"))
     if isinstance(unit, list):
         unit = unit[::-1]
-    return spacing_of(_floats(sizes)[::-1], unit, axes)
-
-
-def _floats(values: Any) -> list[float]:
-    try:
-        return [float(value) for value in values or ()]
-    except (TypeError, ValueError):
-        return []
+    return spacing_of(numbers_of(sizes)[::-1], unit, axes)
 
 
 def _whole(where: str, attributes: Mapping[str, Any], name: str) -> list[int]:

@@ -14,6 +14,7 @@ from stereocell.read.image import Image, printable
 from stereocell.read.readers import find_reader
 from stereocell.read.remarks import cast_note
 from stereocell.read.spacing import Triple, levels_of
+from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location
 
 MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
@@ -50,13 +51,14 @@ def open(
         volume = dataset.read(0, Box((0, 0, 0), (64, 64, 64)))
     """
     location, reader = find_reader(source)
-    image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
-    try:
-        return _dataset(location, image, time, spacing_um)
-    except BaseException:
-        if image.close is not None:
-            image.close()
-        raise
+    with library_boundary(location.shown, f"{reader.name} that is whole"):
+        image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
+        try:
+            return _dataset(location, image, time, spacing_um)
+        except BaseException:
+            if image.close is not None:
+                image.close()
+            raise
 
 
 def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | None) -> Dataset:

@@ -15,7 +15,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.file_kind import require_kind
 from stereocell.read.image import Image, printable
 from stereocell.storage.first_bytes import describe
-from stereocell.storage.library_errors import one_line
+from stereocell.storage.library_errors import library_boundary, one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
 
 _SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
@@ -40,6 +40,11 @@ class Reader:
     has_pattern: bool = False
     has_axes: bool = False
     is_remote: bool = False
+
+    @property
+    def name(self) -> str:
+        """The title without what stands in brackets, for messages."""
+        return self.title.partition(" (")[0]
 
     def read_image(
         self, location: Location, *, series: int = 0, pattern: str = "", axes: str = ""
@@ -116,7 +121,7 @@ def find_reader(source: str | Path) -> tuple[Location, Reader]:
     if named is None and not import_module(OTHER.module).can_read(location):
         raise _unknown(location)
     reader = READERS.get(named or "", OTHER)
-    require_kind(location, named or "", reader.title.partition(" (")[0])
+    require_kind(location, named or "", reader.name)
     if not location.is_local and not reader.is_remote:
         raise SourceError(
             f"{location.shown}: {reader.title} at an address, expected a path on this machine: "
@@ -141,7 +146,8 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     location, reader = find_reader(source)
     if not reader.has_series:
         raise _not_taken(location, reader, "series", "list")
-    lines: tuple[str, ...] = import_module(reader.module).list_series(location)
+    with library_boundary(location.shown, f"{reader.name} that is whole"):
+        lines: tuple[str, ...] = import_module(reader.module).list_series(location)
     return lines
 
 

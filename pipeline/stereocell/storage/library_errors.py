@@ -1,4 +1,15 @@
-"""Errors of the format libraries on damaged, unusual or unreachable sources, as one line."""
+"""Errors of the format libraries on damaged, unusual or unreachable sources, as one line.
+
+A damaged file makes a library raise anything: tifffile an AssertionError, a parser a
+RecursionError. So an Exception of any class becomes one line where a library raised it. Our own
+code around such a call parses values of the file, too. An exception that was raised there becomes
+one line if its class is in _FAULTS; all others are bugs, and keep their traceback.
+
+`one_line` stands around the calls of one library, and quotes its text. `library_boundary` stands
+around a whole reader as the last resort. It takes only what was raised inside a library, and quotes
+no text, which could hold a patient's name. A library that can end its process runs in a child
+process (child_process.py), whose death `one_line` turns into a line, too.
+"""
 
 import logging
 import lzma
@@ -10,19 +21,24 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from json import JSONDecodeError
+from pathlib import Path
+from types import FrameType
 
 from pydantic import ValidationError
 from zstandard import ZstdError
 
 import stereocell.storage.location as location
 from stereocell.model.errors import SourceError, StereoCellError
+from stereocell.storage.child_process import ChildError
 from stereocell.storage.first_bytes import HEAD_BYTES, identify
 from stereocell.storage.processes import address_limit, shortage
 
-# Seen with truncated and garbled files of every codec: zarr and numpy raise ValueError, TypeError
-# and KeyError; numcodecs and imagecodecs RuntimeError; gzip EOFError and zlib.error; tifffile
-# ValueError, and struct.error for a truncated header. Metadata of another form than the format's
-# raise AttributeError, sizes beyond this machine MemoryError, OverflowError and SystemError.
+_PACKAGE = Path(__file__).parents[1]
+_REMEDY = ": it may be damaged, copy or download it again"
+# Classes that a damaged file raises in our own parsing, or in C code, which has no frame. numpy and
+# numcodecs raise ValueError, TypeError and RuntimeError; packed bytes that end early zlib.error and
+# EOFError; a short header struct.error; metadata of another form AttributeError; sizes beyond this
+# machine MemoryError, OverflowError and SystemError.
 _FAULTS = (
     OSError,
     EOFError,
@@ -73,11 +89,52 @@ def one_line(
     """
     try:
         yield
+    except ChildError as error:
+        raise raised(f"{where}: {error} while it was read, expected {expected}{_REMEDY}") from None
     except StereoCellError:
         raise
-    except _faults() as error:
+    except Exception as error:
+        if not isinstance(error, _faults()) and not _library_of(error):
+            raise
         raise_if_short(error, where, raised=raised)
         raise raised(f"{where}: {_reason(error)}; expected {expected}") from error
+
+
+@contextmanager
+def library_boundary(where: str, expected: str) -> Iterator[None]:
+    """Turn an error that a library raised inside the block into a SourceError of one line.
+
+    expected  the expected state of the source, for the text
+
+    Errors that our own code raised pass: they are bugs, or lines already.
+    """
+    try:
+        yield
+    except StereoCellError:
+        raise
+    except Exception as error:
+        if not (library := _library_of(error)):
+            raise
+        raise_if_short(error, where)
+        raise SourceError(
+            f"{where}: {library} failed on its content ({type(error).__name__}), expected "
+            f"{expected}{_REMEDY}"
+        ) from error
+
+
+def _library_of(error: BaseException) -> str:
+    """Return the library that our code called where an error was raised in one; else empty."""
+    frames: list[FrameType] = []
+    trace = error.__traceback__
+    while trace is not None:
+        frames.append(trace.tb_frame)
+        trace = trace.tb_next
+    called = ""
+    for frame in reversed(frames):
+        if _PACKAGE in Path(frame.f_code.co_filename).parents:
+            break
+        called = str(frame.f_globals.get("__name__", "a library")).partition(".")[0]
+    return called
 
 
 def raise_if_short(
@@ -119,7 +176,9 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, TimeoutError):  # aiohttp's text is longer for silence than for other waits
         is_silence = bool(str(error))
         return f"did not answer {f'within {location.SILENCE_S:g} s' if is_silence else 'in time'}"
-    return _shortened(str(error)) or type(error).__name__
+    if not str(error):
+        return f"its content can't be decoded ({_library_of(error)} raised {type(error).__name__})"
+    return _shortened(str(error))
 
 
 def _shortened(text: str) -> str:

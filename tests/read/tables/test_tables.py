@@ -286,7 +286,7 @@ def test_a_table_of_parquet(tmp_path: Path) -> None:
 
 def test_parquet_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place = parquet(tmp_path, id=pa.array([1]))
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert refusal(place).endswith('expected: pip install "stereocell[tables]"')
 
 

@@ -9,6 +9,7 @@ from stereocell.read.tables.parquet import read_parquet
 from stereocell.read.tables.table import KEYS, Table, TableColumn
 from stereocell.storage.file_states import unchanged_while_read
 from stereocell.storage.first_bytes import identify, pointer_words
+from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location, first_bytes
 
 __all__ = ["KEYS", "Table", "TableColumn", "read_table"]
@@ -25,7 +26,10 @@ def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Ta
     Raises SourceError where the table can't be read, changes meanwhile or lacks a column.
     """
     location = Location.of(place)
-    with unchanged_while_read(location, "run the same command again"):
+    with (
+        unchanged_while_read(location, "run the same command again"),
+        library_boundary(location.shown, "a table that is whole"),
+    ):
         return _read(location, key, wanted, labels)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
+from stereocell.read.stated_numbers import number_of
 from stereocell.read.tables.table import (
     MAX_NAMES,
     MAX_ROWS,
@@ -160,7 +161,7 @@ def _require_rows(where: str, name: str, values: list[Any], rows: int) -> None:
 def _column(name: str, values: list[Any], kept: NDArray[np.bool_]) -> TableColumn:
     values = [value for value, keep in zip(values, kept, strict=True) if keep]
     if all(value is None or isinstance(value, bool | int | float) for value in values):
-        numbers = [np.nan if value is None else float(value) for value in values]
+        numbers = [np.nan if value is None else number_of(value) for value in values]
         return TableColumn(name, np.array(numbers, np.float64), None)
     texts = ("" if value is None else clean(str(value)) for value in values)
     return TableColumn(name, None, tuple(texts))

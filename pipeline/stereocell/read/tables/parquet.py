@@ -1,9 +1,13 @@
 """Tables in Parquet, by pyarrow (Apache-2.0; the extra `tables`): columns of numbers and texts.
 
-What a file states of its sizes is checked before it is read, and it is read a batch of rows at a
-time, the columns that are taken alone.
+The sizes that a file states are checked before it is read. It is read a batch of rows at a time,
+and only the columns that are taken.
+
+libarrow ends its process on some damaged files, so all of it runs in a child process
+(storage/child_process.py).
 """
 
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, BinaryIO
 
@@ -24,28 +28,50 @@ from stereocell.read.tables.table import (
     require_once,
     word_of,
 )
+from stereocell.storage.child_process import Bounds, run_in_child
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
+_EXPECTED = "a Parquet file that is whole"
 _BATCH = 1 << 16  # rows
+_MOST_S = 600.0  # seconds for a table; one of 10 million rows takes less than a tenth of it
 _MAX_BYTES = 1 << 28  # most bytes of a column in a group of rows
 _INDEX = "__index_level_"  # how pandas calls an index without a name
+
+
+@dataclass(frozen=True, slots=True)
+class _Request:
+    """The file's name for messages, the columns that are wanted, and the most bytes of one."""
+
+    where: str
+    key: str
+    wanted: tuple[str, ...]
+    most_bytes: int
 
 
 def read_parquet(location: Location, key: str, wanted: tuple[str, ...]) -> Table:
     """Return a table of Parquet. Raises SourceError."""
     where = location.shown
-    with extras.required("tables", where, "Parquet"):
-        import pyarrow.parquet as parquet
-    with one_line(where, "a Parquet file that is whole"), open(location.source, "rb") as source:
+    extras.require_installed("pyarrow", "tables", where, "Parquet")
+    request = _Request(where, key, wanted, _MAX_BYTES)
+    with one_line(where, _EXPECTED):
+        table: Table = run_in_child(_read_file, location.source, request, bounds=Bounds(_MOST_S))
+    return table
+
+
+def _read_file(path: str, request: _Request) -> Table:
+    import pyarrow.parquet as parquet
+
+    with one_line(request.where, _EXPECTED), open(path, "rb") as source:
         try:
-            return _read(parquet, source, where, key, wanted)
+            return _read(parquet, source, request)
         except (import_module("pyarrow").ArrowException, OSError) as error:
             # names of Arrow's own classes follow
             raise ValueError(str(error).partition(":")[0]) from error
 
 
-def _read(parquet: Any, source: BinaryIO, where: str, key: str, wanted: tuple[str, ...]) -> Table:
+def _read(parquet: Any, source: BinaryIO, request: _Request) -> Table:
+    where, wanted = request.where, request.wanted
     file = parquet.ParquetFile(source)
     stated, schema = file.metadata, file.schema_arrow
     rows = int(stated.num_rows)
@@ -57,7 +83,7 @@ def _read(parquet: Any, source: BinaryIO, where: str, key: str, wanted: tuple[st
     require_once(where, schema.names)
     kinds = {field.name: _kind(field.type) for field in schema}
     names = [name for name, kind in kinds.items() if kind and not name.startswith(_INDEX)]
-    chosen = choose_key(where, names, key)
+    chosen = choose_key(where, names, request.key)
     for name in wanted:
         if name in kinds and not kinds[name]:
             raise SourceError(
@@ -65,7 +91,7 @@ def _read(parquet: Any, source: BinaryIO, where: str, key: str, wanted: tuple[st
                 f"{clean(str(schema.field(name).type)):.60}, expected numbers or texts"
             )
     taken, left_out = choose_columns(where, names, chosen, wanted)
-    _require_small(stated, where, {chosen, *taken})
+    _require_small(stated, request, {chosen, *taken})
     # a text that stands in many rows stays one
     texts = [name for name in (chosen, *taken) if kinds[name] == _TEXT]
     file = parquet.ParquetFile(
@@ -98,16 +124,16 @@ def _kind(type_: Any) -> str:
     return _TEXT if is_text else ""
 
 
-def _require_small(stated: Any, where: str, names: set[str]) -> None:
+def _require_small(stated: Any, request: _Request, names: set[str]) -> None:
     for group in range(stated.num_row_groups):
         parts = stated.row_group(group)
         for place in range(parts.num_columns):
             part = parts.column(place)
             size = int(part.total_uncompressed_size)
-            if part.path_in_schema in names and not 0 <= size <= _MAX_BYTES:
+            if part.path_in_schema in names and not 0 <= size <= request.most_bytes:
                 raise SourceError(
-                    f"{where}: column {clean(part.path_in_schema)!r:.60}: found {size} bytes in "
-                    f"{parts.num_rows} rows, expected at most {_MAX_BYTES}"
+                    f"{request.where}: column {clean(part.path_in_schema)!r:.60}: found {size} "
+                    f"bytes in {parts.num_rows} rows, expected at most {request.most_bytes}"
                 )
 
 

@@ -17,6 +17,7 @@ from tifffile import TiffFile
 from stereocell.model.color import linear_color
 from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
+from stereocell.read.stated_numbers import number_of
 
 _CENTIMETRE = 3  # TIFF tag ResolutionUnit
 _ESCAPED = re.compile(r"\\u([0-9A-Fa-f]{4})")
@@ -186,7 +187,7 @@ def _um(unit: Any) -> float | None:
 def _times(per: float | None, value: Any) -> float | None:
     if per is None or isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return per * float(value) if math.isfinite(value) else None
+    return per * number_of(value) if math.isfinite(number_of(value)) else None
 
 
 def _over(per: float | None, resolution: float | None) -> float | None:
@@ -205,6 +206,6 @@ def _name(text: Any) -> str | None:
 def _rgb(color: Any) -> Color | None:
     try:
         red, green, blue = (int(value) & 0xFF for value in list(color)[:3])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return None if red == green == blue else linear_color((red, green, blue))

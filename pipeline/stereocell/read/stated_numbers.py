@@ -1,0 +1,24 @@
+"""Numbers that a file states, as floats. JSON and attributes may hold integers of any length."""
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+
+def number_of(value: Any) -> float:
+    """Return a stated number; infinity where it has more digits than a float can hold.
+
+    Raises ValueError or TypeError where it is no number.
+    """
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def numbers_of(values: Iterable[Any] | None) -> list[float]:
+    """Return a list of stated numbers; empty where one of them is none, or nothing is stated."""
+    try:
+        return [number_of(value) for value in (() if values is None else values)]
+    except (TypeError, ValueError):
+        return []
