@@ -9,7 +9,9 @@ type Item = Control | Group;
 
 /** An item of another shape needs another element. */
 function shapeOf(item: Item): string {
-  return item.kind === "group" ? `${item.id}, group of ${item.controls.length}` : item.id;
+  if (item.kind !== "group") return item.id;
+  const opens = item.more.length > 0 ? "opens" : "";
+  return `${item.id}, group of ${item.controls.length} ${opens}`;
 }
 
 class Items {

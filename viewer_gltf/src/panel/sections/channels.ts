@@ -206,14 +206,16 @@ function addingOf(
   return items;
 }
 
-/** A card as a row of the list: all but the switch waits until it is opened. */
+/** A card as a row of the list: all but the switch waits until the channel is shown, and opened. */
 function rowOf(card: Group): Group {
   const isSwitch = ({ id }: Control) => id === `${card.id}/shown`;
+  const canOpen = !card.isDimmed || card.isOpen;
+  const rest = [...card.controls.filter((each) => !isSwitch(each)), ...card.more];
   return {
     ...card,
     isCompact: true,
     controls: card.controls.filter(isSwitch),
-    more: [...card.controls.filter((each) => !isSwitch(each)), ...card.more],
+    more: canOpen ? rest : [],
   };
 }
 
