@@ -16,6 +16,7 @@ import {
   changePanel,
   type Layout,
   type Lenses,
+  type PanelChange,
   type PanelView,
   START_VIEW,
   type Wish,
@@ -28,7 +29,7 @@ import { isRefusal, type KeyContext } from "../panel/key";
 import { isWritten, listenForKeys } from "../panel/key_events";
 import { wishOf } from "../panel/keys";
 import { type Facts, layOut } from "../panel/layout";
-import type { Ranges } from "../panel/sections/channels";
+import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
 import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
@@ -62,6 +63,8 @@ const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-
 const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
 
 const LENS_KEY = "stereocell-lens";
+/** Changes of the panel after which the cards are those of the channels that are shown by then. */
+const LAYS_OUT: ReadonlySet<PanelChange["panel"]> = new Set(["find", "unfold"]);
 const EYE_ROWS = [EYE_DISTANCE, STEREO_STRENGTH] as const;
 
 /** The user's phone viewer, from the visit before. */
@@ -199,6 +202,7 @@ export class Controller {
   refresh(): void {
     clearTimeout(this.timer);
     this.timer = 0;
+    this.view = keepPlaces(this.view, this.viewer.state);
     this.panel.update(this.layOut());
     const eyes = EYE_ROWS.map((row) => row.get(this.viewer.state)).join();
     if (eyes !== this.eyes) remember(EYES_KEY, eyes);
@@ -216,6 +220,7 @@ export class Controller {
     else if ("panel" in wish) {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
+      if (LAYS_OUT.has(wish.panel)) this.view = { ...this.view, carded: null };
       this.refresh();
     } else this.viewer.dispatch(wish);
   }
@@ -231,6 +236,7 @@ export class Controller {
     const stand = standOf(search); // what `reset` returns to, wherever a link looks from
     if (camera === null || stand !== null) viewer.openWith(stand, saysDistance);
     if (camera !== null) viewer.lookFrom(camera);
+    this.view = { ...this.view, carded: null };
     viewer.forgetSteps();
   }
 

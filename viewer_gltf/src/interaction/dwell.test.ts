@@ -1,19 +1,41 @@
 import { describe, expect, it } from "vitest";
-import { advanceDwell, DWELL_S, type Dwell, dwellProgress, fire, NO_DWELL } from "./dwell";
+import {
+  advanceDwell,
+  DWELL_S,
+  type Dwell,
+  dwellProgress,
+  NO_DWELL,
+  type Sight,
+  spend,
+} from "./dwell";
 
 const FRAME_S = 1 / 64; // exact in binary: 1.5 s is 96 frames
+/** Degrees to the right at which each target's middle is. */
+const MIDDLES: Readonly<Record<string, number>> = { a: 0, b: 2, far: 20 };
 
-/** Look at each target for so many seconds; the targets that fired, in order. */
-function watch(gazes: readonly (readonly [string | null, number])[], isOn = true) {
-  let dwell: Dwell = NO_DWELL;
+/** @param at_deg to the right */
+function seen(target: string | null, more: Partial<Sight> = {}, at_deg?: number): Sight {
+  const angle = ((at_deg ?? (target === null ? 10 : MIDDLES[target])) * Math.PI) / 180;
+  const direction = [Math.sin(angle), 0, -Math.cos(angle)] as const;
+  return { target, place: null, layout: "", direction, isGradual: false, ...more };
+}
+
+/** Look at each sight for so many seconds; the targets that fired, in order. */
+function watch(
+  gazes: readonly (readonly [Sight | string | null, number])[],
+  isOn = true,
+  start = NO_DWELL,
+) {
+  let dwell: Dwell = start;
   const fired: (string | null)[] = [];
   const progress: number[] = [];
-  for (const [target, seconds] of gazes) {
+  for (const [at, seconds] of gazes) {
+    const sight = at === null || typeof at === "string" ? seen(at) : at;
     // The frame on which a target is first seen starts its clock and adds nothing to it.
     for (let i = 0; i <= Math.round(seconds / FRAME_S); i++) {
-      const [next, fires] = advanceDwell(dwell, target, FRAME_S, isOn);
+      const [next, fires] = advanceDwell(dwell, sight, FRAME_S, isOn);
       dwell = next;
-      if (fires) fired.push(target);
+      if (fires) fired.push(sight.target);
       progress.push(dwellProgress(dwell));
     }
   }
@@ -60,7 +82,7 @@ describe("gaze that lasts", () => {
 
   it("fires at nothing never", () => {
     expect(watch([[null, 5]]).fired).toEqual([]);
-    expect(fire(NO_DWELL)).toEqual([NO_DWELL, false]);
+    expect(spend(NO_DWELL)).toEqual(NO_DWELL);
   });
 
   it("can be turned off, also half-way", () => {
@@ -68,32 +90,93 @@ describe("gaze that lasts", () => {
     expect(fired).toEqual([]);
     expect(Math.max(...progress)).toBe(0);
     const half = watch([["a", 1]]).dwell;
-    const [off] = advanceDwell(half, "a", FRAME_S, false);
+    const [off] = advanceDwell(half, seen("a"), FRAME_S, false);
     expect(dwellProgress(off)).toBe(0);
   });
 
   it("is not made by a stall of the page", () => {
     const { dwell } = watch([["a", 0]]);
-    expect(advanceDwell(dwell, "a", 60)[1]).toBe(false);
+    expect(advanceDwell(dwell, seen("a"), 60)[1]).toBe(false);
+  });
+});
+
+describe("a gaze that rests where it has chosen", () => {
+  it("chooses nothing more, though it trembles across the border of the next control", () => {
+    // from .4 degrees inside of one control to .5 degrees inside of the next one, and back
+    const gazes = Array.from({ length: 8 }, (_, i) =>
+      i % 2 === 0 ? ([seen("a", {}, 0.6), 2] as const) : ([seen("b", {}, 1.5), 2] as const),
+    );
+    expect(watch(gazes).fired).toEqual(["a"]);
+  });
+
+  it("chooses again by a slider, a little further along it, and not by a switch", () => {
+    const slider = { isGradual: true };
+    const along = (more: Partial<Sight>, by_deg: number) =>
+      watch([
+        [seen("a", more, 0), 2],
+        [seen("a", more, by_deg), 2],
+      ]).fired.length;
+    expect([along(slider, 1.4), along(slider, 1.6)]).toEqual([1, 2]);
+    expect([along({}, 1.6), along({}, 6)]).toEqual([1, 1]);
+  });
+});
+
+describe("a layout that changes under the gaze", () => {
+  const before = { layout: "before", place: "upper" };
+  const after = { layout: "after", place: "upper" };
+
+  it.each([
+    ["another control takes the place", seen("b", after, 0)],
+    ["the control is elsewhere, and still under the gaze", seen("a", { ...after, place: "lower" })],
+  ])("chooses nothing until the gaze has moved: %s", (_, next) => {
+    const { dwell } = watch([[seen("far", { ...before, place: "aside" }), 0]]);
+    const arrived = watch([[seen("a", before), 1]], true, dwell);
+    expect(dwellProgress(arrived.dwell)).toBeGreaterThan(0.5);
+    const rested = watch([[next, 6]], true, arrived.dwell);
+    expect(rested.fired).toEqual([]);
+    const trembling = watch(
+      [[{ ...next, direction: seen("a", {}, 0.9).direction }, 6]],
+      true,
+      rested.dwell,
+    );
+    expect(trembling.fired).toEqual([]);
+    const moved = { ...next, direction: seen("a", {}, 1.6).direction };
+    expect(watch([[moved, 6]], true, rested.dwell).fired).toEqual([next.target]);
+  });
+
+  it("goes on where nothing changes under the gaze itself", () => {
+    const { dwell } = watch([
+      [seen("far", { ...before, place: "aside" }), 0],
+      [seen("a", before), 1],
+    ]);
+    expect(watch([[seen("a", after), 1]], true, dwell).fired).toEqual(["a"]);
+  });
+
+  it("is not what a gaze meets that moves to another control", () => {
+    const { dwell } = watch([[seen("far", { ...before, place: "aside" }), 0]]);
+    expect(watch([[seen("b", before), 2]], true, dwell).fired).toEqual(["b"]);
+  });
+
+  it("is the first sight of a control as well, but not of a tile", () => {
+    expect(watch([[seen("a", before), 6]]).fired).toEqual([]);
+    expect(watch([[seen("a", { ...before, place: null }), 6]]).fired).toEqual(["a"]);
+  });
+
+  it("leaves a control that has fired as it is, though it comes back under the gaze", () => {
+    const { dwell } = watch([[seen("far", { ...before, place: "aside" }), 0]]);
+    const slid = seen("b", { layout: "then", place: "upper" }, 0);
+    const gazes = [
+      [seen("a", before), 2],
+      [slid, 2],
+      [seen("a", after), 6],
+    ] as const;
+    expect(watch(gazes, true, dwell).fired).toEqual(["a"]);
   });
 });
 
 describe("the button", () => {
-  it("fires at once, every time, also where dwell is off", () => {
-    const { dwell } = watch([["a", 0]], false);
-    const [once, first] = fire(dwell);
-    const [, second] = fire(once);
-    expect([first, second]).toEqual([true, true]);
-  });
-
   it("takes the dwell's turn: the same target does not fire late as well", () => {
-    let [dwell] = fire(watch([["a", 1]]).dwell);
-    let fired = 0;
-    for (let i = 0; i < 300; i++) {
-      const [next, fires] = advanceDwell(dwell, "a", FRAME_S);
-      dwell = next;
-      fired += fires ? 1 : 0;
-    }
-    expect(fired).toBe(0);
+    const dwell = spend(watch([["a", 1]]).dwell);
+    expect(watch([["a", 5]], true, dwell).fired).toEqual([]);
   });
 });

@@ -1,46 +1,107 @@
 /**
  * How long one target (a tile or a control) has been gazed at. Plain data, so that tests need no
- * headset. Dwell fires late what the button fires at once; neither waits for the other.
+ * headset.
+ *
+ * A dwell fires once and is spent. It is spent as well when the layout under a resting gaze changes:
+ * a control that slides or opens under the gaze was not looked for. A spent dwell fires nothing until
+ * the gaze moves on, and the tremble of a resting head is no such move.
  */
-export type Dwell = Readonly<{
+import { dot, type Vec3 } from "../math/vec3";
+
+/** What the gaze meets in one frame. */
+export type Sight = Readonly<{
+  /** The key of the target; null: nothing that can be chosen. */
   target: string | null;
-  elapsed_s: number;
-  /** A target that has fired, by gaze or button, is done with until the gaze leaves it. */
+  /** Where the target lies in its layout; null: it belongs to no layout, as a tile does. */
+  place: string | null;
+  /** Changes whenever any target comes, goes or moves in its layout. */
+  layout: string;
+  /** Direction of the gaze, of unit length. */
+  direction: Vec3;
+  /** Each place on the target is a choice of its own, as on a slider. */
+  isGradual: boolean;
+}>;
+
+/** Where the gaze was when its dwell was spent. */
+type Spent = Readonly<{
+  direction: Vec3;
+  target: string | null;
+  /** Whether the target itself has fired. */
   hasFired: boolean;
+}>;
+
+export type Dwell = Readonly<{
+  /** The sight of the frame before; null: there was none. */
+  sight: Sight | null;
+  elapsed_s: number;
+  /** null: the time counts. */
+  spent: Spent | null;
 }>;
 
 export const DWELL_S = 1.5;
 /** Longest time that a frame counts, s: a stall of the page is no gaze. */
 const LONGEST_FRAME_S = 0.1;
+/** Largest turn of a resting head, radians, from one of its directions to another. */
+export const TREMBLE_RAD = (1 * Math.PI) / 180;
+/** Turn that is a move of its own, also within one control, radians. */
+const MOVE_RAD = (1.5 * Math.PI) / 180;
 
-export const NO_DWELL: Dwell = { target: null, elapsed_s: 0, hasFired: false };
+export const NO_DWELL: Dwell = { sight: null, elapsed_s: 0, spent: null };
 
 /** The next state, and whether this frame is the one on which the dwell fires. */
 export function advanceDwell(
   dwell: Dwell,
-  target: string | null,
+  sight: Sight,
   dt_s: number,
   isOn = true,
 ): readonly [Dwell, boolean] {
-  if (target !== dwell.target) return [{ target, elapsed_s: 0, hasFired: false }, false];
-  if (target === null || dwell.hasFired) return [dwell, false];
-  if (!isOn) return [dwell.elapsed_s === 0 ? dwell : { ...dwell, elapsed_s: 0 }, false];
+  const { spent } = dwell;
+  if (hasLayoutChanged(dwell.sight, sight)) {
+    const hasFired = spent?.hasFired === true && spent.target === sight.target;
+    const direction = spent?.direction ?? sight.direction;
+    const { target } = sight;
+    return [{ sight, elapsed_s: 0, spent: { direction, target, hasFired } }, false];
+  }
+  if (spent !== null && !hasLeft(spent, sight)) return [{ sight, elapsed_s: 0, spent }, false];
+  const isCounting = spent === null && isOn && sight.target === dwell.sight?.target;
+  if (!isCounting || sight.target === null) return [{ sight, elapsed_s: 0, spent: null }, false];
   const elapsed_s = dwell.elapsed_s + Math.min(Math.max(dt_s, 0), LONGEST_FRAME_S);
-  const fires = elapsed_s >= DWELL_S;
-  return [{ target, elapsed_s, hasFired: fires }, fires];
+  const next = { sight, elapsed_s, spent: null };
+  return elapsed_s < DWELL_S ? [next, false] : [spend(next), true];
+}
+
+/** The dwell after something was chosen, by the gaze or by a button: the same gaze chooses no more. */
+export function spend(dwell: Dwell): Dwell {
+  const { sight } = dwell;
+  if (sight === null) return dwell;
+  const { direction, target } = sight;
+  return { sight, elapsed_s: 0, spent: { direction, target, hasFired: true } };
+}
+
+/** Share of the ring that is filled, 0..1; 0 while the dwell is spent: the ring is gone. */
+export function dwellProgress(dwell: Dwell): number {
+  return Math.min(1, dwell.elapsed_s / DWELL_S);
+}
+
+/** The angle between two directions of unit length, radians. */
+export function angleBetween(a: Vec3, b: Vec3): number {
+  return Math.acos(Math.min(1, Math.max(-1, dot(a, b))));
 }
 
 /**
- * The button: fires whatever is gazed at, as often as it is pressed, also where dwell is off. The
- * dwell does not fire the same target a second time.
+ * Whether another control is under the gaze because the layout has changed, and not because the gaze has
+ * moved. At the first sight this is so for each control, and not for what belongs to no layout.
  */
-export function fire(dwell: Dwell): readonly [Dwell, boolean] {
-  if (dwell.target === null) return [dwell, false];
-  return [{ ...dwell, hasFired: true }, true];
+function hasLayoutChanged(before: Sight | null, now: Sight): boolean {
+  if (before === null) return now.place !== null;
+  if (before.layout === now.layout) return false;
+  return before.target !== now.target || before.place !== now.place;
 }
 
-/** Share of the ring that is filled, 0..1; 0 after the target has fired: the ring is gone. */
-export function dwellProgress(dwell: Dwell): number {
-  if (dwell.target === null || dwell.hasFired) return 0;
-  return Math.min(1, dwell.elapsed_s / DWELL_S);
+/** Whether the gaze has moved on since its dwell was spent. */
+function hasLeft({ direction, target, hasFired }: Spent, sight: Sight): boolean {
+  const turn = angleBetween(direction, sight.direction);
+  const isElsewhere = sight.target !== target;
+  if (turn > MOVE_RAD) return isElsewhere || sight.isGradual || !hasFired;
+  return turn > TREMBLE_RAD && isElsewhere;
 }

@@ -66,10 +66,28 @@ describe("the gaze", () => {
   it("does not choose again what the button has chosen", () => {
     const pointer = new Pointer();
     pointer.advance(AHEAD, [], [tile], FRAME_S, true);
-    pointer.press("tile");
+    if (pointer.gaze === null) throw new Error("nothing is met");
+    expect(pointer.press(pointer.gaze, [tile], 0)).toBe(true);
     for (let i = 0; i < 240; i++) {
       expect(pointer.advance(AHEAD, [], [tile], FRAME_S, true)).toBeNull();
     }
     expect(pointer.progress).toBe(0);
+  });
+
+  it("chooses nothing after a hand has chosen, until it has moved", () => {
+    const pointer = new Pointer();
+    const hand = { ...AHEAD, origin: new Vector3(0.2, 0, 0) };
+    pointer.advance(AHEAD, [hand], [tile], FRAME_S, true);
+    const [met] = pointer.hands;
+    if (met === null) throw new Error("nothing is met");
+    pointer.press(met, [tile], 0);
+    for (let i = 0; i < 240; i++) {
+      expect(pointer.advance(AHEAD, [null], [tile], FRAME_S, true)).toBeNull();
+    }
+    const aside = { ...AHEAD, direction: new Vector3(0.1, 0, -1).normalize() };
+    const later = Array.from({ length: 120 }, () =>
+      pointer.advance(aside, [null], [tile], FRAME_S, true),
+    );
+    expect(later.filter((each) => each !== null)).toHaveLength(1);
   });
 });

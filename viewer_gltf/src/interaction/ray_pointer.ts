@@ -4,7 +4,8 @@
  */
 import { type Matrix4, Vector3 } from "three";
 import type { Command } from "../state/commands";
-import { advanceDwell, type Dwell, dwellProgress, fire, NO_DWELL } from "./dwell";
+import { isSecondPress, type Press } from "./double_press";
+import { advanceDwell, type Dwell, dwellProgress, NO_DWELL, type Sight, spend } from "./dwell";
 
 /** `direction` has unit length. */
 export type RoomRay = Readonly<{ origin: Vector3; direction: Vector3 }>;
@@ -20,12 +21,18 @@ export type Hit = Readonly<{
   hold?: "slide" | "carry";
   /** Goes on, little by little, while the button is held or the gaze stays. */
   repeats?: Command;
+  /** Where it lies in its target's layout; absent: it belongs to no layout. */
+  place?: string;
+  /** Each press goes on by a step: pressing quickly is meant. */
+  isStep?: boolean;
 }>;
 
 /** Something that rays meet: the panel, handles, the specimen's tiles. */
 export interface Target {
   /** Drawn over what is nearer, so that it is met before it. */
   readonly isOnTop: boolean;
+  /** Changes whenever something that can be chosen comes, goes or moves in it; absent: nothing does. */
+  readonly layout?: string;
   meet(ray: RoomRay): Hit | null;
   /** Chosen by dwell (`isByGaze`) or button; what holds on to the ray is chosen before it is dragged. */
   choose(hit: Hit, ray: RoomRay, isByGaze: boolean): void;
@@ -57,12 +64,28 @@ export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null 
   return first;
 }
 
+function layoutOf(targets: readonly Target[]): string {
+  return targets.map(({ layout = "" }) => layout).join("\n");
+}
+
+/** @param met null: nothing can be chosen */
+function sightOf({ direction }: RoomRay, met: Met | null, targets: readonly Target[]): Sight {
+  return {
+    target: met?.key ?? null,
+    place: met?.place ?? null,
+    layout: layoutOf(targets),
+    direction: direction.toArray(),
+    isGradual: met?.hold === "slide",
+  };
+}
+
 export class Pointer {
   /** The hit of the gaze. */
   gaze: Met | null = null;
   /** The hit of each hand's ray, in the order given. */
   hands: readonly (Met | null)[] = [];
   private dwell: Dwell = NO_DWELL;
+  private lastPress: Press | null = null;
 
   /** Of the dwell, 0..1. */
   get progress(): number {
@@ -85,20 +108,32 @@ export class Pointer {
     this.gaze = meetFirst(gaze, targets);
     this.hands = hands.map((ray) => ray && meetFirst(ray, targets));
     const isGazing = this.hands.every((met) => met === null);
-    const key = isGazing ? (this.gaze?.key ?? null) : null;
-    const [dwell, fires] = advanceDwell(this.dwell, key, dt_s, isDwellOn);
+    const sight = sightOf(gaze, isGazing ? this.gaze : null, targets);
+    const [dwell, fires] = advanceDwell(this.dwell, sight, dt_s, isDwellOn);
     this.dwell = dwell;
     return fires ? this.gaze : null;
   }
 
-  /** The button was pressed on something: looking at it on does not choose it again. */
-  press(key: string): void {
-    if (this.dwell.target === key) [this.dwell] = fire(this.dwell);
+  /**
+   * Something is chosen, by a button or by the dwell: a gaze that stays chooses no more.
+   *
+   * @returns whether it counts; the second press of a double press does not
+   */
+  press(met: Met, targets: readonly Target[], time_ms: number): boolean {
+    this.dwell = spend(this.dwell);
+    const sight = sightOf(met.ray, met, targets);
+    // a tile that one press selects is isolated by the next, however soon; a slider may be taken again
+    const isStep = met.isStep === true || met.place === undefined || met.hold !== undefined;
+    const press = { time_ms, sight, isStep };
+    const isSecond = isSecondPress(this.lastPress, press);
+    this.lastPress = press;
+    return !isSecond;
   }
 
   reset(): void {
     this.gaze = null;
     this.hands = [];
     this.dwell = NO_DWELL;
+    this.lastPress = null;
   }
 }

@@ -15,8 +15,9 @@ const OF = "/";
 
 export class TileTarget implements Target {
   readonly isOnTop = false;
-  /** Those that are shown. */
-  tiles: readonly BoxedTile[] = [];
+  /** Which tiles are shown. */
+  layout = "";
+  private shown: readonly BoxedTile[] = [];
   clip: Clip = WHOLE;
   /** The object along a ray, in um of the specimen: its name, and where; null: none. */
   objectAlong: (ray: Ray) => Readonly<{ id: string; distance: number }> | null = () => null;
@@ -28,10 +29,17 @@ export class TileTarget implements Target {
     private readonly onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void,
   ) {}
 
+  /** The tiles that are shown. */
+  set tiles(tiles: readonly BoxedTile[]) {
+    if (tiles === this.shown) return;
+    this.shown = tiles;
+    this.layout = tiles.map(({ id }) => id).join();
+  }
+
   meet(ray: RoomRay): Hit | null {
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
     const inside = rayAlong(ray, this.toSpecimen);
-    const met = pickTile(inside, this.tiles, this.clip);
+    const met = pickTile(inside, this.shown, this.clip);
     const object = met && this.objectAlong(inside);
     if (object) return { key: `${TILE}${met.id}${OF}${object.id}`, distance_m: object.distance };
     // The ray's direction is one metre long, whatever it is in um.

@@ -44,8 +44,13 @@ export type Wish = Action | PanelChange | Command;
 
 export type PanelView = Readonly<{
   search: string;
-  /** Of the channels that are not shown. */
+  /** Of the list of channels. */
   page: number;
+  /**
+   * The channels that have a card above the list, if there are many: those that were shown when the section
+   * was last laid out. null: those that are shown now.
+   */
+  carded: readonly string[] | null;
   picked: string | null;
   clipPart: ClipPart | null;
   parameter: string | null;
@@ -66,6 +71,7 @@ export type PanelView = Readonly<{
 export const START_VIEW: PanelView = {
   search: "",
   page: 0,
+  carded: null,
   picked: null,
   clipPart: null,
   parameter: null,
@@ -143,6 +149,8 @@ export type Button = Base &
   Readonly<{
     kind: "button";
     isPrimary?: boolean;
+    /** Each press goes on by a step, as undoing does: pressing quickly is meant. */
+    isStep?: boolean;
     /** Goes on with it, little by little, while it is held or gazed at. */
     repeats?: Command;
     to: () => Wish;
@@ -232,6 +240,10 @@ export type Group = Readonly<{
   tags: readonly string[];
   /** What the tags mean, in a sentence; empty: nothing more. */
   about: string;
+  /** It is not shown in the picture. */
+  isDimmed: boolean;
+  /** A row of a long list. */
+  isCompact?: boolean;
   controls: readonly Control[];
   more: readonly Control[];
   isOpen: boolean;

@@ -151,11 +151,13 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
   return [
     {
       ...command("undo", "Undo"),
+      isStep: true,
       name: `Undo ${undo ?? ""}`.trim(),
       refusal: undo === null ? "Nothing to undo." : "",
     },
     {
       ...command("redo", "Redo"),
+      isStep: true,
       name: `Redo ${redo ?? ""}`.trim(),
       refusal: redo === null ? "Nothing to redo." : "",
     },

@@ -10,6 +10,7 @@ const REST_RAD = (1.5 * Math.PI) / 180;
 export class GazeCarry implements Target {
   /** While it is carried, nothing else is met. */
   readonly isOnTop = true;
+  readonly layout = "carry";
   private carried: Met | null = null;
   /** Where the gaze has come to rest, and how often it has gone on. */
   private rest: RoomRay | null = null;

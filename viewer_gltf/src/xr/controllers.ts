@@ -21,6 +21,7 @@ export type HandEvent = Readonly<{
   source: XRInputSource;
   /** At the time of the event; null: as the gaze. */
   ray: RoomRay | null;
+  time_ms: number;
 }>;
 
 const KINDS = {
@@ -99,9 +100,9 @@ export class Controllers {
     const { signal } = this.stopped;
     for (const [type, kind] of Object.entries(KINDS)) {
       const listener = (event: XRInputSourceEvent) => {
-        const { inputSource: source, frame } = event;
+        const { inputSource: source, frame, timeStamp: time_ms } = event;
         const ray = this.rayOf(source, frame);
-        this.events.push({ kind, source, ray });
+        this.events.push({ kind, source, ray, time_ms });
       };
       session.addEventListener(type, listener as unknown as EventListener, { signal });
     }

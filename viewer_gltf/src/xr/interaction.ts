@@ -54,6 +54,10 @@ export type HandsOptions = Readonly<{
   onLeave: () => void;
   /** The phone is in a viewer of other lenses. */
   onLenses?: (lenses: Lenses) => void;
+  /** Absent: true. False: panel and notices are not painted, as in a program without a screen. */
+  isPainted?: boolean;
+  /** The clock of the page's events, ms; absent: the page's own. */
+  now_ms?: () => number;
 }>;
 
 /** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
@@ -86,7 +90,7 @@ type GoesOn = {
 export class Hands {
   readonly panel: RoomPanel;
   readonly ring = new Ring();
-  readonly notice = new RoomNotice();
+  readonly notice: RoomNotice;
   private readonly controllers = new Controllers();
   private readonly pointer = new Pointer();
   readonly tiles: TileTarget;
@@ -96,10 +100,11 @@ export class Hands {
   /** The hands that hold the specimen, and their places in the frame before. */
   private held = new Map<XRInputSource, HandPose | null>();
   private gaze: RoomRay = gazeOf(new Matrix4());
-  private taps = 0;
+  /** When the button was pressed since the frame before, ms. */
+  private taps: number[] = [];
   private isRunning = false;
   private shown = "";
-  private gestures: Gesture[] = [];
+  private gestures: (readonly [Gesture, time_ms: number])[] = [];
   /** A finger that rests on the split screen; `met`: what was gazed at when it came. */
   private touched: { met: Met | null; isUsed: boolean; elapsed_s: number } | null = null;
   /** The head holds the specimen by a button that is down. */
@@ -109,11 +114,13 @@ export class Hands {
 
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
-    const { onLenses = () => undefined } = options;
+    const { onLenses = () => undefined, isPainted = true } = options;
+    this.notice = new RoomNotice(isPainted);
     this.panel = new RoomPanel({
       layOut,
       onLeave,
       onLenses,
+      isPainted,
       onAnnounce: (text) => this.announce(text),
       onWish: (wish) => {
         if (typeof wish === "string") options.onCommand(wish);
@@ -159,7 +166,7 @@ export class Hands {
     this.carry.drop();
     this.presses.clear();
     this.held.clear();
-    this.taps = 0;
+    this.taps = [];
     this.gestures = [];
     this.touched = null;
     this.goesOn = null;
@@ -169,14 +176,14 @@ export class Hands {
     this.ring.hide();
   }
 
-  /** The only button of the split screen, or a key in its place. */
-  tap(): void {
-    this.taps++;
+  /** The only button of the split screen, or a key in its place. @param time_ms on the clock of events */
+  tap(time_ms = this.now_ms()): void {
+    this.taps.push(time_ms);
   }
 
   /** What fingers do on the split screen. */
-  touch(gesture: Gesture): void {
-    this.gestures.push(gesture);
+  touch(gesture: Gesture, time_ms = this.now_ms()): void {
+    this.gestures.push([gesture, time_ms]);
   }
 
   /** Say something where the head looks. */
@@ -217,7 +224,7 @@ export class Hands {
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
     for (const event of this.controllers.take()) this.handle(event);
     const hasTouched = this.followFingers(state);
-    for (; this.taps > 0; this.taps--) this.press(this.gaze);
+    for (const time_ms of this.taps.splice(0)) this.press(this.gaze, time_ms);
     this.forgetTheLost();
     const hasHeld = this.hold(dt_s);
     const hasFollowed = this.followHead(dt_s, state);
@@ -228,7 +235,7 @@ export class Hands {
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
     if (fired?.key === GAZE_SWITCH && state.isDwellOn) this.announce(KEEPS_GAZE);
     else if (fired !== null) {
-      this.choose(fired, true);
+      this.choose(fired, this.now_ms(), true);
       if (fired.repeats !== undefined) this.goesOn = { met: fired, source: null, elapsed_s: 0 };
     }
     const hasGone = this.goOn(dt_s, state);
@@ -246,6 +253,10 @@ export class Hands {
     this.ring.dispose();
   }
 
+  private now_ms(): number {
+    return (this.options.now_ms ?? (() => performance.now()))();
+  }
+
   private get tracked(): readonly Hand[] {
     return this.controllers.hands.filter(({ isTracked }) => isTracked);
   }
@@ -260,14 +271,14 @@ export class Hands {
     return this.controllers.hands.find((hand) => hand.source === source);
   }
 
-  private handle({ kind, source, ray }: HandEvent): void {
+  private handle({ kind, source, ray, time_ms }: HandEvent): void {
     const press = this.presses.get(source);
     switch (kind) {
       case "press":
-        this.presses.set(source, this.begin(source, ray));
+        this.presses.set(source, this.begin(source, ray, time_ms));
         break;
       case "select":
-        if (!press?.isUsed) this.press(ray ?? this.gaze);
+        if (!press?.isUsed) this.press(ray ?? this.gaze, time_ms);
         break;
       case "release":
         this.presses.delete(source);
@@ -282,11 +293,13 @@ export class Hands {
     }
   }
 
-  private begin(source: XRInputSource, ray: RoomRay | null): Press {
+  private begin(source: XRInputSource, ray: RoomRay | null, time_ms: number): Press {
     const met = meetFirst(ray ?? this.gaze, this.free);
     // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
     const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
-    if (met !== null && isUsed) met.target.choose(met, met.ray, false);
+    if (met !== null && isUsed && this.pointer.press(met, this.free, time_ms)) {
+      met.target.choose(met, met.ray, false);
+    }
     if (met?.repeats !== undefined) this.goesOn = { met, source, elapsed_s: 0 };
     const at = this.handOf(source)?.pose?.position ?? null;
     return { met, at, elapsed_s: 0, isUsed };
@@ -296,14 +309,14 @@ export class Hands {
   private followFingers(state: ViewerState): boolean {
     const { specimen } = this.options;
     const before = specimen.pose;
-    for (const gesture of this.gestures.splice(0)) {
+    for (const [gesture, time_ms] of this.gestures.splice(0)) {
       if (gesture.kind === "press") {
         const met = meetFirst(this.gaze, this.free);
         this.touched = { met, isUsed: false, elapsed_s: 0 };
         if (met?.repeats !== undefined) this.goesOn = { met, source: "finger", elapsed_s: 0 };
       } else if (gesture.kind === "release") this.touched = null;
       else if (gesture.kind === "tap") {
-        if (this.touched?.isUsed === false) this.taps++;
+        if (this.touched?.isUsed === false) this.tap(time_ms);
       } else {
         const pivot = middleOf(this.around(state));
         const pose = moveByFingers(specimen.pose, gesture, pivot, this.gaze.origin);
@@ -314,14 +327,15 @@ export class Hands {
   }
 
   /** The button: what the ray meets, or if that is nothing, what is gazed at. */
-  private press(ray: RoomRay): void {
+  private press(ray: RoomRay, time_ms: number): void {
     const met = meetFirst(ray, this.free) ?? meetFirst(this.gaze, this.free);
-    if (met !== null) this.choose(met);
+    if (met !== null) this.choose(met, time_ms);
   }
 
-  private choose(met: Met, isByGaze = false): void {
+  private choose(met: Met, time_ms: number, isByGaze = false): void {
     if (met.key === null) return;
-    this.pointer.press(met.key);
+    const counts = this.pointer.press(met, this.free, time_ms);
+    if (!counts && !isByGaze) return;
     met.target.choose(met, met.ray, isByGaze);
     if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
   }

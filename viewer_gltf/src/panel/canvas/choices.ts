@@ -68,7 +68,7 @@ export function stepper(choice: Choice, row: Rect): Block {
       : unlessRefused(choice, [
           region(`${id}=before`, `${choice.label}: before`, before, step(-1)),
           region(`${id}=after`, `${choice.label}: after`, after, step(1)),
-        ]),
+        ]).map((each) => ({ ...each, isStep: true })),
   );
 }
 

@@ -103,8 +103,8 @@ function isRepeating(item: Control | Group): item is Button {
 }
 
 function buttonIn(item: Button, rect: Rect): Block {
-  const place = region(item.id, item.name ?? item.label, rect, item.to);
-  const { repeats } = item;
+  const { repeats, isStep } = item;
+  const place = { ...region(item.id, item.name ?? item.label, rect, item.to), isStep };
   return one(
     [
       box(rect, item.isPrimary && !item.refusal ? "accent" : "raised"),
@@ -177,7 +177,7 @@ function groupBlocks(group: Group, width: number): readonly Block[] {
     add(nextSwatch(control, { x: left, y: 0, width: SWATCH, height: ROW }));
     left += SWATCH;
   }
-  for (const control of [...inRow].reverse()) {
+  for (const control of inRow) {
     if (control.kind !== "toggle") continue;
     right -= CHIP;
     add(chip(control, { x: right, y: 0, width: CHIP, height: ROW }));
@@ -186,7 +186,8 @@ function groupBlocks(group: Group, width: number): readonly Block[] {
   const canOpen = group.controls.length > 1 || group.more.length > 0;
   const sign = canOpen ? (group.isOpen ? "▾ " : "▸ ") : "";
   const tags = group.tags.length === 0 ? "" : ` (${group.tags.join(", ")})`;
-  marks.push(text(name, `${sign}${group.label}${tags}`));
+  const tone = group.isDimmed ? "dim" : "text";
+  marks.push(text(name, `${sign}${group.label}${tags}`, { tone }));
   if (canOpen) regions.push(region(`${group.id}/open`, group.label, name, () => group.opener));
   const head = one(marks, regions);
   if (!group.isOpen) return [head];

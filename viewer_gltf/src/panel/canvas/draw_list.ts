@@ -73,6 +73,8 @@ export type Region = Readonly<{
   press?: (across: number, down: number) => CanvasWish;
   /** Goes on, little by little, while it is held or gazed at. */
   repeats?: Command;
+  /** Each press goes on by a step, as to the next option: pressing quickly is meant. */
+  isStep?: boolean;
 }>;
 
 /** A row, or what must not be broken; its upper left corner is 0, 0. */

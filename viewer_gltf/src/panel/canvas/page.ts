@@ -170,6 +170,7 @@ function pager(page: number, count: number): Block {
         label: "More",
         rect,
         isSlide: false,
+        isStep: true,
         to: () => ({ canvas: "page", page: (page + 1) % count }),
       },
     ],

@@ -9,7 +9,9 @@ type Item = Control | Group;
 
 /** An item of another shape needs another element. */
 function shapeOf(item: Item): string {
-  return item.kind === "group" ? `${item.id}, group of ${item.controls.length}` : item.id;
+  if (item.kind !== "group") return item.id;
+  const opens = item.more.length > 0 ? "opens" : "";
+  return `${item.id}, group of ${item.controls.length} ${opens}`;
 }
 
 class Items {
@@ -40,7 +42,7 @@ class Items {
   }
 }
 
-/** A channel: those that are shown can be opened. */
+/** A channel: its card, or a row of a long list. */
 function makeGroup(first: Group, send: Send): Widget<Group> {
   let now = first;
   const canOpen = first.more.length > 0;
@@ -56,7 +58,7 @@ function makeGroup(first: Group, send: Send): Widget<Group> {
   const more = new Items(element("div", { className: "more" }), send);
   const root = element(
     "div",
-    { className: canOpen ? "channel" : "channel off", role: "group", ariaLabel: first.label },
+    { className: "channel", role: "group", ariaLabel: first.label },
     { channel: first.id },
     name,
     always.root,
@@ -67,6 +69,8 @@ function makeGroup(first: Group, send: Send): Widget<Group> {
     root,
     update(group) {
       now = group;
+      root.classList.toggle("compact", group.isCompact === true);
+      root.classList.toggle("dimmed", group.isDimmed);
       setText(name, group.label);
       name.title = group.label;
       if (canOpen) name.ariaExpanded = String(group.isOpen);

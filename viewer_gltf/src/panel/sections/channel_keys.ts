@@ -35,8 +35,8 @@ export const CHANNEL_KEYS: readonly Key[] = [
     return { type: "show", channel: channel.id, shown: !channel.shown };
   }),
   key("/", "Find a channel that is not shown", "find"),
-  key("A", "Next page of the channels that are not shown", ({ state, view }) => {
-    const pages = pagesOf(state, view.search);
+  key("A", "Next page of the list of channels", ({ state, view }) => {
+    const pages = pagesOf(state, view);
     return pages === 1
       ? no("There is one page alone.")
       : { panel: "page", page: (view.page + 1) % pages };

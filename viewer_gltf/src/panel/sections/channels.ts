@@ -1,6 +1,8 @@
 /**
- * The channels' part of the panel. Those that are shown come first, each with a card; the others
- * are a list to add from, by name, and a page at a time: there may be seventy. Pure.
+ * The channels' part of the panel. A few channels have a card each, in the bundle's order. Of many, the
+ * cards of those that are shown come first; the others are a list to add from, by name, and a page at a
+ * time: there may be seventy. No row changes its place when a channel is shown or hidden, since the next
+ * row would slide under the pointer or the gaze. Pure.
  */
 
 import { valueText } from "../../annotations/measure";
@@ -12,7 +14,9 @@ import { colourOf, controlOf, paletteOf } from "../control_templates";
 import type { Control, Group, PanelView, Section } from "../controls";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
-/** Channels of a page that are not shown; fewer need no search. */
+/** Most channels that all have a card: so many rows fit a page of the panel in stereo. */
+export const FEW = 9;
+/** Channels of a page of the list; fewer need no search. */
 export const PAGE = 6;
 /** Steps of a window's slider: the volumes have 8 bits. */
 const WINDOW_STEPS = 255;
@@ -78,6 +82,7 @@ function cardOf(
     label: name,
     tags: tagsOf(channel),
     about: channel.surfaceReason,
+    isDimmed: !channel.shown,
     isOpen,
     opener: { panel: "pick", channel: isOpen ? null : id },
   } as const;
@@ -128,63 +133,65 @@ function cardOf(
   };
 }
 
-/** The hidden channels with the sought text in their name or id. */
-export function foundChannels(state: ViewerState, search: string): readonly ChannelState[] {
+/** The channels that have a card above the list. */
+function carded({ channels }: ViewerState, { carded: ids }: PanelView): readonly ChannelState[] {
+  if (channels.length <= FEW) return channels;
+  return channels.filter(({ id, shown }) => ids?.includes(id) ?? shown);
+}
+
+/** The listed channels with the sought text in their name or id. */
+export function foundChannels(
+  state: ViewerState,
+  view: PanelView,
+  search = view.search,
+): readonly ChannelState[] {
   const sought = search.trim().toLowerCase();
+  const cards = carded(state, view);
   return state.channels.filter(
-    ({ shown, name, id }) =>
-      !shown && (name.toLowerCase().includes(sought) || id.toLowerCase().includes(sought)),
+    (channel) =>
+      !cards.includes(channel) &&
+      (channel.name.toLowerCase().includes(sought) || channel.id.toLowerCase().includes(sought)),
   );
 }
 
 /** How many pages those that are found take. */
-export function pagesOf(state: ViewerState, search: string): number {
-  return Math.max(1, Math.ceil(foundChannels(state, search).length / PAGE));
+export function pagesOf(state: ViewerState, view: PanelView): number {
+  return Math.max(1, Math.ceil(foundChannels(state, view).length / PAGE));
 }
 
-/** Beginnings of the hidden channels' names, as `CD`: the letters up to a digit, three at most. */
-function beginningsOf(state: ViewerState): readonly string[] {
-  const found = foundChannels(state, "").map(
-    ({ name }) => /^\p{L}{1,3}/u.exec(name)?.[0] ?? name.slice(0, 1),
-  );
+/** Beginnings of the channels' names, as `CD`: the letters up to a digit, three at most. */
+function beginningsOf(channels: readonly ChannelState[]): readonly string[] {
+  const found = channels.map(({ name }) => /^\p{L}{1,3}/u.exec(name)?.[0] ?? name.slice(0, 1));
   return [...new Set(found)].sort((a, b) => a.localeCompare(b, "en"));
 }
 
-function addingOf(state: ViewerState, view: PanelView): readonly (Control | Group)[] {
-  const hidden = foundChannels(state, "").length;
-  if (hidden === 0) return [];
-  const isLong = hidden > PAGE;
-  const search = isLong ? view.search : "";
-  const found = foundChannels(state, search);
-  const pages = pagesOf(state, search);
+function addingOf(
+  state: ViewerState,
+  facts: ChannelFacts,
+  view: PanelView,
+): readonly (Control | Group)[] {
+  const all = foundChannels(state, view, "");
+  if (all.length === 0) return [];
+  const isLong = all.length > PAGE;
+  const found = isLong ? foundChannels(state, view) : all;
+  const pages = Math.max(1, Math.ceil(found.length / PAGE));
   const page = Math.min(view.page, pages - 1);
-  const listed = found.slice(page * PAGE, (page + 1) * PAGE);
   const items: (Control | Group)[] = [];
   if (isLong) {
     items.push({
       kind: "search",
       id: "find-channel",
-      label: `Add one of ${hidden} more channels`,
+      label: `Add one of ${all.length} more channels`,
       value: view.search,
-      hints: beginningsOf(state),
+      hints: beginningsOf(all),
       to: (text) => ({ panel: "find", text }),
     });
   }
-  for (const channel of listed) {
-    items.push({
-      kind: "group",
-      id: channel.id,
-      label: channel.name,
-      tags: tagsOf(channel),
-      about: channel.surfaceReason,
-      controls: [shownToggle(channel)],
-      more: [],
-      isOpen: false,
-      opener: { panel: "pick", channel: null },
-    });
+  for (const channel of found.slice(page * PAGE, (page + 1) * PAGE)) {
+    items.push(rowOf(cardOf(channel, facts, view)));
   }
   if (isLong && found.length === 0) {
-    const value = `No hidden channel is called "${view.search.trim()}".`;
+    const value = `No channel of the list is called "${view.search.trim()}".`;
     items.push({ kind: "text", id: "no-channel", label: "Channels", value });
   }
   if (pages > 1) {
@@ -192,10 +199,24 @@ function addingOf(state: ViewerState, view: PanelView): readonly (Control | Grou
       kind: "button",
       id: "next-channels",
       label: `Next ${PAGE} (page ${page + 1} of ${pages})`,
+      isStep: true,
       to: () => ({ panel: "page", page: (page + 1) % pages }),
     });
   }
   return items;
+}
+
+/** A card as a row of the list: all but the switch waits until the channel is shown, and opened. */
+function rowOf(card: Group): Group {
+  const isSwitch = ({ id }: Control) => id === `${card.id}/shown`;
+  const canOpen = !card.isDimmed || card.isOpen;
+  const rest = [...card.controls.filter((each) => !isSwitch(each)), ...card.more];
+  return {
+    ...card,
+    isCompact: true,
+    controls: card.controls.filter(isSwitch),
+    more: canOpen ? rest : [],
+  };
 }
 
 export function channelItems(
@@ -203,8 +224,12 @@ export function channelItems(
   facts: ChannelFacts,
   view: PanelView,
 ): Section["items"] {
-  const cards = state.channels
-    .filter(({ shown }) => shown)
-    .map((channel) => cardOf(channel, facts, view));
-  return [...cards, ...addingOf(state, view)];
+  const cards = carded(state, view).map((channel) => cardOf(channel, facts, view));
+  return [...cards, ...addingOf(state, facts, view)];
+}
+
+/** The view with the cards of the channels that are shown now; they keep their places until it is laid out anew. */
+export function keepPlaces(view: PanelView, { channels }: ViewerState): PanelView {
+  if (view.carded !== null) return view;
+  return { ...view, carded: channels.filter(({ shown }) => shown).map(({ id }) => id) };
 }

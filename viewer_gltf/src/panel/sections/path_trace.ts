@@ -22,6 +22,7 @@ function lampGroup(lamp: LampParameters, state: ViewerState, { picked }: PanelVi
     label: name,
     tags: [],
     about: "",
+    isDimmed: false,
     isOpen,
     opener: { panel: "pick", channel: isOpen ? null : id },
     controls: [controlOf(color, state), controlOf(isOn, state)],

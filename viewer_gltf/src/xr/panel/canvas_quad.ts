@@ -31,26 +31,17 @@ export class CanvasQuad {
   /** How often it was painted. */
   paints = 0;
   private readonly lit: Mesh<PlaneGeometry, MeshBasicMaterial>;
-  private readonly texture: CanvasTexture;
-  private readonly context: CanvasRenderingContext2D;
+  private readonly texture: CanvasTexture | null;
   private painted = "";
   private readonly toQuad = new Matrix4();
 
+  /** @param context what the picture is painted with; null: nobody sees it, as in a program without a screen */
   constructor(
     readonly width: number,
     readonly height: number,
+    private readonly context: CanvasRenderingContext2D | null = newContext(width, height),
   ) {
-    const canvas = document.createElement("canvas");
-    canvas.width = width;
-    canvas.height = height;
-    const context = canvas.getContext("2d");
-    if (context === null) throw new Error("the browser has no 2D canvas");
-    this.context = context;
-    this.texture = new CanvasTexture(canvas);
-    this.texture.colorSpace = SRGBColorSpace;
-    this.texture.minFilter = LinearMipmapLinearFilter;
-    this.texture.magFilter = LinearFilter;
-    this.texture.anisotropy = ANISOTROPY;
+    this.texture = context === null ? null : textureOf(context.canvas);
     this.mesh = new Mesh(
       new PlaneGeometry(width / PX_PER_M, height / PX_PER_M),
       new MeshBasicMaterial({ map: this.texture, toneMapped: false }),
@@ -85,10 +76,11 @@ export class CanvasQuad {
     const text = JSON.stringify(marks);
     if (text === this.painted) return false;
     this.painted = text;
+    this.paints++;
+    if (this.context === null || this.texture === null) return true;
     this.context.clearRect(0, 0, this.width, this.height);
     paint(this.context, marks);
     this.texture.needsUpdate = true;
-    this.paints++;
     return true;
   }
 
@@ -127,10 +119,28 @@ export class CanvasQuad {
   }
 
   dispose(): void {
-    this.texture.dispose();
+    this.texture?.dispose();
     for (const { geometry, material } of [this.mesh, this.lit]) {
       geometry.dispose();
       material.dispose();
     }
   }
+}
+
+function newContext(width: number, height: number): CanvasRenderingContext2D {
+  const canvas = document.createElement("canvas");
+  canvas.width = width;
+  canvas.height = height;
+  const context = canvas.getContext("2d");
+  if (context === null) throw new Error("the browser has no 2D canvas");
+  return context;
+}
+
+function textureOf(canvas: HTMLCanvasElement): CanvasTexture {
+  const texture = new CanvasTexture(canvas);
+  texture.colorSpace = SRGBColorSpace;
+  texture.minFilter = LinearMipmapLinearFilter;
+  texture.magFilter = LinearFilter;
+  texture.anisotropy = ANISOTROPY;
+  return texture;
 }

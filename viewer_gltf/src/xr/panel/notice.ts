@@ -21,12 +21,14 @@ const DISTANCE_M = 0.9;
 const RENDER_ORDER = 1900;
 
 export class RoomNotice {
-  private readonly quad = new CanvasQuad(NOTICE_WIDTH, NOTICE_HEIGHT);
+  private readonly quad: CanvasQuad;
   private announcements: Announcements = NO_ANNOUNCEMENTS;
   /** It comes with the next frame, which knows where the head looks. */
   private wantsPlace = false;
 
-  constructor() {
+  /** @param isPainted false: nobody sees it */
+  constructor(isPainted = true) {
+    this.quad = new CanvasQuad(NOTICE_WIDTH, NOTICE_HEIGHT, isPainted ? undefined : null);
     this.quad.drawOver(RENDER_ORDER);
     this.quad.mesh.name = "notice";
   }

@@ -21,6 +21,7 @@ import {
   type PanelView,
   START_VIEW,
 } from "../../panel/controls";
+import { keepPlaces } from "../../panel/sections/channels";
 import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import type { ViewerState } from "../../state/viewer_state";
@@ -53,15 +54,24 @@ export type RoomPanelOptions = Readonly<{
   onLenses: (lenses: Lenses) => void;
   /** Reports why a request can't be granted. */
   onAnnounce: (text: string) => void;
+  /** Absent: true. False: nobody sees it, as in a program without a screen. */
+  isPainted?: boolean;
 }>;
+
+function placeOf({ rect: { x, y, width, height } }: Region): string {
+  return `${x} ${y} ${width} ${height}`;
+}
 
 export class RoomPanel {
   readonly group = new Group();
-  readonly quad = new CanvasQuad(WIDTH, HEIGHT);
-  private readonly opener = new CanvasQuad(OPENER.width, OPENER.height);
+  readonly quad: CanvasQuad;
+  private readonly opener: CanvasQuad;
   /** In the order in which rays meet them. */
   readonly targets: readonly Target[];
   private page: Page = { marks: [], regions: [] };
+  /** Where the controls of the page are, and how often that has changed. */
+  private arrangement = "";
+  private changes = 0;
   private view: PanelView = START_VIEW;
   private section: CanvasView = START_CANVAS;
   private state: ViewerState | null = null;
@@ -75,14 +85,21 @@ export class RoomPanel {
   private dragged = "";
 
   constructor(private readonly options: RoomPanelOptions) {
+    const context = options.isPainted === false ? null : undefined;
+    this.quad = new CanvasQuad(WIDTH, HEIGHT, context);
+    this.opener = new CanvasQuad(OPENER.width, OPENER.height, context);
     this.group.name = "panel";
     this.group.visible = false;
     this.group.add(this.quad.mesh, this.opener.mesh);
     this.opener.mesh.visible = true;
     for (const quad of [this.quad, this.opener]) quad.drawOver(RENDER_ORDER);
+    const layout = () => this.layout;
     this.targets = [
       {
         isOnTop: true,
+        get layout() {
+          return layout();
+        },
         meet: (ray) => this.meet(ray),
         choose: (hit, ray) => this.choose(hit, ray),
         drag: (key, ray) => this.drag(key, ray),
@@ -104,6 +121,11 @@ export class RoomPanel {
 
   get isOpen(): boolean {
     return this.quad.mesh.visible;
+  }
+
+  /** Changes whenever a control comes, goes or moves. */
+  private get layout(): string {
+    return `panel ${this.isOpen} ${this.changes}`;
   }
 
   /** The regions to point at now, for tests and for a program that reads them aloud. */
@@ -153,6 +175,7 @@ export class RoomPanel {
     if (!this.isOpen) return isChanged;
     this.rested_s += dt_s;
     if (state !== this.state || this.rested_s >= REFRESH_S) this.isStale = true;
+    this.view = keepPlaces(this.view, state);
     this.state = state;
     if (!this.isStale) return isChanged;
     return this.refresh() || isChanged;
@@ -209,14 +232,23 @@ export class RoomPanel {
   private open(eye: Vector3, bearing: Bearing): void {
     this.quad.place(pointAt(bearing, eye, DISTANCE_M), eye);
     this.quad.mesh.visible = true;
-    this.isStale = true;
+    this.layOutAnew();
     this.paintOpener();
+  }
+
+  /** The cards are those of the channels that are shown by now. */
+  private layOutAnew(): void {
+    this.view = { ...this.view, carded: null };
+    this.isStale = true;
   }
 
   private refresh(): boolean {
     this.isStale = false;
     this.rested_s = 0;
     this.page = pageOf(this.options.layOut(this.view), this.section);
+    const arrangement = this.page.regions.map((each) => `${each.id} ${placeOf(each)}`).join("\n");
+    if (arrangement !== this.arrangement) this.changes++;
+    this.arrangement = arrangement;
     return this.quad.show(this.page.marks);
   }
 
@@ -236,18 +268,19 @@ export class RoomPanel {
     const spot = this.quad.meet(ray);
     if (spot === null) return null;
     const region = this.regionAt(spot);
-    const key = region && PANEL + region.id;
     const { distance_m } = spot;
-    if (region?.repeats !== undefined) return { key, distance_m, repeats: region.repeats };
-    if (!region?.isSlide) return { key, distance_m };
+    if (region === null) return { key: null, distance_m };
+    const { id, repeats, isStep } = region;
+    const hit: Hit = { key: PANEL + id, distance_m, place: placeOf(region), isStep };
+    if (repeats !== undefined) return { ...hit, repeats, isStep: true };
+    if (!region.isSlide) return hit;
     // what is first taken hold of can be carried by the gaze alone
-    const hold = region.press === undefined ? "slide" : "carry";
-    return { key, distance_m, hold };
+    return { ...hit, hold: region.press === undefined ? "slide" : "carry" };
   }
 
   private meetOpener(ray: RoomRay): Hit | null {
     const spot = this.opener.meet(ray);
-    return spot && { key: OPENER_KEY, distance_m: spot.distance_m };
+    return spot && { key: OPENER_KEY, distance_m: spot.distance_m, place: OPENER_KEY };
   }
 
   private choose({ key }: Hit, ray: RoomRay): void {
@@ -284,8 +317,10 @@ export class RoomPanel {
       this.view = changePanel(this.view, wish);
       if (wish.panel === "lenses") this.options.onLenses(wish.lenses);
     } else if ("type" in wish) this.options.onWish(wish);
-    else if (wish.canvas === "tab") this.section = { tab: wish.section, page: 0 };
-    else if (wish.canvas === "page") this.section = { ...this.section, page: wish.page };
+    else if (wish.canvas === "tab") {
+      this.section = { tab: wish.section, page: 0 };
+      this.layOutAnew();
+    } else if (wish.canvas === "page") this.section = { ...this.section, page: wish.page };
     else if (wish.canvas === "announce") this.options.onAnnounce(wish.text);
     else if (wish.canvas === "close") this.close();
     else this.options.onLeave();

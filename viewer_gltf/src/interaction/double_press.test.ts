@@ -1,0 +1,50 @@
+import { describe, expect, it } from "vitest";
+import { DOUBLE_MS, isSecondPress, type Press } from "./double_press";
+import type { Sight } from "./dwell";
+
+const SIGHT: Sight = {
+  target: "a",
+  place: "upper",
+  layout: "before",
+  direction: [0, 0, -1],
+  isGradual: false,
+};
+/** @param right_deg where the ray points */
+function pressed(time_ms: number, more: Partial<Sight> = {}, isStep = false, right_deg = 0): Press {
+  const angle = (right_deg * Math.PI) / 180;
+  const direction = [Math.sin(angle), 0, -Math.cos(angle)] as const;
+  return { time_ms, sight: { ...SIGHT, direction, ...more }, isStep };
+}
+
+describe("the second of two quick presses", () => {
+  const first = pressed(1000);
+
+  it("does nothing on the same control", () => {
+    expect(isSecondPress(first, pressed(1150))).toBe(true);
+    expect(isSecondPress(first, pressed(1150, {}, false, 3))).toBe(true); // a trigger shakes the hand
+  });
+
+  it("counts where the first one was long ago, or where there was none", () => {
+    expect(isSecondPress(first, pressed(1001 + DOUBLE_MS))).toBe(false);
+    expect(isSecondPress(null, pressed(1000))).toBe(false);
+  });
+
+  it("counts on a control that goes on by steps", () => {
+    expect(isSecondPress(pressed(1000, {}, true), pressed(1150, {}, true))).toBe(false);
+  });
+
+  it("does nothing on what has come under the ray meanwhile, steps or not", () => {
+    const other = { target: "b", layout: "after" };
+    expect(isSecondPress(first, pressed(1150, other))).toBe(true);
+    expect(isSecondPress(first, pressed(1150, other, true))).toBe(true);
+    expect(isSecondPress(first, pressed(1150, { place: "lower", layout: "after" }))).toBe(true);
+  });
+
+  it("counts on another control to which the ray has moved", () => {
+    expect(isSecondPress(first, pressed(1150, { target: "b", place: "lower" }, false, 2))).toBe(
+      false,
+    );
+    const other = { target: "b", place: "lower", layout: "after" };
+    expect(isSecondPress(first, pressed(1150, other, false, 5))).toBe(false);
+  });
+});

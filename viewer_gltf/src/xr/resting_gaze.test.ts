@@ -1,0 +1,223 @@
+/** People in stereo rest, tremble and press twice: each control of each page changes one thing, once. */
+import { describe, expect, it } from "vitest";
+import { sweep } from "../../test/support/exhaustive";
+import { LookingPerson, pagesOf } from "../../test/support/xr/looking_person";
+import { reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
+
+const VIEW = { picked: "c2", isHistogramOpen: true } as const;
+/** Faults, a measurement, and a path-traced picture, so that every section has all that it can have. */
+function busy(state: ViewerState): ViewerState {
+  const points = [
+    [0, 0, 0],
+    [3, 4, 0],
+  ] as const;
+  return [
+    { type: "notify", text: "a fault", isMendable: true } as const,
+    { type: "measure", points } as const,
+    { type: "finish-measuring" } as const,
+    { type: "measure", points } as const,
+  ].reduce(reduce, state);
+}
+/** The light's section is another one where paths of light are traced. */
+const traced = (state: ViewerState) => reduce(state, { type: "set", id: "mode", value: "traced" });
+
+type Variant = (state: ViewerState) => ViewerState;
+type TestedPage = readonly [
+  name: string,
+  tab: string,
+  page: number,
+  ids: readonly string[],
+  variant: Variant,
+];
+/** The name is for what is reported of a test that fails. */
+const PAGES: readonly TestedPage[] = [
+  ...pagesOf(VIEW, busy).map(
+    ([tab, page, ids]) => [`${tab} ${page}`, tab, page, ids, busy] as const,
+  ),
+  ...pagesOf(VIEW, traced)
+    .filter(([tab]) => tab === "light")
+    .map(([tab, page, ids]) => [`traced ${page}`, tab, page, ids, traced] as const),
+];
+
+function at([, tab, page, , variant]: TestedPage): LookingPerson {
+  const person = new LookingPerson(12, variant);
+  person.open(tab, page, VIEW);
+  return person;
+}
+const CHANNELS = PAGES[1];
+
+/** Most wishes and changes that a control led to, and the control. */
+type Led = Readonly<{ id: string; wishes: number; changes: number }>;
+
+function ledTo(
+  page: TestedPage,
+  act: (person: LookingPerson, id: string) => void,
+  ids = page[3],
+): readonly Led[] {
+  return ids.map((id) => {
+    const person = at(page);
+    act(person, id);
+    const { changes, wishes } = person;
+    person.dispose();
+    return { id, wishes: wishes.length, changes };
+  });
+}
+const moreThanOne = (all: readonly Led[]) => all.filter((led) => led.wishes > 1 || led.changes > 1);
+
+describe("every control of every page", () => {
+  it("is part of these tests", () => {
+    const ids = PAGES.flatMap(([, , , all]) => all);
+    expect(ids.length).toBeGreaterThan(100);
+    expect(ids).toEqual(expect.arrayContaining(["leave", "tab=cut", "c0/shown", "dwell", "more"]));
+  });
+
+  it.each(PAGES)("changes one thing under a gaze that rests on it for 6 s more: %s", (...page) => {
+    const all = ledTo(page, (person, id) => {
+      person.lookAt(id, 0.5);
+      person.rest(7.5);
+    });
+    expect(moreThanOne(all)).toEqual([]);
+    expect(Math.max(...all.map(({ changes, wishes }) => changes + wishes))).toBeGreaterThan(0);
+  });
+
+  it.each(sweep(PAGES, ([, tab]) => tab === "channels"))(
+    "changes one thing under a gaze at its lower edge: %s",
+    (...page) => {
+      const all = ledTo(page, (person, id) => {
+        person.lookAt(id, 0.5, 0.9);
+        person.rest(7.5);
+      });
+      expect(moreThanOne(all)).toEqual([]);
+    },
+  );
+
+  it.each(PAGES)("changes one thing by the button, and the gaze adds nothing: %s", (...page) => {
+    const all = ledTo(page, (person, id) => {
+      person.lookAt(id, 0.5);
+      person.rest(1.4);
+      person.press();
+      person.rest(2);
+    });
+    expect(moreThanOne(all)).toEqual([]);
+  });
+
+  it.each(PAGES)("changes one thing by a double press, but for steps: %s", (...page) => {
+    const first = at(page);
+    const isStep = (id: string) => {
+      const { isStep, repeats } = first.region(id);
+      return isStep === true || repeats !== undefined;
+    };
+    const switches = page[3].filter((id) => !isStep(id) && !first.region(id).isSlide);
+    first.dispose();
+    const act = (person: LookingPerson, id: string) => {
+      person.lookAt(id, 0.5);
+      person.press();
+      person.press(180);
+      person.rest(2);
+    };
+    const all = ledTo(page, act, switches);
+    expect(moreThanOne(all)).toEqual([]);
+  });
+});
+
+describe("the rows of the panel", () => {
+  const places = (person: LookingPerson) =>
+    new Map(person.regions.map(({ id, rect }) => [id, rect]));
+
+  it.each(PAGES)("keep their places when a switch among them is pressed: %s", (...page) => {
+    const first = at(page);
+    const switches = page[3].filter((id) => first.switches.includes(id));
+    first.dispose();
+    for (const id of switches) {
+      const person = at(page);
+      const before = places(person);
+      person.lookAt(id);
+      person.press();
+      person.rest(1);
+      const after = places(person);
+      expect(after.get(id), id).toEqual(before.get(id));
+      // what opens below a switch moves the rest of the page
+      const common = [...before].filter(([each]) => after.has(each) && !id.endsWith("/plane"));
+      expect(
+        common.map(([each]) => [each, after.get(each)]),
+        id,
+      ).toEqual(common);
+      person.dispose();
+    }
+  });
+
+  it("keep their places also in a list of many channels, and until the panel is opened again", () => {
+    const person = new LookingPerson(70);
+    person.open("channels");
+    const ids = () => person.regions.flatMap(({ id }) => (id.endsWith("/shown") ? [id] : []));
+    expect(ids()).toEqual(["c0", "c1", "c2", "c3", "c4", "c5", "c6"].map((id) => `${id}/shown`));
+    const before = ids();
+    for (const id of ["c6/shown", "c0/shown", "c5/shown"]) {
+      person.lookAt(id);
+      person.press();
+      person.rest(1);
+      expect(ids()).toEqual(before);
+    }
+    person.lookAt("close");
+    person.press();
+    person.open("channels");
+    const shown = person.state.channels.filter((channel) => channel.shown);
+    expect(ids().slice(0, 4)).toEqual(shown.map(({ id }) => `${id}/shown`));
+  });
+});
+
+describe("a gaze that opens or closes the panel", () => {
+  it("does no more, though a control lies where the button was", () => {
+    const person = new LookingPerson(9, busy);
+    person.lookAt("opener");
+    person.changes = 0;
+    person.rest(2);
+    expect(person.hands.panel.isOpen).toBe(true);
+    expect(person.hands.pointed).toMatch(/^panel:/);
+    person.rest(6);
+    expect(person.hands.panel.isOpen).toBe(true);
+    expect([person.changes, person.wishes]).toEqual([1, []]);
+  });
+
+  it("chooses no tile behind it", () => {
+    const person = at(CHANNELS);
+    person.lookAt("close");
+    person.rest(7.5);
+    expect(person.hands.panel.isOpen).toBe(false);
+    expect([person.changes, person.wishes]).toEqual([1, []]);
+  });
+
+  it("is not taken for one by a double press: the panel stays open", () => {
+    const person = new LookingPerson(12, busy);
+    person.lookAt("opener");
+    person.press();
+    person.press(180);
+    expect(person.hands.panel.isOpen).toBe(true);
+    expect(person.wishes).toEqual([]);
+  });
+});
+
+describe("a press that comes just after the dwell", () => {
+  it("is the same intention", () => {
+    const person = at(CHANNELS);
+    person.lookAt("c0/shown");
+    person.rest(1.6);
+    expect(person.wishes).toHaveLength(1);
+    person.press(100);
+    expect(person.wishes).toHaveLength(1);
+  });
+});
+
+describe("a press again, after a while", () => {
+  it("switches back", () => {
+    const person = at(CHANNELS);
+    person.lookAt("c0/shown");
+    person.press();
+    person.press(600);
+    expect(person.wishes).toEqual([
+      { type: "show", channel: "c0", shown: false },
+      { type: "show", channel: "c0", shown: true },
+    ]);
+  });
+});

@@ -1,0 +1,70 @@
+/** A head in a phone's viewer, on the whole page: it looks at controls of the panel, and rests as heads do. */
+import type { Page } from "playwright-core";
+import { tick } from "../browser/clock";
+import type { ViewerPage } from "../browser/page";
+import { seeded } from "../seeded";
+
+/** Time of a frame, ms: the longest that counts in full. */
+const FRAME_MS = 100;
+/** Sway of a resting head, degrees, and its period, s. */
+const SWAY_DEG = 0.3;
+const SWAY_S = 2.3;
+/** Tremor of a resting head, degrees to either side. */
+const TREMOR_DEG = 0.15;
+/** The eyes move with the neck, so that looking at a place takes a few corrections. */
+const CORRECTIONS = 4;
+/** Age of a report, ms, from which nothing is predicted: the head's turn is then the same in every run. */
+const OLD_MS = 1000;
+
+/** The page has to have a held clock: see `addClock`. */
+export class Gazer {
+  private yaw_deg = 0;
+  private pitch_deg = 0;
+  private readonly random = seeded(7);
+
+  constructor(private readonly viewer: ViewerPage) {}
+
+  private get page(): Page {
+    return this.viewer.page;
+  }
+
+  /** Look at the middle of a control of the panel, or at its button (`opener`). */
+  async lookAt(id: string): Promise<void> {
+    for (let i = 0; i < CORRECTIONS; i++) {
+      const { menu } = await this.viewer.snapshot();
+      const entry = menu.find((each) => each.id === id);
+      if (entry === undefined) throw new Error(`no ${id} in ${menu.map((each) => each.id)}`);
+      await this.turnTo(this.yaw_deg + entry.right_deg, entry.up_deg);
+    }
+  }
+
+  /** To the right of where the head first looked, and up. */
+  async turnTo(yaw_deg: number, pitch_deg: number): Promise<void> {
+    [this.yaw_deg, this.pitch_deg] = [yaw_deg, pitch_deg];
+    await this.report(0, 0);
+    await tick(this.page, 10);
+  }
+
+  /** Look on at the same place, with the tremor and the sway of a head. */
+  async rest(seconds: number): Promise<void> {
+    for (let k = 0; k < Math.round((1000 * seconds) / FRAME_MS); k++) {
+      const sway = SWAY_DEG * Math.sin((2 * Math.PI * k * FRAME_MS) / 1000 / SWAY_S);
+      const tremor = () => TREMOR_DEG * (2 * this.random() - 1);
+      await this.report(sway + tremor(), tremor());
+      await tick(this.page, FRAME_MS);
+    }
+  }
+
+  private report(right_deg: number, up_deg: number): Promise<void> {
+    const alpha = -this.yaw_deg - right_deg;
+    const beta = 90 + this.pitch_deg + up_deg;
+    return this.page.evaluate(
+      ([angles, age_ms]) => {
+        const event = new DeviceOrientationEvent("deviceorientation", { ...angles, gamma: 0 });
+        Object.defineProperty(event, "timeStamp", { value: performance.now() - age_ms });
+        dispatchEvent(event);
+      },
+      [{ alpha, beta }, OLD_MS] as const,
+    );
+  }
+}

@@ -1,0 +1,204 @@
+/** A person in stereo who looks, rests and presses, without a browser: the hands as they are, nothing painted. */
+import { Euler, Matrix4, Quaternion, Scene, Vector3 } from "three";
+import type { Region } from "../../../src/panel/canvas/draw_list";
+import { type PanelView, START_VIEW } from "../../../src/panel/controls";
+import { chosenTile, type Facts, layOut } from "../../../src/panel/layout";
+import { XR_DISTANCE_M } from "../../../src/render/placement";
+import { Specimen } from "../../../src/render/specimen_pose";
+import { initialState } from "../../../src/state/initial_state";
+import { reduce } from "../../../src/state/reduce";
+import type { ViewerState } from "../../../src/state/viewer_state";
+import { Hands } from "../../../src/xr/interaction";
+import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
+import { tremble } from "./tremble";
+
+/** Longest time that a frame counts, s. */
+const FRAME_S = 0.1;
+/** Time that a head takes to turn, ms. */
+const TURN_MS = 500;
+const EYE = new Vector3();
+const RAD = Math.PI / 180;
+
+export const STEREO_FACTS: Facts = {
+  title: "sample",
+  subtitle: "",
+  shown: SPECIMEN_BOX,
+  ranges: new Map(),
+  focusTile: "r1_c2",
+  isStereo: true,
+  stereo: { isAvailable: true, reason: "" },
+  split: { isAvailable: true, reason: "" },
+  hasRoom: false,
+  canScan: false,
+  faultOfCode: () => "",
+  frame_ms: 12.3,
+  settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
+  triangles: 12_345,
+  volumeLevel: 1,
+  samples: null,
+  isLoading: false,
+  values: [],
+  sliceValues: [],
+  isFilming: false,
+  undo: "Colour",
+  redo: "Colour",
+};
+
+export class LookingPerson {
+  state: ViewerState;
+  /** Everything that was asked for outside of the panel. */
+  readonly wishes: unknown[] = [];
+  /** How often anything has changed, the panel's own pages too; what follows in the next frame is the same change. */
+  changes = 0;
+  readonly hands: Hands;
+  /** Of the clock. */
+  now_ms = 1000;
+  private view: Partial<PanelView> = {};
+  private facing = new Quaternion();
+  private before: readonly unknown[] = [];
+  private hasJustChanged = false;
+  private readonly offsets = tremble(FRAME_S);
+
+  constructor(channels = 12, change: (state: ViewerState) => ViewerState = (state) => state) {
+    const manifest = sampleManifest(channels);
+    this.state = change(initialState(manifest));
+    const specimen = new Specimen(manifest.specimen.bounds_um);
+    specimen.anchorAt(new Vector3(0, 0, -XR_DISTANCE_M));
+    this.hands = new Hands({
+      xr: { getFrame: () => null as unknown as XRFrame, getReferenceSpace: () => null },
+      scene: new Scene(),
+      specimen,
+      tiles: manifest.tiles,
+      isPainted: false,
+      now_ms: () => this.now_ms,
+      layOut: (view) => layOut(this.state, STEREO_FACTS, view),
+      onAction: (action) => {
+        this.wishes.push(action);
+        this.state = reduce(this.state, action);
+      },
+      onCommand: (command) => this.wishes.push(command),
+      onChoose: (_, tile) => {
+        this.wishes.push(tile);
+        this.state = reduce(this.state, chosenTile(this.state, tile));
+      },
+      onLeave: () => this.wishes.push("leave"),
+      onLenses: (lenses) => this.wishes.push(lenses),
+    });
+    this.hands.start(null);
+    this.frame(0);
+  }
+
+  get regions(): readonly Region[] {
+    return this.hands.panel.regions;
+  }
+
+  /** The names of all controls of the panel that are on or off. */
+  get switches(): readonly string[] {
+    return layOut(this.state, STEREO_FACTS, { ...START_VIEW, ...this.view })
+      .sections.flatMap(({ items }) => items)
+      .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item]))
+      .flatMap(({ kind, id }) => (kind === "toggle" ? [id] : []));
+  }
+
+  region(id: string): Region {
+    const found = this.regions.find((each) => each.id === id);
+    if (found === undefined) throw new Error(`no ${id} in ${this.regions.map((each) => each.id)}`);
+    return found;
+  }
+
+  /** Look at a control of the panel, or at its button, `opener`. `across` and `down` are shares of it. */
+  lookAt(id: string, across?: number, down?: number): void {
+    const at = this.hands.panel.pointOf(id, across, down);
+    if (at === null) throw new Error(`no ${id} in ${this.regions.map((each) => each.id)}`);
+    this.facing.setFromRotationMatrix(new Matrix4().lookAt(EYE, at, new Vector3(0, 1, 0)));
+    this.now_ms += TURN_MS;
+    this.frame(0);
+  }
+
+  lookUp(): void {
+    this.facing.setFromEuler(new Euler(60 * RAD, 0, 0));
+    this.now_ms += TURN_MS;
+    this.frame(0);
+  }
+
+  /** Look on at the same place, trembling as heads do. */
+  rest(seconds: number): void {
+    for (let k = 0; k < Math.round(seconds / FRAME_S); k++) this.frame(FRAME_S);
+  }
+
+  /** Press the Cardboard's button, so many ms after what was done before. */
+  press(after_ms = 0): void {
+    this.now_ms += after_ms;
+    this.hands.tap();
+    this.frame(0);
+  }
+
+  /** Open the panel's page of a tab, and go on by so many pages. */
+  open(tab: string, page = 0, view: Partial<PanelView> = {}): void {
+    this.view = view;
+    this.hands.panel.take(view);
+    if (!this.hands.panel.isOpen) this.hands.panel.toggle();
+    this.frame(0);
+    this.lookAt(`tab=${tab}`);
+    this.press();
+    this.frame(0);
+    if (page > 0) this.lookAt("more");
+    for (let k = 0; k < page; k++) this.press();
+    this.lookUp();
+    this.frame(FRAME_S);
+    this.wishes.length = 0;
+    this.changes = 0;
+  }
+
+  dispose(): void {
+    this.hands.dispose();
+  }
+
+  private frame(dt_s: number): void {
+    this.now_ms += 1000 * dt_s;
+    const [right_deg, up_deg] = this.offsets.next().value as readonly [number, number];
+    const offset = new Quaternion().setFromEuler(new Euler(up_deg * RAD, -right_deg * RAD, 0));
+    const head = new Matrix4().makeRotationFromQuaternion(this.facing.clone().multiply(offset));
+    this.hands.update(dt_s, head, this.state);
+    this.note();
+  }
+
+  private note(): void {
+    const { isOpen, quad } = this.hands.panel;
+    const now = [this.state, isOpen, quad.paints, this.wishes.length];
+    const hasChanged = now.some((each, i) => each !== this.before[i]);
+    this.before = now;
+    if (hasChanged && !this.hasJustChanged) this.changes++;
+    this.hasJustChanged = hasChanged;
+  }
+}
+
+/** The tabs of the panel, and how many pages each has. */
+export function pagesOf(
+  view: Partial<PanelView>,
+  change?: (state: ViewerState) => ViewerState,
+): readonly (readonly [tab: string, page: number, ids: readonly string[]])[] {
+  const person = new LookingPerson(12, change);
+  person.open("channels", 0, view);
+  const tabs = person.regions.flatMap(({ id }) => (id.startsWith("tab=") ? [id.slice(4)] : []));
+  const pages = tabs.flatMap((tab) => {
+    person.open(tab);
+    const found: (readonly [string, number, readonly string[]])[] = [];
+    const seen = new Set<string>();
+    for (let page = 0; ; page++) {
+      const ids = person.regions.map(({ id }) => id);
+      if (seen.has(ids.join())) return found;
+      seen.add(ids.join());
+      found.push([tab, page, page === 0 && tab === tabs[0] ? ids : ids.filter(isOfThePage)]);
+      if (!ids.includes("more")) return found;
+      person.lookAt("more");
+      person.press();
+      person.lookUp();
+    }
+  });
+  person.dispose();
+  return pages;
+}
+
+/** Tabs, and the two buttons above, are the same on every page. */
+const isOfThePage = (id: string) => !id.startsWith("tab=") && !["leave", "close"].includes(id);

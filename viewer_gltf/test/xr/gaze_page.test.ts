@@ -1,0 +1,69 @@
+/** A gaze that rests on the whole page, on the split screen: it does one thing and no more. */
+import { join } from "node:path";
+import { expect, it } from "vitest";
+import { addClock, holdFrames } from "../support/browser/clock";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+import { Gazer } from "../support/xr/gazer";
+
+const SHOTS = process.env.STEREOCELL_SHOTS;
+const SIZE = SHOTS ? { width: 1600, height: 720 } : { width: 320, height: 144 };
+
+describeInChromium("a gaze that rests on the page's panel", () => {
+  const stand = prepareStand({ viewport: SIZE, pixelRatio: SHOTS ? 1 : undefined });
+  const menu = async () => (await stand.viewer.snapshot()).menu.map(({ id }) => id);
+  const channels = async () => (await stand.viewer.snapshot()).state.channels;
+
+  async function enter(): Promise<Gazer> {
+    const { page } = stand.viewer;
+    await addClock(page);
+    await page.addInitScript(() => {
+      localStorage.setItem("stereocell-told", "9"); // no card before the eyes
+      localStorage.setItem("stereocell-screen", "240"); // pixels in an inch of the phone's screen
+    });
+    await stand.open("&mode=off");
+    await page.keyboard.press("P");
+    await page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
+    await holdFrames(page);
+    const gazer = new Gazer(stand.viewer);
+    await gazer.turnTo(0, 0);
+    return gazer;
+  }
+
+  const shoot = async (name: string) => {
+    if (SHOTS) await stand.viewer.page.screenshot({ path: join(SHOTS, `${name}.png`) });
+  };
+
+  it("opens the menu and does no more, however long it stays", async () => {
+    const gazer = await enter();
+    const before = (await stand.viewer.snapshot()).state;
+    await gazer.lookAt("opener");
+    await gazer.rest(2);
+    expect((await menu()).length).toBeGreaterThan(1);
+    const opened = await menu();
+    await shoot("menu_opened");
+    await gazer.rest(6);
+    await shoot("menu_rested");
+    expect(await menu()).toEqual(opened);
+    expect((await stand.viewer.snapshot()).state).toEqual(before);
+  });
+
+  it("hides one channel, whose row stays where it is, and no other", async () => {
+    const gazer = await enter();
+    await gazer.lookAt("opener");
+    await gazer.rest(2);
+    const [first, ...others] = await channels();
+    const places = async () =>
+      (await stand.viewer.snapshot()).menu.map(({ id, up_deg }) => [id, Math.round(up_deg)]);
+    await gazer.lookAt(`${first.id}/shown`);
+    await shoot("channels_shown");
+    const rows = await places();
+    await gazer.rest(6);
+    await shoot("channels_rested");
+    expect((await channels()).map(({ shown }) => shown)).toEqual([
+      false,
+      ...others.map(({ shown }) => shown),
+    ]);
+    expect(await places()).toEqual(rows);
+  });
+});
