@@ -350,10 +350,9 @@ def test_only_libraries_that_can_change_a_byte_are_in_a_unit_s_key() -> None:
         ("liffile", {"lif"}),
         ("nd2", {"nd2"}),
         ("hdf5plugin", {"hdf5", "ims", "bdv"}),
-        ("imagecodecs", {"tiff", "planes"}),
+        ("imagecodecs", {"tiff", "planes", "dicom"}),
         ("python-gdcm", {"dicom"}),
         ("pylibjpeg-openjpeg", {"dicom"}),
-        ("pyjpegls", {"dicom"}),
         ("bioio_*", {"bioio"}),
     ],
 )

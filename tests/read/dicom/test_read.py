@@ -269,6 +269,17 @@ def test_compressed_pixels_are_what_was_compressed(tmp_path: Path, name: str) ->
     assert np.abs(whole(dataset).astype(int) - before).max() <= tolerance
 
 
+@pytest.mark.parametrize("bits", [7, 12])
+def test_signed_values_of_fewer_bits_in_jpeg_ls_keep_their_signs(tmp_path: Path, bits: int) -> None:
+    shape, dtype = (3, 12, 10), np.int8 if bits <= 8 else np.int16
+    values = np.linspace(-(2 ** (bits - 1)), 2 ** (bits - 1) - 1, 360).astype(dtype).reshape(shape)
+    for k, plane in enumerate(values):
+        ds = image(plane, grid(shape=shape), k, bits=bits)
+        compress(save(ds, tmp_path / "s" / f"{k}"), uid.JPEGLSLossless)
+    dataset = read.open(tmp_path / "s")
+    assert np.array_equal(np.sort(whole(dataset).ravel()), values.ravel())
+
+
 def test_twelve_of_sixteen_bits_signed_with_an_overlay_above(tmp_path: Path) -> None:
     values = np.arange(-2048, -2048 + 12 * 10 * 3).reshape(3, 12, 10)
     for k, plane in enumerate(values):

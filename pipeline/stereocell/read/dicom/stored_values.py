@@ -26,6 +26,8 @@ from pydicom import uid
 from pydicom.encaps import generate_frames
 from pydicom.pixels.utils import iter_pixels
 
+from stereocell.read.dicom import jpeg_ls
+
 _TAGS: list[Any] = [
     "Rows",
     "Columns",
@@ -110,8 +112,8 @@ PLUGINS: dict[str, str] = {
     uid.JPEGExtended12Bit: "gdcm",
     uid.JPEGLossless: "gdcm",
     uid.JPEGLosslessSV1: "gdcm",
-    uid.JPEGLSLossless: "pyjpegls",
-    uid.JPEGLSNearLossless: "pyjpegls",
+    uid.JPEGLSLossless: jpeg_ls.PLUGIN,
+    uid.JPEGLSNearLossless: jpeg_ls.PLUGIN,
     uid.JPEG2000Lossless: "pylibjpeg",
     uid.JPEG2000: "pylibjpeg",
     uid.HTJ2KLossless: "pylibjpeg",

@@ -1,0 +1,31 @@
+"""JPEG-LS in DICOM, decoded by CharLS as imagecodecs has it.
+
+pydicom's own plugin takes pyjpegls, which has no wheels for Python 3.14. GDCM refuses precisions of
+6 and 7 bits.
+"""
+
+import imagecodecs
+from pydicom.pixels.decoders import JPEGLSLosslessDecoder, JPEGLSNearLosslessDecoder
+from pydicom.pixels.decoders.base import DecodeRunner
+from pydicom.uid import JPEGLSTransferSyntaxes
+
+PLUGIN = "imagecodecs"
+
+
+def is_available(uid: str) -> bool:
+    """Return whether the syntax is JPEG-LS. pydicom asks each plugin."""
+    return uid in JPEGLSTransferSyntaxes
+
+
+def decode_frame(stream: bytes, runner: DecodeRunner) -> bytearray:
+    """Return the values of one grey plane. Raises ValueError for colours, and CharLS's errors."""
+    plane = imagecodecs.jpegls_decode(stream)
+    if plane.ndim != 2:
+        raise ValueError(f"a stream of {plane.shape}, expected one component")
+    runner.set_option("bits_allocated", 8 * plane.dtype.itemsize)
+    return bytearray(plane.tobytes())  # pydicom extends signs in place
+
+
+for _decoder in (JPEGLSLosslessDecoder, JPEGLSNearLosslessDecoder):
+    if PLUGIN not in _decoder.available_plugins:
+        _decoder.add_plugin(PLUGIN, (__name__, decode_frame.__name__))
