@@ -126,7 +126,9 @@ class Image:
                 folder = Path(self._inside(target))
                 folder.mkdir(parents=True)
                 for pattern in patterns:
-                    for file in sorted(self.context.glob(pattern)):
+                    files = sorted(self.context.glob(pattern))
+                    assert files, f"COPY {pattern}: `make wheel` leaves no such file"
+                    for file in files:
                         shutil.copy2(file, folder)
             case "RUN":
                 for line in step.text.split(" && "):
@@ -159,7 +161,8 @@ class Image:
         if done.returncode and re.search(
             r"network was disabled|Network connectivity is disabled", done.stderr
         ):
-            pytest.skip(f"uv's cache lacks wheels of requirements.lock: {sys.version_info[:2]}")
+            version = ".".join(map(str, sys.version_info[:2]))
+            pytest.skip(f"uv's cache lacks wheels that requirements.lock has for Python {version}")
         assert done.returncode == 0, f"{line}: {done.stderr}"
         if line.startswith("pip install"):
             self.after_install(self)

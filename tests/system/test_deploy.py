@@ -1,6 +1,6 @@
-"""Files of deploy/ agree with the package, and all that name a version of Python name a tested one.
+"""Files of deploy/ agree with the package, and versions of Python are tested ones everywhere.
 
-No container engine is at hand. test_empty_environment.py carries out the steps of the Containerfile.
+No container engine is at hand: test_empty_environment.py carries out the Containerfile's steps.
 """
 
 import re
