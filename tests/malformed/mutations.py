@@ -12,7 +12,7 @@ from pathlib import Path
 
 Chance = random.Random
 _HEAD = 1500  # bytes of a file in which most headers lie
-_TEXTS = (".json", ".xml", ".mhd", ".zattrs", ".zarray", ".zgroup", ".csv")
+TEXTS = (".json", ".xml", ".mhd", ".zattrs", ".zarray", ".zgroup", ".csv")
 _NUMBER = re.compile(rb"\d+(?:\.\d+)?")
 _WORDS = (b"0", b"-1", b"1e999", b"nan", b"9" * 400, b"999999999999", b"2.5", b'"x"', b"null", b"")
 
@@ -20,7 +20,7 @@ _WORDS = (b"0", b"-1", b"1e999", b"nan", b"9" * 400, b"999999999999", b"2.5", b'
 def mutate(file: Path, content: bytes, chance: Chance) -> bytes:
     """Return the changed content of a file; the kind is drawn, too."""
     kinds: list[Callable[[bytes, Chance], bytes]] = [*KINDS.values()]
-    if file.name.endswith(_TEXTS):
+    if file.name.endswith(TEXTS):
         kinds += [_edit_text] * len(kinds)
     return chance.choice(kinds)(content, chance)
 

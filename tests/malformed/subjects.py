@@ -83,8 +83,9 @@ def _whole(path: Path) -> Ranges:
     return [] if path.suffix in (".json", ".xml") or path.name.startswith(".z") else [(0, 1 << 60)]
 
 
-def _scans_of_jpeg(path: Path) -> Ranges:
-    return [(path.read_bytes().find(b"\xff\xda"), 1 << 60)]
+def _image_of_jpeg(path: Path) -> Ranges:
+    """Return all from the first quantisation table on: tables and codes have no checksum."""
+    return [(path.read_bytes().find(b"\xff\xdb"), 1 << 60)]
 
 
 def _pixels_of_dicom(path: Path) -> Ranges:
@@ -306,7 +307,7 @@ def all_subjects() -> Sequence[Subject]:
         Subject("labels", "TIFF", _labels, unprotected=_rows(_LABELS.repeat(12))),
         Subject("TIFF", "planes", _planes(".tif", VOXELS), unprotected=_rows(VOXELS)),
         Subject("PNG", "planes", _planes(".png", VOXELS)),
-        Subject("JPEG", "planes", _planes(".jpg", _BYTES), unprotected=_scans_of_jpeg),
+        Subject("JPEG", "planes", _planes(".jpg", _BYTES), unprotected=_image_of_jpeg),
         Subject("series", "DICOM", _dicom(), unprotected=_pixels_of_dicom),
         Subject("JPEG 2000", "DICOM", _dicom(JPEG2000Lossless), unprotected=_pixels_of_dicom),
         Subject("enhanced", "DICOM", _enhanced, unprotected=_pixels_of_dicom),

@@ -206,7 +206,7 @@ def test_a_bomb_unpacks_no_further_than_its_block(tmp_path: Path) -> None:
     path = write(tmp_path / "a.n5", packing={"type": "bzip2"}, **NM)
     block = path / "0" / "0" / "0"
     block.write_bytes(block.read_bytes()[:16] + bz2.compress(bytes(1 << 27)))
-    assert whole(read.open(path))[0, 0, 0] == 0
+    assert "unpacks to over" in refusal(path)
 
 
 @pytest.mark.parametrize(

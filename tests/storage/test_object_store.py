@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from stereocell.building import passes
 from stereocell.building.tissue import TissueRequest, add_tissue
 from stereocell.cli.__main__ import main
 from stereocell.engine import object_store_tasks
@@ -82,6 +83,42 @@ def marks(store: ObjectStore, prefix: str) -> dict[str, str]:
         name.removeprefix(f"{prefix}/"): about["ETag"]
         for name, about in store.files().find(prefix, detail=True).items()
     }
+
+
+@pytest.mark.parametrize("is_other", [True, False])
+def test_an_input_that_is_written_while_units_are_built_is_told_where_its_bytes_are_others(
+    store: ObjectStore,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    is_other: bool,
+) -> None:
+    fs, source = store.files(), f"bucket/{'other' if is_other else 'same'}.ome.zarr"
+    body = phantoms.f_phantom()
+    for name, voxels in (("a", body), ("b", body[:, ::-1])):
+        phantoms.write_ome_zarr(tmp_path / name, [voxels], chunks=(8, 24, 18))
+    fs.put(str(tmp_path / "a"), source, recursive=True)
+    chunk = "0/c/0/1/0"
+    new = (tmp_path / ("b" if is_other else "a") / chunk).read_bytes()
+    build, left = passes._run, [1]
+
+    def run(task: Any) -> None:
+        build(task)
+        if left:
+            left.pop()
+            fs.pipe_file(f"{source}/{chunk}", new)
+
+    monkeypatch.setattr(passes, "_run", run)
+    out = tmp_path / "out"
+    assert main(["plan", f"s3://{source}", "-o", str(out), "--grid", GRID]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == int(is_other)
+    said = capsys.readouterr().err
+    assert (f"changed while it was read: 1 of 10 files, as '{chunk}'" in said) == is_other
+    assert bool(list(out.rglob("unit.json"))) != is_other
+    if is_other:
+        assert "plan into another OUT" in said
+        assert main(["plan", f"s3://{source}", "-o", str(tmp_path / "2"), "--grid", GRID]) == 0
+        assert main(["units", str(tmp_path / "2"), "--workers", "0"]) == 0
 
 
 @pytest.mark.exhaustive

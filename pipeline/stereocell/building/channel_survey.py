@@ -8,6 +8,7 @@ level, which decides how the surface is cleaned. The result, survey.json, steers
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -284,7 +285,8 @@ def _windows(
         files[channel.id] = file
         if find_sealed(file, WINDOW) is None:
             tasks[file] = (channel.base or channel.name, (task, file))
-    run_on_input(plan, engine, "windows", write_window, list(tasks.values()))
+    run = partial(engine.run, "windows", write_window, list(tasks.values()))
+    run_on_input(out_folder, plan, run, list(tasks))
     return {
         id_: window_from_json(read_sealed(file, WINDOW, AGAIN)) for id_, file in files.items()
     }, {id_: file.relative_to(out_folder.out).as_posix() for id_, file in files.items()}
@@ -384,7 +386,8 @@ def _by_tile(
             files[tile.id, channel.id] = file
             if find_sealed(file, schema) is None:
                 tasks[file] = (f"{tile.id}/{channel.base or channel.name}", (task, file))
-    run_on_input(plan, engine, name, write, list(tasks.values()))
+    run = partial(engine.run, name, write, list(tasks.values()))
+    run_on_input(out_folder, plan, run, list(tasks))
     return {
         unit: _Result(file, schema, file.relative_to(out_folder.out).as_posix())
         for unit, file in files.items()

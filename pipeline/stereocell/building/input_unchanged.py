@@ -1,17 +1,41 @@
-"""Check that a plan's source, and that of each added channel, is unchanged since the plan."""
+"""Check that a plan's inputs are unchanged: since the plan, and again once tasks have read them.
 
+The fingerprint of a large volume covers a sample of its voxels. So the files are compared too, by
+size and date: one that was written while tasks ran may hold other voxels that no sample shows.
+"""
+
+from collections.abc import Iterator
 from pathlib import Path
 
-from stereocell.building.open_source import open_source
+from stereocell.building.input_files import first_states, forget, open_watched
+from stereocell.building.open_source import SourceRef, open_afresh
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.tissue_files import read_whole
 from stereocell.model.errors import SourceError
+from stereocell.read.fingerprint import covers_all
+from stereocell.read.readers import format_of
+from stereocell.storage.file_states import FileStates
+
+# formats whose files are called by numbers; those of others may be called by a patient's name
+_NAMED = ("ome-zarr", "n5", "planes", "tiff")
+_SHOWN = 100  # characters of a path in a message
+
+
+class InputChangedError(SourceError):
+    """An input changed while tasks read it: their results may be of both.
+
+    is_told  whether the fingerprint tells the two inputs apart, and so do the names of results
+    """
+
+    def __init__(self, text: str, *, is_told: bool) -> None:
+        super().__init__(text)
+        self.is_told = is_told
 
 
 def require_input(plan: Plan) -> None:
     """Raise SourceError unless the input holds the voxels that were planned."""
-    dataset = open_source(source_of(plan))
+    dataset = open_watched(source_of(plan))
     if dataset.fingerprint != plan.fingerprint:
         # DICOM leaves out truncated files; the remarks report them
         remarks = "".join(f"; {remark}" for remark in dataset.remarks)
@@ -34,7 +58,7 @@ def require_input(plan: Plan) -> None:
 def require_labels(plan: Plan) -> None:
     """Raise SourceError unless the label maps hold the voxels that were planned."""
     for labels in plan.labels:
-        found = open_source(labels.ref).fingerprint
+        found = open_watched(labels.ref).fingerprint
         if found != labels.ref.fingerprint:
             raise SourceError(
                 f"labels {labels.name!r}: changed since they were planned (fingerprint "
@@ -47,10 +71,80 @@ def require_added(plan: Plan) -> None:
     for folder in {Path(channel.source).parent for channel in plan.channels if channel.source}:
         read_whole(folder)
     for channel in plan.channels:
-        if channel.source and open_source(source_of(plan, channel=channel)).fingerprint != (
+        if channel.source and open_watched(source_of(plan, channel=channel)).fingerprint != (
             channel.fingerprint
         ):
             raise SourceError(
                 f"{channel.source}: channel {channel.name!r} changed since it was planned: run the "
                 "command again that made it (`stereocell tissue OUT`)"
             )
+
+
+def require_still(plan: Plan, *, again: str = "stereocell units OUT") -> None:
+    """Raise InputChangedError where the image or a label map changed since it was first opened.
+
+    again  the command that reads it anew
+
+    A file that was written again with the same bytes, or of which the fingerprint covers all
+    voxels, may have another date. Raises SourceError or OutputError where added channels changed.
+    """
+    for name, ref in _inputs(plan):
+        states = first_states(ref)
+        if states is None:
+            continue
+        changed = states.changed()
+        if changed or not states.is_complete:
+            _require_same(name, ref, _in_words(ref, states, changed), again, bool(changed))
+    added = [source_of(plan, channel=channel) for channel in plan.channels if channel.source]
+    if any(one.changed() for ref in added if (one := first_states(ref)) is not None):
+        forget()
+        require_added(plan)
+
+
+def _inputs(plan: Plan) -> Iterator[tuple[str, SourceRef]]:
+    yield plan.name, source_of(plan)
+    for labels in plan.labels:
+        yield f"labels {labels.name!r}", labels.ref
+
+
+def _require_same(name: str, ref: SourceRef, told: str, again: str, is_written: bool) -> None:
+    """Raise InputChangedError unless the voxels are those of the reference's fingerprint.
+
+    told        which files changed
+    is_written  whether one did, by its date or size
+    """
+    told = f"{name}: changed while it was read: {told}"
+    remedy = (
+        "no result of it is kept: plan into another OUT (`stereocell build INPUT -o OUT`), or put "
+        f"back the input that was planned and run `{again}` again"
+    )
+    try:
+        now = open_afresh(ref)
+        found = now.fingerprint
+    except SourceError as error:
+        forget()
+        raise InputChangedError(f"{told}, and now {error}; {remedy}", is_told=True) from error
+    if found != ref.fingerprint:
+        forget()
+        prints = f"fingerprint {found[:12]}, expected {ref.fingerprint[:12]}"
+        raise InputChangedError(f"{told} ({prints}); {remedy}", is_told=True)
+    if is_written and not covers_all(now):
+        forget()
+        raise InputChangedError(
+            f"{told}; the fingerprint, a sample, can't tell whether the voxels are the same, so "
+            f"that no unit is kept: run `{again}` again",
+            is_told=False,
+        )
+
+
+def _in_words(ref: SourceRef, states: FileStates, changed: list[str]) -> str:
+    """Return how many files changed, and which is the first, unless that may name a patient."""
+    count, total = len(changed), len({*states.states, *changed})
+    words = f"{count} of {total} files"
+    if not changed:
+        return "its address lists no files"
+    if format_of(ref.source) not in _NAMED:
+        return words if total > 1 else "its file"
+    root = ref.source.partition("://")[2] or ref.source
+    first = changed[0].removeprefix(root).lstrip("/") or changed[0].rpartition("/")[2]
+    return f"{words}, as {first!r:.{_SHOWN}}"

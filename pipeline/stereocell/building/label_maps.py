@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stereocell.building.input_files import open_anew
 from stereocell.building.open_source import SourceRef, as_asked, open_source
 from stereocell.building.settings import PlanOptions
 from stereocell.model.errors import SourceError, UsageError
@@ -122,14 +123,14 @@ def _opened(
     where = Location.of(place or f"{source.rstrip('/')}/labels/{name}").source
     ref = SourceRef(where, 0, ())
     try:
-        dataset = open_source(ref)
+        dataset = open_anew(ref)
     except SourceError as error:
         if "voxel size" not in str(error):
             remedy = "" if place else f"; or give its path, as --labels {name}=PATH"
             raise SourceError(f"--labels {name}: {error}{remedy}") from error
         # masks of segmentation programs state no lengths: they lie on the image
         ref = replace(ref, spacing_um=image.levels[0].spacing_um)
-        dataset = open_source(ref)
+        dataset = open_anew(ref)
         if dataset.levels[0].shape != image.levels[0].shape:
             raise SourceError(
                 f"{dataset.shown}: states no voxel size: found {_by(dataset.levels[0].shape)} "

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +62,8 @@ def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: En
         files[tile] = out_folder.tile_result("extents", tile, labels.id, key)
         if find_sealed(files[tile], EXTENTS) is None:
             tasks.append((f"{tile}/{labels.name}", (ExtentsTask(labels, box), files[tile])))
-    run_on_input(plan, engine, "objects", write_extents, tasks)
+    run = partial(engine.run, "objects", write_extents, tasks)
+    run_on_input(out_folder, plan, run, [file for _, (_, file) in tasks])
     parts = {
         tile: extents_from_json(read_sealed(file, EXTENTS, _AGAIN)) for tile, file in files.items()
     }

@@ -32,6 +32,11 @@ class SourceRef:
 @lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
+    return open_afresh(ref)
+
+
+def open_afresh(ref: SourceRef) -> read.Dataset:
+    """Return the dataset as the files are now, whatever this process opened before."""
     fetch(Path(ref.source))  # an added channel's source lies in OUT
     given = None
     if ref.spacing_um:

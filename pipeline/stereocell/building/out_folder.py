@@ -42,7 +42,8 @@ class OutFolder:
         self.out = out
         self.plan_file = out / "plan.json"
         self.settings_file = out / "stereocell.toml"
-        self.survey_file = out / "units" / "survey.json"
+        self.units_dir = out / "units"
+        self.survey_file = self.units_dir / "survey.json"
         self.index_file = out / "units" / "done.json"
         self.units_plan_file = out / "units" / "plan.key"
         self.phases_file = out / "phases.json"

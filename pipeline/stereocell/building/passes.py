@@ -6,6 +6,7 @@ volumes are built. Every result lies under a name that says what it depends on.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
+from functools import partial
 from itertools import chain, product
 
 from stereocell.building.channel_survey import survey_channels
@@ -73,7 +74,8 @@ def run_passes(
     if tasks:
         for labels in plan.labels:
             tell_objects(labels, located[labels.id])
-    run_on_input(plan, engine, "units", _run, tasks)
+    run = partial(engine.run, "units", _run, tasks)
+    run_on_input(out_folder, plan, run, [task.directory for _, task in tasks])
     if not others:  # all there: the stage may be made of them
         out_folder.save_units(plan, keys)
     return len(tasks), others

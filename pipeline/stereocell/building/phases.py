@@ -10,6 +10,7 @@ from typing import Any
 
 from stereocell.building import stage_tasks
 from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
+from stereocell.building.input_files import open_anew
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
 from stereocell.building.object_passes import locate_objects, read_notes, told_before
@@ -19,7 +20,7 @@ from stereocell.building.object_tables import (
     require_color_by,
     table_of,
 )
-from stereocell.building.open_source import as_asked, open_source
+from stereocell.building.open_source import as_asked
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import run_passes
 from stereocell.building.phase import (
@@ -93,7 +94,7 @@ def settle(source: str, settings: Settings) -> Plan:
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
     _require_labels(settings)
-    dataset = open_source(as_asked(location, options))
+    dataset = open_anew(as_asked(location, options))
     modality = dataset.modality or options.modality
     alone = are_alone(settings.labels)
     indices = dataset.find_channels(options.channels) if options.channels else None

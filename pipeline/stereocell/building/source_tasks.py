@@ -1,34 +1,57 @@
 """Tasks that read a plan's source: how they run, and the source's part of their results' keys."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any
 
 from stereocell.building.channels import Channel
-from stereocell.building.input_unchanged import require_added, require_input, require_labels
+from stereocell.building.input_unchanged import (
+    InputChangedError,
+    require_added,
+    require_input,
+    require_labels,
+    require_still,
+)
+from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.engine.run import Engine
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.read.readers import reader_of
-
-T = TypeVar("T")
-R = TypeVar("R")
+from stereocell.storage.workspace import remove
 
 
 def run_on_input(
+    out_folder: OutFolder,
     plan: Plan,
-    engine: Engine,
-    label: str,
-    function: Callable[[T], R],
-    tasks: Sequence[tuple[str, T]],
-) -> list[R]:
-    """Run tasks that read the source. Raises SourceError where it changed since the plan."""
-    if not tasks:
-        return []
+    run: Callable[[], object],
+    results: Sequence[Path],
+) -> None:
+    """Run tasks that read the inputs and write results; without results nothing is run.
+
+    Raises SourceError where an input changed since the plan, and where it changed while the tasks
+    ran: their results are removed then. Where the fingerprint doesn't tell the two inputs apart,
+    earlier results would be taken for those of the new one, so that all are removed.
+    """
+    if not results:
+        return
     require_input(plan)
     require_added(plan)
     require_labels(plan)
-    return engine.run(label, function, tasks)
+    try:
+        run()
+    except BaseException:  # which may come of the change: that is said instead
+        _require_still(out_folder, plan, results)
+        raise
+    _require_still(out_folder, plan, results)
+
+
+def _require_still(out_folder: OutFolder, plan: Plan, results: Sequence[Path]) -> None:
+    try:
+        require_still(plan)
+    except InputChangedError as error:
+        for result in results if error.is_told else [out_folder.units_dir]:
+            remove(result)
+        raise
 
 
 def around(field: LatticeField | None, box: Box) -> LatticeField | None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.building.channels import PALETTE, Channel
-from stereocell.building.input_unchanged import require_input
+from stereocell.building.input_unchanged import require_input, require_still
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.phases import provenance
@@ -34,7 +34,9 @@ from stereocell.model.version import GENERATOR
 from stereocell.read.readers import reader_of
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.cache_key import key_of, libraries_of
+from stereocell.storage.file_states import unchanged_while_read
 from stereocell.storage.json_files import write_json
+from stereocell.storage.location import Location
 from stereocell.tissue import classify as tissue_module
 from stereocell.tissue import onnx_classifier as network_module
 from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions, learn_tissue
@@ -145,10 +147,11 @@ def with_tissue(plan: Plan, out: Path, record: dict[str, Any]) -> Plan:
 
 def _load_network(path: Path) -> Network:
     """Return the model in a file. Raises SourceError, UsageError as `Network.load`."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise SourceError(f"{path}: {error.strerror}, expected an ONNX model") from None
+    with unchanged_while_read(Location.of(path), "run `stereocell tissue OUT` again"):
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise SourceError(f"{path}: {error.strerror}, expected an ONNX model") from None
     return Network.load(path, content)
 
 
@@ -179,6 +182,7 @@ def _learn(
     require_input(plan)
     dataset = open_source(source_of(plan))
     volume = dataset.read(channel.index, plan.region, plan.level)
+    require_still(plan, again="stereocell tissue OUT")
     if network is None:
         learned = learn_tissue(volume.voxels, plan.spacing_um, options=options)
         names = _names(plan, len(learned.means), options.brain)

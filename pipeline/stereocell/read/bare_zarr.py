@@ -20,7 +20,7 @@ from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import Grid
 from stereocell.read.zarr_collections import is_collection, ome_of
-from stereocell.read.zarr_store import open_array, quiet
+from stereocell.read.zarr_store import files_of, open_array, quiet
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -47,7 +47,9 @@ def read_array(location: Location, store: Store, path: str, *, axes: str = "") -
         )
     unnamed = (None,) * voxels.size("c")
     grid = Grid(voxels.shape, spacing_from(dict(array.attrs), names))
-    return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=notes)
+    return Image(
+        (voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files_of(location, [path])
+    )
 
 
 def read_only_array(

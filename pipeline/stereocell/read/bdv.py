@@ -4,6 +4,7 @@ References: https://imagej.net/plugins/bdv/index
 """
 
 import os
+from dataclasses import replace
 
 from stereocell.model.errors import SourceError
 from stereocell.read import hdf5, n5
@@ -38,4 +39,5 @@ def read_image(location: Location) -> Image:
     if not os.path.exists(path) or container.format not in _READERS:
         raise SourceError(f"{field}: not found, expected HDF5 (.h5) or N5 beside the XML")
     require_kind(container, "" if container.format == "n5" else container.format, "HDF5")
-    return _READERS[container.format](container)
+    image = _READERS[container.format](container)
+    return replace(image, files=(location.path, *(image.files or (path,))))

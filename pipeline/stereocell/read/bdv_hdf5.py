@@ -62,7 +62,7 @@ def read_image(tree: Hdf5Tree, location: Location) -> Image:
     factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]
     described = read_setups(location.path)
     image = image_of(tree.where, levels, factors, None, described)
-    return replace(image, close=tree.close)
+    return replace(image, close=tree.close, files=tree.files)
 
 
 def _named(tree: Hdf5Tree, pattern: str) -> list[str]:

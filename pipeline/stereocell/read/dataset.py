@@ -123,6 +123,7 @@ class Dataset:
     acquired     the source's own images: the axis across which they lie
     labels       what in the metadata says that the voxels number objects; empty: nothing does
     objects      what the file says of these objects
+    files        paths or addresses of the files, and of the folders, that hold all that is read
     offset_um    where the source puts the centre of level 0's voxel (0, 0, 0), (z, y, x), um;
                  results count from that voxel, and only two sources together need it
     """
@@ -146,6 +147,7 @@ class Dataset:
     objects: ObjectNotes = ObjectNotes()  # noqa: RUF009  (frozen)
     offset_um: Point = (0.0, 0.0, 0.0)
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)
+    files: tuple[str, ...] = field(repr=False, default=())
     _darkest: dict[int, float] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -2,17 +2,14 @@
 
 Unpacked ones are read a window at a time, by nibabel's `fileslice`: a memory map of the file would
 take address space of its whole size, and end the process where the file is cut short meanwhile.
-Packed ones have no blocks: they are decoded all at once, at the first access, and cached.
+Packed ones have no blocks: they are unpacked all at once, at the first access, and cached.
 """
 
-import bz2
-import gzip
 import math
 import os
-import zlib
 from collections.abc import Callable, Sequence
 from threading import Lock
-from typing import IO, Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 from nibabel.fileslice import fileslice
@@ -20,9 +17,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray
-
-PACKINGS = ("zlib", "gzip", "bzip2")
-_PIECE = 1 << 24  # bytes that are unpacked at once, of those before the voxels
+from stereocell.read.packed_stream import unpack
 
 
 class FileArray:
@@ -101,11 +96,7 @@ def _mirrored(part: Any, size: int) -> Any:
     return slice(size - stop, size - start)
 
 
-class _Stream(Protocol):
-    def read(self, size: int, /) -> bytes: ...
-
-
-def unpack(
+def unpack_array(
     path: str,
     shape: Sequence[int],
     dtype: np.dtype[Any],
@@ -114,60 +105,15 @@ def unpack(
     *,
     skip: int = 0,
 ) -> NDArray[Any]:
-    """Return the voxels of a packed stretch of a file.
+    """Return the voxels of a packed stretch of a file, which ends with the file.
 
-    packing  one of PACKINGS
+    packing  one of packed_stream.PACKINGS
     offset   bytes before the stretch
     skip     unpacked bytes before the first voxel
 
-    No more is unpacked than the shape asks for. Raises the library's error, or EOFError.
+    Raises OSError for a stretch that is damaged or cut short.
     """
-    size = math.prod(shape) * dtype.itemsize
     with open(path, "rb") as file:
         file.seek(offset)
-        stream = _opened(file, packing)
-        parts, left = [], size
-        try:
-            while skip > 0 and (passed := len(stream.read(min(skip, _PIECE)))):
-                skip -= passed
-            while left > 0 and (part := stream.read(min(left, _PIECE))):
-                parts.append(part)
-                left -= len(part)
-        except EOFError:  # of gzip and bzip2, in words about streams
-            raise EOFError(_short(path, size - left, size)) from None
-    if left > 0:
-        raise EOFError(_short(path, size - left, size))
-    return np.frombuffer(b"".join(parts), dtype).reshape(tuple(shape))
-
-
-def _short(path: str, found: int, size: int) -> str:
-    return (
-        f"the packed voxels are cut short: the file ends at byte {os.path.getsize(path)} with "
-        f"{found} of {size} bytes (copy or download it again)"
-    )
-
-
-def _opened(file: IO[bytes], packing: str) -> _Stream:
-    if packing == "gzip":
-        return cast("_Stream", gzip.GzipFile(fileobj=file))
-    if packing == "bzip2":
-        return bz2.BZ2File(file)
-    return _Zlib(file)
-
-
-class _Zlib:
-    """A stream of zlib's own format, read piece by piece."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self._file = file
-        self._stream = zlib.decompressobj()
-
-    def read(self, size: int, /) -> bytes:
-        """Return up to `size` unpacked bytes; none at the end."""
-        while not self._stream.eof:
-            packed = self._stream.unconsumed_tail or self._file.read(_PIECE)
-            if found := self._stream.decompress(packed, size):
-                return found
-            if not packed:
-                break
-        return b""
+        found = unpack(file, math.prod(shape) * dtype.itemsize, packing, skip=skip)
+    return np.frombuffer(found, dtype).reshape(tuple(shape))

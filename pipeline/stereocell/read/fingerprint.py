@@ -62,6 +62,14 @@ def fingerprint_of(dataset: Fingerprinted) -> str:
     return digest.hexdigest()
 
 
+def covers_all(dataset: Fingerprinted) -> bool:
+    """Whether the digest covers every voxel of every level, not a sample of them."""
+    count = len(dataset.levels)
+    budget = BUDGET_BYTES // min(count, 2)
+    voxels = (len(dataset.channels) * math.prod(level.shape) for level in dataset.levels)
+    return count <= 2 and max(voxels) * dataset.dtype.itemsize <= budget
+
+
 def _spread(dataset: Fingerprinted, level: int, budget: int) -> Iterator[tuple[int, Box]]:
     """Yield (channel, box): the whole level where it fits `budget` (bytes), else some chunks."""
     whole = dataset.levels[level].box

@@ -58,7 +58,10 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
         )
     unnamed = (None,) * array.size("c")
     grid = Grid(array.shape, _spacing(dataset, names))
-    return Image((array,), (grid,), unnamed, unnamed, 1, tree.close, notes=(*notes, *assumed))
+    return Image(
+        (array,), (grid,), unnamed, unnamed, 1, tree.close,
+        notes=(*notes, *assumed), files=tree.files,
+    )  # fmt: skip
 
 
 def _choose(tree: Hdf5Tree, key: str) -> tuple[h5py.Dataset, tuple[str, ...]]:

@@ -43,14 +43,21 @@ class Hdf5Tree:
         self.where = location.path
         self._folder = location.folder
         self._stack = ExitStack()
+        self._files: list[str] = []
         with one_line(self.where, expected):
             self.root = self._open(os.path.realpath(location.path))["/"]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The paths of the files that are open: the source, and those that links led to."""
+        return tuple(self._files)
 
     def close(self) -> None:
         """Close the file, and those that its links led to."""
         self._stack.close()
 
     def _open(self, path: str) -> h5py.File:
+        self._files.append(path)
         try:
             return self._stack.enter_context(h5py.File(path, "r", locking="best-effort"))
         except OSError as error:

@@ -24,6 +24,8 @@ class Image:
     title          the image's name; None: the file's name is used
     modality, placement, has_sides, acquired, labels, objects  as in Dataset
     notes          become Dataset's `remarks`
+    files          paths or addresses of files, and of folders, that hold all that is read; none:
+                   the source as a whole
     notes_at       returns more notes, about one time point; it may read that point's voxels
     """
 
@@ -41,6 +43,7 @@ class Image:
     labels: str = ""
     objects: ObjectNotes = ObjectNotes()  # noqa: RUF009  (frozen)
     notes: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
     notes_at: Callable[[int], tuple[str, ...]] | None = None
 
 

@@ -84,7 +84,7 @@ def _image(tree: Hdf5Tree) -> Image:
         arrays.append(array)
         grids.append(Grid(shape, spacing, half))
     names, colors = zip(*(_channel(tree, index) for index in range(channels)), strict=True)
-    return Image(tuple(arrays), tuple(grids), names, colors, 1, tree.close)
+    return Image(tuple(arrays), tuple(grids), names, colors, 1, tree.close, files=tree.files)
 
 
 def _count(tree: Hdf5Tree, path: str, kind: str, most: int) -> int:

@@ -10,6 +10,7 @@ References: https://itk.org/Wiki/ITK/MetaIO/Documentation
 
 import math
 import os
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray
-from stereocell.read.file_array import FileArray, PackedArray, unpack
+from stereocell.read.file_array import FileArray, PackedArray, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.patient_grid import place
 from stereocell.storage.library_errors import one_line
@@ -61,9 +62,13 @@ def read_image(location: Location) -> Image:
     array = _array(location, fields, end, (*reversed(shape), samples[0]))
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
     affine, notes = _affine(where, fields, len(shape))
-    return place(where, array, axes, affine, "TransformMatrix").image(
+    image = place(where, array, axes, affine, "TransformMatrix").image(
         NAME, notes=notes, has_sides="TransformMatrix" in fields
     )
+    beside = fields["ElementDataFile"]
+    folder = os.path.dirname(os.path.realpath(location.path))
+    voxels = () if beside.upper() == "LOCAL" else (os.path.join(folder, beside),)
+    return replace(image, files=(location.path, *voxels))
 
 
 def _header(location: Location) -> tuple[dict[str, str], int]:
@@ -117,7 +122,7 @@ def _array(
             raise SourceError(f"{field}: not found, expected the voxels beside the header")
         where = field
     if _flag(fields, "CompressedData", False):
-        load = partial(unpack, path, shape, dtype, "zlib", end)
+        load = partial(unpack_array, path, shape, dtype, "zlib", end)
         return PackedArray(shape, dtype, load)
     skip = (_integers(location.shown, fields, "HeaderSize") or [0])[0]
     if skip < 0:  # the voxels are the last bytes of the file

@@ -19,7 +19,7 @@ from mrcfile.utils import data_dtype_from_header
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.file_array import FileArray, FlippedArray, PackedArray, unpack
+from stereocell.read.file_array import FileArray, FlippedArray, PackedArray, unpack_array
 from stereocell.read.image import Image
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
@@ -61,7 +61,7 @@ def read_image(location: Location) -> Image:
     array: StoredArray
     if packing:
         array = PackedArray(
-            shape, dtype, partial(unpack, path, shape, dtype, packing, 0, skip=offset)
+            shape, dtype, partial(unpack_array, path, shape, dtype, packing, 0, skip=offset)
         )
     else:
         array = FileArray(path, shape, dtype, offset, where)

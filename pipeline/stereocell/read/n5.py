@@ -160,7 +160,8 @@ def _pyramid(
     scales = [_factors(group, attributes, i, names) for i, (_, attributes) in enumerate(levels)]
     grids = grids_of([v.shape for v in voxels], finest, scales)
     unnamed = (None,) * count
-    return Image(voxels, grids, unnamed, unnamed, 1, notes=notes)
+    read = tuple(files.address(path) for path, _ in levels)
+    return Image(voxels, grids, unnamed, unnamed, 1, notes=notes, files=read)
 
 
 def _container(files: N5Files, setups: Sequence[str], described: Mapping[int, Setup]) -> Image:

@@ -1,14 +1,11 @@
-"""A block of N5: its header and codecs. Nothing unpacks beyond the block's size.
+"""A block of N5: its header and codecs. No block unpacks to much more than its voxels.
 
 The header is of big-endian numbers: mode (16 bits; 0: dense), number of dimensions (16), the size
 along each (32), fastest first. Blocks at the edge are smaller than `blockSize`.
 """
 
-import bz2
-import lzma
 import math
 import struct
-import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +14,9 @@ import zstandard
 from numcodecs import blosc, lz4
 from numpy.typing import NDArray
 
+from stereocell.read.packed_stream import PACKINGS, unpack
+
+_MOST_BEHIND = 1 << 20  # bytes that a block may unpack to beyond its voxels
 _LZ4_HEADER = struct.Struct("<8sBiii")  # magic, token, packed and unpacked bytes, checksum
 _LZ4_RAW = 0x10  # token of a part that is stored as it is
 _BLOSC_HEADER = struct.Struct("<4B3I")  # last three, bytes: unpacked, of a block, packed
@@ -49,14 +49,12 @@ def _unpack(data: bytes, size: int, packing: Mapping[str, Any]) -> bytes:
     kind = packing.get("type")
     if kind == "raw":
         return data
-    if kind == "gzip":
-        return zlib.decompressobj(15 if packing.get("useZlib") else 31).decompress(data, size)
-    if kind == "bzip2":
-        return bz2.BZ2Decompressor().decompress(data, size)
-    if kind == "xz":
-        return lzma.LZMADecompressor().decompress(data, size)
+    if kind == "gzip" and packing.get("useZlib"):
+        kind = "zlib"
+    if kind in PACKINGS:
+        return unpack(data, size, kind, most_behind=_MOST_BEHIND)
     if kind == "zstd":
-        return zstandard.ZstdDecompressor().decompressobj().decompress(_fitting_zstd(data, size))
+        return zstandard.ZstdDecompressor().decompress(_fitting_zstd(data, size))
     if kind == "blosc":
         *_, unpacked, _, packed = _BLOSC_HEADER.unpack_from(data)
         if unpacked > size or packed > len(data):

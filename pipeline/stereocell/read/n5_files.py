@@ -52,6 +52,12 @@ class N5Files:
             return None
         return content
 
+    def address(self, path: str) -> str:
+        """Return the folder of a dataset; at an address of `http`, which lists none, a file."""
+        folder = f"{self._location.source.rstrip('/')}/{path}".rstrip("/")
+        is_listed = not self._location.source.startswith("http")
+        return folder if is_listed else f"{folder}/{_NAME}"
+
     def _attributes(self, path: str) -> Mapping[str, Any]:
         """Return the attributes of a group or a dataset; empty: there are none."""
         name = f"{path}/{_NAME}".lstrip("/")

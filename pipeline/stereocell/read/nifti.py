@@ -30,13 +30,15 @@ from stereocell.model.object_notes import ObjectNotes
 from stereocell.read.acquired import Acquired
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import VoxelArray
+from stereocell.read.file_array import unpack_array
 from stereocell.read.image import Image
 from stereocell.read.label_notes import notes_of_nifti
+from stereocell.read.packed_stream import unpack
 from stereocell.read.resample import orthogonal_grid, resample_sheared
 from stereocell.read.rescale import dtype_for, rescale
 from stereocell.read.spacing import Grid
 from stereocell.read.whole_array import WholeArray
-from stereocell.storage.library_errors import raise_if_short
+from stereocell.storage.library_errors import one_line, raise_if_short
 from stereocell.storage.location import Location, require_own
 
 NAME, ANALYZE = "NIfTI", "Analyze"
@@ -123,14 +125,30 @@ def read_image(location: Location) -> Image:
         objects=notes_of_nifti(_tables(header)) if is_nifti else ObjectNotes(),
         acquired=Acquired(_image_axis(header.get_dim_info()[2] if is_nifti else None, canonical)),
         notes=tuple(notes),
+        files=tuple(_files(image)),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
 
 
+def _files(image: Any) -> set[str]:
+    """Return the paths of the file or of the pair, and of SPM's matrix beside a pair."""
+    held = [one.filename for one in image.file_map.values() if one.filename]
+    return {name for name in held if os.path.exists(name)}
+
+
 def _require_whole(image: Any, where: str) -> None:
-    """Raise SourceError where the file of the voxels, if it isn't packed, ends before them."""
+    """Raise SourceError where an unpacked file ends before its voxels, or where the packed header
+    of a pair is damaged. A packed file of voxels is checked when they are read.
+    """
     name, data = image.file_map["image"].filename, image.dataobj
-    if name.lower().endswith(tuple(filter(None, ImageOpener.compress_ext_map))):
+    held = image.file_map.get("header")
+    if held is not None and held.filename != name and _is_packed(held.filename):
+        with (
+            one_line(where, f"a header of {NAME} that is whole"),
+            open(held.filename, "rb") as file,
+        ):
+            unpack(file, 0, "gzip", most_behind=_MAX_OFFSET)
+    if _is_packed(name):
         return
     end, size = data.offset + math.prod(data.shape) * data.dtype.itemsize, os.path.getsize(name)
     if end > size:
@@ -138,6 +156,10 @@ def _require_whole(image: Any, where: str) -> None:
             f"{where}: found {size} bytes, expected at least {end} for {tuple(data.shape)} of "
             f"{data.dtype.name} (the file is cut short)"
         )
+
+
+def _is_packed(name: str) -> bool:
+    return name.lower().endswith(".gz")
 
 
 def _states_zero(image: Any) -> bool:
@@ -252,9 +274,7 @@ def _load(
     try:
         image = _open(location)
         data = image.dataobj
-        place = (slice(None),) * 3 + (time, 0, 0, 0)[: len(data.shape) - 3]
-        with ImageOpener(image.file_map["image"].filename) as file:
-            raw = fileslice(file, place, data.shape, data.dtype, data.offset, data.order)  # type: ignore[no-untyped-call]
+        raw = _stored(image.file_map["image"].filename, data, time)
         is_measured = np.isfinite(raw)
         values = rescale(raw, float(data.slope), float(data.inter), dtype)
     except _FAULTS as error:
@@ -262,12 +282,29 @@ def _load(
         found = "its voxels can't be read"
         if isinstance(error, EOFError):
             found = f"cut short at byte {os.path.getsize(location.source)}"
+        elif isinstance(error, OSError) and not error.strerror:
+            found = str(error)
         raise SourceError(f"{location.shown}: {found}, expected {NAME} that is whole") from None
     if values.dtype.kind == "f":
         values, counts[time] = _without_gaps(values, is_measured, location.shown)
     if skewed is not None:
         values, _ = resample_sheared(values, skewed)
     return canonical.apply(values)
+
+
+def _stored(name: str, data: Any, time: int) -> NDArray[Any]:
+    """Return the voxels of a time point, (x, y, z), as they lie in a file.
+
+    data  nibabel's proxy of all voxels
+    """
+    if _is_packed(name):
+        zyx = data.shape[2::-1]
+        skip = data.offset + time * math.prod(zyx) * data.dtype.itemsize
+        return unpack_array(name, zyx, data.dtype, "gzip", 0, skip=skip).transpose()
+    place = (slice(None),) * 3 + (time, 0, 0, 0)[: len(data.shape) - 3]
+    with open(name, "rb") as file:
+        found = fileslice(file, place, data.shape, data.dtype, data.offset, data.order)  # type: ignore[no-untyped-call]
+    return np.asarray(found)
 
 
 def _without_gaps(

@@ -12,6 +12,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.file_array import FileArray, PackedArray, unpack
+from stereocell.read.file_array import FileArray, PackedArray, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.patient_grid import place
 from stereocell.read.spacing import Grid, Triple, um_per
@@ -67,22 +68,23 @@ def read_image(location: Location) -> Image:
     if (count := shape[names.index("c")] if "c" in names else 1) > MAX_CHANNELS:
         raise SourceError(f"{where}: sizes: found {count} values, expected at most {MAX_CHANNELS}")
     spatial = directions[[names.index(axis) for axis in "ijk"]]
-    to_lps = _to_lps(where, fields)
+    to_lps, files = _to_lps(where, fields), _files(location, fields)
     if to_lps is None:
         swapped = {"i": "x", "j": "y", "k": "z"}
         voxels = VoxelArray(array, tuple(swapped.get(axis, axis) for axis in axes))
         z, y, x = reversed(sizes)
         grid, placed_notes = Grid((z, y, x), _spacing(fields, spatial)), _turned(spatial)
         unnamed = (None,) * count
-        return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=placed_notes)
+        return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=placed_notes, files=files)
     affine = np.eye(4)
     unit = _unit(fields)
     affine[:3, :3] = to_lps @ spatial.T * (unit / 1000.0)
     origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
     affine[:3, 3] = to_lps @ np.where(np.isfinite(origin), origin, 0.0) * (unit / 1000.0)
-    return place(where, array, axes, affine, "space directions").image(
+    image = place(where, array, axes, affine, "space directions").image(
         NAME, has_sides=_names_sides(fields)
     )
+    return replace(image, files=files)
 
 
 def _header(location: Location) -> tuple[Mapping[str, Any], int]:
@@ -205,6 +207,14 @@ def _turned(spatial: NDArray[np.float64]) -> tuple[str, ...]:
     return () if is_straight else ("axes turned or mirrored by `space directions`: as stored",)
 
 
+def _files(location: Location, fields: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the paths of the header and of the voxels beside it, if they are beside it."""
+    named = fields.get("data file", fields.get("datafile"))
+    if named is None:
+        return (location.path,)
+    return location.path, os.path.join(os.path.dirname(os.path.realpath(location.path)), str(named))
+
+
 def _array(
     location: Location, fields: Mapping[str, Any], end: int, shape: Sequence[int]
 ) -> StoredArray:
@@ -241,7 +251,7 @@ def _array(
             f"{where}: encoding: found {encoding!r:.40}, byte skip {skip}, expected raw, gzip or "
             "bzip2: write it anew"
         )
-    load = partial(unpack, path, shape, dtype, _PACKINGS[encoding], end, skip=skip)
+    load = partial(unpack_array, path, shape, dtype, _PACKINGS[encoding], end, skip=skip)
     return PackedArray(shape, dtype, load)
 
 

@@ -93,6 +93,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
             *(image.notes_at(time) if image.notes_at is not None else ()),
         ),
         acquired=image.acquired,
+        files=image.files or (location.path if location.is_local else location.source,),
         labels=image.labels,
         objects=image.objects,
         offset_um=image.grids[0].offset_um or (0.0, 0.0, 0.0),

@@ -11,7 +11,7 @@ import lzma
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -178,6 +178,19 @@ def open_store(location: Location) -> Store:
         return FsspecStore.from_url(
             location.source, storage_options=location.storage_options, read_only=True
         )
+
+
+def files_of(location: Location, arrays: Sequence[str]) -> tuple[str, ...]:
+    """Return the folders of a group's arrays, and its own metadata: all that is read of it.
+
+    Of an address of `http`, which can't list a folder, they are the arrays' metadata.
+    """
+    root = location.source.rstrip("/")
+    metadata = [f"{root}/{name}" for name in _METADATA]
+    folders = [f"{root}/{path}".rstrip("/") for path in arrays]
+    if location.source.startswith("http"):
+        folders = [f"{folder}/{name}" for folder in folders for name in ("zarr.json", ".zarray")]
+    return tuple(dict.fromkeys([*folders, *metadata]))
 
 
 def open_array(

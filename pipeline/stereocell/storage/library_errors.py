@@ -12,6 +12,7 @@ process (child_process.py), whose death `one_line` turns into a line, too.
 """
 
 import logging
+import lzma
 import math
 import struct
 import sys
@@ -51,6 +52,7 @@ _FAULTS = (
     SystemError,
     struct.error,
     zlib.error,
+    lzma.LZMAError,
     ZstdError,
 )
 # Classes of libraries that take long to import: an error of theirs is raised once they are there

@@ -83,6 +83,7 @@ def read_image(location: Location, *, series: int = 0) -> Image:
     z, y, x = (layout.shape[axis] for axis in canonical.order)
     load = partial(_load, stack, canonical, found.paths, dtype, location.shown)
     voxels = WholeArray((len(stack.times), z, y, x), dtype, load)
+    read = {frame.file for frames in stack.times for frame in frames}
     modality = stack.first.modality
     return Image(
         arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
@@ -97,6 +98,7 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         labels=_labels(stack, len(found.stacks)),
         acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
         notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
+        files=tuple(str(found.paths[index]) for index in sorted(read)),
     )
 
 
@@ -138,6 +140,7 @@ def _label_map(found: Found, stack: Stack, series: int, shown: str) -> Image:
         objects=own.objects,
         acquired=Acquired(canonical.order.index(0)),
         notes=_left_out(found.left_out),
+        files=(str(found.paths[stack.first.file]),),
     )
 
 

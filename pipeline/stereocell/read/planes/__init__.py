@@ -175,9 +175,10 @@ def _of_planes(location: Location, volume: Volume, first: Head, notes: list[str]
     stepped = (
         z if z is not None else _step([heads[0, 0, n].z_um for n in range(len(volume.planes))])
     )
-    return _image(
+    image = _image(
         VoxelArray(array, _AXES), (stepped, y, x), names, colors, [_read_as(volume), *notes]
     )
+    return replace(image, files=_files(location, volume))
 
 
 def _load(
@@ -247,7 +248,11 @@ def _of_stacks(location: Location, volume: Volume, notes: list[str]) -> Image:
         colors,
         [_read_as(volume), *notes, *first.notes],
     )
-    return replace(image, close=array.close)
+    return replace(image, close=array.close, files=_files(location, volume))
+
+
+def _files(location: Location, volume: Volume) -> tuple[str, ...]:
+    return tuple(join(location.source, place.path) for place in volume.files.values())
 
 
 def _open(location: Location, volume: Volume, time: int, channel: int) -> Image:

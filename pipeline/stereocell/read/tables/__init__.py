@@ -7,6 +7,7 @@ from stereocell.read.file_kind import require_kind
 from stereocell.read.tables.delimited import read_delimited
 from stereocell.read.tables.parquet import read_parquet
 from stereocell.read.tables.table import KEYS, Table, TableColumn
+from stereocell.storage.file_states import unchanged_while_read
 from stereocell.storage.first_bytes import identify, pointer_words
 from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location, first_bytes
@@ -22,10 +23,13 @@ def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Ta
     wanted  names of columns; empty: all but the key
     labels  the name of the label map, of a table that belongs to several
 
-    Raises SourceError where the table can't be read or lacks a column.
+    Raises SourceError where the table can't be read, changes meanwhile or lacks a column.
     """
     location = Location.of(place)
-    with library_boundary(location.shown, "a table that is whole"):
+    with (
+        unchanged_while_read(location, "run the same command again"),
+        library_boundary(location.shown, "a table that is whole"),
+    ):
         return _read(location, key, wanted, labels)
 
 

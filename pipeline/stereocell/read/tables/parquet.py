@@ -94,7 +94,9 @@ def _read(parquet: Any, source: BinaryIO, request: _Request) -> Table:
     _require_small(stated, request, {chosen, *taken})
     # a text that stands in many rows stays one
     texts = [name for name in (chosen, *taken) if kinds[name] == _TEXT]
-    file = parquet.ParquetFile(source, metadata=stated, read_dictionary=texts)
+    file = parquet.ParquetFile(
+        source, metadata=stated, read_dictionary=texts, page_checksum_verification=True
+    )
     keys: list[str] = []
     parts: dict[str, list[Any]] = {name: [] for name in taken}
     for batch in file.iter_batches(batch_size=_BATCH, columns=[chosen, *taken]):

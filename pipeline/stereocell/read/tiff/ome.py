@@ -12,6 +12,8 @@ import os
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
+from itertools import chain
 from xml.etree import ElementTree
 
 from tifffile import TiffFile, TiffPage
@@ -28,7 +30,7 @@ from stereocell.read.tiff.arrays import (
     samples_as_channels,
     with_given_axes,
 )
-from stereocell.read.tiff.open_file import MAX_PLANES, require_pages
+from stereocell.read.tiff.open_file import MAX_PLANES, files_of, require_pages
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
 
@@ -75,7 +77,8 @@ def read_ome(
         require_pages(f"{where}: level {index}", tiff, level, len(level))
     if axes:
         arrays = with_given_axes(where, arrays, axes)
-    return _image(where, images, arrays, page=series.keyframe, stack=stack)
+    image = _image(where, images, arrays, page=series.keyframe, stack=stack)
+    return replace(image, files=files_of(location, chain(*pages)))
 
 
 def _check_claims(where: str, tiff: TiffFile, text: str) -> None:

@@ -9,7 +9,7 @@ References: TIFF 6.0 section 2, https://www.awaresystems.be/imaging/tiff/bigtiff
 
 import os
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from typing import IO, Any, NoReturn
 
@@ -23,6 +23,7 @@ from stereocell.storage.location import Location
 
 MAX_PLANES = 1_000_000
 _REMOTE_BLOCK = 1 << 18  # bytes of a remote read; fsspec's default reads 5 MB ahead for every tile
+_DESCRIPTION = 270  # tag ImageDescription, one byte a character
 _MAX_TAGS = 4096  # of a directory; tifffile refuses more
 _EXPECTED = "a TIFF file, whole"
 
@@ -87,10 +88,26 @@ def require_directories(where: str, file: IO[bytes], size: int) -> None:
         if count > _MAX_TAGS:
             return  # tifffile says so
         end = offset + width + entry * count
+        if len(seen) == 1:
+            _require_description(where, size, file.read(entry * count), order, is_big=is_big)
         if end + offset_bytes > size:
             refuse_short(where, size, end + offset_bytes)
         file.seek(end)
         (offset,) = struct.unpack(order + link, file.read(offset_bytes))
+
+
+def _require_description(
+    where: str, size: int, entries: bytes, order: str, *, is_big: bool
+) -> None:
+    """Raise SourceError where the text of the first directory ends beyond the file.
+
+    tifffile leaves such a text out, and a file without its OME-XML would be read as plain TIFF.
+    """
+    form, inline = struct.Struct(order + ("HHQQ" if is_big else "HHII")), 8 if is_big else 4
+    whole = entries[: len(entries) // form.size * form.size]
+    for tag, _, count, offset in form.iter_unpack(whole):
+        if tag == _DESCRIPTION and count > inline and offset + count > size:
+            refuse_short(where, size, offset + count)
 
 
 def refuse_short(where: str, size: int, needed: int) -> NoReturn:
@@ -120,6 +137,14 @@ def require_pages(
             end = max(a + b for a, b in zip(page.dataoffsets, page.databytecounts, strict=False))
             if end > size:
                 refuse_short(where, size, end)
+
+
+def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
+    """Return the paths of the files that hold some pages; of an address the address alone."""
+    if not location.is_local:
+        return ()
+    paths = {page.parent.filehandle.path for page in pages if page is not None}
+    return tuple(sorted({location.path, *map(str, paths)}))
 
 
 def require_series(where: str, tiff: TiffFile, series: TiffPageSeries) -> None:

@@ -24,7 +24,13 @@ from stereocell.read.tiff.arrays import (
     samples_as_channels,
     with_given_axes,
 )
-from stereocell.read.tiff.open_file import MAX_PLANES, open_tiff, refuse_short, require_series
+from stereocell.read.tiff.open_file import (
+    MAX_PLANES,
+    files_of,
+    open_tiff,
+    refuse_short,
+    require_series,
+)
 from stereocell.read.tiff.stated import stated_by
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
@@ -58,6 +64,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         arrays = [array_of(series, index) for index in range(len(series.levels))]
         page = series.keyframe
         stated = stated_by(tiff)
+        files = files_of(location, (page for level in series.levels for page in level.pages))
     notes = [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
     arrays, more = _at_first_place(arrays)
     notes += more
@@ -88,6 +95,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         1,
         stack.close,
         notes=tuple(notes),
+        files=files,
     )
 
 

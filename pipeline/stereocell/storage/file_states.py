@@ -1,0 +1,146 @@
+"""The files that an input consists of, and whether they changed since they were looked at.
+
+Looking is a listing: size and modification time of each file, size and ETag of each object. Small
+inputs are read as well, so that a file that was written again with the same bytes counts as
+unchanged. An address of `http` can't be listed: there single files are asked for alone.
+"""
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import fsspec
+
+from stereocell.model.errors import SourceError
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location
+
+MAX_READ_BYTES = 64_000_000  # largest size of all files together whose bytes are compared
+MAX_READ_FILES = 2_000  # most files whose bytes are compared
+_UNLISTED = ("http", "https")
+# names that file systems of fsspec have for what changes with an object's content
+_MARKS = (
+    "ETag",
+    "etag",
+    "Content-MD5",
+    "md5Hash",
+    "LastModified",
+    "Last-Modified",
+    "mtime",
+    "created",
+)
+
+State = tuple[int, str]  # size in bytes; modification time or ETag
+
+
+@dataclass(frozen=True, slots=True)
+class FileStates:
+    """Files as they were at one time.
+
+    paths        files, and folders with all that is below them; addresses where it is remote
+    states       by path; a file that isn't there has none
+    digests      SHA-256 by path; empty where the files are too many or too large
+    is_complete  whether all files could be listed
+    """
+
+    location: Location
+    paths: tuple[str, ...]
+    states: Mapping[str, State] = field(repr=False)
+    digests: Mapping[str, str] = field(repr=False)
+    is_complete: bool
+
+    @classmethod
+    def look(cls, location: Location, paths: Sequence[str]) -> "FileStates":
+        """Return the present states. Raises SourceError where a store doesn't answer."""
+        is_complete = location.is_local or not location.source.startswith(_UNLISTED)
+        states = dict(_listed(location, paths))
+        is_small = sum(size for size, _ in states.values()) <= MAX_READ_BYTES
+        digests = {}
+        if location.is_local and is_small and len(states) <= MAX_READ_FILES:
+            digests = {path: _digest(path) for path in states}
+        return cls(location, tuple(paths), states, digests, is_complete)
+
+    def changed(self) -> list[str]:
+        """Return the paths that differ now: other bytes, gone, or new. Raises SourceError."""
+        now = dict(_listed(self.location, self.paths))
+        differ = [path for path in {**self.states, **now} if self.states.get(path) != now.get(path)]
+        return sorted(path for path in differ if not self._is_rewritten(path))
+
+    def _is_rewritten(self, path: str) -> bool:
+        """Whether a file was written again with the same bytes."""
+        known = self.digests.get(path)
+        return known is not None and known == _digest(path)
+
+
+def _digest(path: str) -> str:
+    """Return the SHA-256 of a file's bytes; empty where it is gone."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
+
+
+def _listed(location: Location, paths: Sequence[str]) -> Iterator[tuple[str, State]]:
+    if location.is_local:
+        for path in paths:
+            yield from _on_disk(path)
+        return
+    with one_line(location.shown, "an address that fsspec opens"):
+        files, _ = fsspec.url_to_fs(location.source, **location.storage_options)
+        files.invalidate_cache()
+        for path in paths:
+            for name, about in _stored(files, path, location):
+                mark = next((str(about[key]) for key in _MARKS if about.get(key)), "")
+                yield name, (int(about.get("size") or 0), mark)
+
+
+def _on_disk(path: str) -> Iterator[tuple[str, State]]:
+    try:
+        if not os.path.isdir(path):
+            found = os.stat(path)
+            yield path, (found.st_size, str(found.st_mtime_ns))
+            return
+        with os.scandir(path) as entries:
+            inner = sorted(entries, key=lambda entry: entry.name)
+    except OSError:  # it is gone
+        return
+    for entry in inner:
+        if entry.is_dir(follow_symlinks=False):
+            yield from _on_disk(entry.path)
+        elif entry.is_file():
+            found = entry.stat()
+            yield entry.path, (found.st_size, str(found.st_mtime_ns))
+
+
+def _stored(
+    files: Any, address: str, location: Location
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield each object at or below an address, with what the store says of it."""
+    path = files._strip_protocol(address)
+    if location.source.startswith(_UNLISTED):
+        try:
+            yield path, files.info(path)
+        except FileNotFoundError:
+            return
+        return
+    yield from files.find(path, detail=True).items()
+
+
+@contextmanager
+def unchanged_while_read(location: Location, again: str) -> Iterator[None]:
+    """Raise SourceError where a file or a folder changed while the block read all of it.
+
+    again  the command that reads it anew, for the message
+    """
+    paths = [location.path if location.is_local else location.source]
+    before = dict(_listed(location, paths))
+    yield
+    if dict(_listed(location, paths)) != before:
+        raise SourceError(
+            f"{location.shown}: changed while it was read, expected a file that stays as it is: "
+            f"{again}"
+        )

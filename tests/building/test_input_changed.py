@@ -1,0 +1,297 @@
+"""An input that changes while tasks read it: told in one line, and nothing made of it is kept."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+import zarr
+from numpy.typing import NDArray
+
+from stereocell.building import input_files, object_passes, passes
+from stereocell.building import tissue as tissue_module
+from stereocell.building.open_source import open_source
+from stereocell.cli.__main__ import main
+from stereocell.read import fingerprint
+from stereocell.read import tables as tables_module
+from stereocell.storage import file_states
+from stereocell.storage.file_states import FileStates
+from stereocell.storage.location import Location
+from support import phantoms
+from support.digests import digests_of
+from support.onnx_models import write_model
+
+BODY = phantoms.f_phantom()
+OTHER = np.ascontiguousarray(BODY[:, ::-1])
+INLINE = ["--workers", "0"]
+GRID = ["--grid", "2x1"]
+UM = ["--spacing-um", "0.5,0.2,0.2"]
+
+
+@pytest.fixture(autouse=True)
+def fresh() -> None:
+    """Nothing of an earlier test is held, as in a process of its own."""
+    input_files.forget()
+
+
+def write_tiff(path: Path, voxels: NDArray[np.uint16]) -> Path:
+    return phantoms.write_ome_tiff(path / "f.ome.tif", voxels, "ZYX")
+
+
+def write_zarr(path: Path, voxels: NDArray[np.uint16]) -> Path:
+    return phantoms.write_ome_zarr(path / "f.ome.zarr", [voxels], chunks=(8, 24, 18))
+
+
+def write_planes(path: Path, voxels: NDArray[np.uint16]) -> Path:
+    (path / "planes").mkdir(exist_ok=True)
+    for z, plane in enumerate(voxels):
+        tifffile.imwrite(path / "planes" / f"z{z:02d}.tif", plane)
+    return path / "planes"
+
+
+SOURCES = {"TIFF": write_tiff, "OME-Zarr": write_zarr, "planes": write_planes}
+
+
+def after_the_first_unit(monkeypatch: pytest.MonkeyPatch, change: Callable[[], object]) -> None:
+    """Let `change` happen once, between the first unit and the second."""
+    build, left = passes._run, [change]
+
+    def run(task: object) -> None:
+        build(task)  # type: ignore[arg-type]
+        if left:
+            left.pop()()
+
+    monkeypatch.setattr(passes, "_run", run)
+
+
+def units_of(out: Path) -> dict[str, str]:
+    """Return the digests of all units, but of how long they took and where the input lies."""
+    found = digests_of(out / "units")
+    left_out = ("seconds.json", "plan.key")
+    return {name: sha for name, sha in found.items() if not name.endswith(left_out)}
+
+
+def built(source: Path, out: Path, *flags: str) -> dict[str, str]:
+    """Return the units of a build of an undisturbed input."""
+    input_files.forget()
+    assert main(["plan", str(source), "-o", str(out), *GRID, *flags]) == 0
+    assert main(["units", str(out), *INLINE]) == 0
+    return units_of(out)
+
+
+def last_line(capsys: pytest.CaptureFixture[str]) -> str:
+    return capsys.readouterr().err.strip().splitlines()[-1]
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_an_image_that_changes_while_units_are_built_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    write, out = SOURCES[name], tmp_path / "out"
+    source = write(tmp_path, BODY)
+    flags = UM if name == "planes" else []
+    assert main(["plan", str(source), "-o", str(out), *GRID, *flags]) == 0
+    after_the_first_unit(monkeypatch, lambda: write(tmp_path, OTHER))
+    assert main(["units", str(out), *INLINE]) == 1
+    line = last_line(capsys)
+    assert "changed while it was read" in line
+    assert "plan into another OUT" in line
+    assert not list(out.rglob("unit.json"))
+
+
+def test_after_a_change_both_inputs_are_built_as_if_undisturbed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, out = write_zarr(tmp_path, BODY), tmp_path / "out"
+    undisturbed = built(source, tmp_path / "undisturbed")
+    assert main(["plan", str(source), "-o", str(out), *GRID]) == 0
+    with monkeypatch.context() as patch:
+        after_the_first_unit(patch, lambda: write_zarr(tmp_path, OTHER))
+        assert main(["units", str(out), *INLINE]) == 1
+    (tmp_path / "apart").mkdir()
+    expected = built(write_zarr(tmp_path / "apart", OTHER), tmp_path / "expected")
+    assert built(source, tmp_path / "other") == expected
+    write_zarr(tmp_path, BODY)
+    input_files.forget()
+    assert main(["units", str(out), *INLINE]) == 0
+    assert units_of(out) == undisturbed
+
+
+def test_a_label_map_that_changes_while_units_are_built_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = write_tiff(tmp_path, BODY), tmp_path / "out"
+    labels = tmp_path / "cells.ome.tif"
+    numbers = (BODY > 500).astype(np.uint16)
+    phantoms.write_ome_tiff(labels, numbers, "ZYX")
+    plan = ["plan", str(source), "-o", str(out), *GRID, "--labels", f"cells={labels}"]
+    assert main(plan) == 0
+    after_the_first_unit(monkeypatch, lambda: phantoms.write_ome_tiff(labels, numbers * 2, "ZYX"))
+    assert main(["units", str(out), *INLINE]) == 1
+    assert "labels 'cells': changed while it was read" in last_line(capsys)
+    assert not list(out.rglob("unit.json"))
+
+
+def test_a_change_while_objects_are_located_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out), "--labels", "."]) == 0
+    find = object_passes.write_extents
+
+    def write_extents(task: object) -> None:
+        find(task)  # type: ignore[arg-type]
+        write_tiff(tmp_path, (OTHER > 500).astype(np.uint16))
+
+    monkeypatch.setattr(object_passes, "write_extents", write_extents)
+    assert main(["units", str(out), *INLINE]) == 1
+    assert "changed while it was read" in last_line(capsys)
+    assert not list(out.rglob("extents-*"))
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_files_that_are_written_again_with_the_same_voxels_pass(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    write, out = SOURCES[name], tmp_path / "out"
+    source = write(tmp_path, BODY)
+    flags = UM if name == "planes" else []
+    assert main(["plan", str(source), "-o", str(out), *GRID, *flags]) == 0
+
+    def rewrite() -> None:
+        """Write every file again: with the same bytes, but for a TIFF's, which is packed anew."""
+        write(tmp_path, BODY)
+        for file in tmp_path.rglob("*"):
+            if out not in file.parents:
+                os.utime(file)
+
+    after_the_first_unit(monkeypatch, rewrite)
+    assert main(["units", str(out), *INLINE]) == 0
+
+
+def test_voxels_that_no_sample_shows_are_built_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The fingerprint of a large input covers a sample: earlier results would count as its own."""
+    monkeypatch.setattr(fingerprint, "BUDGET_BYTES", 10_000)
+    monkeypatch.setattr(file_states, "MAX_READ_BYTES", 10_000)
+    source, out = write_zarr(tmp_path, BODY), tmp_path / "out"
+    array = zarr.open_group(source)["0"]
+    assert isinstance(array, zarr.Array)
+    before = open_source(input_files.SourceRef(str(source), 0, ())).fingerprint
+    for place in np.ndindex(2, 2, 2):  # a chunk of which the fingerprint covers nothing
+        box = tuple(slice(i * n, (i + 1) * n) for i, n in zip(place, (8, 24, 18), strict=True))
+        held = array[box]
+        array[box] = 0
+        open_source.cache_clear()
+        if open_source(input_files.SourceRef(str(source), 0, ())).fingerprint == before:
+            break
+        array[box] = held
+    else:
+        raise AssertionError("the fingerprint covers all chunks")
+    array[box] = held
+    input_files.forget()
+    flags = [*GRID, "--as", "intensity"]
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    with monkeypatch.context() as patch:
+        after_the_first_unit(patch, lambda: array.__setitem__(box, 0))
+        assert main(["units", str(out), *INLINE]) == 1
+    line = last_line(capsys)
+    assert "as '0/c/" in line
+    assert "no unit is kept: run `stereocell units OUT` again" in line
+    assert main(["units", str(out), *INLINE]) == 0
+    assert units_of(out) == built(source, tmp_path / "expected", "--as", "intensity")
+
+
+def test_a_failure_of_tasks_that_comes_of_the_change_is_told_as_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = write_zarr(tmp_path, BODY), tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out), *GRID]) == 0
+    after_the_first_unit(monkeypatch, lambda: shutil.rmtree(source))
+    assert main(["units", str(out), *INLINE]) == 1
+    assert "changed while it was read" in last_line(capsys)
+
+
+def test_a_table_that_changes_while_it_is_read_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
+    table = tmp_path / "cells.csv"
+    table.write_text("label,kind\n1,first\n")
+    plan = ["plan", str(source), "-o", str(out), "--labels", ".", "--table", str(table)]
+    assert main(plan) == 0
+    assert main(["units", str(out), *INLINE]) == 0
+    read = tables_module._read
+
+    def change(*arguments: object) -> object:
+        found = read(*arguments)  # type: ignore[arg-type]
+        table.write_text("label,kind\n1,second one\n")
+        return found
+
+    with monkeypatch.context() as patch:
+        patch.setattr(tables_module, "_read", change)
+        assert main(["stage", str(out), *INLINE]) == 1
+    line = last_line(capsys)
+    assert "cells.csv: changed while it was read" in line
+    assert "run the same command again" in line
+    assert main(["stage", str(out), *INLINE]) == 0
+    assert b"second one" in b"".join(
+        file.read_bytes() for file in (out / "stage").rglob("*.usd*") if file.suffix != ".usdz"
+    )
+
+
+@pytest.mark.parametrize("changes", ["model", "image"])
+def test_a_model_or_its_image_that_changes_while_it_is_read_is_told(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    changes: str,
+) -> None:
+    source, out = write_tiff(tmp_path, BODY), tmp_path / "out"
+    model = write_model(tmp_path / "m.onnx")
+    assert main(["plan", str(source), "-o", str(out)]) == 0
+    if changes == "model":
+        read = Path.read_bytes
+
+        def read_bytes(path: Path) -> bytes:
+            found = read(path)
+            if path == model:
+                write_model(model, slopes=(1.0, 2.0, 3.0))
+            return found
+
+        monkeypatch.setattr(Path, "read_bytes", read_bytes)
+    else:
+        opened = tissue_module.open_source
+
+        def open_and_change(ref: input_files.SourceRef) -> object:
+            found = opened(ref)
+            write_tiff(tmp_path, OTHER)
+            return found
+
+        monkeypatch.setattr(tissue_module, "open_source", open_and_change)
+    assert main(["tissue", str(out), "--model", str(model)]) == 1
+    line = last_line(capsys)
+    assert "changed while it was read" in line
+    assert "run `stereocell tissue OUT` again" in line
+    assert not (out / "tissue").exists()
+
+
+def test_many_files_are_listed_and_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(3000):
+        (tmp_path / f"{number}").write_bytes(b"voxels")
+    read: list[str] = []
+    monkeypatch.setattr(file_states, "_digest", lambda path: read.append(path) or "")
+    states = FileStates.look(Location.of(tmp_path), [str(tmp_path)])
+    assert len(states.states) == 3000
+    assert states.changed() == []
+    assert read == []
+    (tmp_path / "77").write_bytes(b"other voxels")
+    (tmp_path / "78").unlink()
+    (tmp_path / "new").write_bytes(b"")
+    assert [Path(path).name for path in states.changed()] == ["77", "78", "new"]

@@ -1,0 +1,215 @@
+"""Packed files: every stream is read on to its checksum, and damage is refused in one line."""
+
+import bz2
+import gzip
+import hashlib
+import zlib
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import hdf5plugin
+import nibabel
+import numcodecs
+import numpy as np
+import pyarrow
+import pytest
+from pyarrow import parquet
+from zarr.codecs import BloscCodec, Crc32cCodec, GzipCodec, ZstdCodec
+
+from stereocell import read
+from stereocell.model.errors import SourceError
+from stereocell.read.packed_stream import unpack
+from stereocell.read.tables import read_table
+from support.packed_files import (
+    NOISE,
+    Stream,
+    dicom,
+    hdf5,
+    metaimage,
+    mrc,
+    n5,
+    nifti,
+    nifti_of_members,
+    nrrd_file,
+    planes,
+    tiff,
+    zarr_2,
+    zarr_3,
+)
+
+NONE = 0  # the stream holds no checksum: a flipped byte gives other voxels, or breaks the decoder
+
+
+class Row(NamedTuple):
+    """A packed format, and how many bytes before the stream's end its checksum lies."""
+
+    write: Callable[[Path], Stream]
+    checksum_at: int
+
+
+ROWS = {
+    "NIfTI, gzip": Row(nifti, 8),
+    "NIfTI of three times, gzip": Row(partial(nifti, times=3), 8),
+    "NIfTI, gzip of several members": Row(nifti_of_members, 8),
+    "NIfTI pair, gzip": Row(partial(nifti, name="a.img.gz"), 8),
+    "MRC, gzip": Row(partial(mrc, pack=gzip.compress, suffix=".gz"), 8),
+    "MRC, bzip2": Row(partial(mrc, pack=bz2.compress, suffix=".bz2"), 4),
+    "NRRD, gzip": Row(partial(nrrd_file, encoding="gzip"), 8),
+    "NRRD, bzip2": Row(partial(nrrd_file, encoding="bzip2"), 4),
+    "NRRD beside its header, gzip": Row(partial(nrrd_file, encoding="gzip", name="a.nhdr"), 8),
+    "MetaImage, zlib": Row(metaimage, 4),
+    "MetaImage beside its header, zlib": Row(partial(metaimage, name="a.mhd"), 4),
+    "TIFF, deflate": Row(partial(tiff, compression="zlib"), 4),
+    "TIFF, deflate by its old number": Row(partial(tiff, compression=32946), 4),
+    "TIFF, LZMA": Row(partial(tiff, compression="lzma"), 12),
+    "TIFF, zstd as tifffile writes it": Row(partial(tiff, compression="zstd"), NONE),
+    "TIFF, LZW": Row(partial(tiff, compression="lzw"), NONE),
+    "TIFF, PackBits": Row(partial(tiff, compression="packbits"), NONE),
+    "TIFF, JPEG 2000": Row(partial(tiff, compression="jpeg2000"), NONE),
+    "planes of PNG": Row(partial(planes, suffix=".png"), 4),
+    "planes of TIFF, deflate": Row(partial(planes, suffix=".tif"), 4),
+    "Zarr 2, gzip": Row(partial(zarr_2, codec=numcodecs.GZip(5)), 8),
+    "Zarr 2, zlib": Row(partial(zarr_2, codec=numcodecs.Zlib(5)), 4),
+    "Zarr 2, bzip2": Row(partial(zarr_2, codec=numcodecs.BZ2(5)), 4),
+    "Zarr 2, LZMA": Row(partial(zarr_2, codec=numcodecs.LZMA()), 12),
+    "Zarr 2, zstd with a checksum": Row(partial(zarr_2, codec=numcodecs.Zstd(checksum=True)), 4),
+    "Zarr 2, CRC-32": Row(partial(zarr_2, codec=None, filters=[numcodecs.CRC32()]), 4),
+    "Zarr 2, Fletcher-32": Row(
+        partial(zarr_2, codec=numcodecs.Blosc(), filters=[numcodecs.Fletcher32()]), 4
+    ),
+    "Zarr 2, zstd": Row(partial(zarr_2, codec=numcodecs.Zstd()), NONE),
+    "Zarr 2, LZ4": Row(partial(zarr_2, codec=numcodecs.LZ4()), NONE),
+    "Zarr 2, Blosc": Row(partial(zarr_2, codec=numcodecs.Blosc()), NONE),
+    "Zarr 3, gzip": Row(partial(zarr_3, codecs=[GzipCodec()]), 8),
+    "Zarr 3, zstd with a checksum": Row(partial(zarr_3, codecs=[ZstdCodec(checksum=True)]), 4),
+    "Zarr 3, CRC-32C": Row(partial(zarr_3, codecs=[BloscCodec(), Crc32cCodec()]), 4),
+    "Zarr 3, a shard with CRC-32C": Row(
+        partial(zarr_3, codecs=[BloscCodec(), Crc32cCodec()], is_shard=True), 4
+    ),
+    "Zarr 3, zstd": Row(partial(zarr_3, codecs=[ZstdCodec()]), NONE),
+    "Zarr 3, Blosc": Row(partial(zarr_3, codecs=[BloscCodec()]), NONE),
+    "Zarr 3, a shard": Row(partial(zarr_3, codecs=[BloscCodec()], is_shard=True), NONE),
+    "N5, gzip": Row(partial(n5, packing={"type": "gzip"}), 8),
+    "N5, zlib": Row(partial(n5, packing={"type": "gzip", "useZlib": True}), 4),
+    "N5, bzip2": Row(partial(n5, packing={"type": "bzip2"}), 4),
+    "N5, xz": Row(partial(n5, packing={"type": "xz"}), 12),
+    "N5, zstd": Row(partial(n5, packing={"type": "zstd"}), NONE),
+    "N5, Blosc": Row(
+        partial(n5, packing={"type": "blosc", "cname": "lz4", "clevel": 5, "shuffle": 1}), NONE
+    ),
+    "HDF5, gzip": Row(partial(hdf5, compression="gzip"), 4),
+    "HDF5, Fletcher-32": Row(partial(hdf5, fletcher32=True), 4),
+    "HDF5, LZF": Row(partial(hdf5, compression="lzf"), NONE),
+    "HDF5, zstd": Row(partial(hdf5, **hdf5plugin.Zstd()), NONE),
+    "DICOM, RLE": Row(dicom, NONE),
+}
+
+
+def opened(source: Path) -> read.Dataset:
+    return read.open(source, spacing_um=(1.0, 1.0, 1.0))
+
+
+def digest(source: Path) -> str:
+    dataset = opened(source)
+    return hashlib.sha256(dataset.read(0, dataset.levels[0].box).voxels.tobytes()).hexdigest()
+
+
+def refusal(source: Path) -> str:
+    with pytest.raises(SourceError) as caught:
+        digest(source)
+    assert "\n" not in str(caught.value)
+    assert "expected" in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_damage_in_a_packed_file_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
+    row = ROWS[name]
+    stream = row.write(tmp_path)
+    content = stream.file.read_bytes()
+    intact = digest(stream.source)
+
+    flipped = bytearray(content)
+    flipped[(stream.start + stream.stop) // 2] ^= 0x10
+    stream.file.write_bytes(flipped)
+    if row.checksum_at == NONE:
+        with suppress(SourceError):  # nothing tells of other voxels, unless the decoder breaks
+            assert digest(stream.source)
+    else:
+        refusal(stream.source)
+        flipped = bytearray(content)
+        flipped[stream.stop - row.checksum_at] ^= 0x10
+        stream.file.write_bytes(flipped)
+        refusal(stream.source)
+
+    stream.file.write_bytes(content[:-8])
+    refusal(stream.source)
+    stream.file.write_bytes(content)
+    assert digest(stream.source) == intact
+
+
+@pytest.mark.parametrize("behind", [b"", bytes(700), b"tape"])
+@pytest.mark.parametrize("members", [1, 3])
+def test_gzip_of_several_members_and_bytes_behind_it_are_read(behind: bytes, members: int) -> None:
+    plain = NOISE.tobytes()
+    step = -(-len(plain) // members)
+    packed = b"".join(gzip.compress(plain[i : i + step]) for i in range(0, len(plain), step))
+    assert unpack(packed + behind, 1000, "gzip", skip=77) == plain[77:1077]
+    assert unpack(packed + behind, len(plain), "gzip") == plain
+
+
+@pytest.mark.parametrize("packing", ["gzip", "zlib"])
+@pytest.mark.parametrize("size", [0, 1, 1 << 18])
+def test_a_stream_cut_at_any_of_its_last_bytes_is_refused(packing: str, size: int) -> None:
+    pack = {"gzip": gzip.compress, "zlib": zlib.compress}[packing]
+    packed = pack(np.random.default_rng(1).integers(0, 4, size, np.uint8).tobytes())
+    assert len(unpack(packed, size, packing)) == size
+    for missing in range(1, min(10, len(packed))):
+        with pytest.raises(OSError, match="cut short"):
+            unpack(packed[:-missing], size, packing)
+
+
+def test_bytes_behind_the_voxels_are_read_up_to_a_limit() -> None:
+    packed = gzip.compress(bytes(5000))
+    assert unpack(packed, 10, "gzip", most_behind=4990) == bytes(10)
+    with pytest.raises(OSError, match="unpacks to over 4989 bytes more than the 10"):
+        unpack(packed, 10, "gzip", most_behind=4989)
+
+
+@pytest.mark.parametrize("kind", [nibabel.Nifti1Pair, nibabel.AnalyzeImage])
+def test_damage_in_the_packed_header_of_a_pair_is_refused(tmp_path: Path, kind: Any) -> None:
+    source = tmp_path / "a.img.gz"
+    nibabel.save(kind(NOISE.astype(np.int16), np.eye(4)), source)
+    digest(source)
+    header = tmp_path / "a.hdr.gz"
+    content = bytearray(header.read_bytes())
+    content[-8] ^= 1
+    header.write_bytes(content)
+    refusal(source)
+
+
+def test_damage_in_another_time_point_is_refused(tmp_path: Path) -> None:
+    """The checksum covers the whole stream, so nobody knows which voxels are damaged."""
+    stream = nifti(tmp_path, times=3)
+    content = bytearray(stream.file.read_bytes())
+    content[stream.stop - 400] ^= 0x10
+    stream.file.write_bytes(content)
+    assert "damaged" in refusal(stream.source)
+
+
+def test_damage_in_a_page_of_parquet_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    columns: dict[str, Any] = {"label": range(1, 5001), "area": np.arange(5000) * 0.37}
+    table = pyarrow.table(columns)
+    parquet.write_table(
+        table, path, write_page_checksum=True, compression="none", use_dictionary=False
+    )
+    assert len(read_table(str(path), "label", (), "cells").labels) == 5000
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0x10
+    path.write_bytes(content)
+    with pytest.raises(SourceError, match="expected a Parquet file that is whole"):
+        read_table(str(path), "label", (), "cells")
