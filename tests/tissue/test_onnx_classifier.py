@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stereocell.model.errors import SourceError, UsageError
-from stereocell.tissue import onnx_classifier as module
+from stereocell.tissue import onnx_session
 from stereocell.tissue.brain_mask import find_foreground
 from stereocell.tissue.onnx_classifier import Network, apply_network
 from support.onnx_models import Shape, write_model
@@ -103,6 +103,6 @@ def test_without_onnxruntime_the_remedy_is_said(
     def missing(name: str) -> None:
         raise ImportError(name)
 
-    monkeypatch.setattr(module, "import_module", missing)
+    monkeypatch.setattr(onnx_session, "import_module", missing)
     with pytest.raises(UsageError, match=r"pip install 'stereocell\[onnx\]'"):
         load(write_model(tmp_path / "m.onnx"))
