@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building import input_unchanged, phases
+from stereocell.building import input_unchanged, model_process, phases
 from stereocell.building import tissue as tissue_channels
 from stereocell.building.open_source import open_source
 from stereocell.building.out_folder import OutFolder
@@ -28,7 +28,6 @@ from stereocell.report import phase as report
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.claim import LOCK
 from stereocell.tissue.classify import TissueOptions
-from stereocell.tissue.onnx_classifier import Network
 from stereocell.verify import formats as check_module
 from support import phantoms
 from support.exhaustive import sweep
@@ -388,7 +387,7 @@ def test_what_dicom_leaves_out_is_said_of_a_source_that_changed(
     undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     left = SimpleNamespace(fingerprint="f" * 64, remarks=("files left out: 1 cut short",))
-    monkeypatch.setattr(input_unchanged, "open_source", lambda ref: left)
+    monkeypatch.setattr(input_unchanged, "open_watched", lambda ref: left)
     capfd.readouterr()
     assert tissue(undisturbed, "--classes", "3") == 1
     line = only_line(capfd)
@@ -421,9 +420,7 @@ def test_a_class_whose_name_no_plan_may_hold_leaves_everything_as_it_was(
     before = digests(out)
     model = write_model(tmp_path / "m.onnx", slopes=(-1.0, 1.0), names=["bone\x07", "marrow"])
     if checked == "by the plan":  # a name that comes by another way
-        monkeypatch.setattr(
-            tissue_channels, "_load_network", lambda path: Network.load(path, path.read_bytes())
-        )
+        monkeypatch.setattr(model_process, "_require_printable", lambda path, network: None)
     capfd.readouterr()
     assert tissue(out, "--model", str(model)) == 1
     line = only_line(capfd)

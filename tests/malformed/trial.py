@@ -60,10 +60,7 @@ class Outcome:
 
 def import_all() -> None:
     """Import the package, so that forks need not."""
-    stereocell = importlib.import_module("stereocell")
-    for module in pkgutil.walk_packages(stereocell.__path__, "stereocell."):
-        if not module.name.endswith(_LEFT_OUT):
-            importlib.import_module(module.name)
+    import_package("stereocell")
     from stereocell.building import stage_tasks
     from stereocell.building.tasks import components, evidence, extents, objects, unit, window
     from stereocell.storage import cache_key
@@ -78,6 +75,14 @@ def import_all() -> None:
         stage_tasks,
     ):  # looked up once a process, at the cost of seconds
         cache_key.libraries_of(maker)
+
+
+def import_package(name: str) -> None:
+    """Import a package and all below it."""
+    package = importlib.import_module(name)
+    for module in pkgutil.walk_packages(package.__path__, f"{name}."):
+        if not module.name.endswith(_LEFT_OUT):
+            importlib.import_module(module.name)
 
 
 def run_in_child(function: Any, *arguments: Any) -> None:

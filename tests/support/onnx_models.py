@@ -41,3 +41,47 @@ def write_model(
         helper.set_model_props(model, {module.NAMES_KEY: text})
     onnx.save(model, path)
     return path
+
+
+def write_endless_model(path: Path) -> Path:
+    """Write a network that adds 0 to its input 2^62 times."""
+    like = helper.make_tensor_value_info
+    body = helper.make_graph(
+        [
+            helper.make_node("Identity", ["go"], ["goes on"]),
+            helper.make_node("Add", ["before", "zero"], ["after"]),
+        ],
+        "step",
+        [
+            like("step", TensorProto.INT64, []),
+            like("go", TensorProto.BOOL, []),
+            like("before", TensorProto.FLOAT, None),
+        ],
+        [like("goes on", TensorProto.BOOL, []), like("after", TensorProto.FLOAT, None)],
+        [numpy_helper.from_array(np.zeros(1, np.float32), "zero")],
+    )
+    loop = helper.make_node("Loop", ["steps", "", "voxels"], ["last"], body=body)
+    both = helper.make_node("Concat", ["last", "last"], ["out"], axis=1)
+    return _save(path, [loop, both], [numpy_helper.from_array(np.array(2**62), "steps")])
+
+
+def write_huge_model(path: Path) -> Path:
+    """Write a network, of some hundred bytes, with a constant of 4.3 GB."""
+    size = numpy_helper.from_array(np.array([1, 2, 1 << 29, 1, 1]), "size")
+    nodes = [
+        helper.make_node("ConstantOfShape", ["size"], ["many"]),
+        helper.make_node("ReduceMax", ["many"], ["one"], axes=[2, 3, 4]),
+        helper.make_node("Add", ["voxels", "one"], ["out"]),
+    ]
+    return _save(path, nodes, [size])
+
+
+def _save(path: Path, nodes: list[onnx.NodeProto], constants: list[TensorProto]) -> Path:
+    ends = [
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, count, 4, 4, 4])]
+        for name, count in (("voxels", 1), ("out", 2))
+    ]
+    graph = helper.make_graph(nodes, "tissue", *ends, constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    onnx.save(model, path)
+    return path

@@ -6,6 +6,7 @@ the plan. Its window is 0..255; its surface lies at probability 1/2.
 
 import math
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from stereocell.building.channels import PALETTE, Channel
 from stereocell.building.input_unchanged import require_input, require_still
+from stereocell.building.model_process import ModelBounds, opened_network
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.phases import provenance
@@ -34,9 +36,7 @@ from stereocell.model.version import GENERATOR
 from stereocell.read.readers import reader_of
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.cache_key import key_of, libraries_of
-from stereocell.storage.file_states import unchanged_while_read
 from stereocell.storage.json_files import write_json, write_sealed
-from stereocell.storage.location import Location
 from stereocell.tissue import classify as tissue_module
 from stereocell.tissue import onnx_classifier as network_module
 from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions, learn_tissue
@@ -60,12 +60,14 @@ class TissueRequest:
     channel     of the input, by name or index; empty: the first
     model       the user's ONNX file; None: the classes are learned
     everywhere  learn in all voxels outside the background; else, in MR, inside the brain
+    bounds      the most time and memory of the model
     """
 
     classes: int | Literal["auto"] | None = None
     channel: str = ""
     model: Path | None = None
     everywhere: bool = False
+    bounds: ModelBounds = ModelBounds()  # noqa: RUF009  (frozen)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,21 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
             f"tissue: the region holds {voxels:,} voxels, expected at most {MAX_VOXELS:,}: plan a "
             "coarser --level or a smaller --region"
         )
-    network = None if request.model is None else _load_network(request.model)
+    with ExitStack() as stack:
+        network = None
+        if request.model is not None:
+            network = stack.enter_context(opened_network(request.model, request.bounds))
+        return _add(out_folder, plan, channel, request, network)
+
+
+def _add(
+    out_folder: OutFolder,
+    plan: Plan,
+    channel: Channel,
+    request: TissueRequest,
+    network: Network | None,
+) -> Plan:
+    out = out_folder.out
     if network is not None and request.classes not in (None, "auto", network.count):
         raise UsageError(
             f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
@@ -150,22 +166,6 @@ def _with_classes(plan: Plan, source: str, fingerprint: str, record: dict[str, A
     values = {**plan.settings.iso_values, **{channel.name: LEVEL for channel in added}}
     settings = replace(plan.settings, iso_values=values)
     return replace(plan, channels=(*plan.channels, *added), settings=settings)
-
-
-def _load_network(path: Path) -> Network:
-    """Return the model in a file. Raises SourceError, UsageError as `Network.load`."""
-    with unchanged_while_read(Location.of(path), "run `stereocell tissue OUT` again"):
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise SourceError(f"{path}: {error.strerror}, expected an ONNX model") from None
-    network = Network.load(path, content)
-    for name in network.classes:
-        if not name.isprintable():
-            raise SourceError(
-                f"{path}: names of classes: found {name!r:.80}, expected names that can be shown"
-            )
-    return network
 
 
 def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:

@@ -259,10 +259,12 @@ def sample(options: argparse.Namespace) -> Answer:
 
 def tissue(options: argparse.Namespace) -> Answer:
     """Learn tissue classes and build their channels."""
+    from stereocell.building.model_process import ModelBounds
     from stereocell.building.tissue import TissueRequest, add_tissue, parse_classes
 
     classes = None if options.classes is None else parse_classes(options.classes)
-    request = TissueRequest(classes, options.channel, options.model, options.everywhere)
+    bounds = ModelBounds(options.model_seconds, options.model_memory_gb)
+    request = TissueRequest(classes, options.channel, options.model, options.everywhere, bounds)
     add_tissue(options.out, request)
     return run_phases(options, "units", "stage", "bundle", "report")
 

@@ -303,6 +303,20 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
         "--model", type=_file, metavar="FILE.onnx", help="a network of your own (docs/tissue.md)"
     )
     parser.add_argument(
+        "--model-seconds",
+        type=float,
+        default=300,
+        metavar="S",
+        help="most seconds that the network may take for a patch (default %(default)s)",
+    )
+    parser.add_argument(
+        "--model-memory-gb",
+        type=float,
+        default=4,
+        metavar="GB",
+        help="most memory that the network may take (default %(default)s)",
+    )
+    parser.add_argument(
         "--everywhere",
         action="store_true",
         help="learn in all that isn't background; by default in MR inside the brain alone",

@@ -16,9 +16,8 @@ self-configuring method for deep learning-based biomedical image segmentation", 
 import hashlib
 import itertools
 import json
-import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -28,8 +27,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.model.errors import SourceError
-from stereocell.model.extra_packages import import_extra
 from stereocell.tissue.brain_mask import find_foreground
+from stereocell.tissue.onnx_session import OnnxError, OnnxSession, Session
 
 Field = NDArray[np.float32]
 PATCH = 64  # voxels along an edge where the model leaves it open
@@ -51,7 +50,7 @@ class Network:
     digest: str
     patch: tuple[int, int, int]
     classes: tuple[str, ...]
-    session: Any = field(repr=False, compare=False)
+    session: Session = field(repr=False, compare=False)
 
     @property
     def count(self) -> int:
@@ -68,23 +67,23 @@ class Network:
         }
 
     @classmethod
-    def load(cls, path: Path, content: bytes) -> "Network":
+    def load(
+        cls,
+        path: Path,
+        content: bytes,
+        open_session: Callable[[bytes], Session] = OnnxSession,
+    ) -> "Network":
         """Return the model of a file's content, tried on one empty patch.
 
-        path  of the file, for its name and for messages
+        path          of the file, for its name and for messages
+        open_session  returns what runs the network; by default in this process
 
         Raises UsageError if onnxruntime isn't installed, SourceError if the file is no such model.
         """
-        onnxruntime = _find_runtime()
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 4
         try:
-            session = onnxruntime.InferenceSession(
-                content, options, providers=["CPUExecutionProvider"]
-            )
-        except _errors() as error:
-            raise SourceError(f"{path}: {_why(error)}, expected an ONNX model") from None
+            session = open_session(content)
+        except OnnxError as error:
+            raise SourceError(f"{path}: {error}, expected an ONNX model") from None
         patch = _patch(path, session)
         tried = _run(str(path), session, np.zeros(patch, np.float32))
         names = _names(path, session, tried.shape[0])
@@ -125,26 +124,6 @@ def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
     return total[:, :z, :y, :x]
 
 
-def _find_runtime() -> Any:
-    """Return onnxruntime. Raises UsageError if it is not installed."""
-    return import_extra("onnxruntime", extra="onnx", wanted_by="--model")
-
-
-def _errors() -> tuple[type[Exception], ...]:
-    """Return onnxruntime's errors, which share no class of their own."""
-    state = import_module("onnxruntime.capi.onnxruntime_pybind11_state")
-    found = (v for v in vars(state).values() if isinstance(v, type) and issubclass(v, Exception))
-    return (*found, RuntimeError, ValueError)
-
-
-def _why(error: Exception) -> str:
-    """Return the runtime's message without its name and codes, in one line."""
-    text = " ".join(str(error).split())
-    if "protobuf" in text:  # the file couldn't be parsed, or holds no graph
-        return "found another kind of file"
-    return re.sub(r"^\[ONNXRuntimeError\] : \d+ : \w+ : ", "", text)[:200]
-
-
 def _starts(length: int, patch: int) -> list[int]:
     """Return the starts of patches that half overlap; the last patch ends where the axis does."""
     step = max(1, patch // 2)
@@ -157,18 +136,18 @@ def _gaussian(patch: tuple[int, int, int]) -> Field:
     return np.maximum(weight, 1e-4).astype(np.float32)
 
 
-def _patch(path: Path, session: Any) -> tuple[int, int, int]:
-    inputs, outputs = session.get_inputs(), session.get_outputs()
+def _patch(path: Path, session: Session) -> tuple[int, int, int]:
+    inputs, outputs = session.inputs(), session.outputs()
     if len(inputs) != 1 or len(outputs) != 1:
         raise SourceError(
             f"{path}: found {len(inputs)} inputs and {len(outputs)} outputs, expected one of each"
         )
-    shape, kind = inputs[0].shape, inputs[0].type
+    shape, kind = inputs[0].shape, inputs[0].kind
     is_fit = len(shape) == 5 and all(n == 1 for n in shape[:2] if isinstance(n, int))
     if kind != "tensor(float)" or not is_fit:
         raise SourceError(
-            f"{path}: input {inputs[0].name!r} is {kind} of shape {shape}, expected tensor(float) "
-            "of shape (1, 1, D, H, W)"
+            f"{path}: input {inputs[0].name!r} is {kind} of shape {list(shape)}, expected "
+            "tensor(float) of shape (1, 1, D, H, W)"
         )
     z, y, x = (n if isinstance(n, int) else PATCH for n in shape[2:])
     if not all(1 <= n <= LARGEST for n in (z, y, x)):
@@ -179,12 +158,11 @@ def _patch(path: Path, session: Any) -> tuple[int, int, int]:
     return z, y, x
 
 
-def _run(where: str, session: Any, patch: Field) -> Field:
+def _run(where: str, session: Session, patch: Field) -> Field:
     try:
-        (found,) = session.run(None, {session.get_inputs()[0].name: patch[None, None]})
-    except _errors() as error:
-        raise SourceError(f"{where}: failed on a patch of {patch.shape}: {_why(error)}") from None
-    result = np.asarray(found)
+        result = session.run(patch[None, None])
+    except OnnxError as error:
+        raise SourceError(f"{where}: failed on a patch of {patch.shape}: {error}") from None
     shape = result.shape
     is_fit = len(shape) == 5 and shape[0] == 1 and shape[2:] == patch.shape
     if not is_fit or not 2 <= shape[1] <= MAX_CLASSES or result.dtype.kind != "f":
@@ -198,8 +176,8 @@ def _run(where: str, session: Any, patch: Field) -> Field:
     return result[0].astype(np.float32)
 
 
-def _names(path: Path, session: Any, count: int) -> tuple[str, ...]:
-    text = session.get_modelmeta().custom_metadata_map.get(NAMES_KEY)
+def _names(path: Path, session: Session, count: int) -> tuple[str, ...]:
+    text = session.metadata(NAMES_KEY)
     if text is None:
         return tuple(f"tissue {k + 1}" for k in range(count))
     try:

@@ -300,6 +300,17 @@ def test_a_text_that_stands_in_a_million_rows_is_kept_once(tmp_path: Path) -> No
     assert found.texts == ("x" * 200,) * rows
 
 
+def test_parquet_on_which_its_library_aborts_is_refused_in_a_line(tmp_path: Path) -> None:
+    """The repetition of a column, 0 to 2, is 33: pyarrow 26 ends its process on it."""
+    place = tmp_path / "a.parquet"
+    table = pa.table({"label": [1, 2, 3], "kind": ["T", "B", "T"]})
+    pq.write_table(table, place, compression="none")
+    content = place.read_bytes()
+    assert content.count(b"%\x02\x18\x05label") == 1
+    place.write_bytes(content.replace(b"%\x02\x18\x05label", b"%\x42\x18\x05label"))
+    assert "expected a Parquet file that is whole" in refusal(place)
+
+
 def test_a_column_of_parquet_beyond_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parquet_tables, "_MAX_BYTES", 50_000)
     place = parquet(tmp_path, id=pa.array([1, 2]), a=pa.array(["x" * 60_000, "y"]), b=[1.5, 2])

@@ -1,0 +1,121 @@
+"""A user's network in a process of its own, with bounds of its time and memory.
+
+The bounds hold for each call: loading, and each patch. Real networks stay far below the defaults: a
+3D U-Net of 30 million weights takes a minute and 3 GB for a patch of 128^3 voxels.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.storage.child_process import Bounds, Child, ChildError
+from stereocell.storage.file_states import unchanged_while_read
+from stereocell.storage.location import Location
+from stereocell.tissue.onnx_classifier import Network
+from stereocell.tissue.onnx_session import OnnxSession, Tensor
+
+
+@dataclass(frozen=True, slots=True)
+class ModelBounds:
+    """The most that a network may take.
+
+    seconds    for loading it, and for each patch
+    memory_gb  resident, 10^9 bytes
+    """
+
+    seconds: float = 300.0
+    memory_gb: float = 4.0
+
+    def __post_init__(self) -> None:
+        for flag, value in (
+            ("--model-seconds", self.seconds),
+            ("--model-memory-gb", self.memory_gb),
+        ):
+            if not 0 < value < float("inf"):
+                raise UsageError(f"{flag} is {value:g}, expected a number above 0")
+
+
+@contextmanager
+def opened_network(path: Path, bounds: ModelBounds) -> Iterator[Network]:
+    """Yield the network of a file, which runs in a process that ends with the block.
+
+    Raises SourceError, UsageError as `Network.load` does, and SourceError beyond the bounds.
+    """
+    with unchanged_while_read(Location.of(path), "run `stereocell tissue OUT` again"):
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise SourceError(f"{path}: {error.strerror}, expected an ONNX model") from None
+    session = _ChildSession(path, bounds)
+    try:
+        network = Network.load(path, content, session.open)
+        _require_printable(path, network)
+        yield network
+    finally:
+        session.close()
+
+
+def _require_printable(path: Path, network: Network) -> None:
+    """Raise SourceError where a class has a name that can't be shown."""
+    for name in network.classes:
+        if not name.isprintable():
+            raise SourceError(
+                f"{path}: names of classes: found {name!r:.80}, expected names that can be shown"
+            )
+
+
+class _ChildSession:
+    """The session of a network, in a child process."""
+
+    def __init__(self, path: Path, bounds: ModelBounds) -> None:
+        self._path, self._bounds = path, bounds
+        self._child: Child | None = None
+
+    def open(self, content: bytes) -> "_ChildSession":
+        bounds = Bounds(self._bounds.seconds, int(1e9 * self._bounds.memory_gb))
+
+        def start() -> Child:
+            return Child(OnnxSession, content, bounds=bounds)
+
+        self._child = self._alive("loaded", start)
+        return self
+
+    def close(self) -> None:
+        if self._child is not None:
+            self._child.close()
+
+    def inputs(self) -> tuple[Tensor, ...]:
+        found: tuple[Tensor, ...] = self._call("loaded", "inputs")
+        return found
+
+    def outputs(self) -> tuple[Tensor, ...]:
+        found: tuple[Tensor, ...] = self._call("loaded", "outputs")
+        return found
+
+    def metadata(self, key: str) -> str | None:
+        found: str | None = self._call("loaded", "metadata", key)
+        return found
+
+    def run(self, values: NDArray[np.float32]) -> NDArray[Any]:
+        found: NDArray[Any] = self._call("run on a patch", "run", values)
+        return found
+
+    def _call(self, doing: str, method: str, *arguments: Any) -> Any:
+        assert self._child is not None
+        return self._alive(doing, lambda: self._child.call(method, *arguments))
+
+    def _alive(self, doing: str, work: Callable[[], Any]) -> Any:
+        try:
+            return work()
+        except ChildError as error:
+            raise SourceError(
+                f"{self._path}: {error} while it was {doing}, expected a network within "
+                f"{self._bounds.seconds:g} s a patch and {self._bounds.memory_gb:g} GB: if it is "
+                "sound, raise --model-seconds or --model-memory-gb"
+            ) from None

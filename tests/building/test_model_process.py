@@ -1,0 +1,56 @@
+"""A user's network that takes too long, too much memory, or its process with it, is one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stereocell.building.model_process import ModelBounds, opened_network
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.tissue.onnx_classifier import Network, apply_network
+from support.onnx_models import write_endless_model, write_huge_model, write_model
+
+
+def refusal(path: Path, bounds: ModelBounds) -> str:
+    with pytest.raises(SourceError) as caught, opened_network(path, bounds):
+        pass
+    line = str(caught.value)
+    assert line.startswith(f"{path}: ")
+    assert "\n" not in line
+    return line
+
+
+def test_a_network_gives_the_same_bytes_in_a_process_of_its_own(tmp_path: Path) -> None:
+    path = write_model(tmp_path / "m.onnx", slopes=(0, 1, 2), names=["", "bone", "marrow"])
+    voxels = np.zeros((20, 24, 30), np.uint16)
+    voxels[4:16, 4:20, 4:26] = np.arange(12 * 16 * 22).reshape(12, 16, 22)
+    here = Network.load(path, path.read_bytes())
+    with opened_network(path, ModelBounds()) as apart:
+        assert apart == here
+        assert apply_network(apart, voxels).tobytes() == apply_network(here, voxels).tobytes()
+
+
+def test_a_network_that_never_ends_is_ended_at_its_bound(tmp_path: Path) -> None:
+    line = refusal(write_endless_model(tmp_path / "m.onnx"), ModelBounds(seconds=3))
+    assert "it did not end within 3 s" in line
+    assert "raise --model-seconds" in line
+
+
+def test_a_network_of_more_memory_than_its_bound_is_refused(tmp_path: Path) -> None:
+    line = refusal(write_huge_model(tmp_path / "m.onnx"), ModelBounds(memory_gb=0.6))
+    assert "it took more than 0.6 GB of memory" in line
+    assert "--model-memory-gb" in line
+
+
+def test_a_file_that_is_no_network_is_named_as_before(tmp_path: Path) -> None:
+    (tmp_path / "m.onnx").write_bytes(b"GIF89a")
+    line = refusal(tmp_path / "m.onnx", ModelBounds())
+    assert line.endswith("found another kind of file, expected an ONNX model")
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_bound_that_is_none_is_refused(value: float) -> None:
+    with pytest.raises(UsageError, match="--model-seconds"):
+        ModelBounds(seconds=value)
+    with pytest.raises(UsageError, match="--model-memory-gb"):
+        ModelBounds(memory_gb=value)
