@@ -137,7 +137,7 @@ class Hdf5Array:
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:
         require_readable(dataset, where)
-        self._dataset = dataset
+        self.dataset = dataset
         self.shape: tuple[int, ...] = dataset.shape
         self.dtype = dataset.dtype
         self.chunks: tuple[int, ...] = dataset.chunks or (
@@ -146,7 +146,7 @@ class Hdf5Array:
         )
 
     def __getitem__(self, key: Any) -> Any:
-        return self._dataset[key]
+        return self.dataset[key]
 
 
 def require_readable(dataset: h5py.Dataset, where: str) -> None:

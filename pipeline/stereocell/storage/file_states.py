@@ -63,6 +63,14 @@ class FileStates:
             digests = {path: _digest(path) for path in states}
         return cls(location, tuple(paths), states, digests, is_complete)
 
+    def names(self) -> set[str]:
+        """Return the paths of all files, relative to the source, with `/`."""
+        source = self.location.source
+        root = source.partition("://")[2] if not self.location.is_local else source
+        root = f"{os.path.normpath(root)}/".replace(os.sep, "/").lstrip("/")
+        paths = (os.path.normpath(path).replace(os.sep, "/").lstrip("/") for path in self.states)
+        return {path.removeprefix(root) for path in paths}
+
     def changed(self) -> list[str]:
         """Return the paths that differ now: other bytes, gone, or new. Raises SourceError."""
         now = dict(_listed(self.location, self.paths))
