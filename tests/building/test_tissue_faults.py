@@ -386,7 +386,7 @@ def test_what_dicom_leaves_out_is_said_of_a_source_that_changed(
     undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     left = SimpleNamespace(fingerprint="f" * 64, remarks=("files left out: 1 cut short",))
-    monkeypatch.setattr(input_unchanged, "open_source", lambda ref: left)
+    monkeypatch.setattr(input_unchanged, "open_watched", lambda ref: left)
     capfd.readouterr()
     assert tissue(undisturbed, "--classes", "3") == 1
     line = only_line(capfd)

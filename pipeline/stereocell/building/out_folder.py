@@ -43,6 +43,7 @@ class OutFolder:
         self.plan_file = out / "plan.json"
         self.settings_file = out / "stereocell.toml"
         self.units_dir = out / "units"
+        self.running_file = out / "running.json"
         self.survey_file = self.units_dir / "survey.json"
         self.index_file = out / "units" / "done.json"
         self.units_plan_file = out / "units" / "plan.key"
