@@ -290,9 +290,10 @@ test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .ven
 object-store: setup ## versitygw for the tests, by Go, which keep to moto's server without
 	GOBIN="$$PWD/$(BIN)" go install github.com/versity/versitygw/cmd/versitygw@latest
 
-torture: setup ## 50 builds killed, evenly over their phases; all malformed inputs
+torture: setup ## 50 builds killed, evenly over their phases; all malformed inputs; 2640 changed ones
 	$(SUPPORT).torture 50
 	$(BIN)/python tests/malformed
+	$(BIN)/python tests/malformed/sweep.py
 
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py

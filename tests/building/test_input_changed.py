@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,9 @@ import tifffile
 import zarr
 from numpy.typing import NDArray
 
-from stereocell.building import input_files, object_passes, passes
+from stereocell.building import input_files, object_passes, passes, source_tasks
 from stereocell.building import tissue as tissue_module
-from stereocell.building.open_source import open_source
+from stereocell.building.open_source import SourceRef, open_afresh
 from stereocell.cli.__main__ import main
 from stereocell.read import fingerprint
 from stereocell.read import tables as tables_module
@@ -172,38 +173,80 @@ def test_files_that_are_written_again_with_the_same_voxels_pass(
     assert main(["units", str(out), *INLINE]) == 0
 
 
-def test_voxels_that_no_sample_shows_are_built_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The fingerprint of a large input covers a sample: earlier results would count as its own."""
+@pytest.fixture
+def sampled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Callable[[], None]]:
+    """An image whose fingerprint covers a sample, and what changes a chunk that is not in it."""
     monkeypatch.setattr(fingerprint, "BUDGET_BYTES", 10_000)
     monkeypatch.setattr(file_states, "MAX_READ_BYTES", 10_000)
-    source, out = write_zarr(tmp_path, BODY), tmp_path / "out"
+    source = write_zarr(tmp_path, BODY)
     array = zarr.open_group(source)["0"]
     assert isinstance(array, zarr.Array)
-    before = open_source(input_files.SourceRef(str(source), 0, ())).fingerprint
-    for place in np.ndindex(2, 2, 2):  # a chunk of which the fingerprint covers nothing
-        box = tuple(slice(i * n, (i + 1) * n) for i, n in zip(place, (8, 24, 18), strict=True))
+    ref = SourceRef(str(source), 0, ())
+    before = open_afresh(ref).fingerprint
+    for z, y, x in np.ndindex(2, 2, 2):
+        box = np.s_[8 * z : 8 * z + 8, 24 * y : 24 * y + 24, 18 * x : 18 * x + 18]
         held = array[box]
         array[box] = 0
-        open_source.cache_clear()
-        if open_source(input_files.SourceRef(str(source), 0, ())).fingerprint == before:
-            break
+        is_seen = open_afresh(ref).fingerprint != before
         array[box] = held
-    else:
-        raise AssertionError("the fingerprint covers all chunks")
-    array[box] = held
-    input_files.forget()
-    flags = [*GRID, "--as", "intensity"]
-    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+        if not is_seen:
+            return source, partial(array.__setitem__, box, 0)
+    raise AssertionError("the fingerprint covers all chunks")
+
+
+AS_IMAGE = ["--as", "intensity"]
+
+
+def test_voxels_that_no_sample_shows_are_built_again(
+    sampled: tuple[Path, Callable[[], None]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The fingerprint is the same: earlier results would count as those of the new voxels."""
+    source, change = sampled
+    out = tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out), *GRID, *AS_IMAGE]) == 0
     with monkeypatch.context() as patch:
-        after_the_first_unit(patch, lambda: array.__setitem__(box, 0))
+        after_the_first_unit(patch, change)
         assert main(["units", str(out), *INLINE]) == 1
     line = last_line(capsys)
     assert "as '0/c/" in line
     assert "no unit is kept: run `stereocell units OUT` again" in line
     assert main(["units", str(out), *INLINE]) == 0
-    assert units_of(out) == built(source, tmp_path / "expected", "--as", "intensity")
+    assert units_of(out) == built(source, tmp_path / "expected", *AS_IMAGE)
+
+
+@pytest.mark.parametrize("is_changed", [True, False])
+def test_what_a_killed_command_made_last_is_made_again_if_the_input_was_written_since(
+    sampled: tuple[Path, Callable[[], None]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    is_changed: bool,
+) -> None:
+    source, change = sampled
+    out = tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out), *GRID, *AS_IMAGE]) == 0
+
+    def die() -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:  # a killed process cleans nothing up
+        after_the_first_unit(patch, die)
+        patch.setattr(source_tasks, "_require_still", lambda *_, **__: None)
+        assert main(["units", str(out), *INLINE]) != 0
+    assert len(list(out.rglob("unit.json"))) == 1
+    assert (out / "running.json").is_file()
+    if is_changed:
+        change()
+    input_files.forget()
+    capsys.readouterr()
+    assert main(["units", str(out), *INLINE]) == 0
+    said = capsys.readouterr().err
+    assert ("is made again" in said) == is_changed
+    assert f"units: {2 if is_changed else 1}/{2 if is_changed else 1}" in said
+    assert not (out / "running.json").exists()
 
 
 def test_a_failure_of_tasks_that_comes_of_the_change_is_told_as_that(
@@ -267,7 +310,7 @@ def test_a_model_or_its_image_that_changes_while_it_is_read_is_told(
     else:
         opened = tissue_module.open_source
 
-        def open_and_change(ref: input_files.SourceRef) -> object:
+        def open_and_change(ref: SourceRef) -> object:
             found = opened(ref)
             write_tiff(tmp_path, OTHER)
             return found

@@ -5,4 +5,11 @@ cases.py        what a case is, and how files are spoilt
 base.py         the sound files that are spoilt
 trial.py        one case in a process of its own, and what is wrong with how it ended
 __main__.py     `python tests/malformed`: all of them, and a table
+
+Beside these cases, which were thought of, there are small changes by chance, by seeds:
+
+subjects.py        an intact source of every format
+mutations.py       kinds of changes
+mutation_trial.py  one changed source, read in a fork, and compared with the intact one
+sweep.py           `python tests/malformed/sweep.py`: all of them, and a table by format
 """

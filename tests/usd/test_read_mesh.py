@@ -48,6 +48,19 @@ def test_polygons_of_any_size_are_cut_into_fans(cube):
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5], [0, 6, 7]]
 
 
+def test_a_face_of_a_million_corners_is_refused_in_a_line(cube):
+    count = 1_000_000
+    cube.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.zeros((count, 3), np.float32)))
+    cube.GetFaceVertexCountsAttr().Set([3, count])
+    cube.GetFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(np.arange(count + 3) % count))
+    with pytest.raises(StageError) as caught:
+        read_mesh(cube, np.eye(4))
+    assert str(caught.value) == (
+        "/Cube: faceVertexCounts[1]: found a face of 1000000 corners, expected at most 20000: "
+        "triangulate it in the program that edited it"
+    )
+
+
 def test_missing_normals_are_made_and_point_out(cube):
     mesh = read_mesh(cube, np.eye(4))
     outward = mesh.positions - 0.5

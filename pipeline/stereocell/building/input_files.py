@@ -29,6 +29,12 @@ def open_watched(ref: SourceRef) -> Dataset:
     return dataset
 
 
+def open_states(ref: SourceRef) -> FileStates:
+    """Return the files as this process first saw them, which may be now."""
+    open_watched(ref)
+    return _first[_key(ref)]
+
+
 def first_states(ref: SourceRef) -> FileStates | None:
     """Return the files as this process first saw them; None: it has not opened them."""
     return _first.get(_key(ref))

@@ -80,10 +80,11 @@ def require_added(plan: Plan) -> None:
             )
 
 
-def require_still(plan: Plan, *, again: str = "stereocell units OUT") -> None:
+def require_still(plan: Plan, *, again: str = "stereocell units OUT", is_last: bool = True) -> None:
     """Raise InputChangedError where the image or a label map changed since it was first opened.
 
-    again  the command that reads it anew
+    again    the command that reads it anew
+    is_last  whether an input that can't be listed is compared too, by its fingerprint
 
     A file that was written again with the same bytes, or of which the fingerprint covers all
     voxels, may have another date. Raises SourceError or OutputError where added channels changed.
@@ -93,7 +94,7 @@ def require_still(plan: Plan, *, again: str = "stereocell units OUT") -> None:
         if states is None:
             continue
         changed = states.changed()
-        if changed or not states.is_complete:
+        if changed or (is_last and not states.is_complete):
             _require_same(name, ref, _in_words(ref, states, changed), again, bool(changed))
     added = [source_of(plan, channel=channel) for channel in plan.channels if channel.source]
     if any(one.changed() for ref in added if (one := first_states(ref)) is not None):

@@ -40,6 +40,7 @@ class OutFolder:
         self.settings_file = out / SETTINGS
         self.provenance_file = out / "provenance.json"
         self.units_dir = out / "units"
+        self.running_file = out / "running.json"
         self.survey_file = self.units_dir / "survey.json"
         self.index_file = out / "units" / "done.json"
         self.units_plan_file = out / "units" / "plan.key"

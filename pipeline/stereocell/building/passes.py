@@ -16,6 +16,7 @@ from stereocell.building.object_passes import locate_objects, object_tasks, save
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
+from stereocell.building.running_pass import remove_mixed
 from stereocell.building.source_tasks import (
     around,
     box_to_json,
@@ -53,6 +54,7 @@ def run_passes(
     Raises SourceError if the source is no longer what was planned, TasksFailedError once all
     others are finished.
     """
+    remove_mixed(out_folder, plan)
     wanted = {f"{tile_id}/{channel.id}": channel for tile_id, channel in _select(plan, only)}
     survey = survey_channels(out_folder, plan, engine)
     for labels in plan.labels:
@@ -76,7 +78,8 @@ def run_passes(
         for labels in plan.labels:
             tell_objects(labels, located[labels.id])
     run = partial(engine.run, "units", _run, tasks)
-    run_on_input(out_folder, plan, run, [task.directory for _, task in tasks])
+    results = [task.directory for _, task in tasks]
+    run_on_input(out_folder, plan, run, results, is_last=True)
     if not others:  # all there: the stage may be made of them
         out_folder.save_units(plan, keys)
     return len(tasks), others

@@ -30,7 +30,7 @@ from stereocell.building.phase import (
     states_of,
 )
 from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
-from stereocell.building.plan_notes import told_in_vain, told_of_gaps
+from stereocell.building.plan_notes import told_in_vain, told_of_absent, told_of_gaps
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
 from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
 from stereocell.building.survey_file import appearance_to_json, read_survey
@@ -148,7 +148,8 @@ def settle(source: str, settings: Settings) -> Plan:
     for one in plan.labels:
         # what can't be read, or isn't there, is told before the build
         require_color_by(plan, one, table_of(plan, one))
-    gaps, objects = told_of_gaps(dataset, plan), list(told_before(plan))
+    gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
+    objects = list(told_before(plan))
     objects += filter(None, map(doubt_of, plan.labels))
     if settings.objects.table and len(plan.labels) > 1:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")

@@ -3,10 +3,16 @@
 from collections.abc import Iterator, Sequence
 
 from stereocell.building.channels import ALL, Channel
+from stereocell.building.input_files import first_states, open_watched
+from stereocell.building.open_source import SourceRef
 from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
 from stereocell.isosurface.options import LADDER, RUNGS
+from stereocell.model.errors import SourceError
+from stereocell.model.tiling import Box
 from stereocell.read import Dataset
+from stereocell.read.absent_chunks import count_absent
 from stereocell.transfer.joint_histogram import sample_boxes
 
 _LOOKED_AT = 16_000_000  # voxels of all channels that are looked at for NaN
@@ -32,6 +38,40 @@ def told_of_gaps(dataset: Dataset, plan: Plan) -> list[str]:
                 "infinite: read as the smallest finite value"
             )
     return found
+
+
+def told_of_absent(dataset: Dataset, plan: Plan) -> list[str]:
+    """Return what is said of chunks that are not stored, of the image and of the label maps.
+
+    Raises SourceError where none is stored.
+    """
+    indices = list(dict.fromkeys(channel.index for channel in plan.channels if not channel.source))
+    found = _absent(dataset, source_of(plan), indices, plan.region, plan.level) if indices else []
+    for labels in plan.labels:
+        own, whole = open_watched(labels.ref), Box((0, 0, 0), labels.shape)
+        told = _absent(own, labels.ref, [labels.channel], whole, 0)
+        found += [f"labels {labels.name!r}: {note}" for note in told]
+    return found
+
+
+def _absent(
+    dataset: Dataset, ref: SourceRef, channels: Sequence[int], box: Box, level: int
+) -> list[str]:
+    states = first_states(ref)
+    absent = None if states is None else count_absent(dataset, channels, box, level, states)
+    if absent is None or not absent.count:
+        return []
+    nouns = f"{absent.noun}s"
+    if absent.count == absent.total:
+        raise SourceError(
+            f"{dataset.shown}: level {level}: found none of {absent.total} {nouns}, expected the "
+            "voxels: they are lost, or lie elsewhere than the metadata say"
+        )
+    share = max(absent.count / absent.total, 1e-4)
+    return [
+        f"{absent.count} of {absent.total} {nouns} of level {level} ({share:.2%}) are not stored: "
+        f"read as {absent.fill}, as the format has it for empty ones and as lost ones are"
+    ]
 
 
 def told_in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:

@@ -14,6 +14,7 @@ from stereocell.building.input_unchanged import (
 )
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
+from stereocell.building.running_pass import begin, end
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.read.readers import reader_of
@@ -25,8 +26,12 @@ def run_on_input(
     plan: Plan,
     run: Callable[[], object],
     results: Sequence[Path],
+    *,
+    is_last: bool = False,
 ) -> None:
     """Run tasks that read the inputs and write results; without results nothing is run.
+
+    is_last  whether no pass follows
 
     Raises SourceError where an input changed since the plan, and where it changed while the tasks
     ran: their results are removed then. Where the fingerprint doesn't tell the two inputs apart,
@@ -37,21 +42,26 @@ def run_on_input(
     require_input(plan)
     require_added(plan)
     require_labels(plan)
+    begin(out_folder, plan, results)
     try:
         run()
     except BaseException:  # which may come of the change: that is said instead
-        _require_still(out_folder, plan, results)
+        _require_still(out_folder, plan, results, is_last=False)
         raise
-    _require_still(out_folder, plan, results)
+    _require_still(out_folder, plan, results, is_last=is_last)
 
 
-def _require_still(out_folder: OutFolder, plan: Plan, results: Sequence[Path]) -> None:
+def _require_still(
+    out_folder: OutFolder, plan: Plan, results: Sequence[Path], *, is_last: bool
+) -> None:
     try:
-        require_still(plan)
+        require_still(plan, is_last=is_last)
     except InputChangedError as error:
         for result in results if error.is_told else [out_folder.units_dir]:
             remove(result)
         raise
+    finally:
+        end(out_folder)
 
 
 def around(field: LatticeField | None, box: Box) -> LatticeField | None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.bdv_image import image_of
-from stereocell.read.bdv_xml import read_setups
+from stereocell.read.bdv_xml import read_described
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.spacing import Triple
@@ -48,6 +48,8 @@ def is_container(tree: Hdf5Tree) -> bool:
 def read_image(tree: Hdf5Tree, location: Location) -> Image:
     """Return the image of a container, whose setups are channels. Raises SourceError."""
     times, setups = _named(tree, r"t\d{5,}"), _named(tree, r"s\d{2,}")[:MAX_CHANNELS]
+    described, numbers = read_described(location.path), [int(name[1:]) for name in setups]
+    described.require_views(tree.where, numbers, [int(name[1:]) for name in times])
     first = tree.find(f"/{times[0]}/{setups[0]}")
     names = set(first) if isinstance(first, h5py.Group) else set()
     count = next((n for n in range(_MAX_LEVELS) if str(n) not in names), _MAX_LEVELS)
@@ -55,13 +57,18 @@ def read_image(tree: Hdf5Tree, location: Location) -> Image:
         raise SourceError(
             f"{tree.where}: /{times[0]}/{setups[0]}: found no level, expected 0/cells"
         )
+    stated = _stated_levels(tree, f"/{setups[0]}/resolutions")
+    if stated > count:
+        raise SourceError(
+            f"{tree.where}: /{times[0]}/{setups[0]}: found {count} levels, expected {stated} as in "
+            f"/{setups[0]}/resolutions: a part is missing: copy it again"
+        )
     levels = [
         [[_cells(tree, f"/{t}/{s}/{level}/cells") for s in setups] for t in times]
         for level in range(count)
     ]
     factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]
-    described = read_setups(location.path)
-    image = image_of(tree.where, levels, factors, None, described)
+    image = image_of(tree.where, levels, factors, None, described.among(numbers))
     return replace(image, close=tree.close, files=tree.files)
 
 
@@ -74,6 +81,11 @@ def _cells(tree: Hdf5Tree, path: str) -> _Cells:
     if not isinstance(node, h5py.Dataset):
         raise SourceError(f"{tree.where}: {path}: expected a dataset z, y, x")
     return _Cells(Hdf5Array(node, f"{tree.where}: {path}"))
+
+
+def _stated_levels(tree: Hdf5Tree, path: str) -> int:
+    node = tree.find(path)
+    return len(node) if isinstance(node, h5py.Dataset) and node.shape else 0
 
 
 def _factors(tree: Hdf5Tree, path: str, level: int) -> Triple | None:

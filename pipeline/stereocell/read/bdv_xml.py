@@ -3,16 +3,23 @@
 References: https://imagej.net/plugins/bdv/index
 """
 
+import re
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
+from stereocell.model.errors import SourceError
 from stereocell.read.spacing import Triple, um_per
 from stereocell.storage.location import is_own
 
 _MAX_FILES = 50  # most XML files of the folder that are looked into
 _MAX_BYTES = 16 << 20
+_MAX_TIMES = 100_000
+_SHOWN = 8  # numbers in a message
+_RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?(?::(\d{1,9}))?")  # first-last:step
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +30,42 @@ class Setup:
     spacing_um: Triple | None
 
 
-def read_setups(path: str) -> dict[int, Setup]:
-    """Return the setups of the XML that names a container on this machine; empty: there is none."""
+@dataclass(frozen=True, slots=True)
+class Described:
+    """The setups of an XML, by their numbers, and its time points; none where there is no XML."""
+
+    setups: Mapping[int, Setup]
+    times: tuple[int, ...] = ()
+
+    def among(self, setups: Sequence[int]) -> dict[int, Setup]:
+        """Return the setups by their place among those of a container."""
+        return {
+            place: self.setups[number]
+            for place, number in enumerate(setups)
+            if number in self.setups
+        }
+
+    def require_views(self, where: str, setups: Sequence[int], times: Sequence[int]) -> None:
+        """Raise SourceError where a container lacks setups or time points.
+
+        They are those of the XML, or without one all from the first to the last.
+        """
+        parts = (("setups", setups, tuple(self.setups)), ("time points", times, self.times))
+        for noun, found, listed in parts:
+            expected = listed or range(min(found), max(found) + 1)
+            missing = sorted(set(expected) - set(found))
+            if missing:
+                shown = ", ".join(map(str, missing[:_SHOWN])) + ", ..." * (len(missing) > _SHOWN)
+                source = "in the XML" if listed else f"up to {max(found)}"
+                raise SourceError(
+                    f"{where}: found {len(set(expected)) - len(missing)} of {len(set(expected))} "
+                    f"{noun} {source}, missing {shown}, expected all of them: copy the container "
+                    "again"
+                )
+
+
+def read_described(path: str) -> Described:
+    """Return what the XML says that names a container on this machine."""
     container = Path(path)
     for file in islice(sorted(container.parent.glob("*.xml")), _MAX_FILES):
         own = is_own(file, [container.parent.resolve()]) and file.is_file()
@@ -36,7 +77,7 @@ def read_setups(path: str) -> dict[int, Setup]:
         loader = root.find("SequenceDescription/ImageLoader")
         named = [(node.text or "").strip() for node in loader] if loader is not None else []
         if container.name in (Path(name).name for name in named if name):
-            return {
+            setups = {
                 int(node.findtext("id", "").strip()): Setup(
                     node.findtext("name", "").strip() or None,
                     _size(node.findtext("voxelSize/size", ""), node.findtext("voxelSize/unit", "")),
@@ -44,7 +85,31 @@ def read_setups(path: str) -> dict[int, Setup]:
                 for node in root.findall("SequenceDescription/ViewSetups/ViewSetup")
                 if node.findtext("id", "").strip().isdecimal()
             }
-    return {}
+            return Described(setups, _times(root, setups))
+    return Described({})
+
+
+def _times(root: ElementTree.Element, setups: Collection[int]) -> tuple[int, ...]:
+    """Return the numbers of the time points, without those of which no view was taken."""
+    node = root.find("SequenceDescription/Timepoints")
+    if node is None:
+        return ()
+    first, last = (node.findtext(name, "").strip() for name in ("first", "last"))
+    pattern = node.findtext("integerpattern", "").replace(" ", "")
+    numbers: set[int] = set()
+    if first.isdecimal() and last.isdecimal():
+        pattern = f"{first}-{last}"
+    for part in pattern.split(",") if pattern else ():
+        found = _RANGE.fullmatch(part)
+        if found is None:
+            return ()
+        low, high, step = int(found[1]), int(found[2] or found[1]), int(found[3] or 1)
+        numbers.update(islice(range(low, high + 1, max(step, 1)), _MAX_TIMES))
+    absent = Counter(
+        view.get("timepoint", "")
+        for view in root.findall("SequenceDescription/MissingViews/MissingView")
+    )
+    return tuple(sorted(n for n in numbers if absent[str(n)] < len(setups)))
 
 
 def container_of(path: str) -> str | None:

@@ -141,6 +141,7 @@ class Hdf5Array:
     """
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:
+        self.dataset = dataset
         self._windows: Any = dataset
         if require_readable(dataset, where):
             self._windows = PluginWindows(dataset)

@@ -7,6 +7,7 @@ arrays of characters.
 References: https://imaris.oxinst.com/support/imaris-file-format
 """
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -25,6 +26,7 @@ from stereocell.storage.location import Location
 _MAX_LEVELS = 64
 _MAX_TIMES = 1_000_000
 _FINEST = "/DataSet/ResolutionLevel 0/TimePoint 0"
+_CHANNEL = re.compile(r"Channel \d+")
 _NO_NAME = "(name not specified)"  # Imaris's own
 _UNIT = "um"  # where the file states none, as Imaris has it
 
@@ -74,6 +76,7 @@ def _image(tree: Hdf5Tree) -> Image:
     times = _count(tree, "/DataSet/ResolutionLevel 0", "TimePoint", _MAX_TIMES)
     channels = _count(tree, _FINEST, "Channel", MAX_CHANNELS)
     levels = _count(tree, "/DataSet", "ResolutionLevel", _MAX_LEVELS)
+    _require_stated(tree, times, channels)
     extents = _extents(tree)
     arrays, grids = [], []
     for level in range(levels):
@@ -87,6 +90,28 @@ def _image(tree: Hdf5Tree) -> Image:
     return Image(tuple(arrays), tuple(grids), names, colors, 1, tree.close, files=tree.files)
 
 
+def _require_stated(tree: Hdf5Tree, times: int, channels: int) -> None:
+    """Raise SourceError where the metadata count more time points or channels than there are.
+
+    FileTimePoints is the number in this file, of a series of files fewer than DatasetTimePoints.
+    """
+    info = tree.find("/DataSetInfo")
+    names = set(info) if isinstance(info, h5py.Group) else set()
+    stated = {"channels": sum(1 for name in names if _CHANNEL.fullmatch(name)), "time points": 0}
+    if "TimeInfo" in names:
+        counts = [
+            _number(tree, "/DataSetInfo/TimeInfo", name)
+            for name in ("FileTimePoints", "DatasetTimePoints")
+        ]
+        stated["time points"] = int(next((n for n in counts if n is not None), 0))
+    for noun, found in (("channels", channels), ("time points", times)):
+        if stated[noun] > found:
+            raise SourceError(
+                f"{tree.where}: /DataSet: found {found} {noun}, expected {stated[noun]} as in "
+                "/DataSetInfo: a part is missing: copy or export it again"
+            )
+
+
 def _count(tree: Hdf5Tree, path: str, kind: str, most: int) -> int:
     """Return the number of groups `KIND 0`, `KIND 1`, ... below a path."""
     node = tree.find(path)
@@ -94,6 +119,12 @@ def _count(tree: Hdf5Tree, path: str, kind: str, most: int) -> int:
     count = 0
     while count < len(names) and f"{kind} {count}" in names:
         count += 1
+    beyond = [int(n[len(kind) + 1 :]) for n in names if re.fullmatch(rf"{kind} \d+", n)]
+    if count and max(beyond) >= count:
+        raise SourceError(
+            f"{tree.where}: {path}: found {kind} {max(beyond)} and no {kind} {count}, expected "
+            "all of them: a part is missing: copy or export it again"
+        )
     if not 0 < count <= most:
         raise SourceError(
             f"{tree.where}: {path}: found {count} of {kind}, expected 1 to {most} as Imaris 5.5"
@@ -114,6 +145,8 @@ def _level(tree: Hdf5Tree, level: int, times: int, channels: int) -> VoxelArray:
     stated = [_number(tree, group, f"ImageSize{axis}") for axis in "ZYX"]
     if level == 0 and None in stated:
         stated = [_number(tree, "/DataSetInfo/Image", axis) for axis in "ZYX"]
+    if level == 0:
+        _require_size(tree, group, stated)
     size = [n if s is None else int(s) for s, n in zip(stated, first.shape, strict=True)]
     for axis, found, most in zip("ZYX", size, first.shape, strict=True):
         if not 0 < found <= most:
@@ -121,6 +154,20 @@ def _level(tree: Hdf5Tree, level: int, times: int, channels: int) -> VoxelArray:
                 f"{tree.where}: {group}: ImageSize{axis}: found {found}, expected 1 to {most}"
             )
     return VoxelArray(_Level((times, channels, *size), first, find), tuple("tczyx"))
+
+
+def _require_size(tree: Hdf5Tree, group: str, stated: list[float | None]) -> None:
+    """Raise SourceError where the finest level is smaller than DataSetInfo says.
+
+    stated  sizes (z, y, x) beside the dataset
+    """
+    for axis, own in zip("ZYX", stated, strict=True):
+        whole = _number(tree, "/DataSetInfo/Image", axis)
+        if own is not None and whole is not None and int(own) < int(whole):
+            raise SourceError(
+                f"{tree.where}: {group}: ImageSize{axis}: found {int(own)}, expected {int(whole)} "
+                f"as {axis} of /DataSetInfo/Image: a part is missing: copy or export it again"
+            )
 
 
 def _extents(tree: Hdf5Tree) -> Triple | None:

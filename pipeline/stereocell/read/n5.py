@@ -25,7 +25,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import settle_axes
 from stereocell.read.array_spacing import spacing_of
 from stereocell.read.bdv_image import grids_of, image_of
-from stereocell.read.bdv_xml import Setup, read_setups
+from stereocell.read.bdv_xml import Described, read_described
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.n5_blocks import unpack_block
@@ -83,8 +83,12 @@ class N5Array:
         kept = tuple(slice(None) if isinstance(part, slice) else 0 for part in key)
         return found[kept]
 
+    def path_of(self, index: Sequence[int]) -> str:
+        """Return the path of a block below the source."""
+        return "/".join([self._path, *map(str, reversed(index))]).lstrip("/")
+
     def _block(self, index: Sequence[int]) -> NDArray[Any] | None:
-        path = "/".join([self._path, *map(str, reversed(index))]).lstrip("/")
+        path = self.path_of(index)
         content = self._files.read(path)
         if content is None:
             if self._files.read(f"{self._path}/attributes.json".lstrip("/")) is None:
@@ -109,13 +113,17 @@ def read_image(location: Location, *, axes: str = "") -> Image:
         return _pyramid(files, attributes, _levels(files, ""), axes)
     if "dimensions" in files.attributes("timepoint0/s0"):
         number = re.fullmatch(r"setup(\d+)", os.path.basename(location.source))
-        described = read_setups(os.path.dirname(location.source)) if location.is_local else {}
-        setup = described.get(int(number[1])) if number else None
-        return _container(files, [""], {0: setup} if setup else {})
+        described = Described({})
+        if location.is_local and number:
+            described = read_described(os.path.dirname(location.source))
+        own = described.setups.get(int(number[1])) if number else None
+        return _container(files, [""], Described({0: own} if own else {}, described.times))
     if "dimensions" in files.attributes("setup0/timepoint0/s0"):
-        count = _count(files, "setup{}/timepoint0/s0", MAX_CHANNELS)
-        described = read_setups(location.source) if location.is_local else {}
-        return _container(files, [f"setup{index}/" for index in range(count)], described)
+        numbers = files.numbered("setup")[:MAX_CHANNELS]
+        if not numbers:
+            numbers = list(range(_count(files, "setup{}/timepoint0/s0", MAX_CHANNELS)))
+        described = read_described(location.source) if location.is_local else Described({})
+        return _container(files, [f"setup{number}/" for number in numbers], described)
     found = files.datasets(_LISTED + 1)
     if len(found) == 1:
         return _pyramid(files, attributes, [(found[0], files.attributes(found[0]))], axes)
@@ -164,25 +172,30 @@ def _pyramid(
     return Image(voxels, grids, unnamed, unnamed, 1, notes=notes, files=read)
 
 
-def _container(files: N5Files, setups: Sequence[str], described: Mapping[int, Setup]) -> Image:
+def _container(files: N5Files, setups: Sequence[str], described: Described) -> Image:
     """Return the image of BigDataViewer's container: setups are channels.
 
     setups     the folders of the setups, each with a slash at its end
-    described  the setups of the XML, by their indices
+    described  by the XML
     """
-    times = _count(files, f"{setups[0]}timepoint{{}}/s0", _MAX_TIMES)
-    levels = _levels(files, f"{setups[0]}timepoint0")
+    numbers = [int(setup[len("setup") : -1] or 0) for setup in setups]
+    times = files.numbered(f"{setups[0]}timepoint")[:_MAX_TIMES]
+    times = times or list(range(_count(files, f"{setups[0]}timepoint{{}}/s0", _MAX_TIMES)))
+    described.require_views(files.where, numbers, times)
+    levels = _levels(files, f"{setups[0]}timepoint{times[0]}")
     views = [
-        [
-            [_dataset(files, f"{setup}timepoint{t}/s{index}") for setup in setups]
-            for t in range(times)
-        ]
+        [[_dataset(files, f"{setup}timepoint{t}/s{index}") for setup in setups] for t in times]
         for index in range(len(levels))
     ]
     group = files.attributes(setups[0].rstrip("/"))
-    stated = _spacing(files.attributes(f"{setups[0]}timepoint0"), "zyx")
+    if isinstance(factors := group.get("downsamplingFactors"), list) and len(factors) > len(levels):
+        raise SourceError(
+            f"{files.where}: {setups[0]}: found {len(levels)} levels, expected {len(factors)} as "
+            "downsamplingFactors: a part is missing: copy it again"
+        )
+    stated = _spacing(files.attributes(f"{setups[0]}timepoint{times[0]}"), "zyx")
     scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
-    return image_of(files.where, views, scales, stated, described)
+    return image_of(files.where, views, scales, stated, described.among(numbers))
 
 
 def _dataset(files: N5Files, path: str) -> N5Array:

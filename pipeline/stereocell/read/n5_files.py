@@ -76,6 +76,16 @@ class N5Files:
         with one_line(file, "attributes of N5"), open(file, "rb") as opened:
             return _parsed(opened.read(_MAX_BYTES))
 
+    def numbered(self, stem: str) -> list[int]:
+        """Return the numbers of the folders `STEM0`, `STEM1`, ... of a source on this machine."""
+        if self._folder is None:
+            return []
+        parent, _, name = stem.rpartition("/")
+        with os.scandir(f"{self._location.source}/{parent}") as entries:
+            names = [entry.name for entry in entries if entry.is_dir()]
+        numbers = (found.removeprefix(name) for found in names if found.startswith(name))
+        return sorted(int(number) for number in numbers if number.isdecimal())
+
     def datasets(self, most: int) -> list[str]:
         """Return the paths of up to `most` datasets below a source on this machine, by name."""
         found: list[str] = []

@@ -18,7 +18,7 @@ from typing import Any
 import zarr
 import zstandard
 from zarr.abc.buffer import Buffer
-from zarr.abc.store import ByteRequest, Store
+from zarr.abc.store import ByteRequest, RangeByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
@@ -72,6 +72,12 @@ class GuardedStore(WrapperStore[Store]):
             if words := pointer_words(value[:HEAD_BYTES].to_bytes()):
                 raise OSError(f"chunk {key}: found {words}")
             self._require_fit(key, value)
+        if value is not None and isinstance(byte_range, RangeByteRequest):
+            asked = byte_range.end - byte_range.start
+            if len(value) < asked:  # of a shard whose index states more than the file has
+                raise OSError(
+                    f"shard {key} is cut short ({len(value)} of {asked} bytes of a chunk)"
+                )
         return value
 
     async def get_partial_values(
@@ -211,7 +217,8 @@ def open_array(
     with quiet(), one_line(where, "a Zarr array"):
         guard = GuardedStore(store, location)
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
-        codecs = tuple(codec_name(codec) for codec in array.compressors)
+        # a shard is no stream of the codecs of its inner chunks
+        codecs = () if array.shards else tuple(codec_name(codec) for codec in array.compressors)
         size = math.prod(array.shards or array.chunks) * (item_bytes or array.dtype.itemsize)
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
         # not `path`, which may end in a slash

@@ -2,7 +2,8 @@
 
 Looking is a listing: size and modification time of each file, size and ETag of each object. Small
 inputs are read as well, so that a file that was written again with the same bytes counts as
-unchanged. An address of `http` can't be listed: there single files are asked for alone.
+unchanged. An address of `http` can't be listed: there a source of one file is complete, if the
+server states an ETag or a date, and no other.
 """
 
 import hashlib
@@ -55,13 +56,29 @@ class FileStates:
     @classmethod
     def look(cls, location: Location, paths: Sequence[str]) -> "FileStates":
         """Return the present states. Raises SourceError where a store doesn't answer."""
-        is_complete = location.is_local or not location.source.startswith(_UNLISTED)
         states = dict(_listed(location, paths))
+        is_complete = location.is_local or not location.source.startswith(_UNLISTED)
+        if not is_complete and tuple(paths) == (location.source,):
+            is_complete = all(mark for _, mark in states.values()) and bool(states)
         is_small = sum(size for size, _ in states.values()) <= MAX_READ_BYTES
         digests = {}
         if location.is_local and is_small and len(states) <= MAX_READ_FILES:
             digests = {path: _digest(path) for path in states}
         return cls(location, tuple(paths), states, digests, is_complete)
+
+    def names(self) -> set[str]:
+        """Return the paths of all files, relative to the source, with `/`."""
+        source = self.location.source
+        root = source.partition("://")[2] if not self.location.is_local else source
+        root = f"{os.path.normpath(root)}/".replace(os.sep, "/").lstrip("/")
+        paths = (os.path.normpath(path).replace(os.sep, "/").lstrip("/") for path in self.states)
+        return {path.removeprefix(root) for path in paths}
+
+    def lines(self) -> list[str]:
+        """Return a line for each file: path below the source, and content, or size and date."""
+        source = self.location.path if self.location.is_local else self.location.source
+        known = {path: self.digests.get(path) or f"{state}" for path, state in self.states.items()}
+        return sorted(f"{path.removeprefix(source)} {about}\n" for path, about in known.items())
 
     def changed(self) -> list[str]:
         """Return the paths that differ now: other bytes, gone, or new. Raises SourceError."""

@@ -18,6 +18,9 @@ from stereocell.usd.read_attributes import require_still
 from stereocell.usd.read_objects import objects_of
 from stereocell.usd.write_objects import PAINT
 
+# Most corners of a face. All its triangles meet at one corner, so the time to look for crossings
+# among them grows with the square: 20 000 take some seconds, 10^6 would take hours.
+MAX_CORNERS = 20_000
 _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
 
 
@@ -47,6 +50,11 @@ def read_mesh(
     path = mesh.GetPath()
     if counts.min() < 3 or counts.sum() != len(indices):
         raise StageError(f"{path}: faceVertexCounts don't fit {len(indices)} faceVertexIndices")
+    if (most := int(counts.max())) > MAX_CORNERS:
+        raise StageError(
+            f"{path}: faceVertexCounts[{counts.argmax()}]: found a face of {most} corners, "
+            f"expected at most {MAX_CORNERS}: triangulate it in the program that edited it"
+        )
     if indices.min() < 0 or indices.max() >= len(points):
         raise StageError(f"{path}: faceVertexIndices outside its {len(points)} points")
 

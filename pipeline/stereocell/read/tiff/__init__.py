@@ -59,7 +59,9 @@ def read_image(location: Location, axes: str = "") -> Image:
                 text = _companion(location, companion)
                 root = ome_xml.parse(text, f"{where}: {companion!r:.100}")
                 tiff = open_tiff(location, stack, omexml=text)
-            return read_ome(location, tiff, stack, root=root, text=text, log=log, axes=axes)
+            image = read_ome(location, tiff, stack, root=root, text=text, log=log, axes=axes)
+            beside = [os.path.join(location.folder, companion)] if companion else []
+            return replace(image, files=(*image.files, *beside))
     except BaseException:
         stack.close()
         raise

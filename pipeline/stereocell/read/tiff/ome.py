@@ -78,7 +78,20 @@ def read_ome(
     if axes:
         arrays = with_given_axes(where, arrays, axes)
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
-    return replace(image, files=files_of(location, chain(*pages)))
+    notes = (*image.notes, *_undescribed(tiff))
+    return replace(image, notes=notes, files=files_of(location, chain(*pages)))
+
+
+def _undescribed(tiff: TiffFile) -> tuple[str, ...]:
+    """Return a note on pages of the files that no image of the OME-XML has."""
+    pages = [page for one in tiff.series for page in one.pages if page is not None]
+    described, total = len(pages), sum(len(file.pages) for file in {page.parent for page in pages})
+    if total <= described:
+        return ()
+    return (
+        f"the OME-XML describes {described} of {total} pages in the files; "
+        f"{total - described} are left out ({(total - described) / total:.0%})",
+    )
 
 
 def _check_claims(where: str, tiff: TiffFile, text: str) -> None:

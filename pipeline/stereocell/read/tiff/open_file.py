@@ -62,8 +62,10 @@ def _require_tiff(where: str, file: IO[bytes]) -> None:
         raise SourceError(f"{where}: not a TIFF file: found {describe(head)}, expected TIFF")
 
 
-def require_directories(where: str, file: IO[bytes], size: int) -> None:
-    """Raise SourceError where the chain of directories leads beyond the file's end.
+def require_directories(where: str, file: IO[bytes], size: int) -> int:
+    """Return the number of directories; 0 where they can't be counted here.
+
+    Raises SourceError where their chain leads beyond the file's end.
 
     file  at any place, which changes
     size  of the file in bytes
@@ -73,7 +75,7 @@ def require_directories(where: str, file: IO[bytes], size: int) -> None:
     order = "<" if head[:2] == b"II" else ">"
     is_big = head[2:4] in (b"+\0", b"\0+")
     if not is_big and size >= 1 << 32:
-        return  # offsets of 32 bits that wrapped around: tifffile mends them
+        return 0  # offsets of 32 bits that wrapped around: tifffile mends them
     number, offset_bytes = ("Q", 8) if is_big else ("H", 4)
     link, entry = ("Q", 20) if is_big else ("I", 12)
     (offset,) = struct.unpack_from(order + link, head, 8 if is_big else 4)
@@ -86,7 +88,7 @@ def require_directories(where: str, file: IO[bytes], size: int) -> None:
         file.seek(offset)
         (count,) = struct.unpack(order + number, file.read(width))
         if count > _MAX_TAGS:
-            return  # tifffile says so
+            return 0  # tifffile says so
         end = offset + width + entry * count
         if len(seen) == 1:
             _require_description(where, size, file.read(entry * count), order, is_big=is_big)
@@ -94,6 +96,7 @@ def require_directories(where: str, file: IO[bytes], size: int) -> None:
             refuse_short(where, size, end + offset_bytes)
         file.seek(end)
         (offset,) = struct.unpack(order + link, file.read(offset_bytes))
+    return len(seen)
 
 
 def _require_description(
@@ -131,12 +134,13 @@ def require_pages(
             f"{where}: found {len(present)} planes, expected {expected} "
             "(the file is cut short, or a file of the set is missing)"
         )
-    size = tiff.filehandle.size
     for page in present:
-        if page.parent is tiff and page.dataoffsets and page.databytecounts:
+        if page.dataoffsets and page.databytecounts:
             end = max(a + b for a, b in zip(page.dataoffsets, page.databytecounts, strict=False))
+            size = page.parent.filehandle.size
             if end > size:
-                refuse_short(where, size, end)
+                named = "" if page.parent is tiff else f": {page.parent.filename!r:.100}"
+                refuse_short(where + named, size, end)
 
 
 def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:

@@ -5,11 +5,9 @@ count as slices along z, and a note says so: time and channels are told by the f
 two unknown axes, of which a short one is taken for channels.
 """
 
-import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 
-import tifffile
 from tifffile import TiffFile, TiffPageSeries
 
 from stereocell.model.errors import SourceError
@@ -24,6 +22,7 @@ from stereocell.read.tiff.arrays import (
     samples_as_channels,
     with_given_axes,
 )
+from stereocell.read.tiff.ndtiff import index_of, with_index
 from stereocell.read.tiff.open_file import (
     MAX_PLANES,
     files_of,
@@ -33,12 +32,11 @@ from stereocell.read.tiff.open_file import (
 )
 from stereocell.read.tiff.stated import stated_by
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_own
+from stereocell.storage.location import Location
 
 _UNKNOWN = "qio"  # tifffile's axes of pages that are sequence, image, other
 _PLACES = {"r": "positions", "p": "positions", "m": "mosaic tiles", "v": "views"}
 _MAX_CHANNELS = 10  # of two unknown axes the one this short may be channels
-_INDEX, _MAX_INDEX = "NDTiff.index", 64 << 20  # of Micro-Manager's NDTiff: file, its most bytes
 _EXPECTED = "a TIFF of planes of one size"
 
 
@@ -49,7 +47,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
     """
     where = location.shown
     with one_line(where, _EXPECTED):
-        tiff, indexed = _with_index(location, tiff, stack)
+        tiff, indexed = with_index(location, tiff, stack)
         _require_imagej_whole(where, tiff)
         found = list(tiff.series)
         if _are_planes(found):
@@ -65,6 +63,8 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         page = series.keyframe
         stated = stated_by(tiff)
         files = files_of(location, (page for level in series.levels for page in level.pages))
+        if series.kind == "ndtiff":
+            files += (index_of(location),)
     notes = [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
     arrays, more = _at_first_place(arrays)
     notes += more
@@ -117,30 +117,6 @@ def _left_out(others: int) -> list[str]:
     if not others:
         return []
     return [f"{others} other image{'s' * (others > 1)} in the file left out: the largest is built"]
-
-
-def _with_index(
-    location: Location, tiff: TiffFile, stack: ExitStack
-) -> tuple[TiffFile, tuple[str, ...]]:
-    """Return the file with its NDTiff index, which names axes and other files, where it has one.
-
-    The second value is the names of channels in the index.
-    """
-    folder = os.path.dirname(os.path.realpath(location.source))
-    index = os.path.join(folder, _INDEX)
-    if not location.is_local or not tiff.is_micromanager or not os.path.exists(index):
-        return tiff, ()
-    found = require_own(index, [location.folder], named=f"{location.shown}: {_INDEX}")
-    if found is None or found.st_size > _MAX_INDEX:
-        return tiff, ()
-    rows = list(tifffile.read_ndtiff_index(index))
-    for name in dict.fromkeys(row[1] for row in rows):
-        named = f"{location.shown}: {_INDEX}: {name!r:.200}"
-        require_own(os.path.join(folder, name), [location.folder], named=named)
-    # tifffile numbers channels in the order of their first planes
-    channels = dict.fromkeys(row[0].get("channel") for row in rows)
-    names = tuple(name for name in channels if isinstance(name, str))
-    return open_tiff(location, stack, is_ndtiff=None), names
 
 
 def _require_imagej_whole(where: str, tiff: TiffFile) -> None:

@@ -1,0 +1,54 @@
+"""The pass that reads the inputs now, noted in OUT: a killed command leaves the note behind.
+
+Results of a killed pass may be of an input that changed under it. So the next command compares the
+inputs with those of the note, and removes the results of that pass where they differ.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from stereocell.building.input_files import open_states
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan import Plan
+from stereocell.building.plan_source import source_of
+from stereocell.engine.run import console
+from stereocell.storage.json_files import find_json, write_json
+from stereocell.storage.workspace import remove
+
+_SCHEMA = "units.schema.json#Running"
+
+
+def begin(out_folder: OutFolder, plan: Plan, results: Sequence[Path]) -> None:
+    """Note the inputs, and the results that a pass is about to make."""
+    names = [result.relative_to(out_folder.out).as_posix() for result in results]
+    write_json(out_folder.running_file, {"inputs": _digest(plan), "results": names})
+
+
+def end(out_folder: OutFolder) -> None:
+    """Remove the note: the pass ended, and its inputs were compared."""
+    remove(out_folder.running_file)
+
+
+def remove_mixed(out_folder: OutFolder, plan: Plan) -> None:
+    """Remove the results of a pass that was killed, where an input was written since it began."""
+    left = find_json(out_folder.running_file, _SCHEMA)
+    if left is None:
+        return
+    if left["inputs"] != _digest(plan):
+        console.print(
+            "units: an input was written to since a command was stopped that read it: what that "
+            "one made last is made again"
+        )
+        for result in (out_folder.out / name for name in left["results"]):
+            if result.is_relative_to(out_folder.units_dir) and ".." not in result.parts:
+                remove(result)
+    end(out_folder)
+
+
+def _digest(plan: Plan) -> str:
+    """Return a digest of the files of image and label maps: by content where they are small."""
+    digest = hashlib.sha256()
+    for ref in (source_of(plan), *(labels.ref for labels in plan.labels)):
+        digest.update("".join(open_states(ref).lines()).encode())
+    return digest.hexdigest()

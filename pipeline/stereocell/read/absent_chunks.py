@@ -1,0 +1,115 @@
+"""Chunks that are not stored: Zarr, N5 and HDF5 read them as a fill value, and so a lost one, too.
+
+Formats allow it, since writers leave out empty chunks. So their share is told. A level of which no
+chunk is where its metadata say holds nothing, and is refused.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence, Set
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from stereocell.model.tiling import Box
+from stereocell.read.dataset import Dataset, VoxelArray
+from stereocell.read.readers import format_of
+from stereocell.storage.file_states import FileStates
+
+_MOST_COUNTED = 2_000_000  # most chunks that are looked for
+Spans = Sequence[Sequence[range]]  # of each axis the ranges of indices that are read
+
+
+@dataclass(frozen=True, slots=True)
+class Absent:
+    """How many chunks of a part of a level are not stored.
+
+    noun  `chunk`, `shard` or `block`
+    fill  the value that is read for them
+    """
+
+    count: int
+    total: int
+    noun: str
+    fill: Any
+
+
+def count_absent(
+    dataset: Dataset, channels: Sequence[int], box: Box, level: int, states: FileStates
+) -> Absent | None:
+    """Return how many chunks of a box of some channels are absent; None: it can't be counted.
+
+    states  the source's files, as they were listed
+    """
+    array = dataset.arrays[level]
+    count = _COUNTERS.get(format_of(dataset.source))
+    if count is None or not states.is_complete:
+        return None
+    return count(array.array, _spans(array, dataset.time, channels, box), states)
+
+
+def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    from stereocell.read.zarr_store import GuardedStore  # slow to import, and loaded by its reader
+
+    if not isinstance(getattr(stored, "store", None), GuardedStore):
+        return None
+    sizes, noun = (stored.shards, "shard") if stored.shards else (stored.chunks, "chunk")
+    if _number(sizes, spans) > _MOST_COUNTED:
+        return None
+    keys = (stored.metadata.encode_chunk_key(place) for place in _places(sizes, spans))
+    paths = (f"{stored.path}/{key}".lstrip("/") for key in keys)
+    return _counted(paths, states.names(), noun, stored.fill_value)
+
+
+def _in_n5(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    if not hasattr(stored, "path_of") or _number(stored.chunks, spans) > _MOST_COUNTED:
+        return None
+    paths = (stored.path_of(place) for place in _places(stored.chunks, spans))
+    return _counted(paths, states.names(), "block", 0)
+
+
+def _in_hdf5(stored: Any, _: Spans, __: FileStates) -> Absent | None:
+    """Count in a dataset as a whole."""
+    dataset = getattr(stored, "dataset", None)
+    if dataset is None or dataset.chunks is None:
+        return None
+    pairs = zip(dataset.shape, dataset.chunks, strict=True)
+    total = math.prod(-(-size // chunk) for size, chunk in pairs)
+    return Absent(total - int(dataset.id.get_num_chunks()), total, "chunk", dataset.fillvalue)
+
+
+_COUNTERS: dict[str, Callable[[Any, Spans, FileStates], Absent | None]] = {
+    "ome-zarr": _in_zarr,
+    "n5": _in_n5,
+    "hdf5": _in_hdf5,
+}
+
+
+def _spans(array: VoxelArray, time: int, channels: Sequence[int], box: Box) -> Spans:
+    """Return, of each axis, the ranges of indices that are read."""
+    wanted = {
+        **{axis: [range(a, b)] for axis, a, b in zip("zyx", box.start, box.stop, strict=True)},
+        "t": [range(time, time + 1)],
+        "c": [range(c, c + 1) for c in channels],
+    }
+    return [wanted.get(axis, [range(1)]) for axis in array.axes]
+
+
+def _of_axis(size: int, ranges: Sequence[range]) -> list[int]:
+    """Return the chunks along one axis, of `size` voxels each, that some ranges touch."""
+    return sorted({n for one in ranges for n in range(one.start // size, -(-one.stop // size))})
+
+
+def _number(sizes: Sequence[int], spans: Spans) -> int:
+    return math.prod(len(_of_axis(n, ranges)) for n, ranges in zip(sizes, spans, strict=True))
+
+
+def _places(sizes: Sequence[int], spans: Spans) -> Iterator[tuple[int, ...]]:
+    return product(*(_of_axis(n, ranges) for n, ranges in zip(sizes, spans, strict=True)))
+
+
+def _counted(keys: Iterator[str], names: Set[str], noun: str, fill: Any) -> Absent:
+    total = count = 0
+    for key in keys:
+        total += 1
+        count += key not in names
+    return Absent(count, total, noun, fill)

@@ -1,0 +1,24 @@
+"""Small changes of a source of every format; `make torture` makes them all, and prints a table.
+
+In a process of their own: each change is read in a fork, and a process that forks has no threads.
+"""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SWEEP = Path(__file__).parents[1] / "malformed" / "sweep.py"
+COUNT = 2  # changes of each source
+
+
+@pytest.mark.slow
+def test_a_changed_source_is_refused_in_a_line_or_read_right() -> None:
+    command = [sys.executable, str(SWEEP), "--count", str(COUNT)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+    counts = dict(re.findall(r"^\| ([^|]+) \| +(\d+) ", run.stdout, re.MULTILINE))
+    assert len(counts) >= 19
+    assert int(counts["all"]) >= 33 * COUNT
