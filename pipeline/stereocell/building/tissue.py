@@ -17,6 +17,7 @@ from stereocell.building.channels import PALETTE, Channel
 from stereocell.building.input_unchanged import require_input
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import require_own_tissue
 from stereocell.building.phases import provenance
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
@@ -105,6 +106,7 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
             f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
             "same, or no --classes"
         )
+    require_own_tissue(out)
     is_brain = plan.modality == "MR" and not request.everywhere
     options = TissueOptions(classes=request.classes or "auto", brain=is_brain)
     settings = asdict(options) if network is None else network.settings()

@@ -23,6 +23,7 @@ from stereocell.export.print_solids import write_print
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import write_nifti, write_nrrd, write_raw
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import is_file
 from stereocell.usd.read_stage import dependencies
@@ -115,7 +116,7 @@ def export_stage(
     _require_takes(ending, way, options)
     if not file.parent.is_dir():
         raise OutputError(f"{file.parent}: no such folder")
-    _require_replaceable(file)
+    require_free(file, expected="nothing")  # files of most formats don't say who wrote them
     chosen = Chosen(stage_path, options, report)
     if way.is_seen:
         chosen.show_as_viewer()
@@ -123,6 +124,8 @@ def export_stage(
         line = _write_smallest(chosen, way, beside / file.name)
         # what goes with the file comes first: whoever sees the file sees it whole
         made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
+        for one in made:
+            require_free(file.parent / one.name, expected="nothing")
         for one in made:
             _put(one, file.parent / one.name)
     for layer in sorted(chosen.as_written.changed):
@@ -174,14 +177,6 @@ def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -
         place.is_relative_to(folder.resolve()) for folder in made
     ):
         raise UsageError(f"{file}: a part of the build lies there, expected another place")
-
-
-def _require_replaceable(file: Path) -> None:
-    """Raise OutputError where a folder is in the way that no export made."""
-    if not file.is_dir() or not any(file.iterdir()):
-        return
-    if not any(file.glob("*/info")) or file.suffix.lower() != ".precomputed":
-        raise OutputError(f"{file}: exists and is a folder of something else")
 
 
 def _put(made: Path, place: Path) -> None:
