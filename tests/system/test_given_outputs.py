@@ -8,6 +8,7 @@ import pytest
 from stereocell.cli import commands
 from stereocell.cli.__main__ import COMMANDS, main
 from stereocell.cli.places import PLACES
+from stereocell.serve.server import BundleServer
 from support.outputs import Outputs, make_outputs
 
 VOLUMES = {"the sample mri", "the sample brain-cells", "exported .nrrd", "exported .nii.gz"}
@@ -51,7 +52,7 @@ def test_each_output_is_taken_or_answered_by_one_line(
     monkeypatch: pytest.MonkeyPatch,
     command: str,
 ) -> None:
-    monkeypatch.setattr("stereocell.serve.server.BundleServer.run", lambda _: None)
+    monkeypatch.setattr(BundleServer, "run", lambda server: server._socket.close())
     if command == "build":  # the plan has read the input; the rest takes long
         monkeypatch.setattr(commands, "run_phases", lambda *_: commands.Answer(dict.fromkeys(
             ("stage", "bundle", "report"), "")))  # fmt: skip
