@@ -195,6 +195,26 @@ def test_damaged_published_page_is_named_by_check(builds: Path, tmp_path: Path) 
     assert f"{packed.relative_to(site)}: not the bytes that stereocell-published.json says" in fault
 
 
+@pytest.mark.parametrize("name", ["cells.stl", "cells.gltf", "cells.nrrd"])
+def test_export_replaces_its_own_file_until_somebody_edits_it(
+    out: Path, builds: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    file = tmp_path / name
+    for more in ([], ["--tiles", "r0_c0"], ["--channels", "F"]):
+        assert main(["export", str(out), str(file), *more]) == 0
+    assert [line for line in check(out) if not line.ok] == []
+    capfd.readouterr()
+    assert main(["export", str(builds / "g"), str(file)]) == 1  # it is of another specimen
+    assert "expected nothing or an earlier export of this build, as it was writ" in _line(capfd)
+    file.write_bytes(file.read_bytes() + b"\n")
+    edited = file.read_bytes()
+    assert main(["export", str(out), str(file)]) == 1
+    assert "or --force replaces it" in _line(capfd)
+    assert file.read_bytes() == edited
+    assert main(["export", str(out), str(file), "--force"]) == 0
+    assert main(["export", str(out), str(file)]) == 0
+
+
 @pytest.mark.parametrize("command", ["slices", "iso"])
 def test_pictures_are_replaced_by_those_of_the_same_source_alone(
     builds: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], command: str

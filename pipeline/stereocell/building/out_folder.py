@@ -31,6 +31,7 @@ from stereocell.storage.workspace import is_file, remove, sizes_below
 SURVEY = "units.schema.json#Survey"
 _PLAN = "plan.schema.json"
 PHASES, INDEX = "units.schema.json#Phases", "units.schema.json#Index"
+EXPORTS = "units.schema.json#Exports"
 PROVENANCE, PLAN_KEY = "units.schema.json#Provenance", "units.schema.json#PlanKey"
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
@@ -57,6 +58,7 @@ class OutFolder:
         self.index_file = out / "units" / "done.json"
         self.units_plan_file = out / "units" / "plan.key"
         self.phases_file = out / "phases.json"
+        self.exports_file = out / "exports.json"
         self.stage_dir = out / "stage"
         self.stage_file = self.stage_dir / "stage.usda"
         self.stage_list = self.stage_dir / "files.json"

@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
@@ -22,6 +23,7 @@ from stereocell.export.pictures import (
 from stereocell.export.print_solids import write_print
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import write_nifti, write_nrrd, write_raw
+from stereocell.export.written import is_own, remember
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
@@ -30,6 +32,7 @@ from stereocell.usd.read_stage import dependencies
 from stereocell.usd.write_usdz import MAX_TRIANGLES
 from stereocell.usd.written_files import CHANGED
 
+_EXPECTED = "nothing or an earlier export of this build, as it was written"
 _LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
 
 
@@ -101,7 +104,10 @@ def export(
         raise OutputError(f"{path} is missing: {remedy}")
     files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
     _require_outside(file, out_folder, files)
-    return export_stage(path, file, options=options, report=report)
+    ours = partial(is_own, out)
+    line, made = _export(path, file, options=options, report=report, is_ours=ours)
+    remember(out, made)
+    return line
 
 
 def export_stage(
@@ -111,12 +117,27 @@ def export_stage(
 
     The file is written whole or not at all, and has the same bytes each time. Raises as `export`.
     """
+    return _export(stage_path, file, options=options, report=report, is_ours=lambda _: False)[0]
+
+
+def _export(
+    stage_path: Path,
+    file: Path,
+    *,
+    options: ExportOptions,
+    report: Report,
+    is_ours: Callable[[Path], bool],
+) -> tuple[str, list[Path]]:
+    """Write `file` and what goes with it; return the lines about it, and all paths.
+
+    is_ours  whether what lies at a path may be replaced without --force
+    """
     ending = find_ending(file)
     way = FORMATS[ending]
     _require_takes(ending, way, options)
     if not file.parent.is_dir():
         raise OutputError(f"{file.parent}: no such folder")
-    require_free(file, expected="nothing")  # files of most formats don't say who wrote them
+    require_free(file, expected=_EXPECTED, is_ours=is_ours(file))  # before the work
     chosen = Chosen(stage_path, options, report)
     if way.is_seen:
         chosen.show_as_viewer()
@@ -124,13 +145,14 @@ def export_stage(
         line = _write_smallest(chosen, way, beside / file.name)
         # what goes with the file comes first: whoever sees the file sees it whole
         made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
-        for one in made:
-            require_free(file.parent / one.name, expected="nothing")
-        for one in made:
-            _put(one, file.parent / one.name)
+        places = [file.parent / one.name for one in made]
+        for place in places:
+            require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
+        for one, place in zip(made, places, strict=True):
+            _put(one, place)
     for layer in sorted(chosen.as_written.changed):
         report(f"{layer}: {CHANGED}: taken as it is")
-    return line
+    return line, places
 
 
 def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:

@@ -27,6 +27,7 @@ SCHEMAS: dict[str, str | None] = {
     r"plan\.json": "plan.schema.json",
     r"provenance\.json": "units.schema.json#Provenance",
     r"phases\.json": "units.schema.json#Phases",
+    r"exports\.json": "units.schema.json#Exports",
     r"plan\.key": "units.schema.json#PlanKey",
     r"survey\.json": "units.schema.json#Survey",
     r"done\.json": "units.schema.json#Index",
