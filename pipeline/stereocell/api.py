@@ -89,11 +89,11 @@ def build(
         if place.is_local:
             folder = Path(place.source)
             require_apart(source, folder)
-            require_build_or_nothing(folder)
+            require_build_or_nothing(folder, source)
             stack.enter_context(alone_in(folder, "build"))
         else:
             folder = stack.enter_context(opened(place.source, command="build"))
-            require_build_or_nothing(folder)
+            require_build_or_nothing(folder, source)
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
         with named_as_settings():

@@ -26,7 +26,7 @@ from stereocell.storage.json_files import find_sealed, read_json, read_sealed, s
 from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import is_forced, require_free
 from stereocell.storage.sealed_text import is_sealed_text
-from stereocell.storage.workspace import is_file, remove, sizes_below
+from stereocell.storage.workspace import is_file, names_in, remove, sizes_below
 
 SURVEY = "units.schema.json#Survey"
 _PLAN = "plan.schema.json"
@@ -37,12 +37,18 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
 
 
-def require_build_or_nothing(out: Path) -> None:
-    """Raise OutputError where OUT is no place for a build: it holds something else."""
+def require_build_or_nothing(out: Path, source: str | Path) -> None:
+    """Raise OutputError where OUT is no place for a build: it holds something else.
+
+    The source's own file may lie there, and files whose names begin with a dot: no result has such
+    a name.
+    """
     found = contents_of(out)
     if found.kind is Kind.FILE:
         raise OutputError(f"{out}: found {found.words}, expected a folder")
-    if found.kind is not Kind.BUILD:
+    beside = {Path(source).name} if Path(source).parent.resolve() == out.resolve() else set()
+    others = {name for name in names_in(out) if not name.startswith(".")} - beside
+    if others and found.kind is not Kind.BUILD:
         require_free(out, expected="nothing or a build")
 
 

@@ -10,8 +10,9 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.tissue_files import FOLDER, RECORD
 from stereocell.bundle.write import FILES, MANIFEST
 from stereocell.model.errors import OutputError
-from stereocell.storage.contents import is_nobodys, words_for
+from stereocell.storage.contents import contents_of, is_nobodys, words_for
 from stereocell.storage.file_list import read_list
+from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import is_forced, refused
 from stereocell.storage.sealed_text import is_sealed_text
 from stereocell.storage.workspace import is_file, remove, sizes_below
@@ -58,6 +59,14 @@ def require_own_bundle(out_folder: OutFolder) -> None:
     others = sorted(files - listed.keys() - {MANIFEST, FILES})
     if others:
         raise refused(folder, words_for(others), "a bundle and no other file")
+
+
+def no_layer(path: Path, *, is_given: bool) -> OutputError:
+    """Return the error of a stage that is no file: OUT's own, or the layer of --stage."""
+    found = contents_of(path)
+    words = "is missing" if found.kind is Kind.NOTHING else f"found {found.words}"
+    remedy = "expected a USD layer" if is_given else "run `stereocell stage OUT` first"
+    return OutputError(f"{path}{'' if words.startswith('is') else ':'} {words}: {remedy}")
 
 
 def require_own_report(out_folder: OutFolder) -> None:

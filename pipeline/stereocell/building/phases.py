@@ -21,7 +21,7 @@ from stereocell.building.object_tables import (
 )
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.own_parts import require_own_bundle, require_own_stage
+from stereocell.building.own_parts import no_layer, require_own_bundle, require_own_stage
 from stereocell.building.passes import run_passes
 from stereocell.building.phase import (
     digest_of_bundle,
@@ -40,7 +40,7 @@ from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
-from stereocell.model.errors import OutputError, UsageError
+from stereocell.model.errors import UsageError
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
@@ -343,8 +343,7 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
             out_folder.plan()  # no phase goes on beside a plan that was changed by hand
         path = stage if stage is not None else out_folder.stage_file
         if not is_file(path):
-            remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
-            raise OutputError(f"{path} is missing: {remedy}")
+            raise no_layer(path, is_given=stage is not None)
         viewer = viewer_dist()
         kept = objects_below(path.parent)
         files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files

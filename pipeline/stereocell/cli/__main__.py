@@ -126,13 +126,13 @@ def _run(options: argparse.Namespace) -> int:
             options.out = stack.enter_context(
                 opened(out, command=name) if is_writer else opened(out, only=READERS[name])
             )
-            require_place(name, options.out)
+            require_place(name, options.out, getattr(options, "input", ""))
         elif name in WRITERS | READERS.keys():
             if hasattr(options, "input"):
                 from stereocell.storage.location import require_apart
 
                 require_apart(options.input, options.out)
-            require_place(name, options.out)
+            require_place(name, options.out, getattr(options, "input", ""))
         if isinstance(out, Path) and name in WRITERS:
             from stereocell.storage.lock import alone_in
 

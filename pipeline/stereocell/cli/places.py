@@ -52,7 +52,7 @@ FORCE = (
 )
 
 
-def require_place(command: str, out: Path) -> None:
+def require_place(command: str, out: Path, source: str = "") -> None:
     """Raise OutputError where OUT is no folder that a command can read or write.
 
     Imports are lazy, so that --help is quick.
@@ -65,4 +65,4 @@ def require_place(command: str, out: Path) -> None:
     elif command in ("build", "plan"):
         from stereocell.building.out_folder import require_build_or_nothing
 
-        require_build_or_nothing(out)
+        require_build_or_nothing(out, source)

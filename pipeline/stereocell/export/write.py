@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import no_layer
 from stereocell.export.chosen import Chosen, Report
 from stereocell.export.gltf_scene import write_gltf
 from stereocell.export.neuroglancer import write_precomputed
@@ -100,8 +101,7 @@ def export(
     out_folder.require_finished("stage")
     path = stage if stage is not None else out_folder.stage_file
     if not is_file(path):
-        remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
-        raise OutputError(f"{path} is missing: {remedy}")
+        raise no_layer(path, is_given=stage is not None)
     files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
     _require_outside(file, out_folder, files)
     ours = partial(is_own, out)
