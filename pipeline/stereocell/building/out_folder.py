@@ -33,6 +33,8 @@ _PLAN = "plan.schema.json"
 PHASES, INDEX = "units.schema.json#Phases", "units.schema.json#Index"
 EXPORTS = "units.schema.json#Exports"
 PROVENANCE, PLAN_KEY = "units.schema.json#Provenance", "units.schema.json#PlanKey"
+_NAMES = {"plan", "units", "stage", "bundle", "report"}  # of the phases
+_UNFINISHED = {"key": "", "results": "", "seconds": 0.0, "about": ""}
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
 
@@ -241,7 +243,8 @@ class OutFolder:
 
     def phases(self) -> dict[str, dict[str, Any]]:
         """Return the record of each phase; without a valid file no phase counts as done."""
-        return find_sealed(self.phases_file, PHASES) or {}
+        found = find_sealed(self.phases_file, PHASES)
+        return dict.fromkeys(self._begun(), _UNFINISHED) if found is None else found
 
     def phases_fault(self) -> str | None:
         """Return a line on a record of the phases that can't be trusted; None: it can, or there is
@@ -257,11 +260,15 @@ class OutFolder:
 
     def has_begun(self, name: str) -> bool:
         """Return whether a phase has ever begun here, by this version or an earlier one."""
+        return name in self._begun()
+
+    def _begun(self) -> set[str]:
+        """Return the phases that a record names, even one of an earlier version."""
         try:
             phases = read_json(self.phases_file, None, "")
         except OutputError:
-            return False
-        return isinstance(phases, dict) and name in phases
+            return set()
+        return _NAMES & phases.keys() if isinstance(phases, dict) else set()
 
     def is_begun(self, name: str) -> bool:
         """Return whether a phase began and did not finish."""
