@@ -32,6 +32,7 @@ def build(
     settings: Mapping[str, Any] | None = None,
     workers: int = 0,
     scheduler: str = "",
+    force: bool = False,
 ) -> Built:
     """Build stage, bundle and report of a source in OUT, as the command `stereocell build` does.
 
@@ -42,6 +43,7 @@ def build(
     settings   sections and keys that override both, as in the TOML
     workers    processes; 0: this one. A script with more needs `if __name__ == "__main__":`
     scheduler  address or scheduler file of a Dask cluster, used instead of `workers`
+    force      replace whatever lies in OUT; without, only a build of the same source is
 
     Progress goes to stderr. Raises StereoCellError, whose text is one line (a line for each
     reason where tasks fail).
@@ -49,6 +51,7 @@ def build(
         built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
     """
     from stereocell.building import phases
+    from stereocell.building.out_folder import require_build_or_nothing
     from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.building.setting_names import named_as_settings
     from stereocell.engine.run import Engine
@@ -56,6 +59,7 @@ def build(
     from stereocell.storage.claim import LOCK
     from stereocell.storage.location import Location, require_apart
     from stereocell.storage.lock import alone_in
+    from stereocell.storage.overwriting import forcing
     from stereocell.storage.workspace import opened
 
     if not isinstance(workers, int) or workers < 0:
@@ -81,12 +85,15 @@ def build(
         wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
     place = Location.of(out)
     with ExitStack() as stack:
+        stack.enter_context(forcing(force))
         if place.is_local:
             folder = Path(place.source)
             require_apart(source, folder)
+            require_build_or_nothing(folder, source)
             stack.enter_context(alone_in(folder, "build"))
         else:
             folder = stack.enter_context(opened(place.source, command="build"))
+            require_build_or_nothing(folder, source)
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
         with named_as_settings():

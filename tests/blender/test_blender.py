@@ -31,6 +31,7 @@ from stereocell.formats.gltf_decode import read_glb
 from stereocell.formats.vdb import write_vdb
 from stereocell.model.identifiers import to_identifier
 from stereocell.samples.cells import table_beside, write_cells
+from stereocell.storage.overwriting import forcing
 from stereocell.usd.validate import validate_stage
 from support.bundles import load
 from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, NAMES, TILES, leaf, write_whole
@@ -499,7 +500,9 @@ def test_a_picture_shows_mesh_volume_and_the_new_colour(stage_path: Path, tmp_pa
 
 def test_its_own_importer_opens_an_exported_gltf(stage_path: Path, tmp_path: Path) -> None:
     for packing in (None, "draco"):
-        export_stage(stage_path, tmp_path / "f.glb", options=ExportOptions(lod=0, compress=packing))
+        with forcing(True):
+            options = ExportOptions(lod=0, compress=packing)
+            export_stage(stage_path, tmp_path / "f.glb", options=options)
         found = run("gltf", tmp_path, file=tmp_path / "f.glb")
         assert found["parents"] == {f"{name} {tile}": name for name in NAMES[:2] for tile in TILES}
         for name, color in zip(NAMES[:2], COLORS[:2], strict=True):

@@ -15,12 +15,14 @@ from stereocell.model.errors import SourceError, StereoCellError, UsageError
 from stereocell.read import Level
 from stereocell.storage.assets import find_asset
 from support.plans import CHANNELS, plan_of
+from support.sealed_files import seal
 
 
 def test_plan_survives_its_file_and_passes_its_schema() -> None:
     plan = plan_of({"grid": "5x2"}, iso_values={"CD3ε": 700.0})
     content = json.loads(json.dumps(to_json(plan)))
-    jsonschema.validate(content, json.loads(find_asset("schemas/plan.schema.json").read_text()))
+    schema = json.loads(find_asset("schemas/plan.schema.json").read_text())
+    jsonschema.validate(seal(content), schema)
     assert from_json(content) == plan
     assert len(plan.tiles) == 10
 

@@ -124,7 +124,7 @@ def copy(out: Path, to: Path, source: Path | None = None) -> Path:
     if source is not None:
         shutil.copy(out.parent / "f.ome.tif", source)
         text = text.replace(f'"{out.parent / "f.ome.tif"}"', f'"{source}"')
-    (to / "plan.json").write_text(json.dumps(seal(json.loads(text))))
+    (to / "plan.json").write_text(json.dumps(seal(json.loads(text)), indent=1) + "\n")
     out_folder = OutFolder(to)
     out_folder.save_units(out_folder.plan(), out_folder.index())
     open_source.cache_clear()

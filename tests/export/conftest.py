@@ -1,12 +1,20 @@
 """The stage that exports are made from: two tiles, a sphere across their border."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from pxr import Sdf, Usd
 
+from stereocell.storage.overwriting import forcing
 from support.bundles import write_tiles
+
+
+@pytest.fixture(autouse=True)
+def forced() -> Iterator[None]:
+    """Exports replace what lies there: tests of one file's content write it several times."""
+    with forcing(True):
+        yield
 
 
 @pytest.fixture(scope="session")

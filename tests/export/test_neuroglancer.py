@@ -24,6 +24,7 @@ from PIL import Image
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.overwriting import forcing
 from support import spheres
 
 VIEWER = Path(__file__).parents[2] / "viewer_gltf"
@@ -115,7 +116,10 @@ def test_the_same_stage_gives_the_same_folder_in_place_of_an_older_one(
     path = tmp_path / "s.precomputed"
     path.mkdir()
     (path / "mine.txt").touch()
-    with pytest.raises(OutputError, match="exists and is a folder of something else"):
+    with (
+        forcing(False),
+        pytest.raises(OutputError, match=r"something else \(mine\.txt\)"),
+    ):
         export_stage(sphere_stage, path, options=ExportOptions())
     (path / "image").mkdir()
     (path / "image" / "info").touch()

@@ -260,7 +260,10 @@ def test_another_folder_is_left_alone_and_slices_are_replaced_as_a_whole(
     full.mkdir()
     (full / "letter.txt").write_text("keep")
     assert main(["slices", str(source), "-o", str(full)]) == 1
-    assert "exists and holds no slices" in capsys.readouterr().err
+    assert (
+        "holds something else (letter.txt), expected nothing or slices of"
+        in capsys.readouterr().err
+    )
     out = str(tmp_path / "out")
     assert main(["slices", str(source), "-o", out]) == 0
     assert main(["slices", str(source), "-o", out, "--region", "2:6,:,:"]) == 0

@@ -50,7 +50,20 @@ def write(out: Path, files: dict[str, bytes]) -> None:
         (bundle / name).unlink(missing_ok=True)
     (bundle / "files.json").write_bytes(encode(list_files(bundle, root=bundle)))
     index = {"path": "files.json", **measure(bundle / "files.json")}
-    (bundle / "manifest.json").write_text(json.dumps({"a": "b" * 2000, "files": index}))
+    (bundle / "manifest.json").write_text(json.dumps(manifest_of("b" * 2000, index)))
+
+
+def manifest_of(name: str, index: dict[str, Any]) -> dict[str, Any]:
+    box = {"min": [0, 0, 0], "max": [1, 1, 1]}
+    return {
+        "format": "stereocell-bundle",
+        "version": 1,
+        "generator": "tests",
+        "specimen": {"name": name, "modality": "", "bounds_um": box},
+        "tiles": [{"id": "r0_c0", "representation": "mesh", "bounds_um": box}],
+        "channels": [],
+        "files": index,
+    }
 
 
 @pytest.fixture
@@ -288,7 +301,10 @@ def test_an_object_store_gets_types_and_a_second_run_nothing(
 ) -> None:
     files = store.files()
     files.pipe_file("bucket/mine/notes.txt", b"mine")
-    code, done, said = run(out, "s3://bucket/mine")
+    code, _, said = run(out, "s3://bucket/mine")
+    assert code == 1
+    assert "s3://bucket/mine: holds something else (notes.txt), expected nothing or a" in said
+    code, done, said = run(out, "s3://bucket/mine", "--force")
     assert code == 0, said
     # a folder of S3 has no page
     assert done["address"] == f"{store.endpoint}/bucket/mine/index.html"

@@ -77,11 +77,12 @@ def test_cycif_again_is_a_no_op_and_anything_else_stays(cycif: Path, tmp_path: P
     times = {file: file.stat().st_mtime_ns for file in cycif.parent.rglob("*")}
     write_cycif(cycif, **SMALL)
     assert {file: file.stat().st_mtime_ns for file in cycif.parent.rglob("*")} == times
-    with pytest.raises(OutputError, match=r"holds something else.*remove it"):
+    with pytest.raises(OutputError, match=r"something else.*--force replaces it"):
         write_cycif(cycif, **{**SMALL, "seed": 4})
     assert digests_of(cycif.parent) == before
     (tmp_path / "mine.ome.zarr").mkdir()
-    with pytest.raises(OutputError, match="holds something else"):
+    (tmp_path / "mine.ome.zarr" / "thesis.tex").write_text("years of work")
+    with pytest.raises(OutputError, match="expected nothing or this very sample"):
         write_cycif(tmp_path / "mine.ome.zarr", **SMALL)
 
 
@@ -143,7 +144,7 @@ def test_sample_that_lost_chunks_is_made_again_and_a_damaged_one_is_named(
     capsys.readouterr()
     assert main(command) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert "holds something else" in line
+    assert "expected nothing or this very sample" in line
 
 
 @pytest.mark.parametrize(
@@ -334,7 +335,7 @@ def test_brain_cells_is_a_small_real_stack_with_its_licence(tmp_path: Path) -> N
 def test_brain_cells_overwrites_nothing(tmp_path: Path) -> None:
     path = tmp_path / "brain.ome.tif"
     path.write_text("mine")
-    with pytest.raises(OutputError, match="holds something else"):
+    with pytest.raises(OutputError, match="expected nothing or this very sample"):
         write_brain_cells(path)
     assert path.read_text() == "mine"
     with pytest.raises(UsageError, match=r"NAME\.ome\.tif"):

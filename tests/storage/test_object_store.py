@@ -411,7 +411,8 @@ def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.M
 
     monkeypatch.setattr("stereocell.serve.server.serve", serve)
     assert main(["serve", there]) == 0
-    assert seen == [{"bundle"}]
+    # and the small records that say what OUT is
+    assert seen == [{"bundle", "plan.json", "provenance.json"}]
 
 
 @pytest.mark.slow

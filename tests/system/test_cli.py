@@ -214,8 +214,8 @@ def test_no_color_leaves_the_colours_out() -> None:
 def test_who_goes_away_in_the_middle_of_an_answer_is_no_error(
     arguments: list[str], code: int, told: str, tmp_path: Path
 ) -> None:
-    for name in ("manifest.json", "index.html"):
-        (tmp_path / name).write_text("{}")
+    (tmp_path / "manifest.json").write_text('{"format": "stereocell-bundle"}')
+    (tmp_path / "index.html").write_text("{}")
     arguments = [str(tmp_path) if word == "BUNDLE" else word for word in arguments]
     reader, writer = os.pipe()
     os.close(reader)

@@ -126,6 +126,26 @@ def test_plan_of_an_earlier_version_is_answered_by_the_remedy(
     assert (out / "plan.json").read_bytes() == (built / "plan.json").read_bytes()
 
 
+def test_whole_build_of_an_earlier_version_goes_on_after_the_remedy(
+    out: Path, built: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("plan.json", "provenance.json", "phases.json", "units/done.json"):
+        content = json.loads((out / name).read_bytes())
+        del content["sha256"]
+        (out / name).write_text(json.dumps(content))
+    for name in (SETTINGS, "report/index.html"):
+        lines = (out / name).read_text().splitlines(keepends=True)
+        (out / name).write_text("".join(lines[:-1]))
+    (out / "units" / "plan.key").write_text("0123abcd")
+    assert "is of an earlier version" in _faults(out)
+    build = ["build", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
+    assert main([*build, "--workers", "0"]) == 1
+    assert "remove it and run `stereocell plan INPUT -o OUT`" in _answer(capfd)
+    (out / "plan.json").unlink()
+    assert main([*build, "--workers", "0"]) == 0
+    assert _faults(out) == ""
+
+
 def test_phases_that_were_changed_by_hand_are_named_and_done_again(
     out: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -225,13 +225,13 @@ def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
     (folder / "IM0007.dcm").unlink()  # it lost a file: it is made again
     write_head(folder, seed=2)
     assert {file.name for file in folder.iterdir()} == {file.name for file in before}
-    with pytest.raises(OutputError, match=r"holds something else.*remove it"):
+    with pytest.raises(OutputError, match=r"something else.*--force replaces it"):
         write_head(folder, seed=5)
     mine = tmp_path / "mine.txt"
     mine.write_text("mine")
     capsys.readouterr()
     assert main(["sample", "mri", str(mine)]) == 1
-    assert "holds something else" in capsys.readouterr().err
+    assert "expected nothing or this very sample" in capsys.readouterr().err
     assert mine.read_text() == "mine"
     assert main(["sample", "mri", str(tmp_path / "x"), "--seed", "-1"]) == 2
     assert "--seed: found -1" in capsys.readouterr().err

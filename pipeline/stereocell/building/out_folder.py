@@ -17,18 +17,41 @@ from typing import Any
 from stereocell.building import plan as plan_module
 from stereocell.building.plan import Plan
 from stereocell.building.plan_file import from_json, to_json
+from stereocell.building.settings import load
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.cache_key import key_of
+from stereocell.storage.contents import contents_of
 from stereocell.storage.documents import NOT_WRITTEN, SETTINGS, parse
-from stereocell.storage.json_files import find_sealed, read_sealed, sealed, write_sealed
-from stereocell.storage.workspace import is_file, remove, sizes_below
+from stereocell.storage.json_files import find_sealed, read_json, read_sealed, sealed, write_sealed
+from stereocell.storage.kinds import Kind
+from stereocell.storage.overwriting import is_forced, require_free
+from stereocell.storage.sealed_text import is_sealed_text
+from stereocell.storage.workspace import is_file, names_in, remove, sizes_below
 
 SURVEY = "units.schema.json#Survey"
 _PLAN = "plan.schema.json"
 PHASES, INDEX = "units.schema.json#Phases", "units.schema.json#Index"
+EXPORTS = "units.schema.json#Exports"
 PROVENANCE, PLAN_KEY = "units.schema.json#Provenance", "units.schema.json#PlanKey"
+_NAMES = {"plan", "units", "stage", "bundle", "report"}  # of the phases
+_UNFINISHED = {"key": "", "results": "", "seconds": 0.0, "about": ""}
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
+
+
+def require_build_or_nothing(out: Path, source: str | Path) -> None:
+    """Raise OutputError where OUT is no place for a build: it holds something else.
+
+    The source's own file may lie there, and files whose names begin with a dot: no result has such
+    a name.
+    """
+    found = contents_of(out)
+    if found.kind is Kind.FILE:
+        raise OutputError(f"{out}: found {found.words}, expected a folder")
+    beside = {Path(source).name} if Path(source).parent.resolve() == out.resolve() else set()
+    others = {name for name in names_in(out) if not name.startswith(".")} - beside
+    if others and found.kind is not Kind.BUILD:
+        require_free(out, expected="nothing or a build")
 
 
 class OutFolder:
@@ -45,6 +68,7 @@ class OutFolder:
         self.index_file = out / "units" / "done.json"
         self.units_plan_file = out / "units" / "plan.key"
         self.phases_file = out / "phases.json"
+        self.exports_file = out / "exports.json"
         self.stage_dir = out / "stage"
         self.stage_file = self.stage_dir / "stage.usda"
         self.stage_list = self.stage_dir / "files.json"
@@ -79,17 +103,46 @@ class OutFolder:
 
         Raises OutputError where OUT holds a build of another input.
         """
-        there = self.plan() if self.plan_file.exists() else None
-        if there == plan:
+        if self.replaced_plan(plan) == plan:
             return False
-        if there is not None and there.fingerprint != plan.fingerprint:
-            raise OutputError(
-                f"{self.out} holds a build of {_what_differs(there, plan)}: "
-                "choose another OUT or remove that folder"
-            )
         self.require_readable(plan)
         write_sealed(self.plan_file, to_json(self._without_place(plan)))
         return True
+
+    def replaced_plan(self, plan: Plan) -> Plan | None:
+        """Return the plan that `plan` would replace; None: there is none.
+
+        Raises OutputError where it was changed by hand, or is of another input, without --force.
+        """
+        try:
+            there = self.plan() if is_file(self.plan_file) else None
+        except OutputError:
+            if not is_forced():
+                raise
+            return None
+        fingerprint = contents_of(self.out).fingerprint if there is None else there.fingerprint
+        if fingerprint not in ("", plan.fingerprint) and not is_forced():
+            found = f"another input (fingerprint {fingerprint[:12]})"
+            found = found if there is None else _what_differs(there, plan)
+            raise OutputError(
+                f"{self.out}: holds a build of {found}: choose another OUT, or --force replaces it"
+            )
+        return there
+
+    def require_own_settings(self, plan: Plan, there: Plan | None) -> None:
+        """Raise OutputError where stereocell.toml is no record of a plan, but a person's own."""
+        file = self.settings_file
+        if not is_file(file) or is_sealed_text(file) or is_forced():
+            return
+        try:
+            found = load(None, file, flags={})
+        except UsageError:
+            found = None
+        if found is None or found not in (plan.settings, there and there.settings):
+            raise OutputError(
+                f"{file}: was written or changed by hand, expected the record of an earlier plan: "
+                "move it elsewhere and give it by --config, or --force replaces it"
+            )
 
     def require_readable(self, plan: Plan) -> None:
         """Raise OutputError where no command could read the plan once it is written."""
@@ -192,7 +245,8 @@ class OutFolder:
 
     def phases(self) -> dict[str, dict[str, Any]]:
         """Return the record of each phase; without a valid file no phase counts as done."""
-        return find_sealed(self.phases_file, PHASES) or {}
+        found = find_sealed(self.phases_file, PHASES)
+        return dict.fromkeys(self._begun(), _UNFINISHED) if found is None else found
 
     def phases_fault(self) -> str | None:
         """Return a line on a record of the phases that can't be trusted; None: it can, or there is
@@ -205,6 +259,18 @@ class OutFolder:
         except OutputError as fault:
             return str(fault)
         return None
+
+    def has_begun(self, name: str) -> bool:
+        """Return whether a phase has ever begun here, by this version or an earlier one."""
+        return name in self._begun()
+
+    def _begun(self) -> set[str]:
+        """Return the phases that a record names, even one of an earlier version."""
+        try:
+            phases = read_json(self.phases_file, None, "")
+        except OutputError:
+            return set()
+        return _NAMES & phases.keys() if isinstance(phases, dict) else set()
 
     def is_begun(self, name: str) -> bool:
         """Return whether a phase began and did not finish."""

@@ -24,16 +24,21 @@ class Phase:
         self.results: Callable[[], str] = str
         self.is_up_to_date = False
 
-    def is_done(self, key: str, results: Callable[[], str]) -> bool:
+    def is_done(
+        self, key: str, results: Callable[[], str], *, require_own: Callable[[OutFolder], None]
+    ) -> bool:
         """Return whether the phase's results are whole and made from the same inputs.
 
-        key      digest of the inputs
-        results  returns a digest of the results
+        key          digest of the inputs
+        results      returns a digest of the results
+        require_own  raises OutputError where the phase would replace what it did not write; it is
+                     called where there is work to do, before the phase is recorded as begun
         """
         self.key, self.results = key, results
         entry = self.out_folder.phases().get(self.name, {})
         self.is_up_to_date = entry.get("key") == key and entry["results"] == results()
         if not self.is_up_to_date:
+            require_own(self.out_folder)
             # an empty key: a killed phase is not done
             self.out_folder.save_phase(self.name, "", "", 0.0, "")
         return self.is_up_to_date

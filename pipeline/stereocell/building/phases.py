@@ -22,6 +22,7 @@ from stereocell.building.object_tables import (
 )
 from stereocell.building.open_source import as_asked
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import no_layer, require_own_bundle, require_own_stage
 from stereocell.building.passes import run_passes
 from stereocell.building.phase import (
     digest_of_bundle,
@@ -30,7 +31,12 @@ from stereocell.building.phase import (
     states_of,
 )
 from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
-from stereocell.building.plan_notes import told_in_vain, told_of_absent, told_of_gaps
+from stereocell.building.plan_notes import (
+    changes_of,
+    told_in_vain,
+    told_of_absent,
+    told_of_gaps,
+)
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
 from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
 from stereocell.building.survey_file import appearance_to_json, read_survey
@@ -40,7 +46,7 @@ from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
-from stereocell.model.errors import OutputError, UsageError
+from stereocell.model.errors import UsageError
 from stereocell.model.extra_packages import version_of
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
@@ -53,6 +59,7 @@ from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.location import Location, require_apart
+from stereocell.storage.overwriting import is_forced
 from stereocell.storage.sealed_text import write_sealed_text
 from stereocell.storage.workspace import is_file, objects_below, remove
 from stereocell.textures.map_packages import (
@@ -79,6 +86,10 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
         plan = settle(source, settings)
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()
+        there = out_folder.replaced_plan(plan)
+        out_folder.require_own_settings(plan, there)
+        if there is not None and (changes := changes_of(there, plan)):
+            console.print(f"plan: {changes}", markup=False, soft_wrap=True)
         phase.is_up_to_date = not out_folder.save_plan(plan)
         write_sealed_text(out_folder.settings_file, text)
         write_sealed(out_folder.provenance_file, provenance(plan))
@@ -269,7 +280,8 @@ def run_stage(out: Path, engine: Engine) -> None:
             {id_: digest_of_table(table) for id_, table in tables.items()},
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
-        if phase.is_done(key, partial(digest_of_stage, out_folder)):
+        done = partial(digest_of_stage, out_folder)
+        if phase.is_done(key, done, require_own=require_own_stage):
             return
         remove(out_folder.stage_list)  # the list of the earlier stage
         engine.run("stage", run_tile, [(id_, tile) for id_, tile in tiles if not tile.is_done()])
@@ -349,8 +361,7 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
                 require_map_packages()
         path = stage if stage is not None else out_folder.stage_file
         if not is_file(path):
-            remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
-            raise OutputError(f"{path} is missing: {remedy}")
+            raise no_layer(path, is_given=stage is not None)
         viewer = viewer_dist()
         kept = objects_below(path.parent)
         files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
@@ -361,8 +372,10 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         key = key_of([made_of, page, encoder], bundle_writer)
         if kept is not None and out_folder.is_begun("bundle"):
             bundle_writer.remove_half(out_folder.bundle_dir)
-        bundle_writer.require_bundle(out_folder.bundle_dir)  # before the phase is recorded as begun
-        if not phase.is_done(key, partial(digest_of_bundle, out_folder)):
+        if not is_forced():
+            bundle_writer.require_bundle(out_folder.bundle_dir)  # before the phase is begun
+        done = partial(digest_of_bundle, out_folder)
+        if not phase.is_done(key, done, require_own=require_own_bundle):
             out_folder.remove_other_folders(out_folder.parts_dir, {key})
             parts = out_folder.parts_dir / key
             bundle_writer.write_bundle(

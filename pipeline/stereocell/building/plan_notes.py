@@ -1,4 +1,4 @@
-"""What a plan says of its source and settings beside the plan: gaps in the data, vain settings."""
+"""Notes beside a plan: gaps in the data, ignored settings, changes since the plan before."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,7 +7,7 @@ from stereocell.building.input_files import first_states, open_watched
 from stereocell.building.open_source import SourceRef
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
-from stereocell.building.settings import Settings
+from stereocell.building.settings import Settings, to_dict
 from stereocell.isosurface.options import LADDER, RUNGS
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
@@ -15,6 +15,7 @@ from stereocell.read import Dataset
 from stereocell.read.absent_chunks import count_absent
 from stereocell.transfer.joint_histogram import sample_boxes
 
+_MAX_CHANGES = 4  # settings that are named
 _LOOKED_AT = 16_000_000  # voxels of all channels that are looked at for NaN
 
 
@@ -90,3 +91,28 @@ def told_in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[st
                 f"{channel.name}: its level is given, so the same in all tiles: --iso-scope tile "
                 "is for levels that are found"
             )
+
+
+def changes_of(there: Plan, plan: Plan) -> str:
+    """Return a line on a plan of the same input that another one replaces; empty: they are equal.
+
+    The results of a build are then replaced where the changes reach them.
+    """
+    if there == plan:
+        return ""
+    old, new = to_dict(there.settings), to_dict(plan.settings)
+    changes = [
+        f"{section}.{key}: {old[section].get(key)!r:.40}, now {new[section].get(key)!r:.40}"
+        for section in new
+        for key in {**old[section], **new[section]}
+        if old[section].get(key) != new[section].get(key)
+    ]
+    names, now = (", ".join(one.name for one in each.channels) for each in (there, plan))
+    if names != now:
+        changes.insert(0, f"channels: {names:.80}, now {now:.80}")
+    more = len(changes) - _MAX_CHANGES
+    told = "; ".join(changes[:_MAX_CHANGES]) + (f"; and {more} more" if more > 0 else "")
+    return (
+        f"OUT holds a build of this input with other settings, whose results are replaced: "
+        f"{told or 'where the input lies'}"
+    )

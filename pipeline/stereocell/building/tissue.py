@@ -19,6 +19,7 @@ from stereocell.building.input_unchanged import require_input, require_still
 from stereocell.building.model_process import ModelBounds, opened_network
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import require_own_tissue
 from stereocell.building.phases import provenance
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
@@ -123,6 +124,7 @@ def _add(
             f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
             "same, or no --classes"
         )
+    require_own_tissue(out)
     is_brain = plan.modality == "MR" and not request.everywhere
     options = TissueOptions(classes=request.classes or "auto", brain=is_brain)
     settings = asdict(options) if network is None else network.settings()

@@ -8,10 +8,12 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from io import TextIOWrapper
+from pathlib import Path
 from typing import NoReturn
 
 from stereocell.cli import commands, flags
 from stereocell.cli.commands import Handler
+from stereocell.cli.places import FORCE, PLACES, require_place
 from stereocell.engine.interrupts import Terminated, answering_sigterm
 from stereocell.model.errors import StereoCellError, UsageError
 from stereocell.storage.processes import require_address_space, shortage
@@ -108,6 +110,10 @@ def _run(options: argparse.Namespace) -> int:
     if name not in LIGHT:
         require_address_space(name)
     with ExitStack() as stack:
+        if PLACES[name].writes:
+            from stereocell.storage.overwriting import forcing
+
+            stack.enter_context(forcing(options.force))
         if isinstance(out, str):  # an address
             if name not in WRITERS | READERS.keys():
                 from stereocell.storage.location import Location
@@ -120,13 +126,16 @@ def _run(options: argparse.Namespace) -> int:
             options.out = stack.enter_context(
                 opened(out, command=name) if is_writer else opened(out, only=READERS[name])
             )
-        elif name in WRITERS:
-            from stereocell.storage.lock import alone_in
-
+            require_place(name, options.out, getattr(options, "input", ""))
+        elif name in WRITERS | READERS.keys():
             if hasattr(options, "input"):
                 from stereocell.storage.location import require_apart
 
                 require_apart(options.input, options.out)
+            require_place(name, options.out, getattr(options, "input", ""))
+        if isinstance(out, Path) and name in WRITERS:
+            from stereocell.storage.lock import alone_in
+
             stack.enter_context(alone_in(options.out, name))
         handler: Handler = options.handler
         return commands.answer(options, handler(options))
@@ -159,6 +168,8 @@ def _parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
         )
         if words is None or name in words:
             declare(command)
+            if PLACES[name].writes:
+                command.add_argument("--force", action="store_true", help=FORCE)
         command.set_defaults(handler=handler, command=name)
         told = "one JSON object" if name not in ("view", "serve") else "JSON objects, one a line,"
         command.add_argument("--json", action="store_true", help=f"answer with {told} on stdout")

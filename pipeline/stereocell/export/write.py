@@ -6,9 +6,11 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import no_layer
 from stereocell.export.chosen import Chosen, Report
 from stereocell.export.gltf_scene import write_gltf
 from stereocell.export.neuroglancer import write_precomputed
@@ -22,13 +24,16 @@ from stereocell.export.pictures import (
 from stereocell.export.print_solids import write_print
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import write_nifti, write_nrrd, write_raw
+from stereocell.export.written import is_own, remember
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import is_file
 from stereocell.usd.read_stage import dependencies
 from stereocell.usd.write_usdz import MAX_TRIANGLES
 from stereocell.usd.written_files import CHANGED
 
+_EXPECTED = "nothing or an earlier export of this build, as it was written"
 _LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
 
 
@@ -96,11 +101,13 @@ def export(
     out_folder.require_finished("stage")
     path = stage if stage is not None else out_folder.stage_file
     if not is_file(path):
-        remedy = "run `stereocell stage OUT` first" if stage is None else "expected a USD layer"
-        raise OutputError(f"{path} is missing: {remedy}")
+        raise no_layer(path, is_given=stage is not None)
     files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
     _require_outside(file, out_folder, files)
-    return export_stage(path, file, options=options, report=report)
+    ours = partial(is_own, out)
+    line, made = _export(path, file, options=options, report=report, is_ours=ours)
+    remember(out, made)
+    return line
 
 
 def export_stage(
@@ -110,12 +117,27 @@ def export_stage(
 
     The file is written whole or not at all, and has the same bytes each time. Raises as `export`.
     """
+    return _export(stage_path, file, options=options, report=report, is_ours=lambda _: False)[0]
+
+
+def _export(
+    stage_path: Path,
+    file: Path,
+    *,
+    options: ExportOptions,
+    report: Report,
+    is_ours: Callable[[Path], bool],
+) -> tuple[str, list[Path]]:
+    """Write `file` and what goes with it; return the lines about it, and all paths.
+
+    is_ours  whether what lies at a path may be replaced without --force
+    """
     ending = find_ending(file)
     way = FORMATS[ending]
     _require_takes(ending, way, options)
     if not file.parent.is_dir():
         raise OutputError(f"{file.parent}: no such folder")
-    _require_replaceable(file)
+    require_free(file, expected=_EXPECTED, is_ours=is_ours(file))  # before the work
     chosen = Chosen(stage_path, options, report)
     if way.is_seen:
         chosen.show_as_viewer()
@@ -123,11 +145,14 @@ def export_stage(
         line = _write_smallest(chosen, way, beside / file.name)
         # what goes with the file comes first: whoever sees the file sees it whole
         made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
-        for one in made:
-            _put(one, file.parent / one.name)
+        places = [file.parent / one.name for one in made]
+        for place in places:
+            require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
+        for one, place in zip(made, places, strict=True):
+            _put(one, place)
     for layer in sorted(chosen.as_written.changed):
         report(f"{layer}: {CHANGED}: taken as it is")
-    return line
+    return line, places
 
 
 def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
@@ -174,14 +199,6 @@ def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -
         place.is_relative_to(folder.resolve()) for folder in made
     ):
         raise UsageError(f"{file}: a part of the build lies there, expected another place")
-
-
-def _require_replaceable(file: Path) -> None:
-    """Raise OutputError where a folder is in the way that no export made."""
-    if not file.is_dir() or not any(file.iterdir()):
-        return
-    if not any(file.glob("*/info")) or file.suffix.lower() != ".precomputed":
-        raise OutputError(f"{file}: exists and is a folder of something else")
 
 
 def _put(made: Path, place: Path) -> None:

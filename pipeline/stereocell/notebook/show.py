@@ -152,6 +152,9 @@ def _build(
 ) -> tuple[str, str]:
     """Build a source or an array in a folder; return words about its quality, and what was said."""
     from stereocell.notebook import arrays
+    from stereocell.storage.contents import contents_of
+    from stereocell.storage.kinds import Kind
+    from stereocell.storage.overwriting import require_free
 
     chosen = ""
     wanted = {
@@ -166,6 +169,8 @@ def _build(
         # the build is called as its file is
         called = re.sub(r"[^\w .-]", "_", name)[:60].strip(" .") or "array"
         source = folder / f"{called}.ome.tif"
+        if contents_of(folder).kind is not Kind.BUILD:
+            require_free(source, expected="nothing or a build of an array")
         arrays.write_source(given, source, blocks)
     else:
         plan = wanted.setdefault("plan", {})

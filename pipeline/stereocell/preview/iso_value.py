@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+from PIL.PngImagePlugin import PngInfo
 
 from stereocell.building.channel_survey import evidence_task, statistics_task
 from stereocell.building.channels import Channel
@@ -35,11 +36,13 @@ from stereocell.isosurface.channel_level import ChannelLevels
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import LADDER
 from stereocell.isosurface.repair_rules import sum_components
-from stereocell.model.errors import NoSurfaceError, UsageError
+from stereocell.model.errors import NoSurfaceError, OutputError, UsageError
 from stereocell.model.tiling import Tile
+from stereocell.model.version import GENERATOR
 from stereocell.preview.draw_slices import Color, Slice, find_font, paint_slices
 from stereocell.preview.views import views_of
 from stereocell.storage.atomic_write import replacing
+from stereocell.storage.overwriting import require_free
 
 COLORS: tuple[Color, ...] = (
     (255, 190, 40),
@@ -50,6 +53,7 @@ COLORS: tuple[Color, ...] = (
     (255, 255, 255),
 )
 LOOKED_AT = 100_000_000  # voxels that the level is found on; a build takes all
+_SOURCE = "Source"  # text in a picture: the fingerprint of its source
 _LONGEST_PX = 900  # pixels, longest side of a slice
 _CHART_PX = 200  # pixels, height of the histogram
 _GROUND, _AXIS, _CURVE = (18, 20, 24), (90, 96, 104), (225, 228, 232)
@@ -102,6 +106,12 @@ def preview(
         raise UsageError(f"-o is {str(out)!r}, expected a file named .png")
     plan = settle(source, settings)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
+    path = out or Path(f"iso_{channel.id}_{tile.id}.png")
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, expected a file named .png")
+    require_free(
+        path, expected="nothing or a picture of the same source", is_ours=_is_own(path, plan)
+    )
     window = measure_window(statistics_task(plan, channel))
     tiles = _spread(plan, tile)
     evidence = {
@@ -120,7 +130,6 @@ def preview(
         raise NoSurfaceError(
             f"{tile.id}/{channel.name}: all voxels are nearly equal: no surface to look at"
         )
-    path = out or Path(f"iso_{channel.id}_{tile.id}.png")
     where = f"{len(tiles)} of {len(plan.tiles)}" if len(tiles) < len(plan.tiles) else "all"
     is_given = given_level(plan, channel) is not None
     basis = f"{'given, and judged' if is_given else 'found'} on {where} tiles"
@@ -140,8 +149,25 @@ def preview(
         found.levels,
     )
     with replacing(path) as temporary:
-        picture.save(temporary, "PNG")
+        picture.save(temporary, "PNG", pnginfo=_mark(plan))
     return result, path
+
+
+def _mark(plan: Plan) -> PngInfo:
+    """Return the texts in a picture by which its program and its source are known again."""
+    mark = PngInfo()
+    mark.add_text("Software", GENERATOR)
+    mark.add_text(_SOURCE, plan.fingerprint)
+    return mark
+
+
+def _is_own(path: Path, plan: Plan) -> bool:
+    """Return whether a file is an earlier picture of the same source."""
+    try:
+        with Image.open(path) as picture:
+            return picture.info.get(_SOURCE) == plan.fingerprint
+    except (OSError, ValueError, SyntaxError):  # PIL's own, of files that are no picture
+        return False
 
 
 def _spread(plan: Plan, tile: Tile) -> list[Tile]:

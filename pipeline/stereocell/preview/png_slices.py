@@ -21,7 +21,7 @@ from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
 from stereocell.building.tasks.window import measure_statistics
 from stereocell.isosurface.options import SurfaceOptions
-from stereocell.model.errors import OutputError, UsageError
+from stereocell.model.errors import UsageError
 from stereocell.model.version import GENERATOR
 from stereocell.preview.cut_planes import (
     ACQUIRED,
@@ -33,7 +33,11 @@ from stereocell.preview.cut_planes import (
 )
 from stereocell.preview.views import views_of
 from stereocell.storage.atomic_write import replacing_folder
-from stereocell.storage.json_files import write_json
+from stereocell.storage.contents import contents_of, is_nobodys, words_for
+from stereocell.storage.json_files import find_json, write_json
+from stereocell.storage.kinds import Kind
+from stereocell.storage.overwriting import require_free
+from stereocell.storage.workspace import names_in
 
 INDEX = "slices.json"
 FORMAT, VERSION = "stereocell-slices", 2
@@ -69,8 +73,7 @@ def write_slices(plan: Plan, folder: Path, *, plane: str = ACQUIRED) -> Written:
     if len(plan.channels) != 1:
         found = ", ".join(channel.name for channel in plan.channels)
         raise UsageError(f"slices are of one channel: found {found}, expected --channels with one")
-    if folder.exists() and not (folder / INDEX).is_file() and _holds(folder):
-        raise OutputError(f"{folder}: exists and holds no slices: no {INDEX} in it")
+    _require_own(folder, plan)
     cut = cut_planes(dataset, plan, channel.index, plane)
     window = measure_statistics(statistics_task(plan, channel)).window
     count = len(cut.first_um)
@@ -99,6 +102,7 @@ def _describe(
         "format": FORMAT,
         "version": VERSION,
         "generator": GENERATOR,
+        "fingerprint": plan.fingerprint,
         "modality": plan.modality,
         "plane": cut.view.name,
         "shape": [len(names), *cut.shape],
@@ -129,5 +133,17 @@ def _line(plan: Plan, cut: Cut) -> str:
     )
 
 
-def _holds(folder: Path) -> bool:
-    return not folder.is_dir() or any(folder.iterdir())
+def _require_own(folder: Path, plan: Plan) -> None:
+    """Raise OutputError unless a folder holds nothing, or slices of the same source alone."""
+    found = contents_of(folder)
+    names = {name for name in names_in(folder) if not is_nobodys(name)}
+    is_ours = found.kind is Kind.SLICES and found.fingerprint == plan.fingerprint
+    if is_ours and (others := sorted(names - {INDEX, *_listed(folder)})):
+        require_free(folder, expected="slices and no other file", found=words_for(others))
+    require_free(folder, expected="nothing or slices of the same source", is_ours=is_ours)
+
+
+def _listed(folder: Path) -> set[str]:
+    """Return the names of the slices that the index in a folder lists."""
+    content = find_json(folder / INDEX, "slices.schema.json")
+    return {one["file"] for one in content["slices"]} if content else set()

@@ -18,14 +18,17 @@ from typing import Any
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.publish.over_http import INDEX, fetch_faults, find_page
 from stereocell.publish.targets import Target, digest, target_of
+from stereocell.storage.contents import PUBLISHED, Contents, contents_of, words_for
 from stereocell.storage.file_list import DAMAGED, find_faults, read_list, to_json
 from stereocell.storage.json_files import read_json
+from stereocell.storage.kinds import Kind
+from stereocell.storage.overwriting import HINT, is_forced, refused
 from stereocell.storage.workspace import cached
 
-PUBLISHED = "stereocell-published.json"
 FILES, MANIFEST = "files.json", "manifest.json"
 _LAST = ("sw.js", FILES, MANIFEST, INDEX)
 _REMEDY = "run `stereocell bundle OUT` first"
+_OF_HOSTS = ("CNAME", "README.md", "LICENSE", "robots.txt", "404.html")
 _SMALL_BYTES = 1000  # JSON below is as short as it is
 
 
@@ -64,14 +67,16 @@ def publish(
     """
     if url is not None and not url.startswith(("https://", "http://")):
         raise UsageError(f"--url is {url}, expected an address as https://me.example/mine")
-    bundle = out / "bundle"
+    held = contents_of(out)
+    bundle = out if held.kind in (Kind.BUNDLE, Kind.SITE) else out / "bundle"
     files = _files_of(bundle)
+    specimen = _specimen_of(bundle, held)
     target = target_of(text, is_public=is_public)
     if isinstance(folder := getattr(target, "folder", None), Path):
         _require_apart(folder, out)
     there = target.sizes()
     before = _read_published(target, there)
-    _refuse_others(target, files, there, before)
+    _require_own(target, files, there, before, specimen)
     changed = [
         path
         for path, file in files.items()
@@ -82,12 +87,12 @@ def publish(
     if changed or gone or before != entries:
         # what is about to be there is ours, too, should this run be killed
         unsure = dict.fromkeys((*gone, *changed))
-        target.write(PUBLISHED, _list({**before, **entries, **unsure}))
+        target.write(PUBLISHED, _list({**before, **entries, **unsure}, specimen))
         _upload(target, files, changed, report)
         for path in gone:
             if path in there:
                 target.remove(path)
-        target.write(PUBLISHED, _list(entries))
+        target.write(PUBLISHED, _list(entries, specimen))
     address = (url and url.rstrip("/") + "/") or target.address
     faults = (
         fetch_faults(address, entries, report)
@@ -97,7 +102,7 @@ def publish(
     if faults:
         # what the target itself has otherwise is put there anew by the next run
         spoilt = [p for p in faults if digest(target.read(p)) != entries[p]["sha256"]]
-        target.write(PUBLISHED, _list({**entries, **dict.fromkeys(spoilt)}))
+        target.write(PUBLISHED, _list({**entries, **dict.fromkeys(spoilt)}, specimen))
         path, fault = next(iter(sorted(faults.items())))
         raise OutputError(
             f"{address or target.shown + '/'}{path}: {fault}, expected the bundle's file of "
@@ -145,10 +150,19 @@ def _require_apart(folder: Path, out: Path) -> None:
         raise OutputError(f"TARGET is {folder}, inside OUT, expected a folder elsewhere")
 
 
-def _list(entries: Mapping[str, Any]) -> bytes:
+def _specimen_of(bundle: Path, held: Contents) -> dict[str, str]:
+    """Return the name of a bundle's specimen, and the fingerprint of its source if it is known."""
+    fingerprint = held.fingerprint
+    if held.build is not None:
+        fingerprint = contents_of(held.build).fingerprint
+    return {"name": contents_of(bundle).name, "fingerprint": fingerprint}
+
+
+def _list(entries: Mapping[str, Any], specimen: Mapping[str, str]) -> bytes:
     content = {
         "format": "stereocell-published",
         "version": 1,
+        "specimen": specimen,
         "files": dict(sorted(entries.items())),
     }
     return to_json(content)
@@ -181,22 +195,63 @@ def _is_inside(path: str) -> bool:
     )
 
 
-def _refuse_others(
+def _require_own(
     target: Target,
     files: Mapping[str, _File],
     there: Mapping[str, int],
     before: Mapping[str, Any],
+    specimen: Mapping[str, str],
 ) -> None:
-    """Raise OutputError where somebody else's file is in the place of one of the bundle."""
+    """Raise OutputError where the target holds another page, or files that no run has put there.
+
+    Files of a host, as CNAME, may lie in a target that nothing was published to before.
+    """
+    if is_forced():
+        return
     for path, file in files.items():
-        if path in before or path not in there:
-            continue
-        is_same = there[path] == file.entry["bytes"]
-        if not (is_same and digest(target.read(path)) == file.entry["sha256"]):
+        if path in there and path not in before and not _is_same(target, path, file, there):
             raise OutputError(
                 f"{target.shown}/{path}: is there, and was not put there by this command, "
-                "expected a place of the bundle's own"
+                f"expected a place of the bundle's own: {HINT}"
             )
+    others = [path for path in there if path not in files and not _is_of_host(path)]
+    if not before and others:
+        raise refused(target.shown, words_for(others), "nothing or a published page")
+    earlier = _published_specimen(target, there)
+    is_other = earlier.get("name") != specimen["name"] or (
+        earlier.get("fingerprint", "") not in ("", specimen["fingerprint"])
+        and specimen["fingerprint"] != ""
+    )
+    if before and earlier and is_other:
+        found, expected = (
+            f"{one.get('name')!r:.80}"
+            + (f" ({one['fingerprint'][:12]})" if one.get("fingerprint") else "")
+            for one in (earlier, specimen)
+        )
+        raise refused(target.shown, f"a published page of {found}", f"one of {expected}")
+
+
+def _is_same(target: Target, path: str, file: _File, there: Mapping[str, int]) -> bool:
+    has_size = there[path] == file.entry["bytes"]
+    return has_size and digest(target.read(path)) == file.entry["sha256"]
+
+
+def _is_of_host(path: str) -> bool:
+    """Return whether a file in a target is one by which hosts are told how to serve it."""
+    return path in _OF_HOSTS or path.startswith(".")
+
+
+def _published_specimen(target: Target, there: Mapping[str, int]) -> dict[str, str]:
+    """Return the specimen of the page at a target: by its list, of an earlier version by name."""
+    for path in (PUBLISHED, MANIFEST):
+        if path not in there:
+            continue
+        try:
+            found = json.loads(target.read(path))["specimen"]
+            return {key: str(found[key]) for key in ("name", "fingerprint") if key in found}
+        except (ValueError, TypeError, KeyError, RecursionError):
+            continue
+    return {}
 
 
 def _upload(

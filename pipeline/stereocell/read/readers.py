@@ -14,12 +14,17 @@ import fsspec
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.file_kind import require_kind
 from stereocell.read.image import Image, printable
-from stereocell.storage.first_bytes import describe
+from stereocell.storage.contents import contents_of
+from stereocell.storage.kinds import Kind
 from stereocell.storage.library_errors import library_boundary, one_line
-from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
+from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
 
-_SURFACES = (".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp")  # GIFTI and the like
+_SURFACES = (
+    *(".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp", ".glb", ".gltf", ".3mf"),
+    *(".usda", ".usdc", ".usdz"),
+)
 _PICTURES = (".png", ".jpg", ".jpeg")  # which are planes of a folder
+_FOLDERS = ("planes", "dicom")  # formats of folders that hold files by any name
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 
 
@@ -118,6 +123,8 @@ def find_reader(source: str | Path) -> tuple[Location, Reader]:
     if location.is_local and not Path(location.path).is_dir():
         require_own(location.path, [location.folder], named=location.shown)
     named = location.format
+    if named in _FOLDERS:
+        _require_no_result(location)
     if named is None and not import_module(OTHER.module).can_read(location):
         raise _unknown(location)
     reader = READERS.get(named or "", OTHER)
@@ -135,6 +142,16 @@ def find_reader(source: str | Path) -> tuple[Location, Reader]:
                 f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
             )
     return location, reader
+
+
+def _require_no_result(location: Location) -> None:
+    """Raise SourceError where a folder is a result of ours: its pictures would pass for planes."""
+    found = contents_of(Path(location.path))
+    if found.kind in (Kind.BUILD, Kind.STAGE, Kind.BUNDLE, Kind.SITE, Kind.PART):
+        raise SourceError(
+            f"{location.shown}: found {found.words}, expected a volume, such as the one that it "
+            "was built from; `stereocell export` writes volumes of a build"
+        )
 
 
 def list_series(source: str | Path) -> tuple[str, ...]:
@@ -162,7 +179,7 @@ def _unknown(location: Location) -> SourceError:
             f"{location.shown}: found the voxels of {printable(header):.200}, expected that file"
         )
     elif location.is_local:
-        content = describe(first_bytes(location.source))
+        content = contents_of(Path(location.source)).words
         if last.endswith(_PICTURES) and content.endswith(" image"):
             return SourceError(
                 f"{location.shown}: one plane (2D): found {content}, expected a volume: name the "

@@ -4,6 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import require_own_report
 from stereocell.building.phase import digest_of_file, phase_of
 from stereocell.building.phases import provenance
 from stereocell.report import page
@@ -22,5 +23,6 @@ def run_report(out: Path) -> None:
         others = {name: entry for name, entry in out_folder.phases().items() if name != "report"}
         content = [out_folder.index(), out_folder.survey(), provenance(plan), others]
         key = key_of([content, page.TEMPLATE.read_text("utf-8")], page)
-        if not phase.is_done(key, partial(digest_of_file, out_folder.report_file)):
+        done = partial(digest_of_file, out_folder.report_file)
+        if not phase.is_done(key, done, require_own=require_own_report):
             page.write_report(out)

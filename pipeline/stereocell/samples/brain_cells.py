@@ -4,7 +4,8 @@ from contextlib import ExitStack
 from importlib.resources import files
 from pathlib import Path
 
-from stereocell.model.errors import OutputError, UsageError
+from stereocell.model.errors import UsageError
+from stereocell.samples.place import is_there
 from stereocell.storage.atomic_write import replacing
 
 SUFFIX = ".ome.tif"
@@ -23,16 +24,5 @@ def write_brain_cells(path: Path) -> None:
     with ExitStack() as stack:
         for name, target in (("LICENSE", licence), ("brain_cells.ome.tif", path)):
             content = (_FOLDER / name).read_bytes()
-            if not _is_there(target, content):
+            if not is_there(target, content):
                 stack.enter_context(replacing(target)).write_bytes(content)
-
-
-def _is_there(target: Path, content: bytes) -> bool:
-    if not target.exists():
-        return False
-    if target.is_file() and target.read_bytes() == content:
-        return True
-    raise OutputError(
-        f"{target}: holds something else, expected nothing or this very sample: "
-        "remove it or choose another name"
-    )

@@ -18,10 +18,12 @@ import zarr
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
+from zarr.abc.buffer import Buffer
 from zarr.codecs import ZstdCodec
-from zarr.storage import LocalStore
+from zarr.storage import MemoryStore
 
 from stereocell.model.errors import UsageError
+from stereocell.samples.place import is_there
 from stereocell.storage.atomic_write import replacing_folder, write_bytes
 
 SUFFIX = ".ome.zarr"
@@ -76,14 +78,21 @@ def write_cells(path: Path, *, seed: int = 1, shape: tuple[int, int, int] = SHAP
 
     shape  voxels (z, y, x); the number of cells goes by the volume
 
-    Raises UsageError for another ending, OutputError where it can't be written.
+    An existing equal sample stays. Raises UsageError for another ending, OutputError where other
+    content lies at the path or at the table's, or it can't be written.
     """
     if not path.name.endswith(SUFFIX):
         raise UsageError(f"{path}: expected a name that ends in {SUFFIX}")
     tissue = make_tissue(shape, seed)
-    with replacing_folder(path) as folder:
-        _write_zarr(folder, tissue, seed)
-    write_bytes(table_beside(path), _table(tissue).encode())
+    files, table = _zarr_files(tissue, seed), _table(tissue).encode()
+    has_volume, has_table = is_there(path, files), is_there(table_beside(path), table)
+    if not has_volume:
+        with replacing_folder(path) as folder:
+            for name, content in files.items():
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                (folder / name).write_bytes(content)
+    if not has_table:
+        write_bytes(table_beside(path), table)
 
 
 def table_beside(path: Path) -> Path:
@@ -122,11 +131,18 @@ def _types(centres: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np
     return np.searchsorted(np.cumsum(_SHARES)[:-1], rank, side="right")
 
 
-def _write_zarr(folder: Path, tissue: CellTissue, seed: int) -> None:
+def _zarr_files(tissue: CellTissue, seed: int) -> dict[str, bytes]:
+    """Return the files of the OME-Zarr by their relative paths."""
+    held: dict[str, Buffer] = {}
+    _write_zarr(MemoryStore(held), tissue, seed)
+    return {name: content.to_bytes() for name, content in sorted(held.items())}
+
+
+def _write_zarr(store: MemoryStore, tissue: CellTissue, seed: int) -> None:
     names = (NUCLEI, *MARKERS)
     shape = tissue.labels.shape
     scale: list[Any] = [{"type": "scale", "scale": [1.0, *SPACING_UM]}]
-    group = zarr.open_group(LocalStore(folder), mode="w", zarr_format=3)
+    group = zarr.open_group(store, mode="w", zarr_format=3)
     axes = [{"name": "c", "type": "channel"}, *_axes()]
     about: dict[str, Any] = {
         "version": "0.5",

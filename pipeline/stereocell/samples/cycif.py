@@ -17,7 +17,9 @@ from stereocell.model.tiling import Box
 from stereocell.samples import microscope
 from stereocell.samples.cycif_geometry import Tissue, grow_tissue
 from stereocell.samples.microscope import BLUR_UM, SPACING_UM, STAINS
+from stereocell.samples.place import EXPECTED
 from stereocell.storage.atomic_write import replacing, replacing_folder
+from stereocell.storage.overwriting import require_free
 
 SUFFIX = ".ome.zarr"
 _CHUNK = (1, 32, 128, 128)  # (c, z, y, x): 1 MB
@@ -60,6 +62,8 @@ def write_cycif(
             return
         tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed, brightness_spread)
         truth = json.dumps(_truth(tissue, shape, settings), indent=1) + "\n"
+        is_same = truth_path.is_file() and truth_path.read_bytes() == truth.encode()
+        require_free(truth_path, expected=EXPECTED, is_ours=is_same)
         with replacing(truth_path) as file:
             file.write_text(truth, encoding="utf-8", newline="\n")
             if not is_there:
@@ -98,10 +102,8 @@ def _is_there(path: Path, attributes: dict[str, Any]) -> bool:
     except (OSError, ValueError, LookupError, TypeError):  # no group, or a damaged one
         found = {}
     if found != attributes:
-        raise OutputError(
-            f"{path}: holds something else, expected nothing or this very sample: "
-            "remove it or choose another name"
-        )
+        require_free(path, expected=EXPECTED)
+        return False  # --force
     levels = [array for _, array in group.arrays()]
     return bool(levels) and all(level.nchunks == level.nchunks_initialized for level in levels)
 

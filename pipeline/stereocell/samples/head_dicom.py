@@ -19,8 +19,9 @@ from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.filewriter import dcmwrite
 from pydicom.uid import UID, ExplicitVRLittleEndian, MRImageStorage
 
-from stereocell.model.errors import OutputError, UsageError
+from stereocell.model.errors import UsageError
 from stereocell.samples.head import HeadPhantom, make_head
+from stereocell.samples.place import is_there
 from stereocell.storage.atomic_write import replacing_folder
 
 _UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # namespace of this sample's UIDs
@@ -62,15 +63,8 @@ def write_dicom(path: Path, head: HeadPhantom, *, seed: int = 0) -> None:
     Raises OutputError where other content lies there or it can't be written.
     """
     files = _files(head, seed)
-    if path.exists():
-        found = {f.name: f.read_bytes() for f in path.iterdir()} if path.is_dir() else {"": b""}
-        if found == files:
-            return
-        if any(files.get(name) != content for name, content in found.items()):
-            raise OutputError(
-                f"{path}: holds something else, expected nothing or this very sample: "
-                "remove it or choose another name"
-            )
+    if is_there(path, files):
+        return
     with replacing_folder(path) as folder:
         for name, content in files.items():
             (folder / name).write_bytes(content)

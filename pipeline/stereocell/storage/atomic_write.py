@@ -18,7 +18,7 @@ from pathlib import Path
 from stereocell.model.errors import OutputError
 from stereocell.storage.claim import require_asked
 from stereocell.storage.documents import require_readable
-from stereocell.storage.temporary_names import clear_beside
+from stereocell.storage.temporary_names import clear_beside, remove_remains
 from stereocell.storage.workspace import making, upload
 
 
@@ -93,4 +93,4 @@ def _swap(new: Path, path: Path, old: Path) -> None:
         if old.exists():
             os.replace(old, path)
         raise
-    shutil.rmtree(old, ignore_errors=True)
+    remove_remains(old)

@@ -13,13 +13,13 @@ import tomllib
 from functools import cache
 from math import isfinite
 from pathlib import Path
-from typing import Any
-
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import best_match
+from typing import TYPE_CHECKING, Any
 
 from stereocell.model.errors import OutputError
 from stereocell.storage.assets import schema_path
+
+if TYPE_CHECKING:
+    from jsonschema import Draft202012Validator
 
 # name of a document -> its schema, a file of schemas/ with `#Name` for one of its definitions;
 # None: its reader checks it by rules of its own, and here it must be JSON
@@ -27,6 +27,7 @@ SCHEMAS: dict[str, str | None] = {
     r"plan\.json": "plan.schema.json",
     r"provenance\.json": "units.schema.json#Provenance",
     r"phases\.json": "units.schema.json#Phases",
+    r"exports\.json": "units.schema.json#Exports",
     r"plan\.key": "units.schema.json#PlanKey",
     r"survey\.json": "units.schema.json#Survey",
     r"done\.json": "units.schema.json#Index",
@@ -95,6 +96,8 @@ def parse(path: Path, data: bytes, schema: str | None, remedy: str) -> Any:
     document = (schema, hashlib.sha256(data).digest())
     if document in _fitting:
         return content
+    from jsonschema.exceptions import best_match  # slow to import
+
     fault = best_match(_validator(schema).iter_errors(content))
     if fault is not None:
         reason = fault.message if len(fault.message) < 200 else f"{fault.message[:200]}..."
@@ -117,7 +120,9 @@ def _finite(text: str) -> float:
 
 
 @cache
-def _validator(schema: str) -> Draft202012Validator:
+def _validator(schema: str) -> "Draft202012Validator":
+    from jsonschema import Draft202012Validator
+
     name, _, definition = schema.partition("#")
     content = json.loads(schema_path(name).read_bytes())
     if definition:

@@ -13,7 +13,7 @@ def clear_remains(out: Path) -> None:
     """Remove all temporary files that a killed command left in its OUT."""
     for path in out.rglob(".*"):
         if _TEMPORARY.fullmatch(path.name):
-            _remove(path)
+            remove_remains(path)
 
 
 def clear_beside(path: Path) -> None:
@@ -22,10 +22,11 @@ def clear_beside(path: Path) -> None:
         for name in os.listdir(path.parent):
             found = _TEMPORARY.fullmatch(name)
             if found and path.name in (found["name"], f"{found['name']}{found['suffix']}"):
-                _remove(path.parent / name)
+                remove_remains(path.parent / name)
 
 
-def _remove(path: Path) -> None:
+def remove_remains(path: Path) -> None:
+    """Remove a file or a folder of a temporary name, if it exists."""
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)  # a worker that was cut off may still write there
     else:

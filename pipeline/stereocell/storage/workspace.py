@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-from stereocell.model.errors import StereoCellError, UsageError
+from stereocell.model.errors import OutputError, StereoCellError, UsageError
 from stereocell.storage.object_store import STEERING, Mirror, Place
 from stereocell.storage.processes import is_alive, machine
 
@@ -122,6 +122,23 @@ def sizes_below(path: Path) -> dict[Path, int]:
         return {mirror.place.root / key: n for key, n in sorted(mirror.keys_of(path).items())}
     files = sorted(path.rglob("*")) if path.is_dir() else [path]
     return {file: file.stat().st_size for file in files if file.is_file()}
+
+
+def names_in(folder: Path) -> list[str]:
+    """Return the names of the files and folders in a folder, local or stored; none if it isn't one.
+
+    Raises OutputError where it can't be listed.
+    """
+    mirror = _of(folder)
+    if mirror is not None:
+        below = {file.relative_to(folder).parts for file in sizes_below(folder) if file != folder}
+        return sorted({parts[0] for parts in below})
+    try:
+        return sorted(os.listdir(folder))
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    except OSError as error:
+        raise OutputError(f"{folder}: can't be listed ({error.strerror})") from None
 
 
 def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:

@@ -6,15 +6,17 @@ bundle are checked against lists of their own: see formats.py.
 
 from collections.abc import Callable
 
-from stereocell.building.out_folder import INDEX, PHASES, PLAN_KEY, PROVENANCE, OutFolder
+from stereocell.building.out_folder import EXPORTS, INDEX, PHASES, PLAN_KEY, PROVENANCE, OutFolder
 from stereocell.model.errors import CheckError, OutputError
 from stereocell.storage.json_files import read_sealed
 from stereocell.storage.sealed_text import require_sealed_text
+from stereocell.storage.workspace import is_file
 
 _PLAN_AGAIN = "run `stereocell plan INPUT -o OUT` again"
 _SETTINGS_AGAIN = f"remove it and {_PLAN_AGAIN}"
 _UNITS_AGAIN = "run `stereocell units OUT` again"
 _PHASES_AGAIN = "run `stereocell units OUT`, then stage, bundle and report, again"
+_EXPORTS_AGAIN = "remove it: the next export of each file then takes --force"
 _REPORT_AGAIN = "run `stereocell report OUT` again"
 
 
@@ -32,6 +34,8 @@ def check_records(out_folder: OutFolder) -> str:
         lambda: require_sealed_text(settings, _SETTINGS_AGAIN),
         lambda: read_sealed(out_folder.phases_file, PHASES, _PHASES_AGAIN),
     ]
+    if is_file(out_folder.exports_file):
+        checks.append(lambda: read_sealed(out_folder.exports_file, EXPORTS, _EXPORTS_AGAIN))
     _raise_on(find_faults(checks))
     return f"{provenance.name}, {settings.name} and {out_folder.phases_file.name} as written"
 

@@ -30,8 +30,10 @@ from stereocell.formats.tiles3d_walk import Content, walk
 from stereocell.formats.vdb import check_vdb
 from stereocell.model.errors import CheckError, OutputError, StereoCellError
 from stereocell.storage.assets import find_asset
+from stereocell.storage.contents import PUBLISHED, require_kind
 from stereocell.storage.file_list import DAMAGED, MISSING, measure
 from stereocell.storage.json_files import find_sealed, read_json
+from stereocell.storage.kinds import Kind
 from stereocell.storage.location import Location, require_own
 from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.transfer.shapes2d import find_fault, shapes_from
@@ -46,6 +48,7 @@ from stereocell.verify.build_records import (
     check_report,
     find_index_faults,
 )
+from stereocell.verify.site_files import find_site_faults
 
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
 _MAX_SHOWN = 3  # problems printed in one line
@@ -70,9 +73,10 @@ def check(out: Path) -> Iterator[CheckLine]:
 
     Raises OutputError, before any line, where there is neither.
     """
-    if any((out / part).exists() for part in ("plan.json", "stage", "bundle")):
+    found = require_kind(out, (Kind.BUILD, Kind.BUNDLE, Kind.SITE))
+    if found.kind is Kind.BUILD:
         checks = [*_checks_of_build(out), *_checks_of_bundle(out / "bundle", OutFolder(out))]
-    elif (out / MANIFEST).is_file():
+    elif found.kind is not Kind.NOTHING:
         checks = _checks_of_bundle(out, None)
     else:
         raise OutputError(
@@ -430,9 +434,11 @@ def _check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
             problems.append(f"{path}: missing")
         elif measure(found[path]) != entry:
             problems.append(f"{path}: not the bytes that {FILES} says")
-    problems += [
-        f"{path}: not in {FILES}" for path in found.keys() - listed.keys() - {MANIFEST, FILES}
-    ]
+    unlisted = found.keys() - listed.keys() - {MANIFEST, FILES}
+    if PUBLISHED in found:
+        problems += find_site_faults(found)
+    else:
+        problems += [f"{path}: not in {FILES}" for path in unlisted]
     references = list(_references(manifest))
     for channel in _channels(bundle):
         path = bundle / channel["volumes"]["path"]

@@ -1,0 +1,95 @@
+"""Whether a part of OUT is a build's own: what somebody else put there is not replaced unasked.
+
+A part that a phase wrote, damaged or not, is made again where it must be. Files that no phase
+wrote, and layers of the stage that were edited in place, end the phase before it writes.
+"""
+
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.tissue_files import FOLDER, RECORD
+from stereocell.bundle.write import FILES, MANIFEST
+from stereocell.model.errors import OutputError
+from stereocell.storage.contents import contents_of, is_nobodys, words_for
+from stereocell.storage.file_list import read_list
+from stereocell.storage.kinds import Kind
+from stereocell.storage.overwriting import is_forced, refused
+from stereocell.storage.sealed_text import is_sealed_text
+from stereocell.storage.workspace import is_file, remove, sizes_below
+from stereocell.usd.written_files import ADVICE, CHANGED, DOUBTFUL, find_damage, read_stage_list
+
+
+def require_own_stage(out_folder: OutFolder) -> None:
+    """Raise OutputError where the stage phase would replace files that it did not write."""
+    folder = out_folder.stage_dir
+    if is_forced() or not _files(folder):
+        return
+    try:
+        listed = read_stage_list(folder)
+    except OutputError:
+        if not out_folder.has_begun("stage"):
+            raise refused(folder, _words(folder), "nothing or a stage of this build") from None
+        return
+    faults = find_damage(folder, listed, since=out_folder.stage_list)
+    edited = sorted(path for path, fault in faults.items() if fault in (CHANGED, DOUBTFUL))
+    if edited:
+        raise OutputError(
+            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage is to be written anew: save "
+            f"what you edited elsewhere ({ADVICE}), or --force replaces it"
+        )
+
+
+def require_own_bundle(out_folder: OutFolder) -> None:
+    """Raise OutputError where OUT/bundle holds files that no bundle phase wrote.
+
+    With --force a folder that is no bundle is removed.
+    """
+    folder = out_folder.bundle_dir
+    files = _files(folder)
+    if is_forced():
+        if files and not is_file(folder / MANIFEST):
+            remove(folder)
+        return
+    if not is_file(folder / MANIFEST):
+        return  # the bundle's writer refuses it
+    try:
+        listed = read_list(folder / FILES, "")
+    except OutputError:
+        return
+    others = sorted(files - listed.keys() - {MANIFEST, FILES})
+    if others:
+        raise refused(folder, words_for(others), "a bundle and no other file")
+
+
+def no_layer(path: Path, *, is_given: bool) -> OutputError:
+    """Return the error of a stage that is no file: OUT's own, or the layer of --stage."""
+    found = contents_of(path)
+    words = "is missing" if found.kind is Kind.NOTHING else f"found {found.words}"
+    remedy = "expected a USD layer" if is_given else "run `stereocell stage OUT` first"
+    return OutputError(f"{path}{'' if words.startswith('is') else ':'} {words}: {remedy}")
+
+
+def require_own_report(out_folder: OutFolder) -> None:
+    """Raise OutputError where the report's place holds a page that no report phase wrote."""
+    file = out_folder.report_file
+    if is_file(file) and not (
+        is_sealed_text(file) or out_folder.has_begun("report") or is_forced()
+    ):
+        raise refused(file, "a page of somebody else", "nothing or a report of this build")
+
+
+def require_own_tissue(out: Path) -> None:
+    """Raise OutputError where OUT/tissue holds files, and no record of `stereocell tissue`."""
+    folder = out / FOLDER
+    if _files(folder) and not is_file(folder / RECORD) and not is_forced():
+        raise refused(folder, _words(folder), "nothing or tissue classes of this build")
+
+
+def _files(folder: Path) -> set[str]:
+    """Return the files below a folder, except those that are nobody's, by their relative paths."""
+    found = (file.relative_to(folder) for file in sizes_below(folder) if file != folder)
+    return {file.as_posix() for file in found if not is_nobodys(file.name)}
+
+
+def _words(folder: Path) -> str:
+    return words_for(sorted(_files(folder)))

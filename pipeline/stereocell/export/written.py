@@ -1,0 +1,48 @@
+"""OUT/exports.json: the files that were exported from a build, with the hash of each.
+
+Most formats have no place that says who wrote a file and of which specimen. By this list an export
+may replace its own earlier file, and not one that somebody else wrote or has edited since.
+"""
+
+import hashlib
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from stereocell.building.out_folder import EXPORTS, OutFolder
+from stereocell.model.errors import OutputError
+from stereocell.storage.file_list import encode, list_files, measure
+from stereocell.storage.json_files import find_sealed, write_sealed
+from stereocell.storage.workspace import is_mirrored
+
+
+def is_own(out: Path, file: Path) -> bool:
+    """Return whether a file or folder is as an export of OUT left it."""
+    found = find_sealed(OutFolder(out).exports_file, EXPORTS)
+    return found is not None and found["files"].get(_key(file), "") == _digest(file)
+
+
+def remember(out: Path, files: Iterable[Path]) -> None:
+    """Add exported files to OUT's list; where OUT can't be written, there is none.
+
+    An OUT on object storage has no list: an export only reads it.
+    """
+    if is_mirrored(out):
+        return
+    list_file = OutFolder(out).exports_file
+    found = find_sealed(list_file, EXPORTS) or {"files": {}}
+    kept = {name: digest for name, digest in found["files"].items() if Path(name).exists()}
+    with suppress(OutputError):
+        added = {_key(file): _digest(file) for file in files}
+        write_sealed(list_file, {"files": dict(sorted({**kept, **added}.items()))})
+
+
+def _key(file: Path) -> str:
+    return str(file.resolve())
+
+
+def _digest(path: Path) -> str:
+    """Return the SHA-256 of a file, or of the list of a folder's files."""
+    if path.is_dir():
+        return hashlib.sha256(encode(list_files(path, root=path))).hexdigest()
+    return str(measure(path)["sha256"]) if path.is_file() else "nothing"

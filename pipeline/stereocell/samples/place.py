@@ -1,0 +1,28 @@
+"""The place of a sample: anything else that lies there stays, unless --force is given."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from stereocell.storage.overwriting import require_free
+
+EXPECTED = "nothing or this very sample"
+
+
+def is_there(place: Path, content: bytes | Mapping[str, bytes]) -> bool:
+    """Return whether a file, or a folder of files by their relative paths, is as it would be made.
+
+    Files that are missing in a folder are no other content. Raises OutputError where something
+    else lies there.
+    """
+    if isinstance(content, bytes):
+        is_same = place.is_file() and place.read_bytes() == content
+        require_free(place, expected=EXPECTED, is_ours=is_same)
+        return is_same
+    found = {
+        file.relative_to(place).as_posix(): file for file in place.rglob("*") if file.is_file()
+    }
+    is_ours = place.is_dir() and all(
+        name in content and file.read_bytes() == content[name] for name, file in found.items()
+    )
+    require_free(place, expected=EXPECTED, is_ours=is_ours)
+    return is_ours and found.keys() == content.keys()

@@ -1,0 +1,220 @@
+"""The one place that recognises what lies at a path: a build, a part of one, a published page, ...
+
+All commands ask here: those that read, so that a folder is not taken for another kind, and those
+that write, so that nothing of somebody else is replaced. Damaged results are still recognised, by
+the names of their files: their command names the fault and the remedy.
+"""
+
+import json
+import os
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from stereocell.model.errors import OutputError
+from stereocell.storage.first_bytes import identify
+from stereocell.storage.kinds import Kind
+from stereocell.storage.location import first_bytes
+from stereocell.storage.sealed_text import is_sealed_text
+from stereocell.storage.workspace import fetch, names_in
+
+PUBLISHED = "stereocell-published.json"
+_PLAN, _MANIFEST, _STAGE, _SLICES = "plan.json", "manifest.json", "stage.usda", "slices.json"
+# parts of a build by their folders' names, in words
+_PARTS = {
+    "units": "the units of a build",
+    "stage": "the stage of a build",
+    "bundle": "the bundle of a build",
+    "report": "the report of a build",
+    "tissue": "the tissue classes of a build",
+    "bundle_parts": "unfinished tiles of a build's bundle",
+    "bricks": "bricks that `stereocell serve` keeps",
+}
+# endings of files that hold surfaces -> words: most begin as other files do
+_BY_ENDING = {
+    (".glb", ".gltf"): "a glTF file of surfaces",
+    (".stl", ".3mf", ".ply", ".obj"): "a file of surfaces",
+    (".usda", ".usdc", ".usdz", ".usd"): "a USD file",
+}
+# files that are nobody's: locks and halves of ours, and those that systems leave in each folder
+_NOBODYS = re.compile(r"\.lock|\.writable\..*|\..+\.[0-9a-f]{8}\b.*|\.DS_Store|Thumbs\.db")
+_MAX_BYTES = 64 << 20  # bytes: a larger JSON file is none of ours
+_MAX_NAMED = 3  # files of a folder that are named
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """The contents of a path.
+
+    words        for messages, with an article
+    name         of the specimen; empty: not known
+    fingerprint  of the specimen's source; empty: not known
+    build        the build that it is a part of; None: of none
+    """
+
+    kind: Kind
+    words: str
+    name: str = ""
+    fingerprint: str = ""
+    build: Path | None = None
+
+
+def contents_of(path: Path) -> Contents:
+    """Return what lies at a path of this machine, or in an OUT on object storage."""
+    if os.path.islink(path) and not path.exists():
+        return Contents(Kind.FILE, "a link to nothing")
+    if path.is_file():
+        return Contents(Kind.FILE, _file_words(path))
+    names = {name for name in names_in(path) if not is_nobodys(name)}
+    if not names:
+        return Contents(Kind.NOTHING, "nothing")
+    for recognise in (_site, _bundle, _build, _stage, _slices, _part):
+        found = recognise(path, names)
+        if found is not None:
+            return found
+    return Contents(Kind.FOLDER, words_for(sorted(names)))
+
+
+def words_for(names: Sequence[str]) -> str:
+    """Return words for files that are none of ours, with the names of a few."""
+    more = f" and {len(names) - _MAX_NAMED} more" if len(names) > _MAX_NAMED else ""
+    return f"something else ({', '.join(names[:_MAX_NAMED])}{more})"
+
+
+def is_nobodys(name: str) -> bool:
+    """Return whether a file of this name is a lock or a half of ours, or what systems leave."""
+    return _NOBODYS.fullmatch(name) is not None
+
+
+def _file_words(path: Path) -> str:
+    """Return what a file is, in words: by its own mark, its ending or its first bytes."""
+    if path.suffix == ".html" and is_sealed_text(path):
+        return "the report of a build"
+    content = identify(first_bytes(str(path)))
+    named = (words for endings, words in _BY_ENDING.items() if path.suffix.lower() in endings)
+    return content.words if content.format else next(named, content.words)
+
+
+def require_kind(path: Path, kinds: Collection[Kind]) -> Contents:
+    """Return what lies at a path. Raises OutputError where it is of none of some kinds.
+
+    Nothing at all passes: the command says which file it misses, and how that is made.
+    """
+    found = contents_of(path)
+    if found.kind is Kind.NOTHING or found.kind in kinds:
+        return found
+    names = [kind.value for kind in Kind if kind in kinds]
+    expected = " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+    hint = "run `stereocell build INPUT -o OUT` first"
+    if found.build is not None and Kind.BUILD in kinds:
+        hint = f"give {found.build}"
+    raise OutputError(f"{path}: found {found.words}, expected {expected}: {hint}")
+
+
+def _site(path: Path, names: set[str]) -> Contents | None:
+    """Recognise what `stereocell publish` wrote."""
+    listed = _read(path / PUBLISHED) if PUBLISHED in names else {}
+    if listed.get("format") != "stereocell-published":
+        return None
+    specimen = _table(listed.get("specimen"))
+    name = _text(specimen.get("name")) or _specimen(path)
+    return Contents(
+        Kind.SITE, _named("a published page", name), name, _text(specimen.get("fingerprint"))
+    )
+
+
+def _bundle(path: Path, names: set[str]) -> Contents | None:
+    """Recognise a bundle, in a build or by itself."""
+    is_ours = _MANIFEST in names and (
+        {"files.json", "channels"} <= names
+        or _read(path / _MANIFEST).get("format") == "stereocell-bundle"
+    )
+    if not is_ours:
+        return None
+    build = _build_around(path)
+    return Contents(Kind.BUNDLE, _named("a bundle", _specimen(path)), _specimen(path), "", build)
+
+
+def _build(path: Path, names: set[str]) -> Contents | None:
+    """Recognise an OUT, from the moment that its plan is written."""
+    plan = _read(path / _PLAN) if _PLAN in names else {}
+    provenance = _read(path / "provenance.json") if "provenance.json" in names else {}
+    is_ours = bool(
+        plan.get("format") == "stereocell-plan"
+        or _text(provenance.get("generator")).startswith("StereoCell")
+        or names <= _PARTS.keys()
+        or ({_PLAN, "phases.json"} & names and {"units", "stage", "bundle"} & names)
+        or ("stage" in names and _STAGE in names_in(path / "stage"))
+        or ("bundle" in names and {_MANIFEST, "files.json"} & {*names_in(path / "bundle")})
+    )
+    if not is_ours:
+        return None
+    name = _text(plan.get("name"))
+    fingerprint = _text(plan.get("fingerprint")) or _text(provenance.get("fingerprint"))
+    return Contents(Kind.BUILD, _named("a build", name), name, fingerprint)
+
+
+def _stage(path: Path, names: set[str]) -> Contents | None:
+    """Recognise the folder of a stage, in a build or by itself."""
+    if _STAGE not in names or not {"tiles", "looks", "files.json"} & names:
+        return None
+    return Contents(Kind.STAGE, "a USD stage", build=_build_around(path))
+
+
+def _slices(path: Path, names: set[str]) -> Contents | None:
+    """Recognise the pictures of `stereocell slices`."""
+    content = _read(path / _SLICES) if _SLICES in names else {}
+    if content.get("format") != "stereocell-slices":
+        return None
+    return Contents(
+        Kind.SLICES,
+        "slices of `stereocell slices`",
+        fingerprint=_text(content.get("fingerprint")),
+    )
+
+
+def _part(path: Path, _: set[str]) -> Contents | None:
+    """Recognise the other folders of a build by their names and places."""
+    build = _build_around(path)
+    if build is None or path.resolve().name not in _PARTS:
+        return None
+    return Contents(Kind.PART, _PARTS[path.resolve().name], build=build)
+
+
+def _build_around(path: Path) -> Path | None:
+    """Return the build that a folder is a part of; None: there is none."""
+    place = path.resolve()
+    if place.name not in _PARTS:
+        return None
+    found = _build(place.parent, set(names_in(place.parent)))
+    return None if found is None else path.parent
+
+
+def _specimen(path: Path) -> str:
+    """Return the specimen's name in a bundle's manifest; empty: it has none."""
+    return _text(_table(_read(path / _MANIFEST).get("specimen")).get("name"))
+
+
+def _named(words: str, name: str) -> str:
+    return f"{words} of {name!r:.80}" if name else words
+
+
+def _read(file: Path) -> Mapping[str, Any]:
+    """Return the content of a JSON file, its seal not looked at; empty for anything else."""
+    fetch(file)
+    try:
+        if file.stat().st_size > _MAX_BYTES:
+            return {}
+        return _table(json.loads(file.read_bytes()))
+    except (OSError, ValueError, RecursionError):
+        return {}
+
+
+def _table(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, dict) else {}
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) and value.isprintable() else ""

@@ -1,0 +1,17 @@
+"""The kinds of contents of a path that commands tell apart: see contents.py."""
+
+from enum import StrEnum
+
+
+class Kind(StrEnum):
+    """The kinds of contents that commands tell apart."""
+
+    NOTHING = "nothing"
+    BUILD = "a build"
+    STAGE = "a stage"
+    BUNDLE = "a bundle"
+    SITE = "a published page"
+    SLICES = "slices"
+    PART = "another part of a build"
+    FOLDER = "another folder"
+    FILE = "a file"

@@ -1,0 +1,51 @@
+"""The guard of all writers: nothing of somebody else is removed or replaced without --force.
+
+A command may replace what StereoCell wrote of the same specimen. Anything else at the place of a
+result ends it before it writes, with a line that says what is there.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+
+from stereocell.model.errors import OutputError
+from stereocell.storage.contents import contents_of
+from stereocell.storage.kinds import Kind
+
+_forced: ContextVar[bool] = ContextVar("forced", default=False)
+HINT = "choose another place, or --force replaces it"
+
+
+@contextmanager
+def forcing(is_forced: bool) -> Iterator[None]:
+    """Within the block, allow that results replace whatever lies at their place (--force)."""
+    before = _forced.set(is_forced)
+    try:
+        yield
+    finally:
+        _forced.reset(before)
+
+
+def is_forced() -> bool:
+    """Return whether the user allows that anything is replaced."""
+    return _forced.get()
+
+
+def require_free(place: Path, *, expected: str, is_ours: bool = False, found: str = "") -> None:
+    """Raise OutputError where a result would replace what isn't ours to replace.
+
+    expected  what may lie there beside nothing, for the message
+    is_ours   whether the caller knows what lies there for its own result of the same specimen
+    found     what lies there, in words; empty: as it is recognised
+    """
+    if is_ours or is_forced():
+        return
+    there = contents_of(place)
+    if there.kind is not Kind.NOTHING:
+        raise refused(place, found or there.words, expected)
+
+
+def refused(place: Path | str, found: str, expected: str) -> OutputError:
+    """Return the error of a place that holds something else."""
+    return OutputError(f"{place}: holds {found}, expected {expected}: {HINT}")

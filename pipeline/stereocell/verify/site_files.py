@@ -1,0 +1,30 @@
+"""Check the files that `stereocell publish` adds to a bundle: packed copies, and their list."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from stereocell.storage.contents import PUBLISHED
+from stereocell.storage.file_list import MISSING, measure
+
+_AGAIN = "run `stereocell publish OUT TARGET` again"
+
+
+def find_site_faults(found: Mapping[str, Path]) -> list[str]:
+    """Return the faults of a published page's files against the list of what was put there.
+
+    found  all files of the page by their relative paths; those that the list lacks are a host's
+    """
+    try:
+        listed = dict(json.loads(found[PUBLISHED].read_bytes())["files"])
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return [f"{PUBLISHED}: damaged, no list of published files: {_AGAIN}"]
+    faults = []
+    for path, entry in listed.items():
+        if entry is None:
+            faults.append(f"{path}: publishing did not finish: {_AGAIN}")
+        elif path not in found:
+            faults.append(f"{path}: {MISSING}: {_AGAIN}")
+        elif measure(found[path]) != entry:
+            faults.append(f"{path}: not the bytes that {PUBLISHED} says: {_AGAIN}")
+    return faults

@@ -1,0 +1,73 @@
+"""Each command's output is given to each other command: it works, or one line says what fits."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stereocell.cli import commands
+from stereocell.cli.__main__ import COMMANDS, main
+from stereocell.cli.places import PLACES
+from stereocell.serve.server import BundleServer
+from support.outputs import Outputs, make_outputs
+
+VOLUMES = {"the sample mri", "the sample brain-cells", "exported .nrrd", "exported .nii.gz"}
+BUNDLES = {"a build", "OUT/bundle", "a published page"}
+# command -> how an output is given to it, and the outputs that it takes
+GIVEN: dict[str, tuple[Callable[[Path, Path], list[object]], set[str]]] = {
+    "build": (lambda given, new: ["build", given, "-o", new], VOLUMES),
+    "plan": (lambda given, new: ["plan", given, "-o", new], VOLUMES),
+    "slices": (lambda given, new: ["slices", given, "-o", new, "--channels", "0"], VOLUMES),
+    "iso": (
+        lambda given, new: ["iso", given, "-o", f"{new}.png", "--channel", "0", "--tile", "r0_c0"],
+        VOLUMES,
+    ),
+    **{
+        name: (lambda given, _, name=name: [name, given], {"a build"})  # type: ignore[misc]
+        for name in ("units", "stage", "bundle", "report", "tissue")
+    },
+    "export": (lambda given, new: ["export", given, f"{new}.usda"], {"a build"}),
+    "publish": (lambda given, new: ["publish", given, new], BUNDLES),
+    "check": (lambda given, _: ["check", given], BUNDLES),
+    "view": (lambda given, _: ["view", given, "--no-browser", "--port", "0"], BUNDLES),
+    "serve": (lambda given, _: ["serve", given, "--port", "0"], BUNDLES),
+}
+NOT_GIVEN = {"sample", "doctor", "settings"}  # they read nothing
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> Outputs:
+    return make_outputs(tmp_path_factory.mktemp("outputs"))
+
+
+def test_every_command_is_tried() -> None:
+    assert GIVEN.keys() | NOT_GIVEN == COMMANDS.keys() == PLACES.keys()
+
+
+@pytest.mark.parametrize("command", GIVEN)
+def test_each_output_is_taken_or_answered_by_one_line(
+    outputs: Outputs,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    command: str,
+) -> None:
+    monkeypatch.setattr(BundleServer, "run", lambda server: server._socket.close())
+    if command == "build":  # the plan has read the input; the rest takes long
+        monkeypatch.setattr(commands, "run_phases", lambda *_: commands.Answer(dict.fromkeys(
+            ("stage", "bundle", "report"), "")))  # fmt: skip
+    if command == "tissue":
+        monkeypatch.setattr("stereocell.building.tissue.add_tissue", lambda *_: None)
+    arguments, taken = GIVEN[command]
+    found = {}
+    for number, (name, path) in enumerate(outputs.paths.items()):
+        capfd.readouterr()
+        words = [str(word) for word in arguments(path, tmp_path / f"new {number}")]
+        found[name] = main(words)
+        said = capfd.readouterr().err
+        assert "Traceback" not in said
+        if found[name]:
+            (line,) = [line for line in said.splitlines() if line.startswith("stereocell: ")]
+            assert str(path) in line
+            assert "expected" in line or "run `stereocell" in line
+    assert {name for name, code in found.items() if code == 0} == taken

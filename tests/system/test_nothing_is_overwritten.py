@@ -1,0 +1,165 @@
+"""Commands that write onto what somebody else has: it stays, and one line says what is there."""
+
+import shutil
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from stereocell import samples
+from stereocell.cli.__main__ import main
+from stereocell.cli.places import PLACES
+from stereocell.export.write import FORMATS
+from support.digests import digests_of
+from support.outputs import make_build, make_source
+
+Given = Callable[[Path, Path, Path], list[object]]  # source, its build, the place of the result
+SAMPLES = {"cycif": ".ome.zarr", "cells": ".ome.zarr", "brain-cells": ".ome.tif", "mri": ""}
+WORK = b"years of work"
+
+
+def _writing(name: str) -> dict[str, tuple[str, Given]]:
+    """Return trials of a command that writes: the ending of the place's name, and the words."""
+    if name in ("build", "plan"):
+        return {name: ("", lambda source, _, place: [name, source, "-o", place])}
+    if name == "slices":
+        return {name: ("", lambda source, _, place: [name, source, "-o", place])}
+    if name == "iso":
+        more = ["--channel", "F", "--tile", "r0_c0"]
+        return {name: (".png", lambda source, _, place: [name, source, "-o", place, *more])}
+    if name == "sample":
+        small = {"cycif": ["--grid", "1x1", "--tile-size", "8,16,16"]}
+        return {
+            f"sample {one}": (
+                ending,
+                lambda _s, _b, place, one=one: [name, one, place, *small.get(one, [])],
+            )
+            for one, ending in SAMPLES.items()
+        }
+    if name == "export":
+        return {
+            f"export {ending}": (ending, lambda _, build, place: [name, build, place])
+            for ending in FORMATS
+        }
+    if name == "publish":
+        return {name: ("", lambda _, build, place: [name, build, place])}
+    return {name: ("", lambda _s, _b, place: [name, place])}  # of a build that lies there
+
+
+TRIALS = {
+    trial: given
+    for name, places in PLACES.items()
+    if places.writes
+    for trial, given in _writing(name).items()
+}
+# a folder is made in no file's place, and no picture in a folder's
+NOT_FORCED = {("build", "a file"), ("plan", "a file"), ("publish", "a file")}
+NOT_FORCED |= {("iso", "a folder"), ("iso", "another build")}
+OF_A_BUILD = {name for name, places in PLACES.items() if places.writes == "out" and places.reads}
+
+
+@pytest.fixture(autouse=True)
+def few_cells(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sample `cells` has few cells here: all 1500 take seconds."""
+    few = partial(samples.write_cells, shape=(12, 30, 30))
+    monkeypatch.setattr(samples, "write_cells", few)
+
+
+@pytest.fixture(scope="module")
+def builds(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A build of one specimen, and one of another."""
+    folder = tmp_path_factory.mktemp("builds")
+    pair = [
+        make_source(folder / f"{name}.ome.tif", lift=lift) for name, lift in (("f", 0), ("g", 9))
+    ]
+    one, other = (make_build(source, source.parent / source.name[0]) for source in pair)
+    return one, other
+
+
+def _lay(kind: str, place: Path, other: Path) -> None:
+    if kind == "a file":
+        place.write_bytes(WORK)
+    elif kind == "a folder":
+        place.mkdir()
+        (place / "thesis.tex").write_bytes(WORK)
+    else:
+        shutil.copytree(other, place)
+
+
+def _line(capfd: pytest.CaptureFixture[str]) -> str:
+    said = capfd.readouterr().err
+    assert "Traceback" not in said
+    (line,) = [line for line in said.splitlines() if line.startswith("stereocell: ")]
+    return line
+
+
+def _run(trial: str, builds: tuple[Path, Path], place: Path, *more: str) -> int:
+    one, _ = builds
+    source = one.parent / "f.ome.tif"
+    words = TRIALS[trial][1](source, one, place)
+    return main([*(str(word) for word in words), *more])
+
+
+@pytest.mark.parametrize(
+    ("trial", "kind"),
+    [
+        (trial, kind)
+        for trial in TRIALS
+        for kind in ("a file", "a folder", "another build")
+        if kind != "another build" or trial not in OF_A_BUILD  # they go on with a build
+    ],
+)
+def test_what_others_put_there_stays_and_is_named(
+    builds: tuple[Path, Path],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    trial: str,
+    kind: str,
+) -> None:
+    place = tmp_path / f"mine{TRIALS[trial][0]}"
+    _lay(kind, place, builds[1])
+    before = digests_of(tmp_path)
+    capfd.readouterr()
+    assert _run(trial, builds, place) == 1
+    line = _line(capfd)
+    assert str(place) in line
+    assert "expected" in line or "choose another OUT" in line
+    assert ("--force" in line) == (trial not in OF_A_BUILD and (trial, kind) not in NOT_FORCED)
+    assert digests_of(tmp_path) == before
+
+
+@pytest.mark.parametrize("kind", ["a file", "a folder"])
+@pytest.mark.parametrize("trial", ["iso", "slices", "export .stl", "sample mri", "sample cells"])
+def test_force_replaces_it_as_its_help_says(
+    builds: tuple[Path, Path],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    trial: str,
+    kind: str,
+) -> None:
+    place = tmp_path / f"mine{TRIALS[trial][0]}"
+    _lay(kind, place, builds[1])
+    assert _run(trial, builds, place, "--force") == ((trial, kind) in NOT_FORCED)
+    if (trial, kind) in NOT_FORCED:
+        return
+    assert WORK not in [file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()]
+    with pytest.raises(SystemExit):
+        main([trial.split()[0], "--help"])
+    assert "--force" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["mine.csv", "mine.ome.zarr", "mine.truth.json"])
+def test_what_lies_beside_a_sample_is_not_overwritten_either(tmp_path: Path, name: str) -> None:
+    sample = "cycif" if "truth" in name else "cells"
+    small = ["--grid", "1x1", "--tile-size", "8,16,16"] if sample == "cycif" else []
+    (tmp_path / name).write_bytes(WORK)
+    assert main(["sample", sample, str(tmp_path / "mine.ome.zarr"), *small]) == 1
+    assert [file.read_bytes() for file in tmp_path.rglob("*")] == [WORK]
+    (tmp_path / name).unlink()
+    for _ in range(2):  # the second time it is there
+        assert main(["sample", sample, str(tmp_path / "mine.ome.zarr"), *small]) == 0
+    assert {file.name for file in tmp_path.iterdir()} == {
+        "mine.ome.zarr",
+        "mine.truth.json" if sample == "cycif" else "mine.csv",
+    }
