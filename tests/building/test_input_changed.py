@@ -287,6 +287,25 @@ def test_a_table_that_changes_while_it_is_read_is_told(
     )
 
 
+def test_a_table_that_changes_while_units_are_built_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
+    table = tmp_path / "cells.csv"
+    table.write_text("label,kind\n1,first\n")
+    plan = ["plan", str(source), "-o", str(out), "--labels", ".", "--table", str(table)]
+    assert main(plan) == 0
+    with monkeypatch.context() as patch:
+        after_the_first_unit(patch, lambda: table.write_text("label,kind\n1,second\n"))
+        assert main(["units", str(out), *INLINE]) == 1
+    line = last_line(capsys)
+    assert "cells.csv: changed since it was planned" in line
+    assert "run the same command again" in line
+    # the units don't depend on it, and nothing is lost
+    assert main(["units", str(out), *INLINE]) == 0
+    assert "units: up to date" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("changes", ["model", "image"])
 def test_a_model_or_its_image_that_changes_while_it_is_read_is_told(
     tmp_path: Path,

@@ -77,6 +77,22 @@ def test_pages_that_no_image_of_the_ome_xml_has_are_told_with_their_share(tmp_pa
     assert note == "the OME-XML describes 12 of 16 pages in the files; 4 are left out (25%)"
 
 
+@pytest.mark.parametrize("name", ["a.ome.tif", "a.tif"])
+def test_tiles_that_are_not_stored_are_told_with_their_share(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    body = np.random.default_rng(0).integers(0, 99, (2, 32, 32)).astype(np.uint16)
+    tifffile.imwrite(path, body, tile=(16, 16), metadata={"axes": "ZYX"})
+    with tifffile.TiffFile(path, mode="r+") as tiff:
+        for tag in ("TileOffsets", "TileByteCounts"):
+            first, second, *_ = tiff.pages[1].tags[tag].value
+            tiff.pages[1].tags[tag].overwrite((first, second, 0, 0))
+    body[1, 16:] = 0
+    dataset = whole(path)
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, body)
+    (note,) = (note for note in dataset.notes if "not stored" in note)
+    assert note.startswith("2 of 8 strips or tiles (25.00%) are not stored: read as 0")
+
+
 def write_set(folder: Path) -> list[Path]:
     """Write OME-TIFF as two files of eight planes, each with the OME-XML of both."""
     names = ["a.ome.tif", "b.ome.tif"]

@@ -6,11 +6,13 @@ A plan looks at them before it reads a voxel; each pass over the tiles compares 
 from dataclasses import replace
 
 from stereocell.building.open_source import SourceRef, open_source
+from stereocell.model.errors import SourceError
 from stereocell.read import Dataset
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
 
 _first: dict[SourceRef, FileStates] = {}
+_tables: dict[str, FileStates] = {}  # by the path that the settings have
 
 
 def open_anew(ref: SourceRef) -> Dataset:
@@ -40,9 +42,28 @@ def first_states(ref: SourceRef) -> FileStates | None:
     return _first.get(_key(ref))
 
 
+def watch_table(path: str) -> None:
+    """Look at a table as a plan reads it."""
+    location = Location.of(path)
+    whole = location.path if location.is_local else location.source
+    _tables[path] = FileStates.look(location, [whole])
+
+
+def require_table(path: str) -> None:
+    """Raise SourceError where a table changed since this process planned with it."""
+    states = _tables.get(path)
+    if states is not None and states.changed():
+        forget()
+        raise SourceError(
+            f"{states.location.shown}: changed since it was planned, expected a table that stays "
+            "as it is while it is built: run the same command again, which goes on from here"
+        )
+
+
 def forget() -> None:
     """Open and look at all inputs again: one of them changed."""
     _first.clear()
+    _tables.clear()
     open_source.cache_clear()
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from stereocell.building import stage_tasks
 from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
-from stereocell.building.input_files import open_anew
+from stereocell.building.input_files import open_anew, require_table, watch_table
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
 from stereocell.building.object_passes import locate_objects, read_notes, told_before
@@ -156,6 +156,8 @@ def settle(source: str, settings: Settings) -> Plan:
         labels=labels,
         formats={format_of(location), *(format_of(one.ref.source) for one in labels)},
     )
+    if settings.objects.table:
+        watch_table(settings.objects.table)
     for one in plan.labels:
         # what can't be read, or isn't there, is told before the build
         require_color_by(plan, one, table_of(plan, one))
@@ -242,6 +244,7 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
         phase.about = "" if built == units else f"{built} of {units} units"
         if missing:
             console.print(f"units: {missing} of {units} are still to be built")
+    require_table(plan.settings.objects.table)
 
 
 def run_stage(out: Path, engine: Engine) -> None:

@@ -30,7 +30,7 @@ from stereocell.read.tiff.arrays import (
     samples_as_channels,
     with_given_axes,
 )
-from stereocell.read.tiff.open_file import MAX_PLANES, files_of, require_pages
+from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
 
@@ -78,7 +78,7 @@ def read_ome(
     if axes:
         arrays = with_given_axes(where, arrays, axes)
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
-    notes = (*image.notes, *_undescribed(tiff))
+    notes = (*image.notes, *_undescribed(tiff), *note_absent(pages[0]))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
 
 

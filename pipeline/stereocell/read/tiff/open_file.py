@@ -151,6 +151,21 @@ def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
     return tuple(sorted({location.path, *map(str, paths)}))
 
 
+def note_absent(pages: Iterable[Any]) -> tuple[str, ...]:
+    """Return a note on strips and tiles of the finest level without any bytes, which are read as 0.
+
+    Writers leave out empty ones (GDAL calls such a file sparse), and a lost one looks alike.
+    """
+    counts = [count for page in pages if page is not None for count in page.databytecounts]
+    absent = counts.count(0)
+    if not absent:
+        return ()
+    return (
+        f"{absent} of {len(counts)} strips or tiles ({max(absent / len(counts), 1e-4):.2%}) are "
+        "not stored: read as 0, as the format has it for empty ones and as lost ones are",
+    )
+
+
 def require_series(where: str, tiff: TiffFile, series: TiffPageSeries) -> None:
     """Raise SourceError where a series lacks planes; it may lie in one block behind one page."""
     pages = list(series.pages)

@@ -26,6 +26,7 @@ from stereocell.read.tiff.ndtiff import index_of, with_index
 from stereocell.read.tiff.open_file import (
     MAX_PLANES,
     files_of,
+    note_absent,
     open_tiff,
     refuse_short,
     require_series,
@@ -63,6 +64,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         page = series.keyframe
         stated = stated_by(tiff)
         files = files_of(location, (page for level in series.levels for page in level.pages))
+        absent = note_absent(series.levels[0].pages)
         if series.kind == "ndtiff":
             files += (index_of(location),)
     notes = [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
@@ -74,7 +76,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         arrays, more = _with_axes(where, arrays)
         notes += more
     arrays, names, colors, told = samples_as_channels(where, arrays, page)
-    notes += [*told, *notes_of(page)]
+    notes += [*told, *notes_of(page), *absent]
     require_depth(where, arrays[0])
     count = len(names) or arrays[0].size("c")
     if count > MAX_CHANNELS or arrays[0].size("z") * arrays[0].size("t") > MAX_PLANES:
