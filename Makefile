@@ -74,7 +74,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -379,6 +379,12 @@ notebook: setup ## Run docs/jupyter.ipynb and store it with its pictures
 lock: setup ## Resolve requirements.lock anew from pyproject.toml
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --group dev pyproject.toml -o requirements.lock
+
+platforms: setup ## Resolve the requirements for each system and Python, and write the table of docs/install.md
+	$(BIN)/python docs/platforms.py
+
+licences: $(READY) ## Write docs/licences.md from the packages that are installed
+	$(BIN)/python docs/licences.py
 
 clean: ## Remove .venv, the viewer's packages and build, and out/
 	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis

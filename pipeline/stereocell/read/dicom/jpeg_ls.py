@@ -5,8 +5,11 @@ pydicom's own plugin takes pyjpegls, which has no wheels for Python 3.14. GDCM r
 """
 
 import imagecodecs
-from pydicom.pixels.decoders import JPEGLSLosslessDecoder, JPEGLSNearLosslessDecoder
-from pydicom.pixels.decoders.base import DecodeRunner
+from pydicom.pixels.decoders.base import (
+    DecodeRunner,
+    JPEGLSLosslessDecoder,
+    JPEGLSNearLosslessDecoder,
+)
 from pydicom.uid import JPEGLSTransferSyntaxes
 
 PLUGIN = "imagecodecs"

@@ -1,0 +1,166 @@
+"""Write docs/licences.md from the metadata of the packages that are installed: `make licences`.
+
+Each requirement's reason is the comment on its line in pyproject.toml.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "licences.md"
+# packages whose metadata names no licence, and where theirs stands
+UNSTATED = {
+    "alktx2": "none stated; it holds Basis Universal, Apache-2.0",
+    "hdf5plugin": "MIT; its filters have their own (its file LICENSE)",
+    "openexr": "BSD-3-Clause (its file LICENSE.md)",
+}
+# what classifiers call licences -> their SPDX identifier
+CLASSIFIERS = {
+    "Apache Software License": "Apache-2.0",
+    "BSD License": "BSD",
+    "GNU Lesser General Public License v3 (LGPLv3)": "LGPL-3.0",
+    "MIT License": "MIT",
+    "Mozilla Public License 2.0 (MPL 2.0)": "MPL-2.0",
+    "Python Software Foundation License": "PSF-2.0",
+}
+_LINE = re.compile(r'^  "(?P<line>[^"]+)", +# (?P<why>.+)$', re.MULTILINE)
+_EXTRA = re.compile(r"^(?P<extra>[a-z0-9-]+) = \[.*\] +# (?P<why>.+)$", re.MULTILINE)
+_ABOUT = """\
+StereoCell is under Apache-2.0. It contains none of these packages: `pip` installs them beside it,
+each under its own licence. No package that every installation has is under the GPL, and a test
+holds that. The packages under the LGPL are used as they are installed, unchanged. This page is made
+by `make licences` from the packages' own metadata."""
+_LONGEST = 60  # characters of a licence's name; longer ones are the licence's text
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A requirement of StereoCell itself.
+
+    why    the comment on its line
+    extra  the extra that brings it; empty: every installation has it
+    """
+
+    requirement: Requirement
+    why: str
+    extra: str = ""
+
+    @property
+    def name(self) -> str:
+        return canonicalize_name(self.requirement.name)
+
+
+def asked() -> list[Asked]:
+    """Return the direct requirements with the comments of pyproject.toml, once each."""
+    text = (ROOT / "pyproject.toml").read_text("utf-8")
+    project = tomllib.loads(text)["project"]
+    reasons = {match["line"]: match["why"] for match in _LINE.finditer(text)}
+    reasons |= {match["extra"]: match["why"] for match in _EXTRA.finditer(text)}
+    found: dict[tuple[str, str], Asked] = {}
+    for extra, lines in {"": project["dependencies"], **project["optional-dependencies"]}.items():
+        for line in lines:
+            one = Asked(Requirement(line), reasons.get(extra or line, ""), extra)
+            found.setdefault((one.name, extra), one)
+    return list(found.values())
+
+
+def licence_of(name: str) -> str:
+    """Return a package's licence as its metadata states it; see UNSTATED for those that do not."""
+    metadata = distribution(name).metadata.json
+    if expression := metadata.get("license_expression"):
+        return str(expression)
+    stated = str(metadata.get("license") or "").strip()
+    if stated and len(stated) <= _LONGEST and "\n" not in stated:
+        return stated
+    classes = metadata.get("classifier", [])
+    named = [line.rpartition(" :: ")[2] for line in classes if line.startswith("License :: ")]
+    named = [CLASSIFIERS.get(one, one) for one in named if one != "OSI Approved"]
+    return " OR ".join(named) or UNSTATED.get(canonicalize_name(name)) or stated.partition("\n")[0]
+
+
+def is_gpl(licence: str) -> bool:
+    """Return whether a licence is the GPL or AGPL proper, with no other to choose.
+
+    The LGPL is none, nor is the GPL with GCC's exception, as compilers' own libraries have it.
+    """
+    alternatives = re.split(r"\s+OR\s+", licence)
+    return all(_names_gpl(one) for one in alternatives)
+
+
+def _names_gpl(licence: str) -> bool:
+    bare = re.sub(r"A?GPL[\w.+-]*\s+WITH\s+GCC-exception[\w.-]*", "", licence, flags=re.IGNORECASE)
+    words = r"(?<![L\w])A?GPL|(?<!Lesser )(?<!Library )General Public Licen[sc]e"
+    return re.search(words, bare) is not None
+
+
+def closure(requirements: Iterable[Requirement]) -> dict[str, Distribution]:
+    """Return all installed packages that requirements bring, on this system."""
+    seen: set[tuple[str, str]] = set()
+    found: dict[str, Distribution] = {}
+    waiting = [(one, extra) for one in requirements for extra in ("", *one.extras)]
+    while waiting:
+        one, extra = waiting.pop()
+        name = canonicalize_name(one.name)
+        if (name, extra) in seen or (one.marker and not one.marker.evaluate({"extra": extra})):
+            continue
+        seen.add((name, extra))
+        try:
+            found[name] = distribution(name)
+        except PackageNotFoundError:
+            continue
+        for line in found[name].requires or ():
+            more = Requirement(line)
+            if more.marker is None or more.marker.evaluate({"extra": extra}):
+                bare = Requirement(str(more).partition(";")[0])
+                waiting += [(bare, each) for each in ("", *more.extras)]
+    return found
+
+
+def page() -> str:
+    """Return the page."""
+    return "\n".join(_lines()) + "\n"
+
+
+def _lines() -> Iterator[str]:
+    direct = asked()
+    core = [one for one in direct if not one.extra]
+    yield "# Licences"
+    yield ""
+    yield _ABOUT
+    yield ""
+    yield "## What every installation has"
+    yield ""
+    yield "| package | licence | why it is there |"
+    yield "|---|---|---|"
+    for one in core:
+        yield f"| {one.name} | {licence_of(one.name)} | {one.why} |"
+    yield ""
+    yield "## What extras bring"
+    yield ""
+    yield "| package | extra | licence | why it is there |"
+    yield "|---|---|---|---|"
+    for one in direct:
+        if one.extra:
+            yield f"| {one.name} | `{one.extra}` | {licence_of(one.name)} | {one.why} |"
+    yield ""
+    yield "## What these bring along"
+    yield ""
+    yield "On Linux, without extras; other systems may bring a few others."
+    yield ""
+    yield "| package | licence |"
+    yield "|---|---|"
+    own = {one.name for one in core}
+    for name in sorted(closure(one.requirement for one in core)):
+        if name not in own:
+            yield f"| {name} | {licence_of(name)} |"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), "utf-8")
