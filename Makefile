@@ -284,7 +284,7 @@ test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .ven
 	            || $(BLENDER)/bin/pip install --quiet --disable-pip-version-check bpy==5.0.1 'numpy<2'; }; } \
 	  || echo "test-blender: bpy 5.0.1 can't be installed here (it wants $$BLENDER_BASE and 350 MB)" >&2
 	@if $(BLENDER)/bin/python -c 'import bpy' 2>&1; then \
-	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/blender/test_blender.py; \
+	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/blender; \
 	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
 
 object-store: setup ## versitygw for the tests, by Go, which keep to moto's server without

@@ -91,9 +91,8 @@ def test_a_heavy_specimen_is_shown_at_a_coarser_level(
     names = zipfile.ZipFile(path).namelist()
     assert names[0] == "specimen.usdc"
     # the coarse level has normal maps, one for each mesh
-    assert sorted(names[1:]) == sorted(
-        f"textures/{c}_{t}_normal.png" for c in (F_ID, BALL_ID) for t in ("r0_c0", "r0_c1")
-    )
+    maps = [f"textures/{c}_{t}_normal.png" for c in (F_ID, BALL_ID) for t in ("r0_c0", "r0_c1")]
+    assert sorted(names[1:]) == sorted([*maps, "textures/dome.exr"])
     stage = Usd.Stage.Open(str(path))
     mesh = meshes(stage)[f"{F_ID}_r0_c0"]
     material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()

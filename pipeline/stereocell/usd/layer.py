@@ -25,6 +25,7 @@ CHANNELS = ROOT.AppendChild("Channels")
 CLASSES = ROOT.AppendChild("Classes")  # by channel: materials of its objects' classes
 TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")
+LIGHTS = ROOT.AppendChild("Lights")
 CHANNEL_API = "StereoCellChannelAPI"
 SPECIMEN_API = "StereoCellSpecimenAPI"
 PATIENT_API = "StereoCellPatientAPI"

@@ -2,7 +2,7 @@
 
 stage.usda                    /Specimen: tiles by payload, cameras; sublayers the two looks/ layers
 looks/channels.usda           /Specimen/Channels, see usd/write_appearances.py
-looks/lights.usda             a copy of usd_assets/lights.usda
+looks/lights.usda             a copy of usd_assets/lights.usda, and beside it the image of its dome
 tiles/<tile>/tile.usdc        see usd/write_tile.py
 
 specimen.usdz                 see usd/write_usdz.py
@@ -108,7 +108,8 @@ def write_stage(
     """
     with replacing_folder(stage_dir / "looks") as folder:
         write_appearances(folder, appearances, tables or {})
-        shutil.copyfile(find_asset("usd_assets/lights.usda"), folder / "lights.usda")
+        for asset in (find_asset("usd_assets/lights.usda"), find_asset("usd_assets/studio.exr")):
+            shutil.copyfile(asset, folder / asset.name)
 
     stage = new_stage(".usda", ROOT.name)
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()

@@ -9,7 +9,8 @@ an image it has the maps alone, as the viewer opens, if any is drawn: both would
 other.
 
 Volumes are left out: usdz allows no .vdb. The archive holds one .usdc without variants or payloads,
-which comes first, and the baked maps of that level. The same stage gives the same bytes.
+which comes first, the baked maps of that level, and the stage's lights with the image of the dome.
+The same stage gives the same bytes.
 
 References: OpenUSD, Usdz File Format Specification, https://openusd.org/release/spec_usdz.html
 """
@@ -17,7 +18,7 @@ References: OpenUSD, Usdz File Format Specification, https://openusd.org/release
 import struct
 import tempfile
 import zipfile
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,6 +44,7 @@ from stereocell.usd.read_stage import (
 )
 from stereocell.usd.read_variants import lod_levels
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
+from stereocell.usd.usdz_lights import copy_lights
 from stereocell.usd.written_files import AsWritten
 
 USDZ_NAME = "specimen.usdz"
@@ -100,7 +102,11 @@ def write_usdz(
     high = np.max([box[1] for box in boxes], axis=0)
     flat = _new_stage(specimen_name(stage), float((high - low).max()), shown)
     _define_parts(flat, found, low, high)
-    _pack(flat.GetRootLayer(), found, path, as_written)
+    images = {
+        _texture_name(part, kind): file for part in found for kind, file in _images(part).items()
+    }
+    images |= copy_lights(stage, flat)
+    _pack(flat.GetRootLayer(), images, path, as_written)
     return shown
 
 
@@ -242,22 +248,18 @@ def _texture_name(part: _Part, kind: Kind) -> str:
     return f"textures/{part.channel}_{part.tile}_{kind}.png"
 
 
-def _pack(layer: Sdf.Layer, parts: list[_Part], path: Path, as_written: AsWritten) -> None:
-    """Put the layer and its textures into an archive, the layer first.
+def _pack(layer: Sdf.Layer, images: Mapping[str, Path], path: Path, as_written: AsWritten) -> None:
+    """Put the layer and its images, by their names, into an archive, the layer first.
 
-    Raises OutputError where it can't be written, StageError for a damaged texture.
+    Raises OutputError where it can't be written, StageError for a damaged image.
     """
     with tempfile.TemporaryDirectory() as folder:
         export(layer, Path(folder) / _LAYER)
-        files = [(_LAYER, Path(folder) / _LAYER)]
-        for part in parts:
-            fetch(*_images(part).values())
-            files += [
-                (_texture_name(part, kind), as_written.require(file))
-                for kind, file in _images(part).items()
-            ]
+        fetch(*images.values())
+        files = {_LAYER: Path(folder) / _LAYER}
+        files |= {name: as_written.require(file) for name, file in images.items()}
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-            for name, file in files:
+            for name, file in files.items():
                 archive.writestr(_entry(name, archive.start_dir), file.read_bytes())
 
 

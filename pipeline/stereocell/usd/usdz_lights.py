@@ -1,0 +1,53 @@
+"""Copy the lights of a composed stage into a specimen.usdz.
+
+A usdz is scaled, so only lights without a place keep their effect: distant lights and domes. Images
+of other formats than those that usdz allows are left out.
+
+References: OpenUSD, Usdz File Format Specification, https://openusd.org/release/spec_usdz.html
+"""
+
+from pathlib import Path
+
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
+
+from stereocell.usd.layer import LIGHTS
+from stereocell.usd.read_attributes import file_of
+
+_IMAGES = (".exr", ".png", ".jpg", ".jpeg")
+
+
+def copy_lights(composed: Usd.Stage, small: Usd.Stage) -> dict[str, Path]:
+    """Define the drawn lights of a composed stage in the stage of a usdz.
+
+    Returns the images of the lights by their names in the archive.
+    """
+    group = composed.GetPrimAtPath(LIGHTS)
+    images: dict[str, Path] = {}
+    for light in group.GetChildren() if group else ():
+        has_place = not (light.IsA(UsdLux.DistantLight) or light.IsA(UsdLux.DomeLight))
+        visibility = UsdGeom.Imageable(light).ComputeVisibility()
+        if not has_place and visibility != UsdGeom.Tokens.invisible:
+            images |= _copy_light(light, small)
+    return images
+
+
+def _copy_light(light: Usd.Prim, small: Usd.Stage) -> dict[str, Path]:
+    UsdGeom.Scope.Define(small, LIGHTS)
+    copy = small.DefinePrim(LIGHTS.AppendChild(light.GetName()), light.GetTypeName())
+    world = UsdGeom.XformCache().GetLocalToWorldTransform(light)
+    turn = Gf.Matrix4d(world.ExtractRotationMatrix().GetOrthonormalized(), Gf.Vec3d(0))
+    if turn != Gf.Matrix4d(1):
+        UsdGeom.Xformable(copy).AddTransformOp().Set(turn)
+    images = {}
+    for attribute in light.GetAuthoredPropertiesInNamespace("inputs"):
+        value = attribute.Get()
+        if isinstance(value, Sdf.AssetPath):
+            if not value.path or Path(value.path).suffix.lower() not in _IMAGES:
+                continue
+            file = file_of(attribute)
+            name = f"textures/{light.GetName()}{file.suffix}"
+            images[name] = file
+            value = Sdf.AssetPath(name)
+        if value is not None:
+            copy.CreateAttribute(attribute.GetName(), attribute.GetTypeName(), False).Set(value)
+    return images
