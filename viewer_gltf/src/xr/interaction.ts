@@ -2,7 +2,7 @@
  * Everything that is done in stereo: looking, pointing, pressing, holding. One of it serves both
  * WebXR and the split screen, where there is nothing but the gaze and a tap.
  */
-import { Matrix4, type Scene, Vector3, type WebXRManager } from "three";
+import { Matrix4, Vector3 } from "three";
 import { Ring } from "../interaction/dwell_ring";
 import {
   gazeOf,
@@ -14,17 +14,14 @@ import {
 } from "../interaction/ray_pointer";
 import { TILE, TileTarget } from "../interaction/tile_target";
 import { type HandPose, zoomAbout } from "../math/grab";
-import { type BoxedTile, shownTiles } from "../math/pick";
-import type { Ray } from "../math/vec3";
-import type { Layout, Lenses, PanelView } from "../panel/controls";
-import type { Specimen } from "../render/specimen_pose";
-import type { Action } from "../state/actions";
+import { shownTiles } from "../math/pick";
 import type { Command } from "../state/commands";
 import { DWELL } from "../state/parameters/tools";
 import type { ViewerState } from "../state/viewer_state";
 import type { Gesture } from "./cardboard/fingers";
 import { GazeCarry } from "./carry_handle";
 import { Controllers, type Hand, type HandEvent } from "./controllers";
+import type { HandsOptions } from "./hands_options";
 import {
   type HeadHold,
   moveByCommand,
@@ -37,28 +34,6 @@ import {
 import { RoomNotice } from "./panel/notice";
 import { PANEL, RoomPanel } from "./panel/panel";
 import { hullOf, middleOf } from "./shown_hull";
-
-export type HandsOptions = Readonly<{
-  xr: Pick<WebXRManager, "getFrame" | "getReferenceSpace">;
-  scene: Scene;
-  specimen: Specimen;
-  tiles: readonly BoxedTile[];
-  /** Between the panel and the tiles: what is dragged, such as a cut's handles. */
-  handles?: readonly Target[];
-  layOut: (view: PanelView) => Layout;
-  onAction: (action: Action) => void;
-  onCommand: (command: Command) => void;
-  /** A tile was chosen by dwell (`isByGaze`) or button; the ray is in um of the specimen. */
-  onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void;
-  /** Stereo is to end. */
-  onLeave: () => void;
-  /** The phone is in a viewer of other lenses. */
-  onLenses?: (lenses: Lenses) => void;
-  /** Absent: true. False: panel and notices are not painted, as in a program without a screen. */
-  isPainted?: boolean;
-  /** The clock of the page's events, ms; absent: the page's own. */
-  now_ms?: () => number;
-}>;
 
 /** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
 const HOLD_S = 0.35;

@@ -180,6 +180,20 @@ describe("a gaze that opens or closes the panel", () => {
     expect([person.changes, person.wishes]).toEqual([1, []]);
   });
 
+  it("was not looked for when stereo begins with the gaze on the button", () => {
+    const person = new LookingPerson(9, busy);
+    person.lookAt("opener");
+    person.hands.stop();
+    person.hands.start(null);
+    person.rest(6);
+    expect(person.hands.pointed).toBe("opener");
+    expect(person.hands.panel.isOpen).toBe(false);
+    person.lookUp();
+    person.lookAt("opener");
+    person.rest(2);
+    expect(person.hands.panel.isOpen).toBe(true);
+  });
+
   it("chooses no tile behind it", () => {
     const person = at(CHANNELS);
     person.lookAt("close");

@@ -7,8 +7,9 @@ import type { ViewerState } from "../state/viewer_state";
 import type { SplitSession } from "./cardboard/split_session";
 import { askInTap } from "./cardboard/user_gesture";
 import type { Profile } from "./cardboard/viewer_profile";
+import type { HandsOptions } from "./hands_options";
 import { betweenEyes } from "./head_pose";
-import { Hands, type HandsOptions } from "./interaction";
+import { Hands } from "./interaction";
 import { bearingOf, headBearing } from "./panel/placement";
 import { XrSession } from "./session";
 import { spreadEyes } from "./stereo_strength";
@@ -17,7 +18,12 @@ export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
   Readonly<{ onStart: () => void; onEnd: () => void }>;
 
 /** A control of the panel in the room: how far to the right of where the head faces, and above its level. */
-export type MenuEntry = Readonly<{ id: string; right_deg: number; up_deg: number }>;
+export type MenuEntry = Readonly<{
+  id: string;
+  label: string;
+  right_deg: number;
+  up_deg: number;
+}>;
 
 export type EyeSettings = Readonly<{
   distance_m: number;
@@ -225,10 +231,11 @@ export class Stereo {
     if (head === null) return [];
     const eye = new Vector3().setFromMatrixPosition(head);
     const { yaw } = headBearing(head);
-    return this.hands.panel.places.map(({ id, at }) => {
+    return this.hands.panel.places.map(({ id, label, at }) => {
       const bearing = bearingOf(at.sub(eye));
       return {
         id,
+        label,
         right_deg: MathUtils.radToDeg(bearing.yaw - yaw),
         up_deg: MathUtils.radToDeg(bearing.pitch),
       };

@@ -14,8 +14,17 @@ describeInChromium("a gaze that rests on the page's panel", () => {
   const menu = async () => (await stand.viewer.snapshot()).menu.map(({ id }) => id);
   const channels = async () => (await stand.viewer.snapshot()).state.channels;
 
+  /** Nine channels fill the panel: one of them lies where the button was that opens it. */
   async function enter(): Promise<Gazer> {
     const { page } = stand.viewer;
+    const { channels: few, ...rest } = stand.manifest;
+    const more = Array.from({ length: 9 - few.length }, (_, i) => ({
+      ...few[few.length - 1],
+      id: `marker_${i}`,
+      name: `Marker ${i}`,
+    }));
+    const body = JSON.stringify({ ...rest, channels: [...few, ...more] });
+    stand.host.overrides.set("/bundle/manifest.json", { status: 200, body });
     await addClock(page);
     await page.addInitScript(() => {
       localStorage.setItem("stereocell-told", "9"); // no card before the eyes
@@ -41,6 +50,7 @@ describeInChromium("a gaze that rests on the page's panel", () => {
     await gazer.rest(2);
     expect((await menu()).length).toBeGreaterThan(1);
     const opened = await menu();
+    expect(opened).toContain("marker_1/open");
     await shoot("menu_opened");
     await gazer.rest(6);
     await shoot("menu_rested");

@@ -158,16 +158,14 @@ function tabs(sections: readonly Section[], open: string): Block {
 
 function pager(page: number, count: number): Block {
   const rect: Rect = { ...CONTENT, y: CONTENT.y + CONTENT.height - ROW, height: ROW };
+  const label = `More (${page + 1} of ${count})`;
   return {
     height: ROW,
-    marks: [
-      box(rect, "raised"),
-      text(rect, `More (${page + 1} of ${count})`, { align: "center", size: SMALL + 2 }),
-    ],
+    marks: [box(rect, "raised"), text(rect, label, { align: "center", size: SMALL + 2 })],
     regions: [
       {
         id: "more",
-        label: "More",
+        label,
         rect,
         isSlide: false,
         isStep: true,

@@ -2,6 +2,7 @@
 
 import { arrange, element, setText } from "../../dom/element";
 import type { Control, Group, Layout, Section } from "../controls";
+import { ignoreSecondClicks } from "./double_click";
 import type { Send, Widget } from "./widget";
 import { makeWidget } from "./widgets";
 
@@ -140,6 +141,7 @@ export class Panel {
       this.body,
       this.status,
     );
+    ignoreSecondClicks(this.root);
   }
 
   update(layout: Layout): void {

@@ -191,7 +191,7 @@ function makeButton(first: Button, send: Send): Widget<Button> {
         if (!now.refusal) send(now.to());
       },
     },
-    { ...hooks(first.id), action: first.id },
+    { ...hooks(first.id), action: first.id, ...(first.isStep ? { step: "" } : {}) },
   );
   const data = first.showsReason ? { [`${camel(first.id)}Reason`]: "" } : {};
   const reason = element("p", { className: "hint" }, data);

@@ -192,12 +192,12 @@ export class RoomPanel {
    * The button and what the panel has now, each with a point of it in the room: of a slider at 0.3 of it;
    * none on a flat screen.
    */
-  get places(): readonly Readonly<{ id: string; at: Vector3 }>[] {
+  get places(): readonly Readonly<{ id: string; label: string; at: Vector3 }>[] {
     if (!this.group.visible) return [];
-    const opener = { id: OPENER_KEY, isSlide: false };
-    return [opener, ...this.regions].flatMap(({ id, isSlide }) => {
+    const opener = { id: OPENER_KEY, label: this.openerLabel, isSlide: false };
+    return [opener, ...this.regions].flatMap(({ id, label, isSlide }) => {
       const at = this.pointOf(id, isSlide ? 0.3 : 0.5);
-      return at === null ? [] : [{ id, at }];
+      return at === null ? [] : [{ id, label, at }];
     });
   }
 
@@ -252,11 +252,14 @@ export class RoomPanel {
     return this.quad.show(this.page.marks);
   }
 
+  private get openerLabel(): string {
+    return this.isOpen ? "Close" : "Menu";
+  }
+
   private paintOpener(): void {
-    const words = this.isOpen ? "Close" : "Menu";
     this.opener.show([
       { kind: "box", rect: OPENER, fill: "back", stroke: "accent", radius: 0 },
-      text(OPENER, words, { align: "center", size: 38 }),
+      text(OPENER, this.openerLabel, { align: "center", size: 38 }),
     ]);
   }
 

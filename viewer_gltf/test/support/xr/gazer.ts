@@ -2,15 +2,10 @@
 import type { Page } from "playwright-core";
 import { tick } from "../browser/clock";
 import type { ViewerPage } from "../browser/page";
-import { seeded } from "../seeded";
+import { tremble } from "./tremble";
 
 /** Time of a frame, ms: the longest that counts in full. */
 const FRAME_MS = 100;
-/** Sway of a resting head, degrees, and its period, s. */
-const SWAY_DEG = 0.3;
-const SWAY_S = 2.3;
-/** Tremor of a resting head, degrees to either side. */
-const TREMOR_DEG = 0.15;
 /** The eyes move with the neck, so that looking at a place takes a few corrections. */
 const CORRECTIONS = 4;
 /** Age of a report, ms, from which nothing is predicted: the head's turn is then the same in every run. */
@@ -20,7 +15,7 @@ const OLD_MS = 1000;
 export class Gazer {
   private yaw_deg = 0;
   private pitch_deg = 0;
-  private readonly random = seeded(7);
+  private readonly offsets = tremble(FRAME_MS / 1000);
 
   constructor(private readonly viewer: ViewerPage) {}
 
@@ -45,12 +40,10 @@ export class Gazer {
     await tick(this.page, 10);
   }
 
-  /** Look on at the same place, with the tremor and the sway of a head. */
+  /** Look on at the same place, trembling as heads do. */
   async rest(seconds: number): Promise<void> {
     for (let k = 0; k < Math.round((1000 * seconds) / FRAME_MS); k++) {
-      const sway = SWAY_DEG * Math.sin((2 * Math.PI * k * FRAME_MS) / 1000 / SWAY_S);
-      const tremor = () => TREMOR_DEG * (2 * this.random() - 1);
-      await this.report(sway + tremor(), tremor());
+      await this.report(...(this.offsets.next().value as readonly [number, number]));
       await tick(this.page, FRAME_MS);
     }
   }

@@ -1,0 +1,31 @@
+/** What the hands in stereo are made with. */
+import type { Scene, WebXRManager } from "three";
+import type { Target } from "../interaction/ray_pointer";
+import type { BoxedTile } from "../math/pick";
+import type { Ray } from "../math/vec3";
+import type { Layout, Lenses, PanelView } from "../panel/controls";
+import type { Specimen } from "../render/specimen_pose";
+import type { Action } from "../state/actions";
+import type { Command } from "../state/commands";
+
+export type HandsOptions = Readonly<{
+  xr: Pick<WebXRManager, "getFrame" | "getReferenceSpace">;
+  scene: Scene;
+  specimen: Specimen;
+  tiles: readonly BoxedTile[];
+  /** Between the panel and the tiles: what is dragged, such as a cut's handles. */
+  handles?: readonly Target[];
+  layOut: (view: PanelView) => Layout;
+  onAction: (action: Action) => void;
+  onCommand: (command: Command) => void;
+  /** A tile was chosen by dwell (`isByGaze`) or button; the ray is in um of the specimen. */
+  onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void;
+  /** Stereo is to end. */
+  onLeave: () => void;
+  /** The phone is in a viewer of other lenses. */
+  onLenses?: (lenses: Lenses) => void;
+  /** Absent: true. False: panel and notices are not painted, as in a program without a screen. */
+  isPainted?: boolean;
+  /** The clock of the page's events, ms; absent: the page's own. */
+  now_ms?: () => number;
+}>;
