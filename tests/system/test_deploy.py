@@ -136,9 +136,8 @@ def test_versions_of_python_are_tested_ones() -> None:
     assert "test-newest" in (ROOT / ".ci" / "run").read_text("utf-8")
     table = (ROOT / "docs" / "install.md").read_text("utf-8").split("## How fast")[0]
     assert set(re.findall(r"^\| Linux, x86-64, Python ([\d.]+) \|", table, re.MULTILINE)) == tested
-    assert "--only-binary :all:" in (DEPLOY / "Containerfile").read_text(
-        "utf-8"
-    )  # no compiler there
+    # the image has no compiler
+    assert "--only-binary :all:" in (DEPLOY / "Containerfile").read_text("utf-8")
 
 
 def test_no_page_or_file_names_the_host_of_a_package_registry() -> None:
