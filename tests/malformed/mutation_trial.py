@@ -60,6 +60,7 @@ class Intact:
         self.source = subject.write(folder).relative_to(folder)
         self.files = list(files_of(subject, folder))
         self.unprotected: dict[Path, Ranges] = {f: subject.unprotected(f) for f in self.files}
+        self.names = {self.source.name, *(path.name for path in self.files)}
         answer = _in_fork(folder / self.source, folder.with_suffix(".intact"))
         if "reading" not in answer:
             raise AssertionError(f"{subject.format}, {subject.name}: {answer}")
@@ -93,13 +94,15 @@ class Intact:
             return "fault", answer["fault"]
         if "line" in answer:
             line = answer["line"]
-            is_sound = self.source.name in line or file in line
+            is_sound = any(name in line for name in self.names)
             is_sound = is_sound and ("expected" in line or "needs" in line)
             is_sound = is_sound and "\n" not in line and len(line) < 1500
             return ("refused", line) if is_sound else ("fault", f"not one clear line: {line}")
         found = answer["reading"]
         new = sorted(set(found.pop("notes")) - set(self.notes))
-        other = sorted(key for key in self.reading if found.get(key) != self.reading[key])
+        count = len(found["voxels"])  # a pyramid may state fewer levels now
+        expected = self.reading | {"voxels": self.reading["voxels"][:count]}
+        other = sorted(key for key in expected if found.get(key) != expected[key])
         if not other:
             return "right", ""
         words = "; ".join(
@@ -194,8 +197,10 @@ def _read(source: Path) -> Reading:
     options = {"spacing_um": (1.0, 1.0, 1.0)} if source.name == "planes" else {}
     dataset = read.open(source, **options)
     voxels = [
-        hashlib.sha256(dataset.read(channel, level.box, index).voxels.tobytes()).hexdigest()
-        for channel in range(len(dataset.channels))
+        [
+            hashlib.sha256(dataset.read(channel, level.box, index).voxels.tobytes()).hexdigest()
+            for channel in range(len(dataset.channels))
+        ]
         for index, level in enumerate(dataset.levels)
     ]
     about: Reading = {

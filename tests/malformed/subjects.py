@@ -101,6 +101,20 @@ def _chunks_of_hdf5(path: Path) -> Ranges:
     return [(chunk.byte_offset, chunk.byte_offset + chunk.size) for chunk in chunks]
 
 
+def _arrays_of_hdf5(path: Path) -> Ranges:
+    """Return where contiguous datasets lie, which hold numbers and the places of texts."""
+    found: Ranges = []
+
+    def add(_: str, node: Any) -> None:
+        if isinstance(node, h5py.Dataset) and node.id.get_offset():
+            start = node.id.get_offset()
+            found.append((start, start + node.id.get_storage_size()))
+
+    with h5py.File(path) as file:
+        file.visititems(add)
+    return found
+
+
 def _pages_of_parquet(path: Path) -> Ranges:
     content = path.read_bytes()
     return [(4, len(content) - 8 - int.from_bytes(content[-8:-4], "little"))]
@@ -336,7 +350,7 @@ def all_subjects() -> Sequence[Subject]:
         Subject("uncompressed", "CZI", _czi, unprotected=_rows(VOXELS)),
         Subject("raw", "LIF", _lif, unprotected=_rows(VOXELS)),
         Subject("snappy", "Parquet (table)", _parquet, unprotected=_pages_of_parquet),
-        Subject("contiguous", "AnnData (table)", _h5ad),
+        Subject("contiguous", "AnnData (table)", _h5ad, unprotected=_arrays_of_hdf5),
     )
 
 

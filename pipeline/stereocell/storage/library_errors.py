@@ -8,7 +8,8 @@ one line if its class is in _FAULTS; all others are bugs, and keep their traceba
 `one_line` stands around the calls of one library, and quotes its text. `library_boundary` stands
 around a whole reader as the last resort. It takes only what was raised inside a library, and quotes
 no text, which could hold a patient's name. A library that can end its process runs in a child
-process (child_process.py), whose death `one_line` turns into a line, too.
+process (child_process.py), whose death `one_line` turns into a line, too. Both keep the warnings of
+libraries from the terminal (library_noise.py).
 """
 
 import logging
@@ -31,6 +32,7 @@ import stereocell.storage.location as location
 from stereocell.model.errors import SourceError, StereoCellError
 from stereocell.storage.child_process import ChildError
 from stereocell.storage.first_bytes import HEAD_BYTES, identify
+from stereocell.storage.library_noise import quiet_libraries
 from stereocell.storage.processes import address_limit, shortage
 
 _PACKAGE = Path(__file__).parents[1]
@@ -88,7 +90,8 @@ def one_line(
     Only calls into format libraries belong inside: the caught classes are broad.
     """
     try:
-        yield
+        with quiet_libraries():
+            yield
     except ChildError as error:
         raise raised(f"{where}: {error} while it was read, expected {expected}{_REMEDY}") from None
     except StereoCellError:
@@ -109,7 +112,8 @@ def library_boundary(where: str, expected: str) -> Iterator[None]:
     Errors that our own code raised pass: they are bugs, or lines already.
     """
     try:
-        yield
+        with quiet_libraries():
+            yield
     except StereoCellError:
         raise
     except Exception as error:

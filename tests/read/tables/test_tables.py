@@ -12,9 +12,10 @@ import pytest
 import zarr
 from scipy import sparse
 
+from malformed.base import write_anndata
 from stereocell.model.errors import SourceError
 from stereocell.read.tables import parquet as parquet_tables
-from stereocell.read.tables import read_table
+from stereocell.read.tables import read_table, stores
 
 
 def csv(tmp_path: Path, text: str, name: str = "t.csv") -> str:
@@ -309,6 +310,21 @@ def test_parquet_on_which_its_library_aborts_is_refused_in_a_line(tmp_path: Path
     assert content.count(b"%\x02\x18\x05label") == 1
     place.write_bytes(content.replace(b"%\x02\x18\x05label", b"%\x42\x18\x05label"))
     assert "expected a Parquet file that is whole" in refusal(place)
+
+
+def test_a_heap_of_texts_on_which_hdf5_never_ends_is_refused_at_a_bound(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An object of a heap, of 0 bytes: HDF5 2.0 looks for the next one at the same place."""
+    place = tmp_path / "a.h5ad"
+    with h5py.File(place, "w") as file:
+        write_anndata(file, h5py.string_dtype())
+    content = bytearray(place.read_bytes())
+    size = content.index(b"CD8\0\0\0\0\0") + 16  # of the free space behind the last object
+    content[size : size + 8] = bytes(8)
+    place.write_bytes(content)
+    monkeypatch.setattr(stores, "_MOST_S", 3.0)
+    assert "expected a table of AnnData" in refusal(str(place))
 
 
 def test_a_column_of_parquet_beyond_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,9 @@
-"""Tables of AnnData where they are: in a Zarr store, or in an HDF5 file (.h5ad)."""
+"""Tables of AnnData where they are: in a Zarr store, or in an HDF5 file (.h5ad).
+
+libhdf5 loops without end over some damaged heaps of texts, in C and with Python's lock, so that no
+signal is heard. A .h5ad holds such heaps, so it is read in a child process
+(storage/child_process.py).
+"""
 
 import math
 from typing import Any
@@ -14,10 +19,12 @@ from stereocell.read.hdf5_tree import Hdf5Tree, require_readable
 from stereocell.read.tables.anndata import read_anndata
 from stereocell.read.tables.table import Table
 from stereocell.read.zarr_store import GuardedStore, open_array, open_store, quiet
+from stereocell.storage.child_process import Bounds, run_in_child
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _EXPECTED = "a table of AnnData (obs, var, X)"
+_MOST_S = 300.0  # seconds for a table of HDF5; one of a million rows takes less than a tenth of it
 _TEXT_BYTES = 1024  # bytes of a text, on average in its chunk
 _LARGEST_CHUNK = 1 << 28  # bytes
 _LONGEST_TEXT = 4096  # bytes, of texts of one length
@@ -34,6 +41,14 @@ def read_anndata_zarr(location: Location, key: str, wanted: tuple[str, ...], lab
 
 def read_h5ad(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:
     """Return a table of AnnData in HDF5. Raises SourceError."""
+    with one_line(location.shown, _EXPECTED):
+        table: Table = run_in_child(
+            _read_h5ad, location, key, wanted, labels, bounds=Bounds(_MOST_S)
+        )
+    return table
+
+
+def _read_h5ad(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:
     where = location.shown
     tree = Hdf5Tree(location, _EXPECTED)
     try:
