@@ -15,7 +15,6 @@ from zarr.codecs import BloscCodec, BytesCodec, GzipCodec, ZstdCodec
 
 from stereocell import read
 from stereocell.building import input_files
-from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
 from support import phantoms
@@ -292,92 +291,7 @@ def views(kind: str, part: str, number: int) -> Iterator[str]:
             yield n5 if kind == "n5" else h5
 
 
-# --- Zarr, N5 and HDF5: chunks that are not stored
-
-
-def plan(path: Path | str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
-    capsys.readouterr()
-    flags = ["--spacing-um", "1,1,1", "--as", "intensity"]
-    code = main(["plan", str(path), "-o", str(tmp_path / "out"), *flags])
-    shutil.rmtree(tmp_path / "out", ignore_errors=True)
-    input_files.forget()
-    return code, capsys.readouterr().err
-
-
-def write_shards(path: Path) -> Path:
-    phantoms.write_ome_zarr(path, [BODY])
-    array: Any = zarr.open_group(path).create_array(
-        "0", shape=BODY.shape, dtype="u2", chunks=(4, 12, 18), shards=(8, 24, 36),
-        compressors=None, fill_value=3, overwrite=True,
-    )  # fmt: skip
-    array[:] = BODY
-    return path
-
-
-def write_hdf5(path: Path, count: int) -> Path:
-    """Write the first chunks of a dataset of eight."""
-    with h5py.File(path, "w") as file:
-        data = file.create_dataset("raw", BODY.shape, "u2", chunks=(2, 48, 36), fillvalue=9)
-        data[: 2 * count] = BODY[: 2 * count]
-    return path
-
-
-def test_the_share_of_chunks_that_are_not_stored_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    chunks = phantoms.write_ome_zarr(tmp_path / "a.ome.zarr", [BODY], chunks=(4, 48, 36))
-    flat = phantoms.write_ome_zarr(
-        tmp_path / "b.ome.zarr", [BOTH], "czyx", version="0.4", chunks=(1, 4, 48, 36),
-        scales=[{"z": 1, "y": 1, "x": 1}],
-    )  # fmt: skip
-    shards, blocks = write_shards(tmp_path / "c.ome.zarr"), write_n5(tmp_path / "a.n5", BODY)
-    told = "({}) are not stored: read as {}, as the format has it"
-    for path, lost, words in (
-        (chunks, "0/c/1/0/0", "1 of 4 chunks of level 0 " + told.format("25.00%", 0)),
-        (flat, "0/1/2/0/0", "1 of 8 chunks of level 0 " + told.format("12.50%", 0)),
-        (shards, "0/c/0/1/0", "1 of 4 shards of level 0 " + told.format("25.00%", 3)),
-        (blocks, "1/0/1", "1 of 24 blocks of level 0 " + told.format("4.17%", 0)),
-    ):
-        code, said = plan(path, tmp_path, capsys)
-        assert (code, "not stored" in said) == (0, False)
-        (path / lost).unlink()
-        code, said = plan(path, tmp_path, capsys)
-        assert code == 0
-        assert words in said
-    code, said = plan(write_hdf5(tmp_path / "a.h5", 6), tmp_path, capsys)
-    assert code == 0
-    assert "2 of 8 chunks of level 0 " + told.format("25.00%", 9) in said
-
-
-def test_chunks_of_other_channels_and_regions_are_not_counted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = phantoms.write_ome_zarr(
-        tmp_path / "b.ome.zarr", [BOTH], "czyx", chunks=(1, 4, 48, 36),
-        scales=[{"z": 1, "y": 1, "x": 1}],
-    )  # fmt: skip
-    (path / "0/c/1/3/0/0").unlink()
-    for flags, is_told in (
-        ([], True),
-        (["--channels", "0"], False),
-        (["--region", "0:12,0:48,0:36"], False),
-        (["--region", "0:13,0:48,0:36"], True),
-    ):
-        capsys.readouterr()
-        plan_it = ["plan", str(path), "-o", str(tmp_path / "out"), "--as", "intensity"]
-        assert main([*plan_it, *flags]) == 0
-        assert ("not stored" in capsys.readouterr().err) == is_told
-        shutil.rmtree(tmp_path / "out")
-
-
-def test_a_level_without_any_chunk_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = phantoms.write_ome_zarr(tmp_path / "a.ome.zarr", [BODY], chunks=(4, 48, 36))
-    shutil.rmtree(path / "0" / "c")
-    code, said = plan(path, tmp_path, capsys)
-    assert code == 1
-    assert "level 0: found none of 4 chunks, expected the voxels" in said
+# --- shards
 
 
 @pytest.mark.parametrize("place", ["start", "end"])

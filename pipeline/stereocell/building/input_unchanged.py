@@ -116,8 +116,8 @@ def _require_same(name: str, ref: SourceRef, told: str, again: str, is_written: 
     """
     told = f"{name}: changed while it was read: {told}"
     remedy = (
-        "no result of it is kept: plan into another OUT (`stereocell build INPUT -o OUT`), or put "
-        f"back the input that was planned and run `{again}` again"
+        "no result of this pass is kept: plan into another OUT (`stereocell build INPUT -o "
+        f"ANOTHER_OUT`), or put back the input that was planned and run `{again}` again"
     )
     try:
         now = open_afresh(ref)
