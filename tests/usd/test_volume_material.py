@@ -19,7 +19,8 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def over(stage_path: Path, tmp_path: Path) -> Path:
-    (layer,) = re.findall(r"```usda\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    layers = re.findall(r"```usda\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    (layer,) = (layer for layer in layers if "ND_volume" in layer)
     path = tmp_path / "volume.usda"
     path.write_text(f"{HEAD}subLayers = [@{stage_path}@])\n{layer.replace('CD31', F_ID)}")
     return path
