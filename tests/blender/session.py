@@ -1,4 +1,4 @@
-"""Run steps of test_blender.py inside Blender's Python, each in a process of its own.
+"""Run steps of the tests beside it inside Blender's Python, each in a process of its own.
 
 Each line of standard input names a step, by a file of arguments: {"step", "arguments"}. The step's
 findings go to the file that the arguments name as `result`, as JSON, what it writes to that file
@@ -378,6 +378,20 @@ def step_render(arguments):
     scene.render.filepath = arguments["picture"]
     bpy.ops.render.render(write_still=True)
     return {"engine": scene.render.engine}
+
+
+def step_plain_import(arguments):
+    """Import a stage by Blender's own importer, without the add-on."""
+    bpy.context.scene.world = bpy.data.worlds.new("World")
+    assert bpy.ops.wm.usd_import(filepath=arguments["stage"]) == {"FINISHED"}
+    blocks = [block for block in bpy.data.objects if block.type == "MESH"]
+    world = bpy.context.scene.world.node_tree
+    images = [node.image for node in world.nodes if node.bl_idname == "ShaderNodeTexEnvironment"]
+    return {
+        "colors": {block.name: surface_color(block.data.materials[0]) for block in blocks},
+        "lights": {light.name: light.type for light in bpy.data.lights},
+        "sky": [bpy.path.abspath(image.filepath) for image in images],
+    }
 
 
 def step_gltf(arguments):

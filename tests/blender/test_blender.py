@@ -4,17 +4,9 @@
 STEREOCELL_BLENDER. See blender/session.py for what happens there.
 """
 
-import atexit
 import csv
 import json
-import os
-import re
-import subprocess
-import tempfile
-from functools import cache
-from itertools import count
 from pathlib import Path
-from select import select
 from typing import Any
 
 import numpy as np
@@ -33,59 +25,16 @@ from stereocell.model.identifiers import to_identifier
 from stereocell.samples.cells import table_beside, write_cells
 from stereocell.storage.overwriting import forcing
 from stereocell.usd.validate import validate_stage
+from support.blender_session import NEEDS_BLENDER, run
 from support.bundles import load
 from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, NAMES, TILES, leaf, write_whole
 
-PYTHON = os.environ.get("STEREOCELL_BLENDER", "")
-SESSION = Path(__file__).with_name("session.py")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not PYTHON, reason="needs Blender's Python: run `make test-blender`"),
-]
-_turns = count()
+pytestmark = NEEDS_BLENDER
 
 
 @pytest.fixture(scope="module")
 def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_whole(tmp_path_factory.mktemp("stage"))
-
-
-@cache
-def blender() -> subprocess.Popen[str]:
-    """Start Blender, which runs step after step until this process ends."""
-    folder = tempfile.TemporaryDirectory()  # each step leaves one of Blender's own in it
-    atexit.register(folder.cleanup)
-    process = subprocess.Popen(
-        [PYTHON, str(SESSION)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "TMPDIR": folder.name},
-    )
-    atexit.register(process.communicate)
-    return process
-
-
-def run(step: str, folder: Path, **arguments: Any) -> Any:
-    """Run one step in a Blender that nothing has been done in and return what it found."""
-    turn = next(_turns)
-    result, file = folder / f"result{turn}.json", folder / f"arguments{turn}.json"
-    file.write_text(json.dumps({**arguments, "result": str(result)}, default=str))
-    process = blender()
-    assert process.stdin is not None
-    assert process.stdout is not None
-    print(json.dumps({"step": step, "arguments": str(file)}), file=process.stdin, flush=True)
-    if not select([process.stdout], [], [], 300)[0]:
-        process.kill()
-        blender.cache_clear()  # the next step has another one
-        pytest.fail(f"{step}: no end after 300 s")
-    code = process.stdout.readline().strip()
-    said = Path(f"{result}.txt").read_text()
-    assert code == "0", said[-3000:]
-    found = json.loads(result.read_text())
-    # how an operator's report reaches a terminal
-    told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", said, re.MULTILINE)
-    return {**found, "told": told} if step.startswith("edit") else found
 
 
 def test_meshes_have_their_size_place_and_colour(stage_path: Path, tmp_path: Path) -> None:

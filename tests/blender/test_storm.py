@@ -12,14 +12,11 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from support.stages import HEAD, write_whole
+from support.blender_session import NEEDS_BLENDER, PYTHON
+from support.stages import F_ID, HEAD, write_whole
 
-PYTHON = os.environ.get("STEREOCELL_BLENDER", "")
 SCRIPT = Path(__file__).with_name("storm.py")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not PYTHON, reason="needs Blender's Python: run `make test-blender`"),
-]
+pytestmark = NEEDS_BLENDER
 
 
 @pytest.fixture(scope="module")
@@ -57,3 +54,16 @@ def test_the_specimen_is_neither_black_nor_white_by_its_own_lights(
     assert (lit >= 1).all(axis=1).mean() < 0.01  # no more than highlights are white
     dark = edit(stage_path, tmp_path / "dark.usda", 'over "Lights" (active = false)\n{\n}')
     assert luminance(draw(dark, tmp_path / "dark.png")) < 0.05
+
+
+def test_an_edited_channel_is_drawn_in_its_new_colour(stage_path: Path, tmp_path: Path) -> None:
+    """An artist edits the interface of one material, and sees all tiles change."""
+    color = f'over "{F_ID}"\n{{\ncolor3f inputs:color = (0.05, 0.8, 0.1)\n}}'
+    layer = edit(stage_path, tmp_path / "e.usda", f'over "Channels"\n{{\n{color}\n}}')
+    before, after = draw(stage_path, tmp_path / "a.png"), draw(layer, tmp_path / "b.png")
+
+    def is_green(pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return (pixels[:, 1] > 1.5 * pixels[:, 0]) & (pixels[:, 1] > 1.5 * pixels[:, 2])
+
+    assert is_green(before).mean() < 0.01
+    assert is_green(after).mean() > 0.5

@@ -410,6 +410,7 @@ def test_channel_hidden_in_a_tile_stays_hidden_whatever_is_chosen(bundle, edit, 
             lambda s: choose(s, "r0_c1", representation="wire"),
             "r0_c1: representation 'wire', expected one of mesh, volume, both",
         ),
+        (lambda s: s.SetMetadata("upAxis", "Z"), "upAxis is Z, expected Y"),
         (lambda s: s.SetMetadata("metersPerUnit", 0.01), "metersPerUnit is 0.01, expected 1e-06"),
         (
             lambda s: s.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(1, 2, 0)),

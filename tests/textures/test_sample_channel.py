@@ -115,7 +115,7 @@ def test_stage_shows_the_paint_and_leaves_other_channels_to_be_recoloured(built:
         tile.GetVariantSet("lod").SetVariantSelection(f"lod{level}")
         mesh = stage.GetPrimAtPath(f"{tile.GetPath()}/{channel}/{channel}_r0_c0")
         material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
-        surface, _, _ = material.ComputeSurfaceSource()
+        surface, _, _ = material.ComputeSurfaceSource("glslfx")
         (source,) = surface.GetInput("diffuseColor").GetValueProducingAttributes()
         return source
 

@@ -7,7 +7,7 @@ import pytest
 from pxr import Usd, UsdShade
 
 from stereocell.usd.validate import validate_stage
-from support.stages import COLORS, F_ID, HEAD, TILES, leaf, write_whole
+from support.stages import COLORS, F_ID, TILES, leaf, write_whole
 
 DOCS = Path(__file__).parents[2] / "docs" / "stage.md"
 
@@ -19,9 +19,11 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def over(stage_path: Path, tmp_path: Path) -> Path:
-    (layer,) = re.findall(r"```usda\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    layers = re.findall(r"```usda\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    (layer,) = (layer for layer in layers if "ND_volume" in layer)
     path = tmp_path / "volume.usda"
-    path.write_text(f"{HEAD}subLayers = [@{stage_path}@])\n{layer.replace('CD31', F_ID)}")
+    named = layer.replace("CD31", F_ID).replace("out/mine/stage/stage.usda", str(stage_path))
+    path.write_text(named)
     return path
 
 

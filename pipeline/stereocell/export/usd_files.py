@@ -8,13 +8,14 @@
 import os
 from pathlib import Path
 
-from pxr import Sdf, Usd, UsdGeom, UsdUtils
+from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
 from stereocell.export.chosen import Chosen
 from stereocell.model.counted import counted
 from stereocell.model.errors import OutputError
 from stereocell.storage.workspace import is_mirrored
 from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, UP_AXIS, export
+from stereocell.usd.read_appearances import edited_color
 from stereocell.usd.read_attributes import select_variant
 from stereocell.usd.read_variants import lod_levels
 from stereocell.usd.write_usdz import write_usdz
@@ -44,6 +45,7 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
         if levels:
             select_variant(prim, "lod", f"lod{levels[-1]}")
     flat = stage.Flatten(addSourceFileComment=False)
+    _state_colors(stage, flat)
     for name in chosen.all_tiles:
         if name not in chosen.tiles:
             _remove(flat, TILES.AppendChild(name))
@@ -62,6 +64,15 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
     export(flat, path)
     tiles = counted(len(chosen.tiles), "tile")
     return f"{tiles} at lod{level}; volumes and maps stay in {chosen.path.parent}"
+
+
+def _state_colors(stage: Usd.Stage, flat: Sdf.Layer) -> None:
+    """Give shaders the colour of a material's edited interface: many programs read theirs alone."""
+    for prim in stage.Traverse():
+        edited = edited_color(prim) if prim.IsA(UsdShade.Material) else None
+        if edited is not None:
+            plain = flat.GetAttributeAtPath(f"{prim.GetPath()}/surface.inputs:diffuseColor")
+            plain.default = edited.Get()
 
 
 def _channels(stage: Usd.Stage, place: Sdf.Path) -> list[str]:

@@ -21,6 +21,7 @@ METERS_PER_UNIT = 1e-6  # a stage unit is 1 um
 UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
 PAINTED_BY = "stereocell:paintedBy"  # on a channel's prim: ID of the channel that is painted on it
+BUILT_COLOR = "stereocellBuiltColor"  # custom data of a surface's colour: as the build wrote it
 CHANNELS = ROOT.AppendChild("Channels")
 CLASSES = ROOT.AppendChild("Classes")  # by channel: materials of its objects' classes
 TILES = ROOT.AppendChild("Tiles")

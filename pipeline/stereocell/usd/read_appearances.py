@@ -16,7 +16,7 @@ from stereocell.model.channel import (
     normalized,
 )
 from stereocell.model.errors import StageError
-from stereocell.usd.layer import CHANNELS
+from stereocell.usd.layer import BUILT_COLOR, CHANNELS
 from stereocell.usd.numbers2d import read_numbers
 from stereocell.usd.read_attributes import (
     color_of,
@@ -121,12 +121,42 @@ def material_of(surface: UsdShade.Shader) -> Material:
     """
     color = WHITE
     if feeder(surface, "color") is None:
-        diffuse = _source(surface, "diffuseColor")
+        diffuse = _color_source(surface)
         if diffuse is None:
             raise StageError(f"{surface.GetPath()}.inputs:diffuseColor: no value")
         color = color_of(diffuse)
     # defaults: the specification of UsdPreviewSurface
     return Material(color, _share(surface, "metallic", 0.0), _share(surface, "roughness", 0.5))
+
+
+def edited_color(material: Usd.Prim) -> Usd.Attribute | None:
+    """Return the colour of a material's interface if it was edited since the build."""
+    interface = material.GetAttribute("inputs:color")
+    surface = material.GetChild("surface")
+    plain = surface.GetAttribute("inputs:diffuseColor") if surface else None
+    built = plain.GetCustomDataByKey(BUILT_COLOR) if plain else None
+    return interface if interface and built is not None and interface.Get() != built else None
+
+
+def _color_source(surface: UsdShade.Shader) -> Usd.Attribute | None:
+    """Return the attribute with a surface's colour: the interface's, if it was edited.
+
+    The shader has a value of its own beside it, for programs that don't follow connections. An
+    edit of that value counts where the interface was left as it was built.
+    """
+    source = _source(surface, "diffuseColor")
+    is_own = source is not None and source.GetPrim() == surface.GetPrim()
+    edited = edited_color(surface.GetPrim().GetParent()) if is_own else None
+    return edited or source
+
+
+def _channel_color(prim: Usd.Prim) -> Usd.Attribute:
+    """Return the attribute with a channel's colour; without a plain surface, the interface's."""
+    surface = UsdShade.Shader(prim.GetChild("surface"))
+    diffuse = surface.GetInput("diffuseColor") if surface else None
+    is_plain = diffuse and not diffuse.HasConnectedSource() and diffuse.Get() is not None
+    found = _color_source(surface) if is_plain else None
+    return found or prim.GetAttribute("inputs:color")
 
 
 def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
@@ -146,7 +176,7 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
     return ComposedAppearance(
         prim.GetName(),
         prim.GetDisplayName() or prim.GetName(),
-        color_of(prim.GetAttribute("inputs:color")),
+        color_of(_channel_color(prim)),
         window,
         # only stages of other programs lack it
         _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).Get() else window,

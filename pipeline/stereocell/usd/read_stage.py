@@ -30,6 +30,7 @@ from stereocell.usd.layer import (
     SHAPE_HASH,
     SIDES,
     TILES,
+    UP_AXIS,
     hash_shape,
     move_box,
 )
@@ -115,7 +116,8 @@ class ComposedVolume:
 
 
 def open_stage(path: Path) -> Usd.Stage:
-    """Open a stage without its payloads. Raises StageError where it can't, or for other units."""
+    """Open a stage without its payloads. Raises StageError where it can't, or for other
+    units or another up axis."""
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
     try:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
@@ -131,6 +133,9 @@ def open_stage(path: Path) -> Usd.Stage:
         unit = UsdGeom.GetStageMetersPerUnit(stage)
         if not UsdGeom.LinearUnitsAre(unit, METERS_PER_UNIT):
             raise StageError(f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}")
+    axis = UsdGeom.GetStageUpAxis(stage)
+    if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis) and axis != UP_AXIS:
+        raise StageError(f"{path}: upAxis is {axis}, expected {UP_AXIS}")
     for needed in (ROOT, CHANNELS, TILES):
         if not stage.GetPrimAtPath(needed):
             raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")

@@ -1,9 +1,13 @@
 """Write the appearances of a stage: looks/channels.usda, the one place where a channel's lives.
 
 Each channel is a material below /Specimen/Channels that the materials of all tiles inherit. The
-colour is an input of the material: the surface shader is connected to it, volume renderers and the
-bundle read it. The opacity points are the transfer function; the LUT is baked from them. A variant
-with shapes is a 2D function, and its opacity points what stands for it where gradients are unknown.
+colour is an input of the material, which volume renderers and the bundle read. The shader `surface`
+repeats the colour as a plain value, because Blender's importer and small viewers don't follow a
+connection to the material's interface. Storm draws `surface_live` instead, the same shader with
+such a connection, so that an edited interface shows at once. The reader takes the interface where
+it was edited, see usd/read_appearances.py. The opacity points are the transfer function; the LUT is
+baked from them. A variant with shapes is a 2D function, and its opacity points what stands for it
+where gradients are unknown.
 
 The material has no volume output: USD ships no volume shader that renderers agree on, only
 UsdPreviewSurface. So the binding of a Volume prim to its appearance hands over the channel's values
@@ -25,6 +29,7 @@ from stereocell.model.channel import Appearance, OpacityPoints, Shapes, SurfaceL
 from stereocell.model.object_table import ObjectTable
 from stereocell.storage.json_files import write_json
 from stereocell.usd.layer import (
+    BUILT_COLOR,
     CHANNEL_API,
     CHANNELS,
     PAINTED_BY,
@@ -37,6 +42,7 @@ from stereocell.usd.numbers2d import write_numbers
 from stereocell.usd.write_objects import write_columns
 
 DEFAULT_FUNCTION = "default"
+_STORM = "glslfx"  # Storm's name among the render contexts of materials
 ROUGHNESS = 0.5  # roughness of all surfaces: the default of UsdPreviewSurface
 
 _Types = Sdf.ValueTypeNames
@@ -133,12 +139,30 @@ def _author_surface(material: UsdShade.Material, is_fed: bool) -> None:
     surface.CreateIdAttr("UsdPreviewSurface")
     # else tiles feed it: an opinion here would be stronger than theirs
     if not is_fed:
-        color = surface.CreateInput("diffuseColor", _Types.Color3f)
-        color.ConnectToSource(material.GetInput("color"))
+        color = material.GetInput("color").Get()
+        plain = surface.CreateInput("diffuseColor", _Types.Color3f)
+        plain.Set(color)
+        plain.GetAttr().SetCustomDataByKey(BUILT_COLOR, color)
     surface.CreateInput("metallic", _Types.Float).Set(0.0)
     surface.CreateInput("roughness", _Types.Float).Set(ROUGHNESS)
     output = surface.CreateOutput("surface", _Types.Token)
     material.CreateSurfaceOutput().ConnectToSource(output)
+    if not is_fed:
+        _author_live_surface(material, surface)
+
+
+def _author_live_surface(material: UsdShade.Material, surface: UsdShade.Shader) -> None:
+    """Write the surface that Storm draws: as `surface`, but its colour is the material's input.
+
+    It inherits `surface`, so that maps which a tile feeds to that reach it as well.
+    """
+    stage, path = material.GetPrim().GetStage(), material.GetPath().AppendChild("surface_live")
+    live = UsdShade.Shader.Define(stage, path)
+    live.GetPrim().GetInherits().AddInherit(surface.GetPath())
+    color = live.CreateInput("diffuseColor", _Types.Color3f)
+    color.ConnectToSource(material.GetInput("color"))
+    output = live.CreateOutput("surface", _Types.Token)
+    material.CreateSurfaceOutput(_STORM).ConnectToSource(output)
 
 
 def _author_functions(prim: Usd.Prim, appearance: Appearance) -> None:

@@ -1,7 +1,7 @@
 """Blender add-on: import a StereoCell stage as it is meant, export the edits as a USD layer.
 
 Blender's own importer has no way to choose variants, drops the materials of volumes, doesn't follow
-a surface's colour to the material's interface and doesn't read lists of numbers. So this add-on
+an edited colour to the material's interface and doesn't read lists of numbers. So this add-on
 chooses before the import, in a layer over the stage (choice.py), lets Blender import it, and builds
 what is missing from the stage's attributes (looks.py, cameras.py). overlay.py writes what the
 artist changed as a layer over the stage, which `stereocell bundle OUT --stage LAYER` takes. A label

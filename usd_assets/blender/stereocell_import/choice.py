@@ -40,6 +40,9 @@ def open_stage(path):
     unit = stage.GetMetadata("metersPerUnit")
     if abs(unit / METERS_PER_UNIT - 1) > 1e-6:
         raise StageProblem(f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}")
+    axis = stage.GetMetadata("upAxis")
+    if axis != "Y":
+        raise StageProblem(f"{path}: upAxis is {axis}, expected Y")
     return stage
 
 

@@ -1,11 +1,10 @@
 """Build what Blender's importer leaves out of a channel's look: its colour and its volume shader.
 
 Each channel has one node group with its colour, which all of its materials use, of meshes and of
-volumes: recolouring is done there, in one place, as in the stage. (No network of a stage does both:
-recolour by the material's interface and import with the right colour. Blender 5.0.1 shows grey for
-a connected diffuseColor, also with a value beside the connection, through a node graph, another
-shader, a texture's fallback or a primvar reader's.) Each channel has one volume
-material, whose colour ramp is the transfer function: positions are intensities, alphas opacities.
+volumes: recolouring is done there, in one place, as in the stage. Blender's own importer gives each
+material the plain value of its shader, which is the colour that was built.
+
+Each channel has one volume material, whose colour ramp is the transfer function: positions are intensities, alphas opacities.
 
 An opacity holds for one voxel of the volume, as it does in the bundle's viewer: the extinction per
 um is -ln(1 - opacity) / voxel. Blender keeps densities in object space, so that a scaled specimen
