@@ -63,8 +63,9 @@ const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-
 const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
 
 const LENS_KEY = "stereocell-lens";
-/** Changes of the panel after which the cards are those of the channels that are shown by then. */
-const LAYS_OUT: ReadonlySet<PanelChange["panel"]> = new Set(["find", "unfold"]);
+/** Whether the cards are laid out anew by a change: those of the channels that are shown by then. */
+const laysOutCards = (change: PanelChange) =>
+  change.panel === "find" || (change.panel === "unfold" && change.section === "channels");
 const EYE_ROWS = [EYE_DISTANCE, STEREO_STRENGTH] as const;
 
 /** The user's phone viewer, from the visit before. */
@@ -220,7 +221,7 @@ export class Controller {
     else if ("panel" in wish) {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
-      if (LAYS_OUT.has(wish.panel)) this.view = { ...this.view, carded: null };
+      if (laysOutCards(wish)) this.view = { ...this.view, carded: null };
       this.refresh();
     } else this.viewer.dispatch(wish);
   }

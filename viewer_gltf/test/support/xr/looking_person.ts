@@ -44,6 +44,20 @@ export const STEREO_FACTS: Facts = {
   redo: "Colour",
 };
 
+/** A WebXR session of a Cardboard: its one button selects what the head looks at. */
+class ButtonSession extends EventTarget {
+  readonly inputSources = [{ targetRayMode: "gaze", profiles: ["generic-button"] }];
+
+  press(time_ms: number): void {
+    const [inputSource] = this.inputSources;
+    for (const type of ["selectstart", "select", "selectend"]) {
+      const event = Object.assign(new Event(type), { inputSource, frame: null });
+      Object.defineProperty(event, "timeStamp", { value: time_ms });
+      this.dispatchEvent(event);
+    }
+  }
+}
+
 export class LookingPerson {
   state: ViewerState;
   /** Everything that was asked for outside of the panel. */
@@ -54,6 +68,7 @@ export class LookingPerson {
   /** Of the clock. */
   now_ms = 1000;
   private view: Partial<PanelView> = {};
+  private session: ButtonSession | null = null;
   private facing = new Quaternion();
   private before: readonly unknown[] = [];
   private hasJustChanged = false;
@@ -126,10 +141,18 @@ export class LookingPerson {
     for (let k = 0; k < Math.round(seconds / FRAME_S); k++) this.frame(FRAME_S);
   }
 
+  /** Go on in a session of WebXR, whose events tell of the button. */
+  enterSession(): void {
+    this.session = new ButtonSession();
+    this.hands.start(this.session as unknown as XRSession);
+    this.frame(0);
+  }
+
   /** Press the Cardboard's button, so many ms after what was done before. */
   press(after_ms = 0): void {
     this.now_ms += after_ms;
-    this.hands.tap();
+    if (this.session === null) this.hands.tap();
+    else this.session.press(this.now_ms);
     this.frame(0);
   }
 
