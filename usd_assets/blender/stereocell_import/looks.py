@@ -4,7 +4,8 @@ Each channel has one node group with its colour, which all of its materials use,
 volumes: recolouring is done there, in one place, as in the stage. Blender's own importer gives each
 material the plain value of its shader, which is the colour that was built.
 
-Each channel has one volume material, whose colour ramp is the transfer function: positions are intensities, alphas opacities.
+Each channel has one volume material, whose colour ramp is the transfer function: positions are
+intensities, alphas are opacities.
 
 An opacity holds for one voxel of the volume, as it does in the bundle's viewer: the extinction per
 um is -ln(1 - opacity) / voxel. Blender keeps densities in object space, so that a scaled specimen
