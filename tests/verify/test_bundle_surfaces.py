@@ -1,5 +1,7 @@
 """Normals of a bundle's surface against those of the stage: as near as 8 bits let them be."""
 
+import json
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import pytest
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.formats.gltf_decode import read_glb
+from stereocell.model.errors import CheckError
 from stereocell.model.mesh import Mesh
 from stereocell.verify.bundle_surfaces import _compare_faces
 
@@ -49,3 +52,21 @@ def test_normals_turned_by_five_degrees_are(fins: Mesh, tmp_path: Path) -> None:
     assert _faults(alike, alike, tmp_path) == []
     [told] = _faults(alike, replace(alike, normals=turned), tmp_path)
     assert told.endswith("% of its area is shaded by other normals")
+
+
+def test_a_file_that_states_more_rows_than_memory_holds_is_refused(
+    fins: Mesh, tmp_path: Path
+) -> None:
+    grey = Material((0.5, 0.5, 0.5))
+    data = encode_glb(fins, choose_step(2100), material=grey, name="fins", extras={}).data
+    (length,) = struct.unpack_from("<I", data, 12)
+    document = json.loads(data[20 : 20 + length])
+    for view in document["bufferViews"]:
+        view["extensions"]["EXT_meshopt_compression"]["count"] = 3 << 40
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    size = 20 + len(text) + len(data) - 20 - length
+    head = struct.pack("<4s3I4s", b"glTF", 2, size, len(text), b"JSON")
+    (tmp_path / "large.glb").write_bytes(head + text + data[20 + length :])
+    with pytest.raises(CheckError, match="expected at most 1073741824"):
+        read_glb(tmp_path / "large.glb")
