@@ -342,6 +342,20 @@ def test_a_model_or_its_image_that_changes_while_it_is_read_is_told(
     assert not (out / "tissue").exists()
 
 
+def test_a_store_that_permits_no_listing_is_compared_by_its_fingerprint_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object) -> object:
+        raise PermissionError("Access Denied")
+
+    monkeypatch.setattr(file_states, "_stored", refuse)
+    states = FileStates.look(
+        Location.of("memory://public.ome.zarr"), ["memory://public.ome.zarr/0"]
+    )
+    assert not states.is_complete
+    assert states.changed() == []
+
+
 def test_many_files_are_listed_and_not_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

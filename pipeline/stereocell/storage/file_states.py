@@ -55,8 +55,11 @@ class FileStates:
 
     @classmethod
     def look(cls, location: Location, paths: Sequence[str]) -> "FileStates":
-        """Return the present states. Raises SourceError where a store doesn't answer."""
-        states = dict(_listed(location, paths))
+        """Return the present states. A public store that permits no listing has none."""
+        try:
+            states = dict(_listed(location, paths))
+        except SourceError:
+            return cls(location, tuple(paths), {}, {}, False)
         is_complete = location.is_local or not location.source.startswith(_UNLISTED)
         if not is_complete and tuple(paths) == (location.source,):
             is_complete = all(mark for _, mark in states.values()) and bool(states)
@@ -82,6 +85,8 @@ class FileStates:
 
     def changed(self) -> list[str]:
         """Return the paths that differ now: other bytes, gone, or new. Raises SourceError."""
+        if not self.is_complete and not self.states:
+            return []
         now = dict(_listed(self.location, self.paths))
         differ = [path for path in {**self.states, **now} if self.states.get(path) != now.get(path)]
         return sorted(path for path in differ if not self._is_rewritten(path))
@@ -153,10 +158,9 @@ def unchanged_while_read(location: Location, again: str) -> Iterator[None]:
 
     again  the command that reads it anew, for the message
     """
-    paths = [location.path if location.is_local else location.source]
-    before = dict(_listed(location, paths))
+    before = FileStates.look(location, [location.path if location.is_local else location.source])
     yield
-    if dict(_listed(location, paths)) != before:
+    if before.changed():
         raise SourceError(
             f"{location.shown}: changed while it was read, expected a file that stays as it is: "
             f"{again}"
