@@ -53,7 +53,8 @@ def write_choice(stage, choice, file):
 
     Raises StageProblem if no tile fits, or a channel lacks the transfer function.
     """
-    tiles = stage.GetPrimAtPath(TILES).GetAllChildren()
+    # a tile that the stage deactivates can't be loaded, and stays as it is
+    tiles = stage.GetPrimAtPath(TILES).GetFilteredChildren(Usd.PrimIsActive & Usd.PrimIsDefined)
     chosen = [tile for tile in tiles if _fits(tile.GetName(), choice.tiles)]
     if not chosen:
         raise StageProblem(f"no tile fits {choice.tiles!r}; there are {_some_names(tiles)}")

@@ -1,0 +1,34 @@
+"""The Blender add-on imports a stage with a deactivated part, and exports edits over it."""
+
+from pathlib import Path
+
+import pytest
+
+from stereocell.usd.validate import validate_stage
+from support.blender_session import NEEDS_BLENDER, run
+from support.deactivated import PARTS, deactivate
+from support.stages import BALL_ID, F_ID, write_whole
+
+pytestmark = NEEDS_BLENDER
+
+
+@pytest.fixture(scope="module")
+def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_whole(tmp_path_factory.mktemp("stage"))
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_edits_are_exported_over_it(stage_path: Path, tmp_path: Path, part: str) -> None:
+    layer = deactivate(part, tmp_path / "edited.usda", stage_path)
+    overlay = tmp_path / "overlay.usda"
+    color = [BALL_ID, [0.25, 0.5, 0.75]]
+    found = run(
+        "edit", tmp_path, stage=layer, overlay=overlay, representation="both", lod="lod0",
+        color=color,
+        odd=[],
+    )  # fmt: skip
+    ((kind, told),) = found["told"]
+    assert kind == "Info", told
+    assert f"{BALL_ID}: colour" in told
+    assert F_ID not in told
+    assert validate_stage(overlay) == []
