@@ -93,8 +93,9 @@ class _ChildSession:
         return found
 
     def _call(self, doing: str, method: str, *arguments: Any) -> Any:
-        assert self._child is not None
-        return self._alive(doing, lambda: self._child.call(method, *arguments))
+        child = self._child
+        assert child is not None
+        return self._alive(doing, lambda: child.call(method, *arguments))
 
     def _alive(self, doing: str, work: Callable[[], Any]) -> Any:
         try:

@@ -36,7 +36,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from queue import SimpleQueue
 from types import TracebackType
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from stereocell.model.errors import StereoCellError
 
@@ -206,7 +206,7 @@ def _end(code: int) -> str:
     return f"its process ended by {name}{meaning}"
 
 
-def _send(pipe: BinaryIO, message: Any) -> None:
+def _send(pipe: IO[bytes], message: Any) -> None:
     """Write a message: the number of its parts, then each part behind its size in bytes.
 
     The first part is the pickle, and the others are the arrays in it, which are not copied.
@@ -221,7 +221,7 @@ def _send(pipe: BinaryIO, message: Any) -> None:
     pipe.flush()
 
 
-def _receive(pipe: BinaryIO) -> list[bytearray]:
+def _receive(pipe: IO[bytes]) -> list[bytearray]:
     """Return the parts of the next message. Raises EOFError where the other side is gone."""
     (count,) = _NUMBER.unpack(_exactly(pipe, _NUMBER.size))
     parts = []
@@ -235,7 +235,7 @@ def _unpickled(parts: list[bytearray]) -> Any:
     return pickle.loads(parts[0], buffers=parts[1:])
 
 
-def _exactly(pipe: BinaryIO, size: int) -> bytearray:
+def _exactly(pipe: IO[bytes], size: int) -> bytearray:
     content = bytearray(size)
     view, filled = memoryview(content), 0
     while filled < size:

@@ -46,12 +46,12 @@ def _begin() -> None:
     _saved = caught, logging.lastResort
     caught.__enter__()
     warnings.filterwarnings("ignore", module=_LIBRARIES)
-    logging.lastResort = logging.NullHandler()  # type: ignore[assignment]
+    logging.lastResort = logging.NullHandler()
 
 
 def _end() -> None:
     global _saved
     assert _saved is not None
-    caught, logging.lastResort = _saved  # type: ignore[assignment]
+    caught, logging.lastResort = _saved
     caught.__exit__(None, None, None)
     _saved = None
