@@ -97,6 +97,12 @@ async function draws(browser: Process): Promise<boolean> {
   return isThere;
 }
 
+/**
+ * How long an action waits for what it needs, ms. Playwright's own 30 s are short where other
+ * programs have the cores; a test's own limit, which is longer, ends an action that waits in vain.
+ */
+const PATIENCE_MS = 150_000;
+
 /** Pages of their own in a browser: nothing is kept of others, or for them. */
 export async function enter(
   browser: Process,
@@ -116,6 +122,7 @@ export async function enter(
     serviceWorkers,
     reducedMotion: "reduce", // what opens with a turn would never come to rest
   });
+  context.setDefaultTimeout(PATIENCE_MS);
   await context.addInitScript(() => {
     // the card at the beginning of stereo lies over pictures: whoever has seen it gets none
     if (location.protocol.startsWith("http")) localStorage.setItem("stereocell-told", "3");
