@@ -16,12 +16,12 @@ CALLS_BY_UNIT = 200  # it takes 153, imports included
 
 
 def write_empty(path: Path, channels: int) -> Path:
-    """An OME-Zarr of SHAPE that has its metadata alone: no chunk of it was ever written."""
+    """Write an OME-Zarr of SHAPE with a single chunk: all others were never stored."""
     labels = [{"label": f"stain {n}", "color": "FF0000"} for n in range(channels)]
     phantoms.write_ome_zarr(
         path, [phantoms.f_phantom()[None]], "czyx", version="0.4", channels=labels
     )
-    zarr.create_array(
+    array = zarr.create_array(
         path / "0",
         shape=(channels, *SHAPE),
         chunks=(1, *TILE),
@@ -30,6 +30,7 @@ def write_empty(path: Path, channels: int) -> Path:
         chunk_key_encoding={"name": "v2", "separator": "/"},
         overwrite=True,
     )
+    array[0, 0, 0, 0] = 1
     return path
 
 

@@ -31,6 +31,7 @@ from stereocell.model.identifiers import from_identifier, to_identifier
 from stereocell.read import Level
 from stereocell.storage.assets import schema_path
 from support.ktx2_parser import parse
+from support.sealed_files import seal
 from support.vdb_reader import read_vdb, value_at
 
 FEW = settings(
@@ -135,7 +136,7 @@ def test_a_plan_covers_its_region_once_and_its_windows_lie_inside(plan: Plan) ->
 @MANY
 @given(plans())
 def test_a_plan_survives_its_file(plan: Plan) -> None:
-    content = json.loads(json.dumps(to_json(plan)))
+    content = seal(json.loads(json.dumps(to_json(plan))))
     assert list(PLAN_SCHEMA.iter_errors(content)) == []
     assert from_json(content) == plan
     ids = [f"{channel.id}_{tile.id}" for channel in plan.channels for tile in plan.tiles]

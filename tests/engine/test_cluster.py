@@ -277,6 +277,18 @@ def test_a_cluster_without_tls_is_joined_with_a_warning(
     assert "cluster: it has no certificates (TLS), so everybody" in capsys.readouterr().err
 
 
+@pytest.mark.slow
+def test_a_caller_s_own_computations_with_dask_stay_off_the_cluster(
+    cluster: Joined, tmp_path: Path
+) -> None:
+    engine = Engine(0, cluster[0], tmp_path)
+    try:
+        assert engine.run("good", str, [("a", 1), ("b", 2)]) == ["1", "2"]
+        assert dask.config.get("scheduler", None) != "dask.distributed"
+    finally:
+        engine.close()
+
+
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x"])
 def test_what_is_no_scheduler_is_said_in_a_line(
     address: str, monkeypatch: pytest.MonkeyPatch

@@ -318,8 +318,13 @@ def test_a_page_and_its_scripts_run_and_data_does_not(port: int, path: str, is_r
     ],
 )
 def test_both_commands_serve_here_or_on_the_lan(
-    monkeypatch: pytest.MonkeyPatch, arguments: list[str], lan: bool, browser: bool
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    lan: bool,
+    browser: bool,
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     asked: list[tuple[object, ...]] = []
     monkeypatch.setattr(serve_module, "serve", lambda *given, **more: asked.append((given, more)))
     command, *flags = arguments

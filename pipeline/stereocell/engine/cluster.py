@@ -60,7 +60,8 @@ def join(scheduler: str, shared: Path | None) -> Any:
     from distributed import Client
 
     try:
-        client = Client(address, timeout=_ANSWER_S)
+        # not the default one: a caller's own computations with Dask stay where they are
+        client = Client(address, timeout=_ANSWER_S, set_as_default=False)
     except (OSError, OverflowError, ValueError, TypeError, KeyError, RuntimeError) as error:
         raise ClusterError(f"--scheduler {scheduler}: {_reason(error)}") from None
     try:

@@ -66,7 +66,7 @@ def _completed(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
     """
     from distributed import as_completed
 
-    ended = as_completed()
+    ended = as_completed(loop=client.loop)
     looked, missed, waiting, most = -math.inf, 0, 0, 0
     while missed < _LOOKS:
         if time.monotonic() - looked > _LOOK_S:
