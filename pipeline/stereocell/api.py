@@ -55,6 +55,7 @@ def build(
     from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.building.setting_names import named_as_settings
     from stereocell.engine.run import Engine
+    from stereocell.engine.worker_pool import leave_if_importing_main
     from stereocell.report import phase as report_phase
     from stereocell.storage.claim import LOCK
     from stereocell.storage.location import Location, require_apart
@@ -62,6 +63,7 @@ def build(
     from stereocell.storage.overwriting import forcing
     from stereocell.storage.workspace import opened
 
+    leave_if_importing_main()
     if not isinstance(workers, int) or workers < 0:
         raise UsageError(f"workers is {workers!r}, expected a whole number, 0 or more")
     path = (str, Path)

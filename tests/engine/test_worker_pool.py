@@ -78,6 +78,7 @@ def test_a_script_without_a_main_guard_is_told_to_have_one(tmp_path: Path) -> No
     _, text = script.communicate(timeout=PATIENCE_S)
     assert script.returncode == 1
     assert "A script that builds needs the line `if __name__ == '__main__':`" in text
+    assert text.count("Traceback") == 1  # that of the script itself, and none of its workers
 
 
 @pytest.mark.parametrize(

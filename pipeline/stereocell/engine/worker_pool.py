@@ -63,6 +63,7 @@ class WorkerPool:
     """
 
     def __init__(self, count: int, module: str) -> None:
+        leave_if_importing_main()
         self._count = min(count, _MOST_PIPES) if sys.platform == "win32" else count
         with children_ignore_interrupts():
             self._context = _choose_context(module)
@@ -94,19 +95,22 @@ class WorkerPool:
             if not self._busy():
                 retried.add(alone[0])
                 self._send(self._workers[0], function, tasks, alone.popleft())
+            died = []
             for worker in self._heard():
-                task = worker.task
                 try:
                     outcome = self._receive(worker)
                 except (EOFError, OSError):
-                    self._replace(worker)
-                    if task in retried:
-                        yield task, None, StereoCellError(KILLED)
-                    elif task is not None:
-                        alone.append(task)
-                else:
-                    if outcome is not None:
-                        yield outcome
+                    died.append(worker)
+                    continue
+                if outcome is not None:
+                    yield outcome
+            for worker in died:
+                task = worker.task
+                self._replace(worker)
+                if task in retried:
+                    yield task, None, StereoCellError(KILLED)
+                elif task is not None:
+                    alone.append(task)
 
     def close(self) -> None:
         """End the workers: idle ones by closing their pipes, busy ones at once.
@@ -182,6 +186,16 @@ class WorkerPool:
                 "'__main__':` before its first call; --workers 0 needs no processes"
             )
         self._workers[self._workers.index(worker)] = self._start()
+
+
+def leave_if_importing_main() -> None:
+    """End this process without a word if it is a worker that imports the command's script.
+
+    A worker imports the script that started it. A script without the line
+    `if __name__ == "__main__":` then starts its build again, and the command reports that.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing asks
+        os._exit(1)  # an exception would print a traceback
 
 
 def _choose_context(module: str) -> Any:

@@ -22,6 +22,7 @@ from zarr.abc.store import ByteRequest, RangeByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
+from stereocell.read import zarr_ending  # noqa: F401  (it acts as Python ends)
 from stereocell.storage.first_bytes import HEAD_BYTES, pointer_words
 from stereocell.storage.library_errors import one_line, without_warning
 from stereocell.storage.location import Location, require_own, require_own_key
