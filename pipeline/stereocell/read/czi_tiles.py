@@ -19,15 +19,17 @@ _ENTRY = struct.Struct("<2siqiiB5si")  # schema, pixel type, place, part, packin
 _AXIS = struct.Struct("<4siifi")  # name, start, size, coordinate, stored size
 _SIZES = struct.Struct("<iiq")  # of a tile's metadata, attachment and voxels
 _DIRECTORY, _TILE = b"ZISRAWDIRECTORY", b"ZISRAWSUBBLOCK"
+_SCHEMA = b"DV"  # entries of any number of axes; DE, of early files, has a fixed form
 _MOST_AXES = 64
 _PLANE = "CTZ"
+_COMPARED = "CSTXYZ"  # axes by which voxels are read: channel, scene, time and place
 
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
     """All of an entry that says which voxels a tile holds.
 
-    axes  of each axis its name, start, size and stored size
+    axes  of each axis by which voxels are read its name, start, size and stored size
     """
 
     place: int
@@ -72,13 +74,18 @@ class CziTiles:
 
 
 def _entries(file: BinaryIO, at: int) -> list[_Entry]:
-    """Return the entries of a directory. Raises ValueError where it isn't whole."""
+    """Return the entries of a directory; none of an early file's, which are not compared.
+
+    Raises ValueError, struct.error where it isn't whole.
+    """
     file.seek(at)
     name, _, used = SEGMENT.unpack(file.read(SEGMENT.size))
     content = file.read(max(0, used))
     if name.rstrip(b"\0") != _DIRECTORY or len(content) < _COUNT_BYTES:
         raise ValueError(f"no directory of tiles at byte {at}")
     (count,) = _COUNT.unpack_from(content)
+    if content.startswith(b"DE", _COUNT_BYTES):
+        return []
     entries, start = [], _COUNT_BYTES
     for _ in range(count):
         entry, start = _entry(content, start)
@@ -89,13 +96,15 @@ def _entries(file: BinaryIO, at: int) -> list[_Entry]:
 def _entry(content: bytes, start: int) -> tuple[_Entry, int]:
     """Return the entry at an offset, and the offset behind it. Raises ValueError, struct.error."""
     schema, kind, place, _, packing, _, _, count = _ENTRY.unpack_from(content, start)
-    if schema != b"DV" or not 0 <= count <= _MOST_AXES:
+    if schema != _SCHEMA or not 0 <= count <= _MOST_AXES:
         raise ValueError(f"no entry of a tile (DV) at byte {start} of its segment")
     start += _ENTRY.size
     axes = []
     for at in range(start, start + count * _AXIS.size, _AXIS.size):
         name, first, size, _, stored = _AXIS.unpack_from(content, at)
-        axes.append((name.rstrip(b"\0 ").decode("ascii", "replace"), first, size, stored))
+        title = name.rstrip(b"\0 ").decode("ascii", "replace")
+        if title in _COMPARED:
+            axes.append((title, first, size, stored))
     return _Entry(place, kind, packing, tuple(sorted(axes))), start + count * _AXIS.size
 
 

@@ -33,27 +33,36 @@ def require_sound_index(dataset: h5py.Dataset, where: str) -> None:
     places = np.array([one.chunk_offset for one in listed], np.uint64)
     starts = np.array([one.byte_offset for one in listed], np.uint64)
     sizes = np.array([one.size for one in listed], np.uint64)
-    _require(where, places, _has_place(dataset, places), "a chunk's place, each once")
-    is_apart = _is_apart(starts, sizes, int(dataset.file.id.get_filesize()))
-    _require(where, places, is_apart, "bytes in the file, and of no other chunk")
-    skipped = np.array([one.filter_mask for one in listed], np.uint64)
-    _require(where, places, _has_size(dataset, skipped, sizes), "the size of an unpacked chunk")
-    is_found = np.array([_is_found(dataset, one.chunk_offset) for one in listed])
-    _require(where, places, is_found, "a chunk that the index leads to")
+    checks = (
+        (_has_place(dataset, places), "that place twice or off the grid", "each place once"),
+        (
+            _is_apart(starts, sizes, int(dataset.file.id.get_filesize())),
+            "bytes beyond the file or of another chunk",
+            "bytes of its own",
+        ),
+        (
+            _has_size(dataset, listed, sizes),
+            "an unpacked chunk of another size",
+            "the size of its voxels",
+        ),
+        (
+            np.array([_is_found(dataset, one.chunk_offset) for one in listed]),
+            "an entry that no look-up finds",
+            "one that leads to the chunk",
+        ),
+    )
+    for is_sound, found, expected in checks:
+        if not is_sound.all():
+            place = tuple(int(n) for n in places[np.argmin(is_sound)])
+            raise SourceError(
+                f"{where}: index of chunks: {place}: found {found}, expected {expected}: the file "
+                "is damaged: copy it again"
+            )
 
 
 def _number(dataset: h5py.Dataset) -> int:
     """Return how many chunks the shape takes."""
     return math.prod(-(-n // size) for n, size in zip(dataset.shape, dataset.chunks, strict=True))
-
-
-def _require(where: str, places: NDArray[Any], is_sound: NDArray[np.bool_], expected: str) -> None:
-    if not is_sound.all():
-        place = tuple(int(n) for n in places[np.argmin(is_sound)])
-        raise SourceError(
-            f"{where}: index of chunks: entry at {place}: found a contradiction, expected "
-            f"{expected}: the file is damaged: copy it again"
-        )
 
 
 def _has_place(dataset: h5py.Dataset, places: NDArray[Any]) -> NDArray[np.bool_]:
@@ -73,13 +82,12 @@ def _is_apart(starts: NDArray[Any], sizes: NDArray[Any], end: int) -> NDArray[np
     return is_apart
 
 
-def _has_size(
-    dataset: h5py.Dataset, skipped: NDArray[Any], sizes: NDArray[Any]
-) -> NDArray[np.bool_]:
+def _has_size(dataset: h5py.Dataset, listed: list[Any], sizes: NDArray[Any]) -> NDArray[np.bool_]:
     """Whether chunks that no filter packs have the size of their voxels.
 
-    skipped  for each chunk, a bit for each filter that did not pack it
+    The mask of an entry has a bit for each filter that did not pack the chunk.
     """
+    skipped = np.array([one.filter_mask for one in listed], np.uint64)
     filters = dataset.id.get_create_plist().get_nfilters()
     every = np.uint64((1 << filters) - 1)
     unpacked = math.prod(dataset.chunks) * dataset.id.get_type().get_size()

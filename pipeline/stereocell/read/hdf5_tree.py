@@ -4,8 +4,9 @@ HDF5 looks for the file of an external link, of external storage and of a virtua
 several places, the working folder among them. So links are followed here, one by one; a dataset
 whose voxels lie in other files is refused.
 
-Texts of attributes are read in a child process (read/hdf5_texts.py). HDF5's own filters run here. Those of hdf5plugin decode in many libraries of C, which trust their
-input, so they run in a child process (read/hdf5_windows.py).
+Texts of attributes are read in a child process (read/hdf5_texts.py). HDF5's own filters run here.
+Those of hdf5plugin decode in many libraries of C, which trust their input, so they run in a child
+process (read/hdf5_windows.py).
 """
 
 import os
