@@ -276,6 +276,22 @@ def test_standard_numbers_of_either_byte_order_are_read(tmp_path: Path, dtype: s
         require_standard(file["raw"].id.get_type(), "raw")
 
 
+def test_numbers_of_few_bits_are_read_where_the_filter_n_bit_packs_them(tmp_path: Path) -> None:
+    body = f_phantom() % 4096
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        twelve_bits = h5py.h5t.STD_U16LE.copy()
+        twelve_bits.set_precision(12)
+        creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        creation.set_chunk((8, 48, 36))
+        creation.set_filter(h5py.h5z.FILTER_NBIT)
+        space = h5py.h5s.create_simple(body.shape)
+        h5py.h5d.create(file.id, b"raw", twelve_bits, space, creation)
+        file["raw"][:] = body
+        assert file["raw"].id.get_storage_size() < 0.8 * body.nbytes
+    dataset = read.open(tmp_path / "a.h5", spacing_um=SIZE_UM)
+    np.testing.assert_array_equal(whole(dataset), body)
+
+
 def write_chunks(path: Path, libver: str = "earliest", **options: Any) -> dict[Any, bytes]:
     """Write chunks of 8 planes; return the beginning of each one's entry in a B-tree."""
     with h5py.File(path, "w", libver=libver) as file:
