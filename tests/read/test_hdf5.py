@@ -1,6 +1,7 @@
 """HDF5 and Imaris files, written by h5py: axes, voxel sizes, padding, links."""
 
 import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.read import hdf5_texts
+from stereocell.read.hdf5_types import require_standard
 from support.array_files import SIZE_UM, characters, write_bdv_xml, write_ims
 from support.phantoms import F_BODY, f_phantom
 
@@ -216,3 +219,145 @@ def test_bigdataviewer_s_setups_are_channels_of_numbers_without_a_sign(tmp_path:
     cells = read.open(f"{tmp_path / 'a b.h5'}:/t00018/s00/0/cells", spacing_um=SIZE_UM)
     assert whole(cells).shape == (16, 48, 36)
     assert "BigDataViewer's axes" in refusal(tmp_path / "a b.h5", axes="zyx")
+
+
+# damage to parts of the file that have no checksum
+
+
+F32 = bytes.fromhex("11201f0004000000 00002000 17080017 7f000000")
+F64 = bytes.fromhex("11203f0008000000 00004000 340b0034 ff030000")
+U16 = bytes.fromhex("1000000002000000 00001000")
+
+
+def damage(path: Path, part: bytes, offset: int, value: int) -> None:
+    """Set a byte of the only place in a file that holds `part`."""
+    content = bytearray(path.read_bytes())
+    assert content.count(part) == 1
+    content[content.index(part) + offset] = value
+    path.write_bytes(content)
+
+
+def window_refusal(source: Path) -> str:
+    with pytest.raises(SourceError) as caught:
+        whole(read.open(source, spacing_um=SIZE_UM))
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "part", "offset", "value"),
+    [
+        ("f4", F32, 16, 0x77),  # the exponent's bias
+        ("f4", F32, 1, 0x00),  # whether the mantissa's first bit is implied
+        ("f8", F64, 15, 0x30),  # the bits of the mantissa
+        ("u2", U16, 10, 12),  # the bits in use
+    ],
+    ids=["bias", "implied bit", "mantissa", "bits"],
+)
+def test_a_number_that_is_described_in_no_standard_way_is_refused(
+    tmp_path: Path, dtype: str, part: bytes, offset: int, value: int
+) -> None:
+    path = write(tmp_path / "a.h5", voxels=f_phantom().astype(dtype))
+    damage(path, part, offset, value)
+    assert "expected an IEEE float or an integer of all bits" in window_refusal(path)
+
+
+def test_a_voxel_size_that_is_described_in_no_standard_way_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.h5", element_size_um=SIZE_UM)
+    damage(path, F64, 16, 0xFE)
+    assert "attribute 'element_size_um'" in window_refusal(path)
+
+
+@pytest.mark.parametrize("dtype", ["<f2", ">f4", "<f8", ">i2", "<u4", "|i1", "|b1"])
+def test_standard_numbers_of_either_byte_order_are_read(tmp_path: Path, dtype: str) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("raw", data=(f_phantom() // 1000).astype(dtype))
+        require_standard(file["raw"].id.get_type(), "raw")
+
+
+def test_numbers_of_few_bits_are_read_where_the_filter_n_bit_packs_them(tmp_path: Path) -> None:
+    body = f_phantom() % 4096
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        twelve_bits = h5py.h5t.STD_U16LE.copy()
+        twelve_bits.set_precision(12)
+        creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        creation.set_chunk((8, 48, 36))
+        creation.set_filter(h5py.h5z.FILTER_NBIT)
+        space = h5py.h5s.create_simple(body.shape)
+        h5py.h5d.create(file.id, b"raw", twelve_bits, space, creation)
+        file["raw"][:] = body
+        assert file["raw"].id.get_storage_size() < 0.8 * body.nbytes
+    dataset = read.open(tmp_path / "a.h5", spacing_um=SIZE_UM)
+    np.testing.assert_array_equal(whole(dataset), body)
+
+
+def write_chunks(path: Path, libver: str = "earliest", **options: Any) -> dict[Any, bytes]:
+    """Write chunks of 8 planes; return the beginning of each one's entry in a B-tree."""
+    with h5py.File(path, "w", libver=libver) as file:
+        raw = file.create_dataset("raw", data=f_phantom(), chunks=(8, 48, 36), **options)
+        found: list[Any] = []
+        raw.id.chunk_iter(found.append)
+        return {
+            one.chunk_offset[0]: struct.pack(
+                "<II5Q", one.size, one.filter_mask, *one.chunk_offset, 0, one.byte_offset
+            )
+            for one in found
+        }
+
+
+@pytest.mark.parametrize(
+    ("offset", "value", "told"),
+    [
+        (36, 0x20, "no look-up finds"),  # the place within a voxel, which is always 0
+        (8, 8, "twice"),
+        (8, 16, "off the grid"),
+        (43, 1, "bytes beyond the file"),
+        (41, 0x3F, "of another chunk"),
+        (4, 1, "another size"),  # the chunk is packed, and the entry says that it isn't
+    ],
+)
+def test_an_index_of_chunks_that_contradicts_itself_is_refused(
+    tmp_path: Path, offset: int, value: int, told: str
+) -> None:
+    path = tmp_path / "a.h5"
+    entries = write_chunks(path, compression="gzip")
+    damage(path, entries[0], offset, value)
+    line = window_refusal(path)
+    assert "/raw: index of chunks: (" in line
+    assert told in line
+
+
+@pytest.mark.parametrize("libver", ["earliest", "latest"])
+@pytest.mark.parametrize("most", [None, (None, 48, 36), (None, None, 36), (16, 48, 36)])
+def test_an_index_of_any_kind_is_read_with_chunks_that_are_not_stored(
+    tmp_path: Path, libver: str, most: Any
+) -> None:
+    body = f_phantom()
+    body[4:12] = 0
+    with h5py.File(tmp_path / "a.h5", "w", libver=libver) as file:
+        raw = file.create_dataset("raw", body.shape, body.dtype, chunks=(4, 11, 9), maxshape=most)
+        raw[:4], raw[12:] = body[:4], body[12:]
+    dataset = read.open(tmp_path / "a.h5", spacing_um=SIZE_UM)
+    np.testing.assert_array_equal(whole(dataset), body)
+
+
+@pytest.mark.parametrize("name", ["axistags", "unit", "label"])
+def test_a_heap_of_texts_on_which_hdf5_never_ends_is_refused_at_a_bound(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """An object of a heap, of 0 bytes: HDF5 2.0 looks for the next one at the same place."""
+    path = write(tmp_path / "a.h5", resolution=SIZE_UM)
+    with h5py.File(path, "a") as file:
+        if name == "label":
+            for dim in file["raw"].dims:
+                dim.label = "depth of it"
+        else:
+            file["raw"].attrs[name] = "depth of it"
+    content = bytearray(path.read_bytes())
+    size = content.rindex(b"depth of it\0\0\0\0\0") + 16 + 8  # of the free space behind it
+    content[size : size + 8] = bytes(8)
+    path.write_bytes(content)
+    monkeypatch.setattr(hdf5_texts, "_MOST_S", 1.0)
+    line = window_refusal(path)
+    assert "did not end within 1 s" in line

@@ -71,6 +71,38 @@ def test_scenes_of_a_czi_are_series(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert not (tmp_path / "out" / "plan.json").exists()
 
 
+@pytest.mark.parametrize(
+    ("offset", "told"),
+    [
+        (16, "stored size"),
+        (4, "axis X start"),
+        (-1, "axis"),  # the axis' own name
+        (None, "compression"),
+    ],
+)
+def test_a_czi_s_directory_that_differs_from_its_tiles_is_refused(
+    tmp_path: Path, offset: int | None, told: str
+) -> None:
+    path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
+    content = bytearray(path.read_bytes())
+    entries = content.index(b"ZISRAWDIRECTORY") + 32 + 128
+    axis = content.index(b"X\0\0\0", entries)
+    content[entries + 18 if offset is None else axis + max(offset, 0)] ^= 1
+    path.write_bytes(content)
+    line = refusal(path)
+    assert told in line
+    assert "as in the directory" in line
+
+
+def test_a_czi_s_tile_that_is_not_where_the_directory_says_is_refused(tmp_path: Path) -> None:
+    path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
+    content = bytearray(path.read_bytes())
+    first = content.index(b"ZISRAWSUBBLOCK\0")
+    content[first + 3] ^= 1
+    path.write_bytes(content)
+    assert "a.czi" in refusal(path)
+
+
 def test_a_czi_of_rgb_or_of_one_plane_is_refused(tmp_path: Path) -> None:
     with czi.create_czi(str(tmp_path / "a.czi")) as file:
         file.write(data=np.zeros((9, 9, 3), np.uint8), plane={"C": 0, "Z": 0, "T": 0})

@@ -92,6 +92,18 @@ def test_tiles_that_are_not_stored_are_told_with_their_share(tmp_path: Path, nam
     assert note.startswith("2 of 8 strips or tiles (25.00%) are not stored: read as 0")
 
 
+def test_tiles_that_a_smaller_level_does_not_store_are_told(tmp_path: Path) -> None:
+    path = phantoms.write_ome_tiff(tmp_path / "a.ome.tif", BODY, tile=(16, 16), levels=2)
+    with tifffile.TiffFile(path, mode="r+") as tiff:
+        page = tiff.series[0].levels[1].pages[0]
+        for tag in ("TileOffsets", "TileByteCounts"):
+            stored = page.tags[tag].value
+            page.tags[tag].overwrite((0,) * len(stored))
+        count = len(stored) * len(tiff.series[0].levels[1].pages)
+    (note,) = (note for note in whole(path).notes if "not stored" in note)
+    assert note.startswith(f"level 1: {len(stored)} of {count} strips or tiles")
+
+
 def write_set(folder: Path) -> list[Path]:
     """Write OME-TIFF as two files of eight planes, each with the OME-XML of both."""
     names = ["a.ome.tif", "b.ome.tif"]

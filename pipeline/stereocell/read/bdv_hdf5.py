@@ -91,7 +91,9 @@ def _stated_levels(tree: Hdf5Tree, path: str) -> int:
 def _factors(tree: Hdf5Tree, path: str, level: int) -> Triple | None:
     """Return level 0's voxels per voxel (z, y, x); the file has a row x, y, z for each level."""
     node = tree.find(path)
-    table = np.atleast_2d(node[()]) if isinstance(node, h5py.Dataset) else np.zeros((0, 3))
+    table = np.zeros((0, 3))
+    if isinstance(node, h5py.Dataset):
+        table = np.atleast_2d(Hdf5Array(node, f"{tree.where}: {path}")[()])
     if level >= len(table) or table.shape[1] != 3 or not np.all(table[level] > 0):
         return None
     x, y, z = (float(value) for value in table[level])

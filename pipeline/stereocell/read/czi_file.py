@@ -8,9 +8,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
+from stereocell.read.czi_tiles import SEGMENT, CziTiles
 from stereocell.storage.library_errors import one_line
 
-_SEGMENT = struct.Struct("<16s2q")  # a segment's name, its length, and how much of it is used
 _PLACES = struct.Struct("<2q")  # places of the directory of voxels and of the metadata
 _PLACES_AT = 84  # bytes from the file's start
 Rectangle = tuple[int, int, int, int]  # x, y, width, height
@@ -41,7 +41,8 @@ class CziFile:
         self._where = where
         with one_line(where, "a CZI file that is whole"):
             path = os.path.realpath(path)
-            _require_whole(path, where)
+            directory = _require_whole(path, where)
+            self._tiles = CziTiles(path, directory, where)
             self._opened = library.open_czi(path)
             self._file = self._opened.__enter__()
 
@@ -59,28 +60,35 @@ class CziFile:
     def read(self, window: Rectangle, plane: dict[str, int], scene: int | None) -> NDArray[Any]:
         """Return the pixels of a window of a plane. Raises SourceError."""
         with one_line(self._where, "planes that are whole"):
+            self._tiles.require_plane(plane)
             voxels: NDArray[Any] = self._file.read(roi=window, plane=plane, scene=scene)
             return voxels[..., 0]
 
 
-def _require_whole(path: str, where: str) -> None:
-    """Raise SourceError where the directory or the metadata, mostly written last, are not there."""
-    size = os.path.getsize(path)
+def _require_whole(path: str, where: str) -> int:
+    """Return where the directory lies. Raise SourceError where it or the metadata is not there.
+
+    Both are mostly written last.
+    """
+    size, directory = os.path.getsize(path), 0
     with open(path, "rb") as file:
         file.seek(_PLACES_AT)
         head = file.read(_PLACES.size)
         needed = _PLACES_AT + _PLACES.size
         if len(head) == _PLACES.size:
             needed = 0
-            for place in _PLACES.unpack(head):
+            places = _PLACES.unpack(head)
+            directory = places[0]
+            for place in places:
                 if place <= 0:
                     continue
                 file.seek(place)
-                segment = file.read(_SEGMENT.size)
-                length = _SEGMENT.unpack(segment)[2] if len(segment) == _SEGMENT.size else 0
-                needed = max(needed, place + _SEGMENT.size + max(0, length))
+                segment = file.read(SEGMENT.size)
+                length = SEGMENT.unpack(segment)[2] if len(segment) == SEGMENT.size else 0
+                needed = max(needed, place + SEGMENT.size + max(0, length))
     if needed > size:
         raise SourceError(
             f"{where}: cut short at byte {size} of {needed} or more, expected a CZI file that is "
             "whole (copy or download it again)"
         )
+    return directory

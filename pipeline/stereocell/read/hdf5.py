@@ -18,7 +18,7 @@ from stereocell.read import bdv_hdf5
 from stereocell.read.array_axes import settle_axes
 from stereocell.read.array_spacing import ATTRIBUTES, spacing_from
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree, attribute
+from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import Grid, Triple
@@ -34,7 +34,9 @@ def read_image(location: Location, *, axes: str = "") -> Image:
     try:
         # all of it asks h5py, which may fail at any name or attribute of a damaged file
         with one_line(tree.where, "an HDF5 file that is whole"):
-            return _image(tree, location, axes)
+            image = _image(tree, location, axes)
+            tree.end_texts()
+            return image
     except BaseException:
         tree.close()
         raise
@@ -50,14 +52,14 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
     dataset, notes = _choose(tree, location.key)
     where = f"{location.path}:{dataset.name}"
     voxels = Hdf5Array(dataset, where)
-    names, assumed = settle_axes(where, voxels.shape, axes, named=_named(dataset))
+    names, assumed = settle_axes(where, voxels.shape, axes, named=_named(tree, dataset))
     array = VoxelArray(voxels, names)
     if array.size("c") > MAX_CHANNELS:
         raise SourceError(
             f"{where}: axis c: found {array.size('c')}, expected at most {MAX_CHANNELS}"
         )
     unnamed = (None,) * array.size("c")
-    grid = Grid(array.shape, _spacing(dataset, names))
+    grid = Grid(array.shape, _spacing(tree, dataset, names))
     return Image(
         (array,), (grid,), unnamed, unnamed, 1, tree.close,
         notes=(*notes, *assumed), files=tree.files,
@@ -89,22 +91,25 @@ def _choose(tree: Hdf5Tree, key: str) -> tuple[h5py.Dataset, tuple[str, ...]]:
     )
 
 
-def _named(dataset: h5py.Dataset) -> tuple[str, ...]:
+def _named(tree: Hdf5Tree, dataset: h5py.Dataset) -> tuple[str, ...]:
     """Return the axes' names of ilastik or of HDF5's labels; empty: there are none."""
-    tags = attribute(dataset, "axistags")
+    tags = tree.attribute(dataset, "axistags")
     if isinstance(tags, str):
         try:
             return tuple(str(axis["key"]).lower() for axis in json.loads(tags)["axes"])
         except (ValueError, LookupError, TypeError):
             return ()
-    return tuple(str(dim.label).lower() for dim in dataset.dims)
+    labels = tree.attribute(dataset, "DIMENSION_LABELS")
+    if labels is None or len(labels) != dataset.ndim:
+        return ("",) * dataset.ndim
+    return tuple(str(label).lower() for label in labels)
 
 
-def _spacing(dataset: h5py.Dataset, axes: Sequence[str]) -> Triple | None:
+def _spacing(tree: Hdf5Tree, dataset: h5py.Dataset, axes: Sequence[str]) -> Triple | None:
     """Return the spacing (z, y, x), um, of attributes of the dataset or of a group above it."""
     nodes: list[h5py.Group | h5py.Dataset] = [dataset, dataset.parent, dataset.file["/"]]
     for node in nodes:
-        found = {name: attribute(node, name) for name in ATTRIBUTES}
+        found = {name: tree.attribute(node, name) for name in ATTRIBUTES}
         if (spacing := spacing_from(found, axes)) is not None:
             return spacing
     return None

@@ -4,8 +4,9 @@ HDF5 looks for the file of an external link, of external storage and of a virtua
 several places, the working folder among them. So links are followed here, one by one; a dataset
 whose voxels lie in other files is refused.
 
-HDF5's own filters run here. Those of hdf5plugin decode in many libraries of C, which trust their
-input, so they run in a child process (read/hdf5_windows.py).
+Texts of attributes are read in a child process (read/hdf5_texts.py). HDF5's own filters run here.
+Those of hdf5plugin decode in many libraries of C, which trust their input, so they run in a child
+process (read/hdf5_windows.py).
 """
 
 import os
@@ -19,6 +20,9 @@ from typing import Any
 import h5py
 
 from stereocell.model.errors import SourceError
+from stereocell.read.hdf5_chunks import require_sound_index
+from stereocell.read.hdf5_texts import HeapTexts, lies_in_heap
+from stereocell.read.hdf5_types import require_standard
 from stereocell.read.hdf5_windows import PluginWindows, has_plugins
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file, require_own
@@ -43,6 +47,7 @@ class Hdf5Tree:
         self.where = location.path
         self._folder = location.folder
         self._stack = ExitStack()
+        self._texts = HeapTexts()
         self._files: list[str] = []
         with one_line(self.where, expected):
             self.root = self._open(os.path.realpath(location.path))["/"]
@@ -54,7 +59,12 @@ class Hdf5Tree:
 
     def close(self) -> None:
         """Close the file, and those that its links led to."""
+        self._texts.close()
         self._stack.close()
+
+    def end_texts(self) -> None:
+        """End the child processes that read attributes; the files stay open for their voxels."""
+        self._texts.close()
 
     def _open(self, path: str) -> h5py.File:
         self._files.append(path)
@@ -94,6 +104,21 @@ class Hdf5Tree:
                 with one_line(f"{self.where}: {path!r:.200}", "a group or a dataset"):
                     at = at[name]
         raise SourceError(f"{self.where}: {path!r:.200}: links in a circle, expected a dataset")
+
+    def attribute(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
+        """Return an attribute; text as str, also Imaris's arrays of characters; None: it lacks."""
+        if name not in node.attrs:
+            return None
+        where = f"{node.file.filename}: attribute {name!r} of {node.name}"
+        with one_line(where, "a readable one"):
+            stored = node.attrs.get_id(name).get_type()
+            require_standard(stored, where)
+            value = self._texts.read(node, name) if lies_in_heap(stored) else node.attrs[name]
+        if isinstance(value, bytes):
+            return value.decode("utf-8", "replace")
+        if getattr(value, "dtype", None) is not None and value.dtype.kind == "S":
+            return b"".join(value.ravel().tolist()).decode("utf-8", "replace")
+        return value
 
     def volumes(self, start: h5py.Group) -> Iterator[h5py.Dataset]:
         """Yield the datasets of numbers with three axes longer than 1, below a group, by name."""
@@ -137,11 +162,14 @@ def _steps(path: str) -> list[str]:
 class Hdf5Array:
     """A dataset's voxels, read by h5py a window at a time.
 
-    Raises SourceError where they lie in other files, or are packed by a filter that isn't there.
+    Raises SourceError where they lie in other files, are of no standard type, or are packed by a
+    filter that isn't there. The first window raises it where the index of the chunks is damaged.
     """
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:
         self.dataset = dataset
+        self._where = where
+        self._is_sound = False
         self._windows: Any = dataset
         if require_readable(dataset, where):
             self._windows = PluginWindows(dataset)
@@ -153,13 +181,16 @@ class Hdf5Array:
         )
 
     def __getitem__(self, key: Any) -> Any:
+        if not self._is_sound:
+            require_sound_index(self.dataset, self._where)
+            self._is_sound = True
         return self._windows[key]
 
 
 def require_readable(dataset: h5py.Dataset, where: str) -> bool:
     """Return whether a dataset's voxels are packed by a filter that is not of HDF5 itself.
 
-    Raises SourceError where they can't be had from its own file.
+    Raises SourceError where they can't be had from its own file, or are of no standard type.
     """
     is_plugin = False
     if dataset.external or dataset.is_virtual:
@@ -168,6 +199,9 @@ def require_readable(dataset: h5py.Dataset, where: str) -> bool:
             "in the file itself: copy the dataset by h5repack or h5py"
         )
     creation = dataset.id.get_create_plist()
+    filters = {creation.get_filter(index)[0] for index in range(creation.get_nfilters())}
+    if h5py.h5z.FILTER_NBIT not in filters:  # it packs numbers of any bits
+        require_standard(dataset.id.get_type(), where)
     for index in range(creation.get_nfilters()):
         code, _, _, name = creation.get_filter(index)
         is_plugin = is_plugin or (code >= _FIRST_PLUGIN and code != h5py.h5z.FILTER_LZF)
@@ -179,16 +213,3 @@ def require_readable(dataset: h5py.Dataset, where: str) -> bool:
                 f"expected gzip, LZF or szip, or {_EXTRA}"
             )
     return is_plugin
-
-
-def attribute(node: h5py.Group | h5py.Dataset, name: str) -> Any:
-    """Return an attribute; text as str, also Imaris's arrays of characters; None: there is none."""
-    if name not in node.attrs:
-        return None
-    with one_line(f"{node.file.filename}: attribute {name!r} of {node.name}", "a readable one"):
-        value = node.attrs[name]
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    if getattr(value, "dtype", None) is not None and value.dtype.kind == "S":
-        return b"".join(value.ravel().tolist()).decode("utf-8", "replace")
-    return value

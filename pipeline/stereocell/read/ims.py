@@ -17,7 +17,7 @@ import numpy as np
 from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree, attribute
+from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.spacing import Grid, Triple, um_per
 from stereocell.storage.library_errors import one_line
@@ -66,7 +66,9 @@ def read_image(location: Location) -> Image:
     try:
         # all of it asks h5py, which may fail at any name or attribute of a damaged file
         with one_line(tree.where, "an Imaris 5.5 file (HDF5), whole"):
-            return _image(tree)
+            image = _image(tree)
+            tree.end_texts()
+            return image
     except BaseException:
         tree.close()
         raise
@@ -173,7 +175,7 @@ def _require_size(tree: Hdf5Tree, group: str, stated: list[float | None]) -> Non
 def _extents(tree: Hdf5Tree) -> Triple | None:
     """Return the lengths (z, y, x) of the volume in um; None: not stated."""
     info = tree.find("/DataSetInfo/Image")
-    unit = um_per(attribute(info, "Unit") or _UNIT)
+    unit = um_per(tree.attribute(info, "Unit") or _UNIT)
     ends = [
         (
             _number(tree, "/DataSetInfo/Image", f"ExtMin{i}"),
@@ -189,7 +191,7 @@ def _extents(tree: Hdf5Tree) -> Triple | None:
 
 def _number(tree: Hdf5Tree, path: str, name: str) -> float | None:
     """Return a number of an attribute; None: there is none. Raises SourceError for another text."""
-    text = attribute(tree.find(path), name)
+    text = tree.attribute(tree.find(path), name)
     if text is None:
         return None
     try:
@@ -206,8 +208,8 @@ def _channel(tree: Hdf5Tree, index: int) -> tuple[str | None, Color | None]:
     if not isinstance(info, h5py.Group) or f"Channel {index}" not in info:
         return None, None
     node = tree.find(f"/DataSetInfo/Channel {index}")
-    name, color = attribute(node, "Name"), attribute(node, "Color")
-    mode = attribute(node, "ColorMode")
+    name, color = tree.attribute(node, "Name"), tree.attribute(node, "Color")
+    mode = tree.attribute(node, "ColorMode")
     parts: list[float] = []
     if isinstance(color, str) and mode in (None, "BaseColor"):
         try:

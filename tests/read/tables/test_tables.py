@@ -312,6 +312,17 @@ def test_parquet_on_which_its_library_aborts_is_refused_in_a_line(tmp_path: Path
     assert "expected a Parquet file that is whole" in refusal(place)
 
 
+def test_an_h5ad_whose_floats_are_described_in_no_standard_way_is_refused(tmp_path: Path) -> None:
+    place = tmp_path / "a.h5ad"
+    with h5py.File(place, "w") as file:
+        write_anndata(file, h5py.string_dtype())
+    ieee = bytes.fromhex("11203f0008000000 00004000 340b0034 ff030000")
+    content = place.read_bytes()
+    assert ieee in content
+    place.write_bytes(content.replace(ieee, ieee[:-5] + b"\x30" + ieee[-4:]))
+    assert "expected an IEEE float" in refusal(str(place))
+
+
 def test_a_heap_of_texts_on_which_hdf5_never_ends_is_refused_at_a_bound(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
+from stereocell.read.hdf5_chunks import require_sound_index
 from stereocell.read.hdf5_tree import Hdf5Tree, require_readable
 from stereocell.read.tables.anndata import read_anndata
 from stereocell.read.tables.table import Table
@@ -85,6 +86,7 @@ class _ZarrNode:
 class _Hdf5Node:
     def __init__(self, tree: Hdf5Tree, node: h5py.Group | h5py.Dataset) -> None:
         self._tree, self._node = tree, node
+        self._is_sound = False
         self.shape: tuple[int, ...] | None = None
         if isinstance(node, h5py.Dataset):
             self.shape = node.shape
@@ -107,6 +109,9 @@ class _Hdf5Node:
             raise SourceError(f"{where}: found {found}, expected numbers or texts")
         if item * math.prod(self._node.chunks or ()) > _LARGEST_CHUNK:
             raise SourceError(f"{where}: found a chunk over {_LARGEST_CHUNK} bytes, expected less")
+        if not self._is_sound:
+            require_sound_index(self._node, where)
+            self._is_sound = True
         is_text = h5py.check_string_dtype(self._node.dtype) is not None
         stored = self._node.asstr(errors="replace") if is_text else self._node
         return np.asarray(stored[key])

@@ -78,7 +78,7 @@ def read_ome(
     if axes:
         arrays = with_given_axes(where, arrays, axes)
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
-    notes = (*image.notes, *_undescribed(tiff), *note_absent(pages[0]))
+    notes = (*image.notes, *_undescribed(tiff), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
 
 

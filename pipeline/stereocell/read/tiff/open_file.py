@@ -151,19 +151,24 @@ def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
     return tuple(sorted({location.path, *map(str, paths)}))
 
 
-def note_absent(pages: Iterable[Any]) -> tuple[str, ...]:
-    """Return a note on strips and tiles of the finest level without any bytes, which are read as 0.
+def note_absent(levels: Iterable[Iterable[Any]]) -> tuple[str, ...]:
+    """Return a note on each level's strips and tiles without any bytes, which are read as 0.
+
+    levels  the pages of each level, the finest one first
 
     Writers leave out empty ones (GDAL calls such a file sparse), and a lost one looks alike.
     """
-    counts = [count for page in pages if page is not None for count in page.databytecounts]
-    absent = counts.count(0)
-    if not absent:
-        return ()
-    return (
-        f"{absent} of {len(counts)} strips or tiles ({max(absent / len(counts), 1e-4):.2%}) are "
-        "not stored: read as 0, as the format has it for empty ones and as lost ones are",
-    )
+    found = []
+    for index, pages in enumerate(levels):
+        counts = [count for page in pages if page is not None for count in page.databytecounts]
+        if absent := counts.count(0):
+            share = max(absent / len(counts), 1e-4)
+            found.append(
+                f"{f'level {index}: ' if index else ''}{absent} of {len(counts)} strips or tiles "
+                f"({share:.2%}) are not stored: read as 0, as the format has it for empty ones "
+                "and as lost ones are"
+            )
+    return tuple(found)
 
 
 def require_series(where: str, tiff: TiffFile, series: TiffPageSeries) -> None:

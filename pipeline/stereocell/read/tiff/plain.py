@@ -64,7 +64,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         page = series.keyframe
         stated = stated_by(tiff)
         files = files_of(location, (page for level in series.levels for page in level.pages))
-        absent = note_absent(series.levels[0].pages)
+        absent = note_absent(level.pages for level in series.levels)
         if series.kind == "ndtiff":
             files += (index_of(location),)
     notes = [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail

@@ -1,0 +1,131 @@
+"""The directory of a CZI file, compared with the copy of each entry at its tile.
+
+libCZI places a tile by the directory, and decodes it by the copy, so that a tile whose two entries
+differ is drawn at another size or place. Neither has a checksum.
+
+Reference: ZISRAW (CZI) File Format, "SubBlockDirectory" and "DirectoryEntryDV"
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import BinaryIO
+
+from stereocell.model.errors import SourceError
+
+SEGMENT = struct.Struct("<16s2q")  # a segment's name, its length, and how much of it is used
+_COUNT = struct.Struct("<i")  # of entries, at the start of a directory
+_COUNT_BYTES = 128  # bytes of the count and the reserved ones behind it
+_ENTRY = struct.Struct("<2siqiiB5si")  # schema, pixel type, place, part, packing, pyramid, -, axes
+_AXIS = struct.Struct("<4siifi")  # name, start, size, coordinate, stored size
+_SIZES = struct.Struct("<iiq")  # of a tile's metadata, attachment and voxels
+_DIRECTORY, _TILE = b"ZISRAWDIRECTORY", b"ZISRAWSUBBLOCK"
+_SCHEMA = b"DV"  # entries of any number of axes; DE, of early files, has a fixed form
+_MOST_AXES = 64
+_PLANE = "CTZ"
+_COMPARED = "CSTXYZ"  # axes by which voxels are read: channel, scene, time and place
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """All of an entry that says which voxels a tile holds.
+
+    axes  of each axis by which voxels are read its name, start, size and stored size
+    """
+
+    place: int
+    pixel_type: int
+    packing: int
+    axes: tuple[tuple[str, int, int, int], ...]
+
+    @property
+    def plane(self) -> tuple[int, ...]:
+        starts = {name: start for name, start, _, _ in self.axes}
+        return tuple(starts.get(axis, 0) for axis in _PLANE)
+
+
+class CziTiles:
+    """The entries of a directory, by plane; a plane's tiles are compared once.
+
+    at  place of the directory in the file
+    """
+
+    def __init__(self, path: str, at: int, where: str) -> None:
+        self._path, self._where = path, where
+        self._waiting: dict[tuple[int, ...], list[_Entry]] = {}
+        with open(path, "rb") as file:
+            for entry in _entries(file, at):
+                self._waiting.setdefault(entry.plane, []).append(entry)
+
+    def require_plane(self, plane: dict[str, int]) -> None:
+        """Raise SourceError where a tile of a plane differs from its entry in the directory."""
+        key = tuple(plane.get(axis, 0) for axis in _PLANE)
+        if key not in self._waiting:
+            return
+        with open(self._path, "rb") as file:
+            for entry in self._waiting[key]:
+                copy = _copy(file, entry.place)
+                if copy != entry:
+                    raise SourceError(
+                        f"{self._where}: tile at byte {entry.place}: found {_shown(copy, entry)}, "
+                        f"expected {_shown(entry, copy)} as in the directory: the file is "
+                        "damaged: copy or download it again"
+                    )
+        del self._waiting[key]
+
+
+def _entries(file: BinaryIO, at: int) -> list[_Entry]:
+    """Return the entries of a directory; none of an early file's, which are not compared.
+
+    Raises ValueError, struct.error where it isn't whole.
+    """
+    file.seek(at)
+    name, _, used = SEGMENT.unpack(file.read(SEGMENT.size))
+    content = file.read(max(0, used))
+    if name.rstrip(b"\0") != _DIRECTORY or len(content) < _COUNT_BYTES:
+        raise ValueError(f"no directory of tiles at byte {at}")
+    (count,) = _COUNT.unpack_from(content)
+    if content.startswith(b"DE", _COUNT_BYTES):
+        return []
+    entries, start = [], _COUNT_BYTES
+    for _ in range(count):
+        entry, start = _entry(content, start)
+        entries.append(entry)
+    return entries
+
+
+def _entry(content: bytes, start: int) -> tuple[_Entry, int]:
+    """Return the entry at an offset, and the offset behind it. Raises ValueError, struct.error."""
+    schema, kind, place, _, packing, _, _, count = _ENTRY.unpack_from(content, start)
+    if schema != _SCHEMA or not 0 <= count <= _MOST_AXES:
+        raise ValueError(f"no entry of a tile (DV) at byte {start} of its segment")
+    start += _ENTRY.size
+    axes = []
+    for at in range(start, start + count * _AXIS.size, _AXIS.size):
+        name, first, size, _, stored = _AXIS.unpack_from(content, at)
+        title = name.rstrip(b"\0 ").decode("ascii", "replace")
+        if title in _COMPARED:
+            axes.append((title, first, size, stored))
+    return _Entry(place, kind, packing, tuple(sorted(axes))), start + count * _AXIS.size
+
+
+def _copy(file: BinaryIO, place: int) -> _Entry:
+    """Return the entry at a tile, with the place that it lies at. Raises ValueError."""
+    file.seek(max(0, place))
+    head = file.read(SEGMENT.size + _SIZES.size + _ENTRY.size + _MOST_AXES * _AXIS.size)
+    if head[: len(_TILE) + 1] != _TILE + b"\0":
+        raise ValueError(f"no tile at byte {place}")
+    entry, _ = _entry(head, SEGMENT.size + _SIZES.size)
+    return _Entry(place, entry.pixel_type, entry.packing, entry.axes)
+
+
+def _shown(entry: _Entry, other: _Entry) -> str:
+    """Return in words where an entry differs from another one."""
+    parts = [
+        f"axis {name} start {start}, size {size}, stored size {stored}"
+        for name, start, size, stored in sorted(set(entry.axes) - set(other.axes))
+    ]
+    if entry.pixel_type != other.pixel_type:
+        parts.append(f"pixel type {entry.pixel_type}")
+    if entry.packing != other.packing:
+        parts.append(f"compression {entry.packing}")
+    return "; ".join(parts)[:200] or "no other axis"

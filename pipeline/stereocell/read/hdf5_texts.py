@@ -1,0 +1,42 @@
+"""Attributes of HDF5 that are texts of any length, read in a child process with a time limit.
+
+Such texts lie in heaps, and libhdf5 loops without end over some damaged heaps, in C and with
+Python's lock, so that no signal is heard. Other attributes lie in the object itself.
+"""
+
+from typing import Any
+
+import h5py
+
+from stereocell.storage.child_process import Bounds, Child
+from stereocell.storage.open_hdf5 import OpenHdf5
+
+_MOST_S = 30.0  # seconds for one attribute; to start a child takes 0.2 s of CPU, an attribute 1 ms
+_PLAIN = (h5py.h5t.TypeFloatID, h5py.h5t.TypeIntegerID, h5py.h5t.TypeEnumID)
+
+
+class HeapTexts:
+    """Reads attributes of the files of a source. A file's child starts with its first such text."""
+
+    def __init__(self) -> None:
+        self._children: dict[str, Child] = {}
+
+    def read(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
+        """Return an attribute. Raises h5py's errors, ChildError."""
+        path = str(node.file.filename)
+        if path not in self._children:
+            self._children[path] = Child(OpenHdf5, path, bounds=Bounds(_MOST_S))
+        return self._children[path].call("attribute", str(node.name), name)
+
+    def close(self) -> None:
+        """End the children; a later read starts another one."""
+        for child in self._children.values():
+            child.close()
+        self._children.clear()
+
+
+def lies_in_heap(stored: h5py.h5t.TypeID) -> bool:
+    """Whether values of a type lie in a heap, apart from the attribute or dataset."""
+    if isinstance(stored, h5py.h5t.TypeStringID):
+        return bool(stored.is_variable_str())
+    return not isinstance(stored, _PLAIN)

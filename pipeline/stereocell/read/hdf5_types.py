@@ -1,0 +1,24 @@
+"""Whether HDF5's description of a number is that of a type which programs write.
+
+HDF5 describes a number by its bits: the places of sign, exponent and mantissa, the exponent's bias,
+the bits in use. No checksum protects the description in most files, and HDF5 converts by any.
+"""
+
+import h5py
+
+from stereocell.model.errors import SourceError
+
+
+def require_standard(stored: h5py.h5t.TypeID, where: str) -> None:
+    """Raise SourceError for a number that is neither of IEEE nor an integer of all its bits."""
+    if isinstance(stored, h5py.h5t.TypeEnumID):
+        stored = stored.get_super()
+    if not isinstance(stored, h5py.h5t.TypeFloatID | h5py.h5t.TypeIntegerID):
+        return
+    standard = h5py.h5t.py_create(stored.dtype)
+    if not stored.equal(standard):
+        raise SourceError(
+            f"{where}: found a number of {8 * stored.get_size()} bits that its description "
+            "divides in another way than a standard type, expected an IEEE float or an integer "
+            "of all bits: the file is damaged: copy it again, or convert it by h5py"
+        )

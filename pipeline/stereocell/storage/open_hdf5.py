@@ -1,0 +1,19 @@
+"""An open HDF5 file in a child process (read/hdf5_texts.py).
+
+It is apart from `read`, whose imports would double the time in which a child starts.
+"""
+
+from typing import Any
+
+import h5py
+
+
+class OpenHdf5:
+    """An open HDF5 file."""
+
+    def __init__(self, path: str) -> None:
+        self._file = h5py.File(path, "r", locking="best-effort")
+
+    def attribute(self, node: str, name: str) -> Any:
+        """Return an attribute of a group or dataset. Raises h5py's errors."""
+        return self._file[node].attrs[name]
