@@ -99,7 +99,7 @@ def build(
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
         with named_as_settings():
-            phases.make(str(source), folder, wanted)
+            phases.make(str(source), folder, wanted, engine=engine)
         print_choice(choice)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)

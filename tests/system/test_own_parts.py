@@ -230,3 +230,69 @@ def test_pictures_are_replaced_by_those_of_the_same_source_alone(
         (place / "notes.txt").write_text(WORK)
         assert main([command, str(builds / "f.ome.tif"), "-o", str(place)]) == 1
         assert "holds something else (notes.txt), expected slices and no other" in _line(capfd)
+
+
+# --- a rebuild that is stopped between two phases
+
+
+def _rebuild(builds: Path, out: Path) -> list[str]:
+    return ["build", str(builds / "f.ome.tif"), "-o", str(out), *FLAGS, "--grid", "2x1"]
+
+
+@pytest.mark.parametrize("name", ["bundle/mine.txt", "stage/looks/channels.usda"])
+def test_rebuild_is_refused_before_its_first_phase_writes(
+    builds: Path, out: Path, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    own = out / name
+    own.write_text((own.read_text() if own.exists() else "") + "\n# mine\n")
+    before = digests_of(out)
+    assert main(_rebuild(builds, out)) == 1
+    assert "--force replaces it" in _line(capfd)
+    with pytest.raises(OutputError, match="--force replaces it"):
+        stereocell.build(builds / "f.ome.tif", out, settings={"plan": {"grid": "2x1"}})
+    assert digests_of(out) == before
+
+
+def test_results_of_two_plans_pass_neither_check_nor_publish(
+    builds: Path, out: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    site = tmp_path / "site"
+    for command, stale in (
+        (["plan", str(builds / "f.ome.tif"), "-o", str(out), "--grid", "2x1"], "units"),
+        (["units", str(out), *FLAGS], "stage"),
+        (["stage", str(out), *FLAGS], "bundle"),
+        (["bundle", str(out), *FLAGS], "report"),
+    ):
+        assert main(command) == 0
+        faults = [line.detail for line in check(out) if line.name == "records" and not line.ok]
+        assert len(faults) == 1
+        assert f"{out / stale}: made of another " in faults[0]
+        assert f"run `stereocell {stale} OUT`" in faults[0]
+        capfd.readouterr()
+        for source in (out, out / "bundle"):
+            assert main(["publish", str(source), str(site)]) == 1
+            assert f"{stale}: made of another " in _line(capfd)
+    assert not site.exists()
+    assert main(["report", str(out)]) == 0
+    assert [line for line in check(out) if not line.ok] == []
+    assert main(["publish", str(out), str(site)]) == 0
+
+
+def test_results_of_the_same_input_at_another_place_are_current_again(
+    builds: Path, out: Path, tmp_path: Path
+) -> None:
+    moved = shutil.copy(builds / "f.ome.tif", tmp_path / "f.ome.tif")
+    before = _results(out)
+    assert main(["build", str(moved), "-o", str(out), *FLAGS, "--grid", "1x1"]) == 0
+    assert [line for line in check(out) if not line.ok] == []
+    assert _results(out) == before
+
+
+def test_no_file_is_written_where_no_scheduler_answers(
+    builds: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    words = ["build", str(builds / "f.ome.tif"), "-o", str(out)]
+    assert main([*words, "--scheduler", "tcp://127.0.0.1:1"]) == 1
+    assert "--scheduler tcp://127.0.0.1:1" in _line(capfd)
+    assert not digests_of(out)

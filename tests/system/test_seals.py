@@ -1,6 +1,7 @@
 """Each record of a build holds a hash, and is checked by the same code when written and read."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -164,6 +165,29 @@ def test_units_of_another_plan_are_not_taken_for_those_of_this_one(
     _change(OutFolder(out).units_plan_file)
     assert main(["stage", str(out), "--workers", "0"]) == 1
     assert "not built for the plan in plan.json: run `stereocell units OUT`" in _answer(capfd)
+
+
+@pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])
+def test_hashes_in_a_line_differ_though_one_digit_of_the_seal_was_changed(
+    out: Path, name: str
+) -> None:
+    file = out / name
+    seal = re.findall(r"[0-9a-f]{64}", file.read_text())[-1]
+    changed = seal[:-1] + ("0" if seal[-1] != "0" else "1")
+    file.write_text(file.read_text().replace(seal, changed))
+    told = _faults(out)
+    assert f"its content has SHA-256 {seal}, expected {changed}: run `stereocell units" in told or (
+        f"its content has SHA-256 {seal}, expected {changed}: remove it and run" in told
+    )
+    assert told.count("run `stereocell") == 1
+
+
+@pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])
+def test_record_that_is_missing_is_not_to_be_removed(out: Path, name: str) -> None:
+    (out / name).unlink()
+    told = _faults(out)
+    assert f"{out / name} is missing: run `stereocell " in told
+    assert "remove" not in told
 
 
 # --- one rule for writing and reading

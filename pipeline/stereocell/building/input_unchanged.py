@@ -15,6 +15,7 @@ from stereocell.building.tissue_files import read_whole
 from stereocell.model.errors import SourceError
 from stereocell.read.fingerprint import covers_all
 from stereocell.read.readers import format_of
+from stereocell.read.remarks import LEFT_OUT
 from stereocell.storage.file_states import FileStates
 
 # formats whose files are called by numbers; those of others may be called by a patient's name
@@ -37,8 +38,9 @@ def require_input(plan: Plan) -> None:
     """Raise SourceError unless the input holds the voxels that were planned."""
     dataset = open_watched(source_of(plan))
     if dataset.fingerprint != plan.fingerprint:
-        # DICOM leaves out truncated files; the remarks report them
-        remarks = "".join(f"; {remark}" for remark in dataset.remarks)
+        # of a file that was cut short, DICOM leaves it out
+        lost = (remark for remark in dataset.remarks if remark.startswith(LEFT_OUT))
+        remarks = "".join(f"; {remark}" for remark in lost)
         raise SourceError(
             f"{plan.name}: changed since it was planned (fingerprint {dataset.fingerprint[:12]}, "
             f"expected {plan.fingerprint[:12]}{remarks}): plan into another OUT"

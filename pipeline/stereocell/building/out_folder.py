@@ -29,7 +29,7 @@ from stereocell.storage.sealed_text import is_sealed_text
 from stereocell.storage.workspace import is_file, names_in, remove, sizes_below
 
 SURVEY = "units.schema.json#Survey"
-_PLAN = "plan.schema.json"
+PLAN = "plan.schema.json"
 PHASES, INDEX = "units.schema.json#Phases", "units.schema.json#Index"
 EXPORTS = "units.schema.json#Exports"
 PROVENANCE, PLAN_KEY = "units.schema.json#Provenance", "units.schema.json#PlanKey"
@@ -148,14 +148,14 @@ class OutFolder:
         """Raise OutputError where no command could read the plan once it is written."""
         content = to_json(self._without_place(plan))
         data = json.dumps(sealed(content)).encode()
-        from_json(parse(self.plan_file, data, _PLAN, NOT_WRITTEN), NOT_WRITTEN)
+        from_json(parse(self.plan_file, data, PLAN, NOT_WRITTEN), NOT_WRITTEN)
 
     def plan(self) -> Plan:
         """Return the plan. Raises OutputError if there is none or it breaks its schema."""
         remedy = "run `stereocell plan INPUT -o OUT` first"
         if self.plan_file.exists():
             remedy = f"remove it and {remedy}"
-        return self._in_place(from_json(read_sealed(self.plan_file, _PLAN, remedy)))
+        return self._in_place(from_json(read_sealed(self.plan_file, PLAN, remedy)))
 
     def _without_place(self, plan: Plan) -> Plan:
         """Return a plan whose channel sources inside OUT are paths relative to OUT."""
@@ -285,9 +285,8 @@ class OutFolder:
                 f"{self.out / name}: begun and not finished: run `stereocell {name} OUT` first"
             )
 
-    def save_phase(self, name: str, key: str, results: str, seconds: float, about: str) -> None:
-        """Save a phase's key and a digest of its results; an empty key: it isn't finished."""
-        entry = {"key": key, "results": results, "seconds": round(seconds, 2), "about": about}
+    def save_phase(self, name: str, entry: Mapping[str, Any]) -> None:
+        """Save a phase's record; an empty key: it isn't finished."""
         write_sealed(self.phases_file, {**self.phases(), name: entry})
 
 

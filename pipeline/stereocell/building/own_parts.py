@@ -8,7 +8,7 @@ from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.tissue_files import FOLDER, RECORD
-from stereocell.bundle.write import FILES, MANIFEST
+from stereocell.bundle.write import FILES, MANIFEST, require_bundle
 from stereocell.model.errors import OutputError
 from stereocell.storage.contents import contents_of, is_nobodys, words_for
 from stereocell.storage.file_list import read_list
@@ -17,6 +17,23 @@ from stereocell.storage.overwriting import is_forced, refused
 from stereocell.storage.sealed_text import is_sealed_text
 from stereocell.storage.workspace import is_file, remove, sizes_below
 from stereocell.usd.written_files import ADVICE, CHANGED, DOUBTFUL, find_damage, read_stage_list
+
+
+def require_own_places(out_folder: OutFolder, *, is_same_plan: bool) -> None:
+    """Raise OutputError where a phase after the plan would replace files that no phase wrote.
+
+    is_same_plan  whether the plan stays as it is: then edited layers of the stage stay, too
+
+    A build that is refused half-way would leave the units of one plan beside the bundle of another.
+    """
+    if is_forced():
+        return
+    if not is_same_plan:
+        require_own_stage(out_folder)
+    if not out_folder.is_begun("bundle"):  # a bundle that was put there by halves has no manifest
+        require_bundle(out_folder.bundle_dir)
+    require_own_bundle(out_folder)
+    require_own_report(out_folder)
 
 
 def require_own_stage(out_folder: OutFolder) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from stereocell.building.made_of import FIELD, made_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.bundle import write as bundle_writer
 from stereocell.engine.run import console
@@ -23,6 +24,7 @@ class Phase:
         self.key, self.about = "done", ""
         self.results: Callable[[], str] = str
         self.is_up_to_date = False
+        self.is_whole = True  # False: a part of the results is still to be made
 
     def is_done(
         self, key: str, results: Callable[[], str], *, require_own: Callable[[OutFolder], None]
@@ -40,8 +42,23 @@ class Phase:
         if not self.is_up_to_date:
             require_own(self.out_folder)
             # an empty key: a killed phase is not done
-            self.out_folder.save_phase(self.name, "", "", 0.0, "")
+            self.save(0.0, is_finished=False)
         return self.is_up_to_date
+
+    def save(self, seconds: float, *, is_finished: bool = True) -> None:
+        """Save the phase's record."""
+        entry = {"key": "", "results": "", "about": "", "seconds": round(seconds, 2)}
+        if is_finished:
+            entry |= {"key": self.key, "results": self.results(), "about": self.about}
+        of = made_of(self.out_folder, self.name) if is_finished and self.is_whole else ""
+        self.out_folder.save_phase(self.name, {**entry, FIELD: of})
+
+    def keep(self) -> None:
+        """Save that the results, which stay, would be made the same of what lies in OUT now."""
+        entry = self.out_folder.phases().get(self.name)
+        of = made_of(self.out_folder, self.name) if self.is_whole else ""
+        if entry is not None and entry.get(FIELD, "") != of:
+            self.out_folder.save_phase(self.name, {**entry, FIELD: of})
 
 
 @contextmanager
@@ -54,9 +71,10 @@ def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
     yield phase
     seconds = time.perf_counter() - start
     if phase.is_up_to_date:
+        phase.keep()
         console.print(f"{name}: up to date")
     else:
-        out_folder.save_phase(name, phase.key, phase.results(), seconds, phase.about)
+        phase.save(seconds)
         console.print(f"{name}: {seconds:.1f} s")
 
 

@@ -22,7 +22,12 @@ from stereocell.building.object_tables import (
 )
 from stereocell.building.open_source import as_asked
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.own_parts import no_layer, require_own_bundle, require_own_stage
+from stereocell.building.own_parts import (
+    no_layer,
+    require_own_bundle,
+    require_own_places,
+    require_own_stage,
+)
 from stereocell.building.passes import run_passes
 from stereocell.building.phase import (
     digest_of_bundle,
@@ -74,8 +79,11 @@ from stereocell.usd.read_stage import dependencies, may_be_image
 from stereocell.usd.written_files import AsWritten
 
 
-def make(source: str, out: Path, settings: Settings) -> Plan:
+def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = None) -> Plan:
     """Write OUT/plan.json and the settings used (TOML). The same plan again changes nothing.
+
+    engine  the workers of all other phases, where these follow at once: before anything is written,
+            a cluster is joined, and the places of the phases are guarded; None: the plan alone
 
     Raises StereoCellError; OUT is unchanged then.
     """
@@ -88,6 +96,9 @@ def make(source: str, out: Path, settings: Settings) -> Plan:
         out_folder.require_writable()
         there = out_folder.replaced_plan(plan)
         out_folder.require_own_settings(plan, there)
+        if engine is not None:
+            require_own_places(out_folder, is_same_plan=there == plan)
+            engine.join()
         if there is not None and (changes := changes_of(there, plan)):
             console.print(f"plan: {changes}", markup=False, soft_wrap=True)
         phase.is_up_to_date = not out_folder.save_plan(plan)
@@ -240,6 +251,7 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
     with phase_of(out_folder, "units") as phase:
         built, missing = run_passes(out_folder, plan, engine=engine, only=only)
         phase.is_up_to_date = not built
+        phase.is_whole = not missing
         units = len(plan.tiles) * (len(plan.channels) + len(plan.labels))
         phase.about = "" if built == units else f"{built} of {units} units"
         if missing:

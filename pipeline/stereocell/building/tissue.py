@@ -19,7 +19,7 @@ from stereocell.building.input_unchanged import require_input, require_still
 from stereocell.building.model_process import ModelBounds, opened_network
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.own_parts import require_own_tissue
+from stereocell.building.own_parts import require_own_places, require_own_tissue
 from stereocell.building.phases import provenance
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
@@ -136,6 +136,7 @@ def _add(
     if record is None:
         record = _learn(out_folder, plan, channel, options, network, settings, key)
     plan = with_tissue(plan, out, record)
+    require_own_places(out_folder, is_same_plan=out_folder.plan() == plan)
     out_folder.save_plan(plan)
     write_sealed(out_folder.provenance_file, provenance(plan))
     return plan

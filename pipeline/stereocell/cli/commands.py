@@ -9,14 +9,16 @@ import argparse
 import json
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stereocell.cli.flags import flags_of, numbers
 
 if TYPE_CHECKING:
+    from stereocell.engine.run import Engine
     from stereocell.verify.formats import CheckLine
 
 
@@ -112,14 +114,17 @@ def _series(options: argparse.Namespace) -> Answer | None:
 
 def plan(options: argparse.Namespace) -> Answer:
     """Write the plan and print it."""
-    if listed := _series(options):
-        return listed
+    return _series(options) or _plan(options, None)
+
+
+def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
+    """Write the plan; with the workers of all other phases, where these follow at once."""
     from stereocell.building import phases
     from stereocell.building.preset_choice import load_for, print_choice
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    made = phases.make(options.input, options.out, wanted)
+    made = phases.make(options.input, options.out, wanted, engine=engine)
     print_choice(choice)
     return Answer(
         {
@@ -154,8 +159,15 @@ def iso(options: argparse.Namespace) -> Answer:
 
 def run_phases(options: argparse.Namespace, *names: str) -> Answer:
     """Run phases of a build in order and print their times."""
-    from stereocell.building import phases
-    from stereocell.building.out_folder import OutFolder
+    out, engine = _workers_of(options)
+    try:
+        return _run_phases(options, out, engine, names)
+    finally:
+        engine.close()
+
+
+def _workers_of(options: argparse.Namespace) -> "tuple[Path, Engine]":
+    """Return OUT as the workers reach it, and the workers. Raises UsageError."""
     from stereocell.engine.run import Engine
     from stereocell.model.errors import UsageError
     from stereocell.storage.claim import LOCK
@@ -168,21 +180,26 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
             "copy its stage/ there"
         )
     out = options.out.absolute() if scheduler else options.out  # workers may have another folder
-    engine = Engine(getattr(options, "workers", 0), scheduler, None if is_kept else out / LOCK)
-    try:
-        for name in names:
-            if name == "units":
-                phases.run_units(out, engine, only=getattr(options, "only", None))
-            elif name == "stage":
-                phases.run_stage(out, engine)
-            elif name == "bundle":
-                phases.run_bundle(out, engine, stage=edited)
-            else:
-                from stereocell.report import phase  # slow to import: it draws
+    return out, Engine(getattr(options, "workers", 0), scheduler, None if is_kept else out / LOCK)
 
-                phase.run_report(out)
-    finally:
-        engine.close()
+
+def _run_phases(
+    options: argparse.Namespace, out: Path, engine: "Engine", names: Sequence[str]
+) -> Answer:
+    from stereocell.building import phases
+    from stereocell.building.out_folder import OutFolder
+
+    for name in names:
+        if name == "units":
+            phases.run_units(out, engine, only=getattr(options, "only", None))
+        elif name == "stage":
+            phases.run_stage(out, engine)
+        elif name == "bundle":
+            phases.run_bundle(out, engine, stage=getattr(options, "stage", None))
+        else:
+            from stereocell.report import phase  # slow to import: it draws
+
+            phase.run_report(out)
     seconds = {name: phase["seconds"] for name, phase in OutFolder(out).phases().items()}
     results = {
         "stage": "stage/stage.usda",
@@ -202,8 +219,12 @@ def build(options: argparse.Namespace) -> Answer:
     """Run all phases."""
     if listed := _series(options):
         return listed
-    planned = plan(options)
-    made = run_phases(options, "units", "stage", "bundle", "report")
+    out, engine = _workers_of(options)
+    try:
+        planned = _plan(options, engine)
+        made = _run_phases(options, out, engine, ("units", "stage", "bundle", "report"))
+    finally:
+        engine.close()
     for name in ("stage", "bundle", "report"):
         print_unless_json(options, f"{name:<8} {made.data[name]}")
     print_unless_json(options, f"look at it: stereocell view {shlex.quote(str(options.shown))}")

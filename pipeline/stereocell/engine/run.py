@@ -66,6 +66,13 @@ class Engine:
         self._client: Any = None  # of the cluster
         self._pool: WorkerPool | None = None
 
+    def join(self) -> None:
+        """Join the cluster, where there is one; `run` does so, too. Raises ClusterError."""
+        if self._scheduler and self._client is None:
+            self._client = join(self._scheduler, self._shared)
+            if is_open_to_all(self._client):
+                console.print(_OPEN_CLUSTER, markup=False)
+
     def run(
         self, label: str, function: Callable[[T], R], tasks: Sequence[tuple[str, T]]
     ) -> list[R]:
@@ -122,10 +129,7 @@ class Engine:
         work      the same, with what a worker needs around it
         """
         if self._scheduler:
-            if self._client is None:
-                self._client = join(self._scheduler, self._shared)
-                if is_open_to_all(self._client):
-                    console.print(_OPEN_CLUSTER, markup=False)
+            self.join()
             return run_on_cluster(self._client, able(work, self._shared), tasks)
         if self._pool is None:
             if not are_compiled():  # each worker would do it, for half a minute

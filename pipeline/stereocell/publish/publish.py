@@ -15,6 +15,8 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from stereocell.building.made_of import require_current
+from stereocell.building.out_folder import OutFolder
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.publish.over_http import INDEX, fetch_faults, find_page
 from stereocell.publish.targets import Target, digest, target_of
@@ -62,13 +64,17 @@ def publish(
     is_public  ask S3 to let everybody read each object (ACL public-read)
     report     takes lines of progress
 
-    Raises UsageError for a url that is none; OutputError where the bundle is damaged, the target
-    can't be written, holds files of others in the bundle's place, or answers with something else.
+    Raises UsageError for a url that is none; OutputError where the bundle is damaged or not made of
+    the plan, units and stage beside it, or where the target can't be written, holds files of others
+    in the bundle's place, or answers with something else.
     """
     if url is not None and not url.startswith(("https://", "http://")):
         raise UsageError(f"--url is {url}, expected an address as https://me.example/mine")
     held = contents_of(out)
     bundle = out if held.kind in (Kind.BUNDLE, Kind.SITE) else out / "bundle"
+    build = held.build if bundle == out else out
+    if build is not None:
+        require_current(OutFolder(build))
     files = _files_of(bundle)
     specimen = _specimen_of(bundle, held)
     target = target_of(text, is_public=is_public)

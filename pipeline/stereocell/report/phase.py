@@ -3,6 +3,7 @@
 from functools import partial
 from pathlib import Path
 
+from stereocell.building.made_of import FIELD
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_report
 from stereocell.building.phase import digest_of_file, phase_of
@@ -20,7 +21,11 @@ def run_report(out: Path) -> None:
     with phase_of(out_folder, "report") as phase:
         plan = out_folder.plan()
         out_folder.require_units_of(plan)
-        others = {name: entry for name, entry in out_folder.phases().items() if name != "report"}
+        others = {
+            name: {field: value for field, value in entry.items() if field != FIELD}
+            for name, entry in out_folder.phases().items()
+            if name != "report"
+        }
         content = [out_folder.index(), out_folder.survey(), provenance(plan), others]
         key = key_of([content, page.TEMPLATE.read_text("utf-8")], page)
         done = partial(digest_of_file, out_folder.report_file)

@@ -15,6 +15,7 @@ from typing import Any
 from stereocell.model.errors import OutputError
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.documents import NOT_WRITTEN, parse
+from stereocell.storage.seals import damaged
 from stereocell.storage.workspace import fetch
 
 _SEAL = "sha256"
@@ -81,10 +82,7 @@ def read_sealed(path: Path, schema: str, remedy: str) -> dict[str, Any]:
     if isinstance(found, dict) and isinstance(expected := found.get(_SEAL), str):
         digest = _digest_of({name: value for name, value in found.items() if name != _SEAL})
         if expected != digest:
-            raise OutputError(
-                f"{path}: damaged or changed by hand: its content has SHA-256 {digest[:12]}, "
-                f"expected {expected[:12]}: {remedy}"
-            )
+            raise OutputError(damaged(path, digest, expected, remedy))
     content = dict(read_json(path, schema, remedy))
     del content[_SEAL]
     return content

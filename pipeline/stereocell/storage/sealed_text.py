@@ -10,6 +10,7 @@ from pathlib import Path
 
 from stereocell.model.errors import OutputError
 from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.seals import damaged
 from stereocell.storage.workspace import fetch
 
 # ending of the name -> how a comment begins and ends
@@ -44,10 +45,7 @@ def require_sealed_text(path: Path, remedy: str) -> None:
         )
     digest = hashlib.sha256(lines).hexdigest()
     if found[1] != digest:
-        raise OutputError(
-            f"{path}: damaged or changed by hand: its content has SHA-256 {digest[:12]}, expected "
-            f"{found[1][:12]}: {remedy}"
-        )
+        raise OutputError(damaged(path, digest, found[1], remedy))
 
 
 def is_sealed_text(path: Path) -> bool:

@@ -6,6 +6,7 @@ bundle are checked against lists of their own: see formats.py.
 
 from collections.abc import Callable
 
+from stereocell.building.made_of import require_current
 from stereocell.building.out_folder import EXPORTS, INDEX, PHASES, PLAN_KEY, PROVENANCE, OutFolder
 from stereocell.model.errors import CheckError, OutputError
 from stereocell.storage.json_files import read_sealed
@@ -14,7 +15,6 @@ from stereocell.storage.workspace import is_file
 
 _PLAN_AGAIN = "run `stereocell plan INPUT -o OUT` again"
 _SETTINGS_AGAIN = f"remove it and {_PLAN_AGAIN}"
-_UNITS_AGAIN = "run `stereocell units OUT` again"
 _PHASES_AGAIN = "run `stereocell units OUT`, then stage, bundle and report, again"
 _EXPORTS_AGAIN = "remove it: the next export of each file then takes --force"
 _REPORT_AGAIN = "run `stereocell report OUT` again"
@@ -27,15 +27,21 @@ def check_plan(out_folder: OutFolder) -> str:
 
 
 def check_records(out_folder: OutFolder) -> str:
-    """Check what a plan writes beside plan.json, and the record of the phases."""
+    """Check what a plan writes beside plan.json, and the record of the phases.
+
+    That says also whether units, stage, bundle and report were made of each other.
+    """
     settings, provenance = out_folder.settings_file, out_folder.provenance_file
     checks: list[Callable[[], object]] = [
         lambda: read_sealed(provenance, PROVENANCE, _PLAN_AGAIN),
-        lambda: require_sealed_text(settings, _SETTINGS_AGAIN),
+        lambda: require_sealed_text(
+            settings, _SETTINGS_AGAIN if is_file(settings) else _PLAN_AGAIN
+        ),
         lambda: read_sealed(out_folder.phases_file, PHASES, _PHASES_AGAIN),
     ]
     if is_file(out_folder.exports_file):
         checks.append(lambda: read_sealed(out_folder.exports_file, EXPORTS, _EXPORTS_AGAIN))
+    checks.append(lambda: require_current(out_folder))
     _raise_on(find_faults(checks))
     return f"{provenance.name}, {settings.name} and {out_folder.phases_file.name} as written"
 
@@ -47,13 +53,17 @@ def check_report(out_folder: OutFolder) -> str:
 
 
 def find_index_faults(out_folder: OutFolder) -> list[str]:
-    """Return the faults of the list of units, and of the hash of the plan that they are of."""
-    return find_faults(
+    """Return the faults of the list of units, and of the hash of the plan that they are of.
+
+    They name no remedy: the caller has one for all faults of the units.
+    """
+    faults = find_faults(
         [
-            lambda: read_sealed(out_folder.index_file, INDEX, _UNITS_AGAIN),
-            lambda: read_sealed(out_folder.units_plan_file, PLAN_KEY, _UNITS_AGAIN),
+            lambda: read_sealed(out_folder.index_file, INDEX, ""),
+            lambda: read_sealed(out_folder.units_plan_file, PLAN_KEY, ""),
         ]
     )
+    return [fault.removesuffix(": ") for fault in faults]
 
 
 def find_faults(checks: list[Callable[[], object]]) -> list[str]:

@@ -135,7 +135,7 @@ def _check_tissue(out: Path) -> str:
 
 def _check_units(out_folder: OutFolder) -> str:
     """Check the units' files against the hashes in unit.json, and the survey behind them."""
-    problems, files = [*find_index_faults(out_folder), *_spoilt_survey(out_folder)], 0
+    lists, problems, files = find_index_faults(out_folder), _spoilt_survey(out_folder), 0
     index = find_sealed(out_folder.index_file, INDEX) or {}
     for name, key in index.items():
         tile_id, channel_id = name.split("/")
@@ -145,7 +145,8 @@ def _check_units(out_folder: OutFolder) -> str:
             f"{(folder / file).relative_to(out_folder.out).as_posix()}: {fault}"
             for file, fault in unit_files.find_damage(folder).items()
         ]
-    _raise_on_all(problems, "remove what is damaged and run `stereocell units OUT`")
+    removal = "remove what is damaged and " if problems else ""
+    _raise_on_all([*lists, *problems], f"{removal}run `stereocell units OUT`")
     return f"{files} files of {len(index)} units"
 
 
