@@ -109,5 +109,28 @@ def test_a_damaged_chunk_is_one_line(tmp_path: Path) -> None:
     chunk = next(file for file in sorted(path.rglob("*")) if file.is_file() and "c" in file.parts)
     chunk.write_bytes(chunk.read_bytes()[:9])
     dataset = read.open(path, spacing_um=SIZE_UM)
-    with pytest.raises(SourceError, match="expected chunks that are whole"):
+    with pytest.raises(
+        SourceError, match="expected chunks that are whole: copy or download it again"
+    ):
         dataset.read(0, dataset.levels[0].box)
+
+
+def test_a_chunk_of_gzip_that_does_not_decode_is_named(tmp_path: Path) -> None:
+    array = zarr.create_array(
+        str(tmp_path / "a.zarr"),
+        shape=(8, 16, 16),
+        chunks=(4, 16, 16),
+        dtype="u2",
+        compressors=zarr.codecs.GzipCodec(),
+    )
+    array[:] = np.arange(8 * 16 * 16).reshape(8, 16, 16)
+    chunk = tmp_path / "a.zarr" / "c" / "1" / "0" / "0"
+    content = bytearray(chunk.read_bytes())
+    content[-6] ^= 1  # of its checksum
+    chunk.write_bytes(content)
+    dataset = read.open(tmp_path / "a.zarr", spacing_um=SIZE_UM)
+    with pytest.raises(SourceError) as caught:
+        dataset.read(0, dataset.levels[0].box)
+    line = str(caught.value)
+    assert ": chunk c/1/0/0: damaged (the library says: Error -3 while decompressing data" in line
+    assert line.endswith("), expected chunks that are whole: copy or download it again")

@@ -1,11 +1,20 @@
 """Exceptions of a library over a damaged file become one line; bugs of our own keep theirs."""
 
+import gzip
+import io
+import lzma
 import struct
 import traceback
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
+import imagecodecs
+import numcodecs
+import numpy as np
 import pytest
+import zstandard
 
 from stereocell.model.errors import SourceError
 from stereocell.storage import library_errors
@@ -51,6 +60,59 @@ def test_an_exception_of_any_class_that_a_library_raises_becomes_one_line(error:
         assert "expected a TIFF file, whole" in line
         assert "\n" not in line
         assert caught.value.__cause__ is error
+
+
+def fail_in_imagecodecs() -> None:
+    imagecodecs.deflate_decode(imagecodecs.deflate_encode(bytes(4000)), out=10)
+
+
+def fail_in_numcodecs() -> None:
+    numcodecs.Blosc().decode(bytes(range(40)))
+
+
+def fail_in_h5py() -> None:
+    with h5py.File(io.BytesIO(), "w") as file:
+        voxels = file.create_dataset("a", data=np.arange(4000), chunks=(4000,), compression="gzip")
+        voxels.id.write_direct_chunk((0,), b"no stream")
+        voxels[:]
+
+
+DECODERS: list[Callable[[], object]] = [
+    fail_in_imagecodecs,
+    fail_in_numcodecs,
+    fail_in_h5py,
+    lambda: zlib.decompress(b"no stream"),
+    lambda: gzip.decompress(gzip.compress(b"a" * 99)[:-9]),
+    lambda: lzma.decompress(b"no stream"),
+    lambda: zstandard.ZstdDecompressor().decompress(b"no stream"),
+    lambda: struct.unpack("<I", b"abc"),
+]
+
+
+@pytest.mark.parametrize("decode", DECODERS)
+def test_bytes_that_a_decoder_refuses_are_damaged_and_have_the_remedy(
+    decode: Callable[[], object],
+) -> None:
+    with pytest.raises(SourceError) as caught, one_line("a.tif", "pages that are whole"):
+        decode()
+    line = str(caught.value)
+    assert line.startswith("a.tif: damaged (the library says: ")
+    assert line.endswith("), expected pages that are whole: copy or download it again")
+
+
+@pytest.mark.parametrize(
+    "fail",
+    [
+        lambda: numcodecs.get_codec({"id": "nobody's"}),
+        lambda: h5py.File("/nowhere/a.h5"),
+        Path("/nowhere/a.h5").read_bytes,
+        lambda: raised_in_a_library(ValueError("an unknown kind of axis")),
+    ],
+)
+def test_other_errors_of_libraries_are_not_called_damage(fail: Callable[[], object]) -> None:
+    with pytest.raises(SourceError) as caught, one_line("a.tif", "pages that are whole"):
+        fail()
+    assert "damaged" not in str(caught.value)
 
 
 @pytest.mark.parametrize("boundary", [one_line, library_boundary])

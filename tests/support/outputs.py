@@ -1,4 +1,4 @@
-"""What each command leaves, of one small specimen: a build, a page, files for other programs."""
+"""The outputs of each command for one small specimen: a build, a page, files for other programs."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a layer deactivates is left out of bundle and exports, and stops neither."""
+"""Bundle and exports leave out prims that a layer deactivates, and go on."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What each command reads and writes: the table behind --force and the answers to a wrong folder.
+"""Tell what each command reads and writes, for --force and for the answers to a wrong folder.
 
 A test holds that every command has a row, and tries each command that writes onto the files of
 somebody else.

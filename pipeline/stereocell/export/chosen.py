@@ -21,6 +21,7 @@ from stereocell.meshes.clip import clip_mesh
 from stereocell.model.errors import StageError, UsageError
 from stereocell.model.mesh import Mesh
 from stereocell.usd.layer import move_box
+from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
 from stereocell.usd.read_stage import (
@@ -82,6 +83,8 @@ class Chosen:
         for layer in self.stage.GetUsedLayers():
             if layer.realPath:
                 self.as_written.require(Path(layer.realPath))
+        if note := note_missing(self.stage):
+            report(note)
         self.channels = self._channels()
         self.all_tiles = {str(prim.GetName()): hinted_box(prim) for prim in tile_prims(self.stage)}
         if not self.all_tiles:

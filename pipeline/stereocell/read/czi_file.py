@@ -18,7 +18,7 @@ Rectangle = tuple[int, int, int, int]  # x, y, width, height
 
 @dataclass(frozen=True, slots=True)
 class CziFacts:
-    """What a file states.
+    """The facts that a file states of itself.
 
     bounds    first index and the one behind the last, by axis
     types     pixel types, by channel

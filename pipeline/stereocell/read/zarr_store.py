@@ -24,7 +24,13 @@ from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
 from stereocell.read import zarr_ending  # noqa: F401  (it acts as Python ends)
 from stereocell.storage.first_bytes import HEAD_BYTES, pointer_words
-from stereocell.storage.library_errors import one_line, without_warning
+from stereocell.storage.library_errors import (
+    DamagedError,
+    damage_words,
+    is_undecoded,
+    one_line,
+    without_warning,
+)
 from stereocell.storage.location import Location, require_own, require_own_key
 
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
@@ -111,7 +117,12 @@ class GuardedStore(WrapperStore[Store]):
         if measure is None:
             return
         most = self._most(1)
-        size = measure(value.to_bytes()[: max(end, 0)], most)
+        try:
+            size = measure(value.to_bytes()[: max(end, 0)], most)
+        except Exception as error:
+            if is_undecoded(error):
+                raise DamagedError(f"chunk {key}: {damage_words(error)}") from error
+            raise
         if size > most:
             raise OSError(f"chunk {key} unpacks to over {most} bytes, more than its array says")
 

@@ -38,6 +38,17 @@ _BY_ENDING = {
     (".stl", ".3mf", ".ply", ".obj"): "a file of surfaces",
     (".usda", ".usdc", ".usdz", ".usd"): "a USD file",
 }
+# endings of those whose formats have a mark -> the first bytes, one of them
+_USDA, _USDC, _ZIP = b"#usda", b"PXR-USDC", b"PK\x03\x04"
+_MARKS: dict[str, bytes | tuple[bytes, ...]] = {
+    ".glb": b"glTF",
+    ".ply": b"ply",
+    ".3mf": _ZIP,
+    ".usda": _USDA,
+    ".usdc": _USDC,
+    ".usdz": _ZIP,
+    ".usd": (_USDA, _USDC, _ZIP),
+}
 # files that are nobody's: locks and halves of ours, and those that systems leave in each folder
 _NOBODYS = re.compile(r"\.lock|\.writable\..*|\..+\.[0-9a-f]{8}\b.*|\.DS_Store|Thumbs\.db")
 _MAX_BYTES = 64 << 20  # bytes: a larger JSON file is none of ours
@@ -92,9 +103,14 @@ def _file_words(path: Path) -> str:
     """Return what a file is, in words: by its own mark, its ending or its first bytes."""
     if path.suffix == ".html" and is_sealed_text(path):
         return "the report of a build"
-    content = identify(first_bytes(str(path)))
-    named = (words for endings, words in _BY_ENDING.items() if path.suffix.lower() in endings)
-    return content.words if content.format else next(named, content.words)
+    head, ending = first_bytes(str(path)), path.suffix.lower()
+    content = identify(head)
+    if content.format or not head:
+        return content.words
+    if not head.startswith(_MARKS.get(ending, b"")):
+        return f"a file named {ending} that is none"
+    named = (words for endings, words in _BY_ENDING.items() if ending in endings)
+    return next(named, content.words)
 
 
 def require_kind(path: Path, kinds: Collection[Kind]) -> Contents:

@@ -15,6 +15,7 @@ libraries from the terminal (library_noise.py).
 import logging
 import lzma
 import math
+import re
 import struct
 import sys
 import warnings
@@ -36,7 +37,8 @@ from stereocell.storage.library_noise import quiet_libraries
 from stereocell.storage.processes import address_limit, shortage
 
 _PACKAGE = Path(__file__).parents[1]
-_REMEDY = ": it may be damaged, copy or download it again"
+_AGAIN = "copy or download it again"
+_REMEDY = f": it may be damaged, {_AGAIN}"
 # Classes that a damaged file raises in our own parsing, or in C code, which has no frame. numpy and
 # numcodecs raise ValueError, TypeError and RuntimeError; packed bytes that end early zlib.error and
 # EOFError; a short header struct.error; metadata of another form AttributeError; sizes beyond this
@@ -65,6 +67,19 @@ _LATE = (
     ("nrrd.errors", "NRRDError"),
     ("xml.etree.ElementTree", "ParseError"),  # a SyntaxError; liffile lets it pass
     _NO_NODE,
+)
+
+
+class DamagedError(ValueError):
+    """A decoder can't decode a part of a source. The text names the part and says how it failed."""
+
+
+# Errors of decoders, by class and by the module that raised them: they mean damaged bytes. An error
+# with a number is the system's, and no damage.
+_UNDECODED = (DamagedError, zlib.error, lzma.LZMAError, ZstdError, EOFError, struct.error)
+_DECODERS = re.compile(
+    r"imagecodecs\b.*|numcodecs\.(?!registry|errors).*|zarr\.codecs\.crc32c_|pyarrow\b.*|gzip|bz2|lzma"
+    r"|h5py\.(h5d|_selector)"
 )
 
 
@@ -100,6 +115,10 @@ def one_line(
         if not isinstance(error, _faults()) and not _library_of(error):
             raise
         raise_if_short(error, where, raised=raised)
+        if is_undecoded(error):
+            raise raised(
+                f"{where}: {damage_words(error)}, expected {expected}: {_AGAIN}"
+            ) from error
         raise raised(f"{where}: {_reason(error)}; expected {expected}") from error
 
 
@@ -124,6 +143,27 @@ def library_boundary(where: str, expected: str) -> Iterator[None]:
             f"{where}: {library} failed on its content ({type(error).__name__}), expected "
             f"{expected}{_REMEDY}"
         ) from error
+
+
+def is_undecoded(error: BaseException) -> bool:
+    """Return whether a decoder raised an error over bytes that it can't decode."""
+    if isinstance(error, _UNDECODED):
+        return True
+    if not isinstance(error, ValueError | RuntimeError | OSError) or getattr(error, "errno", None):
+        return False
+    if isinstance(error, NotImplementedError | RecursionError | UnicodeError):
+        return False
+    trace, module = error.__traceback__, ""
+    while trace is not None:
+        module, trace = str(trace.tb_frame.f_globals.get("__name__", "")), trace.tb_next
+    return any(_DECODERS.fullmatch(name) for name in (module, type(error).__module__))
+
+
+def damage_words(error: BaseException) -> str:
+    """Return what is wrong with a source that a decoder failed on, in the decoder's own words."""
+    if isinstance(error, DamagedError):
+        return str(error)
+    return f"damaged (the library says: {_shortened(str(error) or type(error).__name__)})"
 
 
 def _library_of(error: BaseException) -> str:

@@ -30,7 +30,7 @@ class Tensor:
 
 
 class Session(Protocol):
-    """What runs a network. `run` and `inputs` raise OnnxError."""
+    """A session that runs a network. `run` and `inputs` raise OnnxError."""
 
     def inputs(self) -> tuple[Tensor, ...]: ...
     def outputs(self) -> tuple[Tensor, ...]: ...

@@ -27,6 +27,10 @@ MAX_CORNERS = 1_000
 _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
 
 
+class LargeFaceError(StageError):
+    """A face has too many corners."""
+
+
 def read_mesh(
     mesh: UsdGeom.Mesh,
     to_world: NDArray[np.float64],
@@ -54,7 +58,7 @@ def read_mesh(
     if counts.min() < 3 or counts.sum() != len(indices):
         raise StageError(f"{path}: faceVertexCounts don't fit {len(indices)} faceVertexIndices")
     if (most := int(counts.max())) > MAX_CORNERS:
-        raise StageError(
+        raise LargeFaceError(
             f"{path}: faceVertexCounts[{counts.argmax()}]: found a face of {most} corners, "
             f"expected at most {MAX_CORNERS}: triangulate it in the program that edited it"
         )

@@ -34,6 +34,7 @@ from stereocell.usd.layer import (
     hash_shape,
     move_box,
 )
+from stereocell.usd.layer_units import STATED_AXIS, STATED_UNIT
 from stereocell.usd.read_appearances import material_of, surface_of
 from stereocell.usd.read_attributes import (
     Point,
@@ -46,7 +47,7 @@ from stereocell.usd.read_attributes import (
     shortest,
     sizes_of,
 )
-from stereocell.usd.read_mesh import read_mesh
+from stereocell.usd.read_mesh import LargeFaceError, read_mesh
 from stereocell.usd.read_objects import without_hidden
 from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice
@@ -132,10 +133,16 @@ def open_stage(path: Path) -> Usd.Stage:
     if UsdGeom.StageHasAuthoredMetersPerUnit(stage):
         unit = UsdGeom.GetStageMetersPerUnit(stage)
         if not UsdGeom.LinearUnitsAre(unit, METERS_PER_UNIT):
-            raise StageError(f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}")
+            raise StageError(
+                f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}: "
+                f"write {STATED_UNIT} there; this scales nothing, a stage's numbers are um"
+            )
     axis = UsdGeom.GetStageUpAxis(stage)
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis) and axis != UP_AXIS:
-        raise StageError(f"{path}: upAxis is {axis}, expected {UP_AXIS}")
+        raise StageError(
+            f"{path}: upAxis is {axis}, expected {UP_AXIS}: write {STATED_AXIS} there; this turns "
+            "nothing"
+        )
     for needed in (ROOT, CHANNELS, TILES):
         if not stage.GetPrimAtPath(needed):
             raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")
@@ -304,6 +311,9 @@ def read_lods(tile: Usd.Prim, channel_id: str, *, finest: int = 0) -> Iterator[C
             surface = surface_of(prim)
             fed = vertex_values_of(surface)
             mesh = read_mesh(UsdGeom.Mesh(prim), matrix, shown=fed, is_edited=shape != built)
+        except LargeFaceError as error:
+            inside = f", inside the variant lod=lod{level}" if levels else ""
+            raise StageError(f"{error}{inside}") from error
         except StageError as error:
             raise StageError(f"{error}{_edit_advice(level) if levels else ''}") from error
         mesh = mesh and without_hidden(mesh, prim)

@@ -8,7 +8,7 @@
  */
 import { dot, type Vec3 } from "../math/vec3";
 
-/** What the gaze meets in one frame. */
+/** The target that the gaze meets in one frame, and its place. */
 export type Sight = Readonly<{
   /** The key of the target; null: nothing that can be chosen. */
   target: string | null;

@@ -44,7 +44,7 @@ export type Wish = Action | PanelChange | Command;
 
 export type PanelView = Readonly<{
   search: string;
-  /** Of the list of channels. */
+  /** The page of the list of channels that is shown, from 0. */
   page: number;
   /**
    * The channels that have a card above the list, if there are many: those that were shown when the section

@@ -1,4 +1,4 @@
-/** What the hands in stereo are made with. */
+/** The options that the hands in stereo are made with. */
 import type { Scene, WebXRManager } from "three";
 import type { Target } from "../interaction/ray_pointer";
 import type { BoxedTile } from "../math/pick";

@@ -1,4 +1,4 @@
-/** Double clicks on the flat panel: each is one wish. STEREOCELL_SHOTS names a folder to leave a picture in. */
+/** Double clicks on the flat panel: each counts once. STEREOCELL_SHOTS names a folder to leave a picture in. */
 import { join } from "node:path";
 import { beforeAll, expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";

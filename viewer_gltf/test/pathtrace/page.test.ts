@@ -99,7 +99,7 @@ describeInChromium("the path-traced page", () => {
     for (const key of keys) await page().keyboard.press(key);
   }
   /**
-   * Of so many samples at least, also where they began anew in between. A picture that has
+   * Takes a picture of `wanted` samples at least, also where they began anew in between. One that has
    * ENOUGH_SAMPLES rests: a busy machine may come to it before the test has looked.
    */
   async function shoot(wanted = 5): Promise<Picture> {

@@ -29,7 +29,7 @@ from stereocell.read.tables.table import (
     word_of,
 )
 from stereocell.storage.child_process import Bounds, run_in_child
-from stereocell.storage.library_errors import one_line
+from stereocell.storage.library_errors import DamagedError, damage_words, one_line
 from stereocell.storage.location import Location
 
 _EXPECTED = "a Parquet file that is whole"
@@ -67,7 +67,10 @@ def _read_file(path: str, request: _Request) -> Table:
             return _read(parquet, source, request)
         except (import_module("pyarrow").ArrowException, OSError) as error:
             # names of Arrow's own classes follow
-            raise ValueError(str(error).partition(":")[0]) from error
+            said = ValueError(str(error).partition(":")[0])
+            if isinstance(error, NotImplementedError):
+                raise said from error
+            raise DamagedError(damage_words(said)) from error
 
 
 def _read(parquet: Any, source: BinaryIO, request: _Request) -> Table:

@@ -65,7 +65,7 @@ export class LookingPerson {
   /** How often anything has changed, the panel's own pages too; what follows in the next frame is the same change. */
   changes = 0;
   readonly hands: Hands;
-  /** Of the clock. */
+  /** Time on the clock of the frames, in milliseconds. */
   now_ms = 1000;
   private view: Partial<PanelView> = {};
   private session: ButtonSession | null = null;

@@ -1,0 +1,91 @@
+"""A layer over the stage that states no units, or others, is told with the lines to write."""
+
+from pathlib import Path
+
+import pytest
+from pxr import Usd
+
+from stereocell.bundle.write import write_bundle
+from stereocell.engine.run import Engine
+from stereocell.export.options import ExportOptions
+from stereocell.export.write import export_stage
+from stereocell.model.errors import StageError
+from stereocell.usd.layer_units import note_missing
+from stereocell.usd.read_stage import loaded, open_stage, read_lods
+from support.stages import F_ID, leaf, write_whole
+
+
+@pytest.fixture(scope="module")
+def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_whole(tmp_path_factory.mktemp("stage"))
+
+
+def write_over(stage_path: Path, layer: Path, fields: str, body: str = "") -> Path:
+    layer.write_text(f"#usda 1.0\n({fields}\nsubLayers = [@{stage_path}@])\n{body}\n")
+    return layer
+
+
+ALL = ("metersPerUnit = 1e-6", 'upAxis = "Y"', 'defaultPrim = "Specimen"')
+
+
+@pytest.mark.parametrize("lost", [ALL, ALL[:1], ALL[1:2], ALL[2:]], ids=len)
+def test_the_note_names_the_layer_and_the_lines_that_it_lacks(
+    stage_path: Path, tmp_path: Path, lost: tuple[str, ...]
+) -> None:
+    kept = [line for line in ALL if line not in lost]
+    layer = write_over(stage_path, tmp_path / "edit.usda", "\n".join(kept))
+    line = note_missing(open_stage(layer))
+    assert line.startswith(f"{layer}: states no {lost[0].split()[0]}")
+    assert line.endswith(f"each on a line: {', '.join(lost)}")
+    assert ("10000 times too large" in line) == ("metersPerUnit = 1e-6" in lost)
+    assert "\n" not in line
+    whole = write_over(stage_path, tmp_path / "whole.usda", "\n".join([*kept, *lost]))
+    assert note_missing(open_stage(whole)) == ""
+
+
+def test_a_layer_without_units_is_told_by_a_bundle_and_an_export(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    layer = write_over(stage_path, tmp_path / "edit.usda", "")
+    told: list[str] = []
+    write_bundle(layer, tmp_path / "b", None, run=Engine(0).run, report_line=told.append)
+    assert sum("states no metersPerUnit, no upAxis, no defaultPrim" in line for line in told) == 1
+    told.clear()
+    export_stage(layer, tmp_path / "flat.usdc", options=ExportOptions(), report=told.append)
+    assert sum("states no metersPerUnit, no upAxis, no defaultPrim" in line for line in told) == 1
+    told.clear()
+    export_stage(stage_path, tmp_path / "own.usdc", options=ExportOptions(), report=told.append)
+    assert not any("states no" in line for line in told)
+
+
+@pytest.mark.parametrize(
+    ("fields", "remedy"),
+    [
+        ("metersPerUnit = 1", "expected 1e-06: write metersPerUnit = 1e-6 there"),
+        ('upAxis = "Z"', 'expected Y: write upAxis = "Y" there'),
+    ],
+)
+def test_another_unit_or_axis_is_refused_with_the_line_to_write(
+    stage_path: Path, tmp_path: Path, fields: str, remedy: str
+) -> None:
+    layer = write_over(stage_path, tmp_path / "edit.usda", fields)
+    with pytest.raises(StageError) as caught:
+        open_stage(layer)
+    assert str(caught.value).startswith(f"{layer}: ")
+    assert remedy in str(caught.value)
+
+
+def test_a_face_of_too_many_corners_has_one_remedy(stage_path: Path, tmp_path: Path) -> None:
+    over = Usd.Stage.CreateNew(str(tmp_path / "face.usda"))
+    over.GetRootLayer().subLayerPaths.append(str(stage_path))
+    mesh = over.OverridePrim(leaf("r0_c0", F_ID))
+    mesh.GetAttribute("faceVertexCounts").Set([30_000])
+    mesh.GetAttribute("faceVertexIndices").Set([0, 1, 2] * 10_000)
+    over.Save()
+    stage = open_stage(tmp_path / "face.usda")
+    with pytest.raises(StageError) as caught, loaded(stage, "r0_c0") as (tile, _):
+        list(read_lods(tile, F_ID))
+    line = str(caught.value)
+    assert "found a face of 30000 corners" in line
+    remedy = "triangulate it in the program that edited it, inside the variant lod=lod0"
+    assert line.endswith(f"expected at most 20000: {remedy}")
