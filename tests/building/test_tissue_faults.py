@@ -386,13 +386,15 @@ def test_broken_or_replaced_source_is_named_and_nothing_is_touched(
 def test_what_dicom_leaves_out_is_said_of_a_source_that_changed(
     undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    left = SimpleNamespace(fingerprint="f" * 64, remarks=("files left out: 1 cut short",))
+    remarks = ("label images of it: cells", "files left out: 1 cut short")
+    left = SimpleNamespace(fingerprint="f" * 64, remarks=remarks)
     monkeypatch.setattr(input_unchanged, "open_watched", lambda ref: left)
     capfd.readouterr()
     assert tissue(undisturbed, "--classes", "3") == 1
     line = only_line(capfd)
     assert "f: changed since it was planned" in line
     assert "; files left out: 1 cut short)" in line
+    assert "cells" not in line
 
 
 def test_a_class_named_as_a_channel_leaves_the_earlier_ones(
