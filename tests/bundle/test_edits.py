@@ -21,6 +21,7 @@ from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support import spheres
 from support.bundles import CD31, channel, factor, files, load, volumes, write_tiles
 from support.glbs import decoded_positions_m, read
+from support.stages import layer_over
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +44,7 @@ def edit(stage, tmp_path):
 
     def export(change):
         path = tmp_path / "edited.usda"
-        layer = Sdf.Layer.CreateNew(str(path))
-        layer.subLayerPaths = [str(stage)]
+        layer = layer_over(path, str(stage))
         over = Usd.Stage.Open(layer)
         change(over)
         layer.Save()
@@ -107,8 +107,7 @@ def measured_stage(tmp_path_factory):
 def edited_over(stage, folder, window):
     """Return the bundle of a layer over a stage that sets the window of CD31."""
     path = folder / "window.usda"
-    layer = Sdf.Layer.CreateNew(str(path))
-    layer.subLayerPaths = [str(stage)]
+    layer = layer_over(path, str(stage))
     over = Usd.Stage.Open(layer)
     over.GetAttributeAtPath(f"{CD31}.stereocell:window").Set(Gf.Vec2f(*window))
     layer.Save()
@@ -712,8 +711,7 @@ def test_points_in_other_units_are_told(stage, tmp_path):
     in_level(over, "lod0", swell(1.25))
     layer.pseudoRoot.SetInfo("metersPerUnit", 0.01)
     layer.Save()
-    root = Sdf.Layer.CreateNew(str(tmp_path / "root.usda"))
-    root.subLayerPaths = ["./an artist's.usda"]
+    root = layer_over(tmp_path / "root.usda", "./an artist's.usda")
     root.Save()
     told: list[str] = []
     write_bundle(
@@ -763,8 +761,7 @@ def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, f
         tiles=[TileExtent.of(tile)],
         provenance={"settings": settings},
     )
-    layer = Sdf.Layer.CreateNew(str(tmp_path / "edit.usda"))
-    layer.subLayerPaths = ["./stage.usda"]
+    layer = layer_over(tmp_path / "edit.usda", "./stage.usda")
     over = Usd.Stage.Open(layer)
     in_level(over, "lod0", swell(1.25))
     layer.Save()

@@ -9,6 +9,7 @@ from stereocell.bundle import write_ar
 from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from support.bundles import load, write_tiles
+from support.stages import layer_over
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +23,7 @@ def export(stage, folder, change=None):
     path = stage
     if change is not None:
         path = folder / "edited.usda"
-        layer = Sdf.Layer.CreateNew(str(path))
-        layer.subLayerPaths = [str(stage)]
+        layer = layer_over(path, str(stage))
         over = Usd.Stage.Open(layer)
         change(over)
         layer.Save()

@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from pxr import Sdf, Usd
+from pxr import Usd
 
 from stereocell.storage.overwriting import forcing
 from support.bundles import write_tiles
+from support.stages import layer_over
 
 
 @pytest.fixture(autouse=True)
@@ -28,8 +29,7 @@ def edited(sphere_stage: Path, tmp_path: Path) -> Callable[[Callable[[Usd.Stage]
     """Write a layer over the stage: `edited(lambda stage: ...)`."""
 
     def write(change: Callable[[Usd.Stage], object]) -> Path:
-        layer = Sdf.Layer.CreateNew(str(tmp_path / "edited.usda"))
-        layer.subLayerPaths = [str(sphere_stage)]
+        layer = layer_over(tmp_path / "edited.usda", str(sphere_stage))
         change(Usd.Stage.Open(layer))
         layer.Save()
         return tmp_path / "edited.usda"

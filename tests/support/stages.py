@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd
+from pxr import Sdf, Usd
 from scipy import ndimage
 from skimage.measure import marching_cubes
 
@@ -88,6 +88,13 @@ def write_whole(folder: Path) -> Path:
         provenance=provenance,
     )
     return folder / "stage.usda"
+
+
+def layer_over(path: Path, sublayer: str) -> Sdf.Layer:
+    """Return a new layer over a stage, which states the stage's units."""
+    layer = Sdf.Layer.CreateNew(str(path))
+    layer.ImportFromString(f"{HEAD}subLayers = [@{sublayer}@])\n")
+    return layer
 
 
 def _make_volume(field: NDArray[np.float32], start: int, end: int) -> NDArray[np.uint8]:
