@@ -54,7 +54,7 @@ def test_each_output_is_taken_or_answered_by_one_line(
 ) -> None:
     monkeypatch.setattr(BundleServer, "run", lambda server: server._socket.close())
     if command == "build":  # the plan has read the input; the rest takes long
-        monkeypatch.setattr(commands, "run_phases", lambda *_: commands.Answer(dict.fromkeys(
+        monkeypatch.setattr(commands, "_run_phases", lambda *_: commands.Answer(dict.fromkeys(
             ("stage", "bundle", "report"), "")))  # fmt: skip
     if command == "tissue":
         monkeypatch.setattr("stereocell.building.tissue.add_tissue", lambda *_: None)
