@@ -21,7 +21,7 @@ UNSTATED = {
     "hdf5plugin": "MIT; its filters have their own (its file LICENSE)",
     "openexr": "BSD-3-Clause (its file LICENSE.md)",
 }
-# what classifiers call licences -> their SPDX identifier
+# SPDX identifiers of licences, by their names in classifiers
 CLASSIFIERS = {
     "Apache Software License": "Apache-2.0",
     "BSD License": "BSD",

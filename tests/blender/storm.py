@@ -10,7 +10,7 @@ import sys
 
 os.environ.setdefault("EGL_PLATFORM", "surfaceless")  # Mesa's, which draws without a GPU
 
-# of EGL/egl.h and EGL_KHR_create_context
+# Constants from EGL/egl.h and from the extension EGL_KHR_create_context
 _SURFACE_TYPE, _PBUFFER, _RENDERABLE, _NONE = 0x3033, 0x0001, 0x3040, 0x3038
 _OPENGL_BIT, _OPENGL_API, _DEPTH_BITS, _ALPHA_BITS = 0x0008, 0x30A2, 0x3025, 0x3021
 _MAJOR, _MINOR, _PROFILE, _COMPATIBILITY = 0x3098, 0x30FB, 0x30FD, 0x0002

@@ -206,8 +206,8 @@ def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() ->
 
 @pytest.mark.slow
 def test_other_programs_are_those_that_other_tests_run() -> None:
-    """Other tests run `dask`, `mkdir`, `python` and `export` (docs/test_cluster_page.py), and
-    `pip install` of a wheel (system/test_wheel.py).
+    """docs/test_cluster_page.py runs `dask`, `mkdir`, `python` and `export`, and
+    system/test_empty_environment.py runs `pip install` of a wheel.
 
     `uvx` and `pipx` would install everything again from an index; each here only asks for help.
     """

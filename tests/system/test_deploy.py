@@ -94,7 +94,7 @@ def test_the_services_of_compose_are_commands_that_exist() -> None:
         ).stdout  # fmt: skip
         for flag in (word for word in words if word.startswith("--")):
             assert re.search(rf"{flag}\b", told), f"dask {command}: {flag}"
-    # whoever reaches the scheduler runs code in the workers
+    # A program that reaches the scheduler can run code in the workers, so no port is published.
     assert all("ports" not in service for service in services.values())
     # all see the store and the input under the same names
     ours = [services[name] for name in ("scheduler", "worker", "stereocell")]

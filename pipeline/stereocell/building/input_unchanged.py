@@ -38,7 +38,7 @@ def require_input(plan: Plan) -> None:
     """Raise SourceError unless the input holds the voxels that were planned."""
     dataset = open_watched(source_of(plan))
     if dataset.fingerprint != plan.fingerprint:
-        # of a file that was cut short, DICOM leaves it out
+        # A DICOM file that was cut short is left out, which explains another fingerprint.
         lost = (remark for remark in dataset.remarks if remark.startswith(LEFT_OUT))
         remarks = "".join(f"; {remark}" for remark in lost)
         raise SourceError(

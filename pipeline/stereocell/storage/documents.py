@@ -21,8 +21,8 @@ from stereocell.storage.assets import schema_path
 if TYPE_CHECKING:
     from jsonschema import Draft202012Validator
 
-# name of a document -> its schema, a file of schemas/ with `#Name` for one of its definitions;
-# None: its reader checks it by rules of its own, and here it must be JSON
+# Schemas by the name of a document: a file of schemas/, with `#Name` for one of its definitions.
+# A document without a schema must be JSON here; its reader checks it by rules of its own.
 SCHEMAS: dict[str, str | None] = {
     r"plan\.json": "plan.schema.json",
     r"provenance\.json": "units.schema.json#Provenance",

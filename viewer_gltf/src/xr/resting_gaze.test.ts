@@ -140,7 +140,7 @@ describe("the rows of the panel", () => {
       person.rest(1);
       const after = places(person);
       expect(after.get(id), id).toEqual(before.get(id));
-      // what opens below a switch moves the rest of the page
+      // a block that opens below a switch moves the rest of the page
       const common = [...before].filter(([each]) => after.has(each) && !id.endsWith("/plane"));
       expect(
         common.map(([each]) => [each, after.get(each)]),

@@ -48,7 +48,7 @@ async function walk(stand: Stand, only = "") {
     const seen = () => {
       const { state, told, specimenAt, specimenTurn, isStereo } = api.snapshot();
       const onPage = [...document.querySelectorAll("input")].map((each) => each.checked);
-      // what opens on the next page is told by the label of the way there: More (1 of 2)
+      // the label of the control that leads to the next page counts the pages: More (1 of 2)
       const labels = menu().map(({ id, label }) => [id, label]);
       return JSON.stringify([state, told, specimenAt, specimenTurn, isStereo, labels, onPage]);
     };
