@@ -244,7 +244,8 @@ def _bundles() -> Iterator[Case]:
                 if place == "transfer_functions_2d"
                 else ("channels", 0, place, "path")
             )
-            yield _edited(f"manifest's {place}: {name}", "check", MANIFEST, put(*steps, path))
+            lie = _sealed(put(*steps, path))
+            yield _edited(f"manifest's {place}: {name}", "check", MANIFEST, lie)
         yield _edited(
             f"volume's file: {name}",
             "check",

@@ -26,6 +26,7 @@ from stereocell.serve import server as serve_module
 from stereocell.serve.access import COOKIE, Gate
 from stereocell.serve.lan import draw_qr, find_addresses, find_names, make_certificate
 from stereocell.serve.server import BundleServer
+from support import plain_bundle
 from support.exhaustive import sweep
 from support.server.timeouts import PATIENCE_S, connect
 
@@ -265,9 +266,7 @@ def serving(arguments, encoding):
 @pytest.mark.parametrize("encoding", sweep(["ascii", "latin-1", "utf-8"], kept=["ascii", "utf-8"]))
 def test_a_program_is_told_the_address_in_json_and_a_person_in_any_encoding(tmp_path, encoding):
     bundle = tmp_path / "\u00fc\u4e2d" / "bundle"
-    bundle.mkdir(parents=True)
-    for name in ("manifest.json", "index.html"):
-        (bundle / name).write_text("{}")
+    plain_bundle.write(bundle.parent, plain_bundle.FILES)
     with serving([str(bundle.parent)], encoding) as process:
         line = process.stdout.readline()
         assert line.startswith("http://localhost:")
@@ -316,9 +315,7 @@ def test_no_network_is_one_line(tmp_path, monkeypatch, capsys):
     def none():
         raise StereoCellError("--lan: this machine has no address on a network, expected one")
 
-    (tmp_path / "bundle").mkdir()
-    for name in ("manifest.json", "index.html"):
-        (tmp_path / "bundle" / name).write_text("{}")
+    plain_bundle.write(tmp_path, plain_bundle.FILES)
     monkeypatch.setattr(serve_module, "find_addresses", none)
     assert main(["serve", str(tmp_path), "--lan", "--port", "0"]) == 1
     assert len(capsys.readouterr().err.splitlines()) == 1

@@ -24,6 +24,7 @@ from stereocell.verify.deep import check_deep
 from stereocell.verify.formats import CheckLine
 from support import phantoms
 from support.exhaustive import sweep
+from support.sealed_files import edit_sealed
 from support.validators import make_assets
 
 TILE = "stage/tiles/r0_c0/tile.usdc"
@@ -180,10 +181,10 @@ def overstate_the_errors(out: Path) -> None:
 
 
 def move_the_bounds(out: Path) -> None:
-    file = out / "bundle" / "manifest.json"
-    manifest = json.loads(file.read_bytes())
-    manifest["tiles"][0]["bounds_um"]["min"][0] -= 1
-    file.write_text(json.dumps(manifest))
+    def move(manifest: dict[str, Any]) -> None:
+        manifest["tiles"][0]["bounds_um"]["min"][0] -= 1
+
+    edit_sealed(out / "bundle" / "manifest.json", move)
 
 
 def empty_the_bricks(out: Path) -> None:
@@ -239,10 +240,10 @@ def spoil_a_voxel(out: Path) -> None:
 
 
 def rename_a_channel(out: Path) -> None:
-    file = out / "bundle" / "manifest.json"
-    manifest = json.loads(file.read_bytes())
-    manifest["channels"][0]["name"] = "G"
-    file.write_text(json.dumps(manifest))
+    def rename(manifest: dict[str, Any]) -> None:
+        manifest["channels"][0]["name"] = "G"
+
+    edit_sealed(out / "bundle" / "manifest.json", rename)
 
 
 def choose_the_volume(out: Path) -> None:

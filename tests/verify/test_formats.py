@@ -22,6 +22,7 @@ from stereocell.usd.written_files import write_list
 from stereocell.verify import formats
 from stereocell.verify.formats import check
 from support import object_bundle, spheres
+from support.sealed_files import edit_sealed
 
 GLB = "channels/CD31/r0_c0/lod0.glb"
 VOLUME = "volumes/r0_c0/CD31.ktx2"
@@ -173,15 +174,13 @@ def test_missing_and_unlisted_files_are_found(out):
 
 
 def test_reference_to_other_bytes_is_found(out):
-    manifest = out / "bundle" / "manifest.json"
-    manifest.write_text(manifest.read_text().replace('"sha256": "', '"sha256": "00000000', 1))
+    edit_sealed(out / "bundle" / "manifest.json", lambda m: m["files"].update(sha256="0" * 64))
     found = lines(out)
     assert "hashes" in failed(found)
 
 
 def test_unknown_version_is_found(out):
-    manifest = out / "bundle" / "manifest.json"
-    manifest.write_text(manifest.read_text().replace('"version": 1', '"version": 2'))
+    edit_sealed(out / "bundle" / "manifest.json", lambda manifest: manifest.update(version=2))
     found = lines(out)
     assert found["manifest"].detail.count("$.version: 1 was expected") == 1
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.tissue_files import FOLDER, RECORD
-from stereocell.bundle.write import FILES, MANIFEST, require_bundle
+from stereocell.bundle.manifest import FILES, MANIFEST
+from stereocell.bundle.write import require_bundle
 from stereocell.model.errors import OutputError
 from stereocell.storage.contents import contents_of, is_nobodys, words_for
 from stereocell.storage.file_list import read_list

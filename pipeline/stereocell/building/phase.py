@@ -8,7 +8,7 @@ from pathlib import Path
 
 from stereocell.building.made_of import FIELD, made_of
 from stereocell.building.out_folder import OutFolder
-from stereocell.bundle import write as bundle_writer
+from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.engine.run import console
 from stereocell.model.errors import OutputError
 from stereocell.storage.file_list import find_faults, measure, read_list
@@ -95,7 +95,7 @@ def digest_of(results: Iterable[Path]) -> str:
 
 def digest_of_bundle(out_folder: OutFolder) -> str:
     """Return a digest of the bundle; empty where one of its files is missing or damaged."""
-    path = out_folder.bundle_dir / bundle_writer.FILES
+    path = out_folder.bundle_dir / FILES
     try:
         listed = read_list(path, "")
     except OutputError:
@@ -106,7 +106,7 @@ def digest_of_bundle(out_folder: OutFolder) -> str:
 
 def digest_of_manifest(out_folder: OutFolder) -> str:
     """Return a digest of the bundle's manifest, which is in no list; empty: there is none."""
-    return digest_of_file(out_folder.bundle_dir / bundle_writer.MANIFEST)
+    return digest_of_file(out_folder.bundle_dir / MANIFEST)
 
 
 def digest_of_file(file: Path) -> str:

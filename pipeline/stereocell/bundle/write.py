@@ -22,6 +22,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from stereocell.bundle.gather_table import gather_table
+from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.write_ar import write_ar
 from stereocell.bundle.write_objects import write_objects
 from stereocell.bundle.write_tile import (
@@ -40,12 +41,13 @@ from stereocell.model.errors import OutputError, StageError
 from stereocell.model.version import GENERATOR
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import encode, to_json
-from stereocell.storage.json_files import compact_json
+from stereocell.storage.json_files import compact_json, sealed
 from stereocell.storage.workspace import is_file, move, remove, sizes_below
 from stereocell.transfer.opacity import evaluate
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_objects import painter_of, read_columns
+from stereocell.usd.read_provenance import fingerprint_of
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
@@ -56,8 +58,6 @@ from stereocell.usd.read_stage import (
 )
 from stereocell.usd.written_files import CHANGED, REMEDY, AsWritten
 
-MANIFEST = "manifest.json"
-FILES = "files.json"
 T = TypeVar("T")
 R = TypeVar("R")
 _ReportLine = Callable[[str], None]
@@ -181,6 +181,8 @@ def _fill(
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
     specimen: dict[str, Any] = {"name": specimen_name(stage), "modality": modality_of(stage)}
+    if fingerprint := fingerprint_of(stage):
+        specimen["fingerprint"] = fingerprint
     if (sides := sides_of(stage)) is not None:
         specimen["sides"] = sides
     ar = {"usdz": usdz, "usdz_reason": usdz_reason}
@@ -200,9 +202,9 @@ def describe_bundle(
     index: FileRef,
     ar: dict[str, Any] | None = None,
 ) -> bytes:
-    """Return manifest.json.
+    """Return manifest.json, with its hash.
 
-    specimen  its name and modality, and where a patient's sides are
+    specimen  its name and modality, the fingerprint of its source, and where a patient's sides are
     channels  as `describe_channel` returns them
     index     files.json
     ar        specimen.usdz, or why there is none; None: the manifest says nothing of it
@@ -220,7 +222,7 @@ def describe_bundle(
         **(ar or {}),
         "files": asdict(index),
     }
-    return to_json(manifest)
+    return to_json(sealed(manifest))
 
 
 def _write_channel(

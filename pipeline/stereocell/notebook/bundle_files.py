@@ -6,13 +6,11 @@ The bundle's own list says which there are. A path that it does not have, as one
 
 from pathlib import Path
 
+from stereocell.bundle.manifest import FILES, MANIFEST, REMEDY, read_manifest
 from stereocell.notebook.page import find_page
 from stereocell.serve.static_files import parse_range
 from stereocell.storage.file_list import read_list
-from stereocell.storage.json_files import read_json
 
-MANIFEST, _FILES = "manifest.json", "files.json"
-_REMEDY = "run `stereocell bundle OUT`"
 _LIGHTS = ("environments/sky.hdr", "environments/studio.hdr")  # the viewer's environments
 _WHOLE, _PART, _MISSING, _UNSATISFIABLE = 200, 206, 404, 416
 
@@ -28,8 +26,8 @@ class NotebookBundle:
     def __init__(self, folder: Path) -> None:
         """Raises OutputError where there is no bundle, or its list is damaged."""
         self._root = folder.resolve()
-        manifest = read_json(self._root / MANIFEST, "bundle.schema.json", _REMEDY)
-        listed = read_list(self._root / _FILES, _REMEDY)
+        manifest = read_manifest(self._root)
+        listed = read_list(self._root / FILES, REMEDY)
         self._names = {MANIFEST, *listed}
         self.name = str(manifest["specimen"]["name"])
         about = [(str(one["id"]), str(one["name"])) for one in manifest["channels"]]

@@ -7,30 +7,37 @@ earlier one or the new one.
 """
 
 import gzip
-import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from stereocell.building.made_of import require_current
 from stereocell.building.out_folder import OutFolder
+from stereocell.bundle.manifest import FILES, MANIFEST, read_manifest
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.publish.over_http import INDEX, fetch_faults, find_page
+from stereocell.publish.published_page import (
+    CHANGED,
+    REPLACES,
+    Entries,
+    find_changed,
+    list_of,
+    read_published,
+    require_own,
+    require_unchanged,
+)
 from stereocell.publish.targets import Target, digest, target_of
-from stereocell.storage.contents import PUBLISHED, Contents, contents_of, words_for
-from stereocell.storage.file_list import DAMAGED, find_faults, read_list, to_json
-from stereocell.storage.json_files import read_json
+from stereocell.storage.contents import PUBLISHED, Contents, contents_of
+from stereocell.storage.file_list import DAMAGED, find_faults, read_list
 from stereocell.storage.kinds import Kind
-from stereocell.storage.overwriting import HINT, is_forced, refused
+from stereocell.storage.overwriting import is_forced
 from stereocell.storage.workspace import cached
 
-FILES, MANIFEST = "files.json", "manifest.json"
 _LAST = ("sw.js", FILES, MANIFEST, INDEX)
 _REMEDY = "run `stereocell bundle OUT` first"
-_OF_HOSTS = ("CNAME", "README.md", "LICENSE", "robots.txt", "404.html")
 _SMALL_BYTES = 1000  # JSON below is as short as it is
 
 
@@ -52,6 +59,14 @@ class _File:
 
     entry: Mapping[str, Any]  # bytes, sha256
     read: Callable[[], bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class _OfRun:
+    """The paths that a run has uploaded, and the specimen that it has published."""
+
+    uploaded: Sequence[str]
+    specimen: Mapping[str, str]
 
 
 def publish(
@@ -80,25 +95,8 @@ def publish(
     target = target_of(text, is_public=is_public)
     if isinstance(folder := getattr(target, "folder", None), Path):
         _require_apart(folder, out)
-    there = target.sizes()
-    before = _read_published(target, there)
-    _require_own(target, files, there, before, specimen)
-    changed = [
-        path
-        for path, file in files.items()
-        if before.get(path) != file.entry or there.get(path) != file.entry["bytes"]
-    ]
-    gone = [path for path in before if path not in files]
     entries = {path: file.entry for path, file in files.items()}
-    if changed or gone or before != entries:
-        # what is about to be there is ours, too, should this run be killed
-        unsure = dict.fromkeys((*gone, *changed))
-        target.write(PUBLISHED, _list({**before, **entries, **unsure}, specimen))
-        _upload(target, files, changed, report)
-        for path in gone:
-            if path in there:
-                target.remove(path)
-        target.write(PUBLISHED, _list(entries, specimen))
+    changed, gone = _put(target, files, entries, specimen, report)
     address = (url and url.rstrip("/") + "/") or target.address
     faults = (
         fetch_faults(address, entries, report)
@@ -106,20 +104,71 @@ def publish(
         else {p: "is another" for p in files if digest(target.read(p)) != entries[p]["sha256"]}
     )
     if faults:
-        # what the target itself has otherwise is put there anew by the next run
-        spoilt = [p for p in faults if digest(target.read(p)) != entries[p]["sha256"]]
-        target.write(PUBLISHED, _list({**entries, **dict.fromkeys(spoilt)}, specimen))
-        path, fault = next(iter(sorted(faults.items())))
-        raise OutputError(
-            f"{address or target.shown + '/'}{path}: {fault}, expected the bundle's file of "
-            f"{entries[path]['bytes']} bytes"
-            + (f" ({len(faults)} such)" if len(faults) > 1 else "")
-            + (": the same command puts it there again" if path in spoilt else "")
-        )
+        raise _fault_of(target, address, faults, entries, _OfRun(changed, specimen))
     size = sum(entry["bytes"] for entry in entries.values())
     sent = sum(entries[path]["bytes"] for path in changed)
     page = address and find_page(address, entries)
     return Published(page, len(files), size, len(changed), sent, len(gone))
+
+
+def _put(
+    target: Target,
+    files: Mapping[str, _File],
+    entries: Entries,
+    specimen: Mapping[str, str],
+    report: Callable[[str], None],
+) -> tuple[list[str], list[str]]:
+    """Upload what has changed and remove what has gone; return the paths of both.
+
+    Raises OutputError, before anything is written, where the target holds what is not ours.
+    """
+    there = target.sizes()
+    before = read_published(target, there)
+    require_own(target, entries, there, before, specimen)
+    other = find_changed(target, entries, there, before) if is_forced() else []
+    changed = [
+        path
+        for path, entry in entries.items()
+        if before.get(path) != entry or there.get(path) != entry["bytes"] or path in other
+    ]
+    gone = [path for path in before if path not in files]
+    require_unchanged(target, [*changed, *gone], there, before)
+    if changed or gone or before != entries:
+        # what is about to be there is ours, too, should this run be killed
+        unsure = dict.fromkeys((*gone, *changed))
+        target.write(PUBLISHED, list_of({**before, **entries, **unsure}, specimen))
+        _upload(target, files, changed, report)
+        for path in gone:
+            if path in there:
+                target.remove(path)
+        target.write(PUBLISHED, list_of(entries, specimen))
+    return changed, gone
+
+
+def _fault_of(
+    target: Target, address: str | None, faults: Mapping[str, str], entries: Entries, run: _OfRun
+) -> OutputError:
+    """Return the error of files that are not as they were put there, or not sent so.
+
+    What this run has put there and the target has otherwise is put there anew by the next run.
+    Anything else that the target has otherwise was changed by somebody: only --force replaces it.
+    """
+    other = [p for p in faults if digest(target.read(p)) != entries[p]["sha256"]]
+    spoilt = [path for path in other if path in run.uploaded]
+    if spoilt:
+        target.write(PUBLISHED, list_of({**entries, **dict.fromkeys(spoilt)}, run.specimen))
+    path, fault = next(iter(sorted(faults.items())))
+    remedy = ""
+    if path in other:
+        remedy = f"{CHANGED}: {REPLACES}"
+    if path in spoilt:
+        remedy = "the same command puts it there again"
+    return OutputError(
+        f"{address or target.shown + '/'}{path}: {fault}, expected the bundle's file of "
+        f"{entries[path]['bytes']} bytes"
+        + (f" ({len(faults)} such)" if len(faults) > 1 else "")
+        + (f": {remedy}" if remedy else "")
+    )
 
 
 def _files_of(bundle: Path) -> dict[str, _File]:
@@ -131,8 +180,8 @@ def _files_of(bundle: Path) -> dict[str, _File]:
     files = {path: _File(entry, partial(_content, bundle / path)) for path, entry in listed.items()}
     # the list names all files but itself and the manifest, which names the list
     index = _made(_content(bundle / FILES))
-    manifest = read_json(bundle / MANIFEST, None, _REMEDY)
-    if not isinstance(manifest, dict) or manifest.get("files") != {"path": FILES, **index.entry}:
+    manifest = read_manifest(bundle, _REMEDY)
+    if manifest["files"] != {"path": FILES, **index.entry}:
         raise OutputError(f"{bundle / MANIFEST}: {DAMAGED}, names another {FILES}: {_REMEDY}")
     files |= {FILES: index, MANIFEST: _made(_content(bundle / MANIFEST))}
     for path, file in list(files.items()):
@@ -158,106 +207,11 @@ def _require_apart(folder: Path, out: Path) -> None:
 
 def _specimen_of(bundle: Path, held: Contents) -> dict[str, str]:
     """Return the name of a bundle's specimen, and the fingerprint of its source if it is known."""
-    fingerprint = held.fingerprint
-    if held.build is not None:
+    found = contents_of(bundle)
+    fingerprint = found.fingerprint
+    if not fingerprint and held.build is not None:
         fingerprint = contents_of(held.build).fingerprint
-    return {"name": contents_of(bundle).name, "fingerprint": fingerprint}
-
-
-def _list(entries: Mapping[str, Any], specimen: Mapping[str, str]) -> bytes:
-    content = {
-        "format": "stereocell-published",
-        "version": 1,
-        "specimen": specimen,
-        "files": dict(sorted(entries.items())),
-    }
-    return to_json(content)
-
-
-def _read_published(target: Target, there: Mapping[str, int]) -> dict[str, Any]:
-    """Return what an earlier run has put there; of what it may have put: None."""
-    if PUBLISHED not in there:
-        return {}
-    where = f"{target.shown}/{PUBLISHED}"
-    try:
-        found = json.loads(target.read(PUBLISHED))
-        files = dict(found["files"])
-        is_known = found["format"] == "stereocell-published" and found["version"] == 1
-    except (ValueError, TypeError, KeyError, RecursionError):
-        is_known, files = False, {}
-    # the list says what may be removed: a path in it may lead nowhere else
-    if not is_known or not all(_is_inside(path) for path in files):
-        raise OutputError(f"{where}: damaged, expected a list of published files; remove it")
-    return files
-
-
-def _is_inside(path: str) -> bool:
-    parts = PurePosixPath(path).parts
-    return (
-        bool(parts)
-        and not path.startswith("/")
-        and not {"..", ".git"} & {*parts}
-        and "\\" not in path
-    )
-
-
-def _require_own(
-    target: Target,
-    files: Mapping[str, _File],
-    there: Mapping[str, int],
-    before: Mapping[str, Any],
-    specimen: Mapping[str, str],
-) -> None:
-    """Raise OutputError where the target holds another page, or files that no run has put there.
-
-    Files of a host, as CNAME, may lie in a target that nothing was published to before.
-    """
-    if is_forced():
-        return
-    for path, file in files.items():
-        if path in there and path not in before and not _is_same(target, path, file, there):
-            raise OutputError(
-                f"{target.shown}/{path}: is there, and was not put there by this command, "
-                f"expected a place of the bundle's own: {HINT}"
-            )
-    others = [path for path in there if path not in files and not _is_of_host(path)]
-    if not before and others:
-        raise refused(target.shown, words_for(others), "nothing or a published page")
-    earlier = _published_specimen(target, there)
-    is_other = earlier.get("name") != specimen["name"] or (
-        earlier.get("fingerprint", "") not in ("", specimen["fingerprint"])
-        and specimen["fingerprint"] != ""
-    )
-    if before and earlier and is_other:
-        found, expected = (
-            f"{one.get('name')!r:.80}"
-            + (f" ({one['fingerprint'][:12]})" if one.get("fingerprint") else "")
-            for one in (earlier, specimen)
-        )
-        raise refused(target.shown, f"a published page of {found}", f"one of {expected}")
-
-
-def _is_same(target: Target, path: str, file: _File, there: Mapping[str, int]) -> bool:
-    has_size = there[path] == file.entry["bytes"]
-    return has_size and digest(target.read(path)) == file.entry["sha256"]
-
-
-def _is_of_host(path: str) -> bool:
-    """Return whether a file in a target is one by which hosts are told how to serve it."""
-    return path in _OF_HOSTS or path.startswith(".")
-
-
-def _published_specimen(target: Target, there: Mapping[str, int]) -> dict[str, str]:
-    """Return the specimen of the page at a target: by its list, of an earlier version by name."""
-    for path in (PUBLISHED, MANIFEST):
-        if path not in there:
-            continue
-        try:
-            found = json.loads(target.read(path))["specimen"]
-            return {key: str(found[key]) for key in ("name", "fingerprint") if key in found}
-        except (ValueError, TypeError, KeyError, RecursionError):
-            continue
-    return {}
+    return {"name": found.name, "fingerprint": fingerprint or held.fingerprint}
 
 
 def _upload(

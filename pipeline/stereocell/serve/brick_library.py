@@ -24,6 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.bundle.manifest import MANIFEST, read_manifest
+from stereocell.bundle.manifest import REMEDY as _REMEDY
 from stereocell.formats.brick_stream import (
     HASH_BYTES,
     BrickFormatError,
@@ -40,8 +42,6 @@ from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.json_files import read_json
 
 CODE_VERSION = 1  # version of build() and encode_tree(): increase it when their bytes change
-MANIFEST = "manifest.json"
-_REMEDY = "run `stereocell bundle OUT`"
 _KEPT_NODES = 2_000_000  # nodes of the cached trees: some 300 MB
 _KEPT_FILES = 256  # cached trees; each holds its file open
 
@@ -244,7 +244,7 @@ def invisible_below(row: NDArray[np.uint8]) -> int:
 
 
 def _read_volumes(bundle: Path) -> dict[tuple[str, str], Volume]:
-    manifest = read_json(bundle / MANIFEST, "bundle.schema.json", _REMEDY)
+    manifest = read_manifest(bundle, _REMEDY)
     found = {}
     for channel in manifest["channels"]:
         listed = read_json(bundle / channel["volumes"]["path"], "volumes.schema.json", _REMEDY)

@@ -25,9 +25,10 @@ from starlette.applications import Starlette
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp
 
+from stereocell.bundle.manifest import MANIFEST, read_manifest
 from stereocell.model.errors import StereoCellError
 from stereocell.serve.access import Access, Gate
-from stereocell.serve.brick_library import MANIFEST, BrickLibrary
+from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.brick_session import BrickEndpoint
 from stereocell.serve.http_protocol import GuardedHttp
 from stereocell.serve.lan import draw_qr, explain, find_addresses, find_names, make_certificate
@@ -50,9 +51,12 @@ def serve(
                  `lan`, an address that admits one device, a new one after each admission
 
     Returns when the running transfers have finished, or STOP_S later. Raises KeyboardInterrupt at
-    once at a second Ctrl+C; StereoCellError where there is no bundle, the port is taken, or there
-    is no network.
+    once at a second Ctrl+C; StereoCellError where there is no bundle, its manifest was changed, the
+    port is taken, or there is no network.
     """
+    bundle, _ = _places(out)
+    if (bundle / MANIFEST).is_file():
+        read_manifest(bundle)  # raises where it was changed
     server = BundleServer(out, port, lan, for_program)
     # a running uvicorn handles SIGTERM itself: it ends, then raises the signal again
     before = signal.signal(signal.SIGTERM, lambda *_: server.stop())

@@ -135,7 +135,7 @@ def _site(path: Path, names: set[str]) -> Contents | None:
     if listed.get("format") != "stereocell-published":
         return None
     specimen = _table(listed.get("specimen"))
-    name = _text(specimen.get("name")) or _specimen(path)
+    name = _text(specimen.get("name")) or _text(_specimen(path).get("name"))
     return Contents(
         Kind.SITE, _named("a published page", name), name, _text(specimen.get("fingerprint"))
     )
@@ -143,14 +143,15 @@ def _site(path: Path, names: set[str]) -> Contents | None:
 
 def _bundle(path: Path, names: set[str]) -> Contents | None:
     """Recognise a bundle, in a build or by itself."""
-    is_ours = _MANIFEST in names and (
-        {"files.json", "channels"} <= names
-        or _read(path / _MANIFEST).get("format") == "stereocell-bundle"
+    is_ours = {"files.json", "channels"} <= names or (  # its manifest may be lost
+        _MANIFEST in names and _read(path / _MANIFEST).get("format") == "stereocell-bundle"
     )
     if not is_ours:
         return None
     build = _build_around(path)
-    return Contents(Kind.BUNDLE, _named("a bundle", _specimen(path)), _specimen(path), "", build)
+    specimen = _specimen(path)
+    name, fingerprint = _text(specimen.get("name")), _text(specimen.get("fingerprint"))
+    return Contents(Kind.BUNDLE, _named("a bundle", name), name, fingerprint, build)
 
 
 def _build(path: Path, names: set[str]) -> Contents | None:
@@ -208,9 +209,9 @@ def _build_around(path: Path) -> Path | None:
     return None if found is None else path.parent
 
 
-def _specimen(path: Path) -> str:
-    """Return the specimen's name in a bundle's manifest; empty: it has none."""
-    return _text(_table(_read(path / _MANIFEST).get("specimen")).get("name"))
+def _specimen(path: Path) -> Mapping[str, Any]:
+    """Return the specimen in a bundle's manifest; empty: it states none."""
+    return _table(_read(path / _MANIFEST).get("specimen"))
 
 
 def _named(words: str, name: str) -> str:

@@ -8,17 +8,11 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from stereocell.bundle.write import MANIFEST
+from stereocell.bundle.manifest import REMEDY
 from stereocell.model.errors import CheckError
 from stereocell.storage.json_files import read_json
 
-REMEDY = "run `stereocell bundle OUT`"
 COLOR_STEP = 1 / 255 + 1e-6  # largest difference of a colour, 0..1: one step of 8 bits
-
-
-def read_manifest(bundle: Path) -> dict[str, Any]:
-    """Return the manifest of a bundle. Raises OutputError where it is invalid."""
-    return dict(read_json(bundle / MANIFEST, "bundle.schema.json", REMEDY))
 
 
 def read_transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:

@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from stereocell.bundle.manifest import read_manifest
 from stereocell.bundle.write_transfer2d import sum_tiles
 from stereocell.transfer.joint_histogram import log_scaled
 from stereocell.transfer.opacity import evaluate
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
+from stereocell.usd.read_provenance import fingerprint_of
 from stereocell.usd.read_stage import modality_of, open_stage, specimen_name, tile_prims
 from stereocell.verify.bundle_files import (
     COLOR_STEP,
     find_differences,
-    read_manifest,
     read_texels,
     read_transfer2d,
 )
@@ -30,6 +31,8 @@ def compare_manifest(stage_file: Path, bundle: Path) -> list[str]:
     stage = open_stage(stage_file)
     manifest = read_manifest(bundle)
     specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
+    if fingerprint := fingerprint_of(stage):
+        specimen["fingerprint"] = fingerprint
     problems = list(find_differences("specimen", manifest["specimen"], specimen))
     tiles = [str(prim.GetName()) for prim in tile_prims(stage)]
     listed = [tile["id"] for tile in manifest["tiles"]]

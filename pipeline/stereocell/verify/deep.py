@@ -11,7 +11,7 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import unit_tasks
 from stereocell.building.plan import Plan
 from stereocell.building.survey_file import read_survey
-from stereocell.bundle.write import MANIFEST
+from stereocell.bundle.manifest import MANIFEST
 from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.usd.read_appearances import read_appearances

@@ -21,7 +21,9 @@ from stereocell.building.out_folder import INDEX, SURVEY, OutFolder
 from stereocell.building.phase import digest_of_manifest
 from stereocell.building.survey_file import COMPONENTS, EVIDENCE, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
-from stereocell.bundle.write import FILES, MANIFEST
+from stereocell.bundle.manifest import FILES, MANIFEST, read_manifest
+from stereocell.bundle.manifest import REMEDY as _RUN_BUNDLE
+from stereocell.bundle.manifest import SCHEMA as _BUNDLE
 from stereocell.bundle.write_objects import hash_parts
 from stereocell.formats.exr import check_exr
 from stereocell.formats.stl import check_stl
@@ -53,8 +55,6 @@ from stereocell.verify.site_files import find_site_faults
 _WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
 _MAX_SHOWN = 3  # problems printed in one line
 _NODE_TIMEOUT_S = 1200.0  # s for one script over all files
-_BUNDLE = "bundle.schema.json"
-_RUN_BUNDLE = "run `stereocell bundle OUT`"
 _Check = tuple[str, Callable[[], str]]
 
 
@@ -108,7 +108,7 @@ def _checks_of_build(out: Path) -> list[_Check]:
 
 def _checks_of_bundle(bundle: Path, out_folder: OutFolder | None) -> list[_Check]:
     return [
-        ("manifest", lambda: _check_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)),
+        ("manifest", lambda: _check_manifest(bundle)),
         ("file list", lambda: _check_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)),
         ("volume lists", lambda: _check_volume_lists(bundle)),
         ("2D transfer functions", lambda: _check_transfer2d(bundle)),
@@ -119,6 +119,11 @@ def _checks_of_bundle(bundle: Path, out_folder: OutFolder | None) -> list[_Check
         ("glTF validator", lambda: _check_meshes(bundle)),
         ("KTX2 textures", lambda: _run_node("check_ktx2.mjs", _textures(bundle))),
     ]
+
+
+def _check_manifest(bundle: Path) -> str:
+    read_manifest(bundle)
+    return f"{MANIFEST} fits {_BUNDLE}, as written"
 
 
 def _check_json(path: Path, schema: str, remedy: str) -> str:
@@ -209,7 +214,7 @@ def _check_usdz(path: Path) -> str:
 
 def _check_usdz_of_bundle(bundle: Path) -> str:
     """Check specimen.usdz where the manifest names one; its hash is checked with all others."""
-    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
+    manifest = read_manifest(bundle)
     if manifest.get("usdz") is None:
         return f"no {USDZ_NAME}: {manifest.get('usdz_reason') or 'the manifest names none'}"
     if not (bundle / USDZ_NAME).is_file():
@@ -304,7 +309,7 @@ def _spoilt_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
 
 
 def _channels(bundle: Path) -> list[dict[str, Any]]:
-    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
+    manifest = read_manifest(bundle)
     channels: list[dict[str, Any]] = manifest["channels"]
     return channels
 
@@ -426,7 +431,7 @@ def _check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
 
     out_folder  the OUT of the bundle, which has a hash of the manifest; None: a bundle by itself
     """
-    manifest = read_json(bundle / MANIFEST, _BUNDLE, _RUN_BUNDLE)
+    manifest = read_manifest(bundle)
     listed = read_json(bundle / FILES, f"{_BUNDLE}#FileIndex", _RUN_BUNDLE)
     problems = []
     found = {p.relative_to(bundle).as_posix(): p for p in bundle.rglob("*") if p.is_file()}

@@ -12,6 +12,7 @@ from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.ktx2 import encode_2d, encode_3d
 from stereocell.transfer.opacity import evaluate, make_transfer_functions
 from support.bundles import write_tiles
+from support.sealed_files import seal
 
 
 def phantom(shape=(60, 75, 90)) -> np.ndarray:
@@ -84,7 +85,7 @@ def replace_transfer_functions(
     entry |= {"transfer_functions": list(names), "transfer_function": chosen}
     entry["transfer_functions_2d"]["names"] = []
     manifest.unlink()
-    manifest.write_text(json.dumps(content))
+    manifest.write_text(json.dumps(seal(content)))
 
 
 def read_mri(folder: Path) -> np.ndarray:

@@ -1,0 +1,158 @@
+"""What lies at a target already: an earlier page of the same specimen, as it was published, or not.
+
+The list that publishing leaves there holds the specimen and a hash of each file. So a page of
+another specimen, a file that somebody changed since, and files of somebody else are refused by
+name, and only --force replaces them.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+from stereocell.bundle.manifest import MANIFEST
+from stereocell.model.errors import OutputError
+from stereocell.publish.targets import Target, digest
+from stereocell.storage.contents import PUBLISHED, words_for
+from stereocell.storage.file_list import to_json
+from stereocell.storage.overwriting import HINT, is_forced, refused
+
+# path -> bytes and sha256; None: a run that was stopped may or may not have put it there
+Entries = Mapping[str, Any]
+_OF_HOSTS = ("CNAME", "README.md", "LICENSE", "robots.txt", "404.html")
+CHANGED = "changed since it was published"
+REPLACES = "keep a copy of what you changed, then --force replaces it"
+
+
+def list_of(entries: Entries, specimen: Mapping[str, str]) -> bytes:
+    """Return the list that is left at the target."""
+    content = {
+        "format": "stereocell-published",
+        "version": 1,
+        "specimen": specimen,
+        "files": dict(sorted(entries.items())),
+    }
+    return to_json(content)
+
+
+def read_published(target: Target, there: Mapping[str, int]) -> dict[str, Any]:
+    """Return the entries of the files that an earlier run has put there."""
+    if PUBLISHED not in there:
+        return {}
+    where = f"{target.shown}/{PUBLISHED}"
+    try:
+        found = json.loads(target.read(PUBLISHED))
+        files = dict(found["files"])
+        is_known = found["format"] == "stereocell-published" and found["version"] == 1
+    except (ValueError, TypeError, KeyError, RecursionError):
+        is_known, files = False, {}
+    # the list says what may be removed: a path in it may lead nowhere else
+    if not is_known or not all(_is_inside(path) for path in files):
+        raise OutputError(f"{where}: damaged, expected a list of published files; remove it")
+    return files
+
+
+def _is_inside(path: str) -> bool:
+    parts = PurePosixPath(path).parts
+    return (
+        bool(parts)
+        and not path.startswith("/")
+        and not {"..", ".git"} & {*parts}
+        and "\\" not in path
+    )
+
+
+def require_own(
+    target: Target,
+    entries: Entries,
+    there: Mapping[str, int],
+    before: Entries,
+    specimen: Mapping[str, str],
+) -> None:
+    """Raise OutputError where the target holds another page, or files that no run has put there.
+
+    Files of a host, as CNAME, may lie in a target that nothing was published to before.
+
+    entries   the files of the bundle
+    there     bytes of each file at the target
+    before    the entries of the files that an earlier run has put there
+    specimen  its name and fingerprint
+    """
+    if is_forced():
+        return
+    for path, entry in entries.items():
+        if path in there and path not in before and not _is_same(target, path, entry, there):
+            raise OutputError(
+                f"{target.shown}/{path}: is there, and was not put there by this command, "
+                f"expected a place of the bundle's own: {HINT}"
+            )
+    others = [path for path in there if path not in entries and not _is_of_host(path)]
+    if not before and others:
+        raise refused(target.shown, words_for(others), "nothing or a published page")
+    earlier = _published_specimen(target, there)
+    if before and not _is_one(earlier, specimen):
+        raise refused(
+            target.shown, f"a published page of {_words(earlier)}", f"one of {_words(specimen)}"
+        )
+
+
+def find_changed(
+    target: Target, paths: Iterable[str], there: Mapping[str, int], before: Entries
+) -> list[str]:
+    """Return those of some paths whose files are not as an earlier run has put them there."""
+    return [
+        path
+        for path in paths
+        if path in there
+        and before.get(path) is not None
+        and not _is_same(target, path, before[path], there)
+    ]
+
+
+def require_unchanged(
+    target: Target, paths: Iterable[str], there: Mapping[str, int], before: Entries
+) -> None:
+    """Raise OutputError where files that a run would replace or remove were changed at the target.
+
+    Only these are read: to read all of a page on object storage takes as long as to upload it.
+    """
+    changed = [] if is_forced() else find_changed(target, paths, there, before)
+    if changed:
+        more = f" ({len(changed)} such files)" if len(changed) > 1 else ""
+        raise OutputError(f"{target.shown}/{min(changed)}: {CHANGED}{more}: {REPLACES}")
+
+
+def _is_same(target: Target, path: str, entry: Mapping[str, Any], there: Mapping[str, int]) -> bool:
+    has_size = there[path] == entry["bytes"]
+    return has_size and digest(target.read(path)) == entry["sha256"]
+
+
+def _is_of_host(path: str) -> bool:
+    """Return whether a file in a target is one by which hosts are told how to serve it."""
+    return path in _OF_HOSTS or path.startswith(".")
+
+
+def _is_one(earlier: Mapping[str, str], specimen: Mapping[str, str]) -> bool:
+    """Return whether two specimens are known to be one: by name, and by the source of both."""
+    known = earlier.get("fingerprint", "")
+    return bool(
+        known and known == specimen["fingerprint"] and earlier.get("name") == specimen["name"]
+    )
+
+
+def _words(specimen: Mapping[str, str]) -> str:
+    source = specimen.get("fingerprint", "")[:12] or "its source is not known"
+    return f"{specimen.get('name', '')!r:.80} ({source})"
+
+
+def _published_specimen(target: Target, there: Mapping[str, int]) -> dict[str, str]:
+    """Return the specimen of the page at a target: by its list, of an earlier version by name."""
+    for path in (PUBLISHED, MANIFEST):
+        if path not in there:
+            continue
+        try:
+            found = json.loads(target.read(path))["specimen"]
+            return {key: str(found[key]) for key in ("name", "fingerprint") if key in found}
+        except (ValueError, TypeError, KeyError, RecursionError):
+            continue
+    return {}

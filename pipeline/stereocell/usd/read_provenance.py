@@ -1,0 +1,26 @@
+"""Read from a composed stage which source it was built from."""
+
+import hashlib
+import re
+
+from pxr import Sdf, Usd
+
+_FINGERPRINT = re.compile(r"[0-9a-f]{16,64}")  # of provenance.json, in hexadecimal digits
+
+
+def fingerprint_of(stage: Usd.Stage) -> str:
+    """Return the fingerprint of the stage's source; empty: no layer states one.
+
+    The stage that a build wrote states it, and an artist's layer lies over that one. A stage that
+    is composed of several builds has a digest of all their fingerprints.
+    """
+    found = sorted({text for layer in stage.GetUsedLayers() if (text := _stated_in(layer))})
+    if len(found) < 2:
+        return "".join(found)
+    return hashlib.sha256(" ".join(found).encode()).hexdigest()
+
+
+def _stated_in(layer: Sdf.Layer) -> str:
+    about = layer.customLayerData.get("stereocell", {})
+    text = about.get("fingerprint", "") if isinstance(about, dict) else ""
+    return text if isinstance(text, str) and _FINGERPRINT.fullmatch(text) else ""

@@ -1,0 +1,90 @@
+"""The manifest of a bundle: it names its source, and no command reads it once it was changed."""
+
+from pathlib import Path
+
+import pytest
+from pxr import Sdf
+
+from stereocell.bundle.manifest import read_manifest
+from stereocell.bundle.write import write_bundle
+from stereocell.cli.__main__ import main
+from stereocell.engine.run import Engine
+from stereocell.model.errors import OutputError
+from stereocell.notebook.bundle_files import NotebookBundle
+from stereocell.serve.brick_library import BrickLibrary
+from stereocell.usd.layer_units import STATED_AXIS, STATED_UNIT
+from support import plain_bundle
+from support.bundles import write_tiles
+
+FIRST, SECOND = "ab" * 32, "cd" * 32
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_tiles(tmp_path_factory.mktemp("stage"))
+
+
+def _state(layer_file: Path, fingerprint: object) -> None:
+    layer = Sdf.Layer.FindOrOpen(str(layer_file))
+    layer.customLayerData = {"stereocell": {"fingerprint": fingerprint}}
+    layer.Save()
+
+
+def _over(stage: Path, place: Path) -> Path:
+    """Write a layer of an artist over a stage, which states no source."""
+    place.write_text(
+        f'#usda 1.0\n(\n    defaultPrim = "Specimen"\n    {STATED_UNIT}\n    {STATED_AXIS}\n'
+        f"    subLayers = [@{stage}@]\n)\n"
+    )
+    return place
+
+
+def _fingerprint(stage: Path, place: Path) -> str:
+    write_bundle(stage, place, None, run=Engine(0).run)
+    return str(read_manifest(place)["specimen"].get("fingerprint", "not stated"))
+
+
+def test_manifest_states_the_fingerprint_of_the_source_below_all_layers(
+    stage: Path, tmp_path: Path
+) -> None:
+    for stated, expected in ((FIRST, FIRST), ("Jane Doe", "not stated"), (7, "not stated")):
+        _state(stage, stated)
+        over = _over(stage, tmp_path / f"over {expected[:3]}{stated}.usda")
+        assert _fingerprint(over, tmp_path / "bundle") == expected
+    _state(stage, FIRST)
+    over = _over(stage, tmp_path / "two.usda")
+    _state(over, SECOND)  # composed of two builds: it is neither
+    both = _fingerprint(over, tmp_path / "bundle")
+    assert len(both) == 64
+    assert both not in (FIRST, SECOND)
+    assert _fingerprint(over, tmp_path / "again") == both
+
+
+@pytest.mark.parametrize("seal", ["changed", "missing"])
+def test_manifest_that_was_changed_is_read_by_no_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], seal: str
+) -> None:
+    plain_bundle.write(tmp_path, plain_bundle.FILES)
+    bundle = tmp_path / "bundle"
+    file = bundle / "manifest.json"
+    words = "damaged or changed by hand"
+    if seal == "changed":
+        file.write_text(file.read_text().replace('"modality": ""', '"modality": "CT"'))
+    else:
+        words = "has no hash of its content"
+        file.write_text(file.read_text().replace('"sha256": "', '"sha255": "'))
+    for read in (
+        lambda: NotebookBundle(bundle),
+        lambda: BrickLibrary(bundle, tmp_path / "bricks").volumes(),
+    ):
+        with pytest.raises(OutputError, match=words):
+            read()
+    for command in (
+        ["serve", str(tmp_path), "--port", "0"],
+        ["view", str(bundle), "--port", "0", "--no-browser"],
+        ["publish", str(bundle), str(tmp_path / "site")],
+    ):
+        assert main(command) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"{file}: {words}" in line
+        assert "run `stereocell bundle OUT`" in line
