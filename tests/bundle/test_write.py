@@ -249,7 +249,9 @@ def test_old_bundle_is_replaced_as_a_whole_and_kept_if_the_new_one_fails(stage, 
 
 def test_folder_that_is_no_bundle_is_left_alone(stage, tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(OutputError, match=r"is no bundle: no manifest\.json in it"):
+    with pytest.raises(
+        OutputError, match=r"is no bundle: found something else \(thesis\.tex\), and no m"
+    ):
         write_bundle(stage, tmp_path, None, run=Engine(0).run)
     assert (tmp_path / "thesis.tex").exists()
 

@@ -255,7 +255,7 @@ def test_damaged_manifest_is_named_and_made_anew(out: Path, built: Path) -> None
     _change_a_digit(out / "bundle" / "manifest.json")
     line = _line(out, "hashes")
     assert not line.ok
-    assert "manifest.json: not the bytes that were written" in line.detail
+    assert "manifest.json: damaged or changed by hand" in line.detail
     assert "run `stereocell bundle OUT`" in line.detail
     _go_on(out)
     assert _assets(out) == _assets(built)

@@ -16,6 +16,7 @@ from stereocell.storage.documents import SCHEMAS, SETTINGS, schema_of
 from stereocell.storage.json_files import write_json
 from stereocell.verify.formats import check
 from support import phantoms
+from support.sealed_files import edit_sealed
 
 RECORDS = ("plan.json", "provenance.json", SETTINGS, "phases.json", "report/index.html")
 OF_UNITS = ("units/plan.key", "units/done.json", "units/survey.json")
@@ -152,7 +153,7 @@ def test_phases_that_were_changed_by_hand_are_named_and_done_again(
 ) -> None:
     _change(out / "phases.json")
     assert main(["bundle", str(out), "--workers", "0"]) == 1
-    assert "run `stereocell stage OUT` first" in _answer(capfd)
+    assert "run `stereocell units OUT`, then stage, bundle and report" in _answer(capfd)
     assert main(["stage", str(out), "--workers", "0"]) == 0
     assert "phases.json: damaged or changed by hand" in capfd.readouterr().err
     assert main(["bundle", str(out), "--workers", "0"]) == 0
@@ -162,7 +163,7 @@ def test_phases_that_were_changed_by_hand_are_named_and_done_again(
 def test_units_of_another_plan_are_not_taken_for_those_of_this_one(
     out: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    _change(OutFolder(out).units_plan_file)
+    edit_sealed(OutFolder(out).units_plan_file, lambda signed: signed.update(key="0123abcd"))
     assert main(["stage", str(out), "--workers", "0"]) == 1
     assert "not built for the plan in plan.json: run `stereocell units OUT`" in _answer(capfd)
 

@@ -37,6 +37,7 @@ _NAMES = {"plan", "units", "stage", "bundle", "report"}  # of the phases
 _UNFINISHED = {"key": "", "results": "", "seconds": 0.0, "about": ""}
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
+PHASES_AGAIN = "run `stereocell units OUT`, then stage, bundle and report, again"
 
 
 def require_build_or_nothing(out: Path, source: str | Path) -> None:
@@ -279,7 +280,7 @@ class OutFolder:
     def require_finished(self, name: str) -> None:
         """Raise OutputError where a phase began and did not finish, or nothing says whether."""
         if is_file(self.phases_file):
-            read_sealed(self.phases_file, PHASES, f"run `stereocell {name} OUT` first")
+            read_sealed(self.phases_file, PHASES, PHASES_AGAIN)
         if self.is_begun(name):
             raise OutputError(
                 f"{self.out / name}: begun and not finished: run `stereocell {name} OUT` first"

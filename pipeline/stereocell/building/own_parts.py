@@ -8,11 +8,9 @@ from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.tissue_files import FOLDER, RECORD
-from stereocell.bundle.manifest import FILES, MANIFEST
-from stereocell.bundle.write import require_bundle
+from stereocell.bundle.manifest import MANIFEST, find_others, require_bundle
 from stereocell.model.errors import OutputError
 from stereocell.storage.contents import contents_of, is_nobodys, words_for
-from stereocell.storage.file_list import read_list
 from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import is_forced, refused
 from stereocell.storage.sealed_text import is_sealed_text
@@ -68,14 +66,8 @@ def require_own_bundle(out_folder: OutFolder) -> None:
         if files and not is_file(folder / MANIFEST):
             remove(folder)
         return
-    if not is_file(folder / MANIFEST):
-        return  # the bundle's writer refuses it
-    try:
-        listed = read_list(folder / FILES, "")
-    except OutputError:
-        return
-    others = sorted(files - listed.keys() - {MANIFEST, FILES})
-    if others:
+    require_bundle(folder)
+    if others := find_others(folder):
         raise refused(folder, words_for(others), "a bundle and no other file")
 
 

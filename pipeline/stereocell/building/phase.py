@@ -8,6 +8,7 @@ from pathlib import Path
 
 from stereocell.building.made_of import FIELD, made_of
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.sealed_documents import require_documents
 from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.engine.run import console
 from stereocell.model.errors import OutputError
@@ -67,6 +68,7 @@ def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
     start = time.perf_counter()
     if (fault := out_folder.phases_fault()) is not None:
         console.print(f"{name}: {fault}", markup=False, soft_wrap=True)
+    require_documents(out_folder, name)
     phase = Phase(out_folder, name)
     yield phase
     seconds = time.perf_counter() - start

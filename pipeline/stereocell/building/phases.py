@@ -48,6 +48,7 @@ from stereocell.building.survey_file import appearance_to_json, read_survey
 from stereocell.building.tasks import components, evidence, unit, window
 from stereocell.building.unit_files import load_objects
 from stereocell.bundle import write as bundle_writer
+from stereocell.bundle.manifest import require_bundle
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
@@ -370,6 +371,7 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
     out_folder = OutFolder(out)
     with phase_of(out_folder, "bundle") as phase:
         out_folder.require_finished("stage")
+        _require_whole_stage(out_folder)
         if is_file(out_folder.plan_file):
             plan = out_folder.plan()  # no phase goes on beside a plan that was changed by hand
             if plan.settings.unwrap.maps:
@@ -388,7 +390,7 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         if kept is not None and out_folder.is_begun("bundle"):
             bundle_writer.remove_half(out_folder.bundle_dir)
         if not is_forced():
-            bundle_writer.require_bundle(out_folder.bundle_dir)  # before the phase is begun
+            require_bundle(out_folder.bundle_dir)  # before the phase is begun
         done = partial(digest_of_bundle, out_folder)
         if not phase.is_done(key, done, require_own=require_own_bundle):
             out_folder.remove_other_folders(out_folder.parts_dir, {key})
@@ -407,6 +409,16 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         console.print(
             "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
         )
+
+
+def _require_whole_stage(out_folder: OutFolder) -> None:
+    """Raise OutputError or StageError where a file that the stage's phase wrote is not as it was.
+
+    A layer that may have been edited in place passes; the bundle's writer names it.
+    """
+    if out_folder.has_begun("stage"):
+        listed = written_files.read_stage_list(out_folder.stage_dir)
+        written_files.require_kept(out_folder.stage_dir, listed, out_folder.stage_list)
 
 
 def _print_line(line: str) -> None:

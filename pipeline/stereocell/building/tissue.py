@@ -23,6 +23,7 @@ from stereocell.building.own_parts import require_own_places, require_own_tissue
 from stereocell.building.phases import provenance
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
+from stereocell.building.sealed_documents import require_documents
 from stereocell.building.tissue_files import (
     FOLDER,
     RECORD,
@@ -96,6 +97,7 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     and code. Raises StereoCellError; plan and OUT/tissue are unchanged then.
     """
     out_folder = OutFolder(out)
+    require_documents(out_folder, "tissue")
     plan = without_tissue(out_folder.plan())
     channel = _find_channel(plan, request.channel)
     voxels = math.prod(plan.region.shape)

@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from stereocell.bundle.gather_table import gather_table
-from stereocell.bundle.manifest import FILES, MANIFEST
+from stereocell.bundle.manifest import FILES, MANIFEST, require_bundle
 from stereocell.bundle.write_ar import write_ar
 from stereocell.bundle.write_objects import write_objects
 from stereocell.bundle.write_tile import (
@@ -99,12 +99,6 @@ def write_bundle(
     with replacing_folder(bundle_dir) as folder:
         _fill(stage_path, folder, viewer_dist, run, parts or folder / ".parts", report_line)
         shutil.rmtree(folder / ".parts", ignore_errors=True)
-
-
-def require_bundle(place: Path) -> None:
-    """Raise OutputError if something else than a bundle lies there."""
-    if _holds(place) and not is_file(place / MANIFEST):
-        raise OutputError(f"{place}: exists and is no bundle: no {MANIFEST} in it")
 
 
 def remove_half(place: Path) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import no_layer
+from stereocell.building.sealed_documents import require_documents
 from stereocell.export.chosen import Chosen, Report
 from stereocell.export.gltf_scene import write_gltf
 from stereocell.export.neuroglancer import write_precomputed
@@ -98,6 +99,7 @@ def export(
     """
     find_ending(file)
     out_folder = OutFolder(out)
+    require_documents(out_folder, "export")
     out_folder.require_finished("stage")
     path = stage if stage is not None else out_folder.stage_file
     if not is_file(path):

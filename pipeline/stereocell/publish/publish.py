@@ -16,6 +16,7 @@ from typing import Any
 
 from stereocell.building.made_of import require_current
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.sealed_documents import require_documents
 from stereocell.bundle.manifest import FILES, MANIFEST, read_manifest
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.publish.over_http import INDEX, fetch_faults, find_page
@@ -89,6 +90,7 @@ def publish(
     bundle = out if held.kind in (Kind.BUNDLE, Kind.SITE) else out / "bundle"
     build = held.build if bundle == out else out
     if build is not None:
+        require_documents(OutFolder(build), "publish")
         require_current(OutFolder(build))
     files = _files_of(bundle)
     specimen = _specimen_of(bundle, held)

@@ -17,6 +17,7 @@ from stereocell.model.errors import StageError
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.file_list import (
     DAMAGED,
+    MISSING,
     FileList,
     encode,
     find_faults,
@@ -71,6 +72,13 @@ def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
     return DOUBTFUL if is_as_long and file.suffix != ".usda" else CHANGED
 
 
+def require_kept(root: Path, listed: FileList, since: Path) -> None:
+    """Raise StageError where a file of a list is missing or damaged, or a layer most likely is."""
+    for path, fault in find_damage(root, listed, since=since).items():
+        if fault != CHANGED:
+            raise _error_of(root / path, fault)
+
+
 def is_kept(root: Path, listed: FileList, since: Path) -> bool:
     """Return whether every file of a list is unchanged or a layer that may have been edited."""
     return set(find_damage(root, listed, since=since).values()) <= {CHANGED, DOUBTFUL}
@@ -119,14 +127,20 @@ class AsWritten:
 
     def _require(self, file: Path, entry: Mapping[str, Any]) -> None:
         if not file.is_file():
-            raise StageError(f"{file}: missing: {REMEDY}")
+            raise _error_of(file, MISSING)
         if is_same(file, entry):
             return
         fault = _name_fault(file, entry)
-        if fault == CHANGED:
-            self.changed.add(file)
-        elif fault == DOUBTFUL:
-            raise StageError(f"{file}: {fault}: remove it and {REMEDY}; {ADVICE}")
-        else:
-            problem = f"damaged, not the bytes that {FILES} says"
-            raise StageError(f"{file}: {problem}: remove it and {REMEDY}")
+        if fault != CHANGED:
+            raise _error_of(file, fault)
+        self.changed.add(file)
+
+
+def _error_of(file: Path, fault: str) -> StageError:
+    """Return the error of a file of the stage that can't be used."""
+    if fault == MISSING:
+        return StageError(f"{file}: missing: {REMEDY}")
+    if fault == DOUBTFUL:
+        return StageError(f"{file}: {fault}: remove it and {REMEDY}; {ADVICE}")
+    problem = f"damaged, not the bytes that {FILES} says"
+    return StageError(f"{file}: {problem}: remove it and {REMEDY}")

@@ -4,20 +4,10 @@ Nothing that one of these files says is trusted before its hash fits. The files 
 bundle are checked against lists of their own: see formats.py.
 """
 
-from collections.abc import Callable
-
 from stereocell.building.made_of import require_current
-from stereocell.building.out_folder import EXPORTS, INDEX, PHASES, PLAN_KEY, PROVENANCE, OutFolder
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.sealed_documents import checks_of, find_document_faults
 from stereocell.model.errors import CheckError, OutputError
-from stereocell.storage.json_files import read_sealed
-from stereocell.storage.sealed_text import require_sealed_text
-from stereocell.storage.workspace import is_file
-
-_PLAN_AGAIN = "run `stereocell plan INPUT -o OUT` again"
-_SETTINGS_AGAIN = f"remove it and {_PLAN_AGAIN}"
-_PHASES_AGAIN = "run `stereocell units OUT`, then stage, bundle and report, again"
-_EXPORTS_AGAIN = "remove it: the next export of each file then takes --force"
-_REPORT_AGAIN = "run `stereocell report OUT` again"
 
 
 def check_plan(out_folder: OutFolder) -> str:
@@ -32,51 +22,22 @@ def check_records(out_folder: OutFolder) -> str:
     That says also whether units, stage, bundle and report were made of each other.
     """
     settings, provenance = out_folder.settings_file, out_folder.provenance_file
-    checks: list[Callable[[], object]] = [
-        lambda: read_sealed(provenance, PROVENANCE, _PLAN_AGAIN),
-        lambda: require_sealed_text(
-            settings, _SETTINGS_AGAIN if is_file(settings) else _PLAN_AGAIN
-        ),
-        lambda: read_sealed(out_folder.phases_file, PHASES, _PHASES_AGAIN),
-    ]
-    if is_file(out_folder.exports_file):
-        checks.append(lambda: read_sealed(out_folder.exports_file, EXPORTS, _EXPORTS_AGAIN))
-    checks.append(lambda: require_current(out_folder))
-    _raise_on(find_faults(checks))
+    faults = find_document_faults(out_folder, "plan", "phases", "exports")
+    # the line `plan` says what is wrong with the plan itself
+    faults = [fault for fault in faults if not fault.startswith(str(out_folder.plan_file))]
+    if not find_document_faults(out_folder, "plan", "phases", "units", "stage"):
+        # a damaged document would be told twice, with the remedy of what was made of it
+        try:
+            require_current(out_folder)
+        except OutputError as fault:
+            faults.append(str(fault))
+    if faults:
+        raise CheckError("; ".join(faults))
     return f"{provenance.name}, {settings.name} and {out_folder.phases_file.name} as written"
 
 
 def check_report(out_folder: OutFolder) -> str:
     """Check the report against the hash in it."""
-    require_sealed_text(out_folder.report_file, _REPORT_AGAIN)
+    for check in checks_of(out_folder, "report"):
+        check()
     return f"{out_folder.report_file.name} as written"
-
-
-def find_index_faults(out_folder: OutFolder) -> list[str]:
-    """Return the faults of the list of units, and of the hash of the plan that they are of.
-
-    They name no remedy: the caller has one for all faults of the units.
-    """
-    faults = find_faults(
-        [
-            lambda: read_sealed(out_folder.index_file, INDEX, ""),
-            lambda: read_sealed(out_folder.units_plan_file, PLAN_KEY, ""),
-        ]
-    )
-    return [fault.removesuffix(": ") for fault in faults]
-
-
-def find_faults(checks: list[Callable[[], object]]) -> list[str]:
-    """Return the text of each error that a check raises."""
-    faults = []
-    for check in checks:
-        try:
-            check()
-        except OutputError as fault:
-            faults.append(str(fault))
-    return faults
-
-
-def _raise_on(faults: list[str]) -> None:
-    if faults:
-        raise CheckError("; ".join(faults))

@@ -19,6 +19,13 @@ from stereocell.building import unit_files
 from stereocell.building.input_unchanged import require_added
 from stereocell.building.out_folder import INDEX, SURVEY, OutFolder
 from stereocell.building.phase import digest_of_manifest
+from stereocell.building.sealed_documents import (
+    UNITS_AGAIN,
+    checks_of,
+    find_document_faults,
+    has_report,
+    has_units,
+)
 from stereocell.building.survey_file import COMPONENTS, EVIDENCE, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.bundle.manifest import FILES, MANIFEST, read_manifest
@@ -48,7 +55,6 @@ from stereocell.verify.build_records import (
     check_plan,
     check_records,
     check_report,
-    find_index_faults,
 )
 from stereocell.verify.site_files import find_site_faults
 
@@ -92,17 +98,17 @@ def check(out: Path) -> Iterator[CheckLine]:
 
 def _checks_of_build(out: Path) -> list[_Check]:
     out_folder = OutFolder(out)
-    has_plan, has_report = is_file(out_folder.plan_file), is_file(out_folder.report_file)
+    has_plan = is_file(out_folder.plan_file)
     return [
         ("plan", lambda: check_plan(out_folder)),
         *([("records", lambda: check_records(out_folder))] if has_plan else []),
         *([("tissue", lambda: _check_tissue(out))] if (out / FOLDER).exists() else []),
-        *([("units", lambda: _check_units(out_folder))] if out_folder.index_file.exists() else []),
+        *([("units", lambda: _check_units(out_folder))] if has_units(out_folder) else []),
         ("stage hashes", lambda: _check_stage_hashes(out_folder)),
         ("stage", lambda: _check_stage(out)),
         ("stage files", lambda: _check_stage_files(out)),
         ("usdz", lambda: _check_usdz(out / "stage" / USDZ_NAME)),
-        *([("report", lambda: check_report(out_folder))] if has_report else []),
+        *([("report", lambda: check_report(out_folder))] if has_report(out_folder) else []),
     ]
 
 
@@ -140,7 +146,9 @@ def _check_tissue(out: Path) -> str:
 
 def _check_units(out_folder: OutFolder) -> str:
     """Check the units' files against the hashes in unit.json, and the survey behind them."""
-    lists, problems, files = find_index_faults(out_folder), _spoilt_survey(out_folder), 0
+    told = find_document_faults(out_folder, "units")
+    lists = [fault.removesuffix(f": {UNITS_AGAIN}") for fault in told]
+    problems, files = _spoilt_survey(out_folder), 0
     index = find_sealed(out_folder.index_file, INDEX) or {}
     for name, key in index.items():
         tile_id, channel_id = name.split("/")
@@ -151,15 +159,13 @@ def _check_units(out_folder: OutFolder) -> str:
             for file, fault in unit_files.find_damage(folder).items()
         ]
     removal = "remove what is damaged and " if problems else ""
-    _raise_on_all([*lists, *problems], f"{removal}run `stereocell units OUT`")
+    _raise_on_all([*lists, *problems], f"{removal}{UNITS_AGAIN}")
     return f"{files} files of {len(index)} units"
 
 
 def _spoilt_survey(out_folder: OutFolder) -> list[str]:
-    """Return the faults of the survey, and of its files of windows and levels."""
-    survey = find_sealed(out_folder.survey_file, SURVEY)
-    if survey is None:
-        return [_fault_of(out_folder, out_folder.survey_file)]
+    """Return the faults of the files of windows and levels that the survey names."""
+    survey = find_sealed(out_folder.survey_file, SURVEY) or {"channels": {}}
     channels = survey["channels"].values()
     files = {channel["statistics_file"]: WINDOW for channel in channels}
     schemas = {"evidence": EVIDENCE, "components": COMPONENTS}
@@ -177,10 +183,10 @@ def _fault_of(out_folder: OutFolder, file: Path) -> str:
 
 def _check_stage_hashes(out_folder: OutFolder) -> str:
     """Check every file that the build wrote against the stage's list; others are an artist's."""
+    for require in checks_of(out_folder, "stage"):
+        require()
     listed = read_json(out_folder.stage_list, "units.schema.json#FileList", written_files.REMEDY)
-    wrote = out_folder.phases().get("stage", {"key": ""})
-    is_other = wrote["key"] and wrote["results"] != written_files.digest_of(listed)
-    if is_other or written_files.STAGE_NAME not in listed:
+    if written_files.STAGE_NAME not in listed:
         path = out_folder.stage_list
         raise CheckError(f"{path}: damaged, not the list that was written: {written_files.REMEDY}")
     problems = written_files.find_damage(out_folder.stage_dir, listed)

@@ -1,0 +1,193 @@
+"""Damage to any file of a build: which commands notice it, and that printed remedies mend it."""
+
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.sealed_documents import NEEDS
+from stereocell.cli.__main__ import main
+from stereocell.cli.places import PLACES
+from stereocell.storage.kinds import Kind
+from stereocell.verify import formats
+from support.digests import digests_of
+from support.exhaustive import sweep
+from support.outputs import make_build, make_source
+
+SOURCE = "f.ome.tif"
+# the documents of each part that a command may depend on
+DOCUMENTS = {
+    "plan": ("plan.json", "provenance.json", "stereocell.toml"),
+    "phases": ("phases.json",),
+    "units": ("units/done.json", "units/plan.key", "units/survey.json"),
+    "stage": ("stage/files.json",),
+}
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("built")
+    out = make_build(make_source(folder / SOURCE), folder / "out")
+    assert main(["export", str(out), str(folder / "f.glb")]) == 0
+    return out
+
+
+@pytest.fixture
+def out(built: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(built, tmp_path / "out")
+
+
+def _change(file: Path) -> None:
+    """Change a letter or digit near the middle: JSON and TOML stay what they are."""
+    data = bytearray(file.read_bytes())
+    after = range(len(data) // 2, len(data))
+    place = next(k for k in after if data[k : k + 1].isalnum())
+    data[place] = ord("1") if data[place] != ord("1") else ord("2")
+    file.write_bytes(data)
+
+
+DAMAGES: dict[str, Callable[[Path], object]] = {
+    "changed": _change,
+    "lost": Path.unlink,
+    "empty": lambda file: file.write_bytes(b""),
+}
+
+
+# --- commands ask the documents that they depend on
+
+
+def test_every_command_that_reads_a_build_and_writes_names_what_it_depends_on() -> None:
+    reading = {name for name, one in PLACES.items() if Kind.BUILD in one.reads and one.writes}
+    assert set(NEEDS) == reading
+    assert {part for parts in NEEDS.values() for part in parts} == DOCUMENTS.keys()
+
+
+def _trials() -> Iterator[tuple[str, str]]:
+    for command, parts in NEEDS.items():
+        for part in parts:
+            yield from ((command, name) for name in DOCUMENTS[part])
+
+
+@pytest.mark.parametrize("damage", ["changed", "lost"])
+@pytest.mark.parametrize(("command", "name"), list(_trials()))
+def test_command_refuses_a_build_whose_documents_are_damaged(
+    out: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], *,
+    command: str, name: str, damage: str,
+) -> None:  # fmt: skip
+    DAMAGES[damage](out / name)
+    before = digests_of(out)
+    place = {"export": "f.glb", "publish": "site"}.get(command)
+    words = [command, str(out), *([str(tmp_path / place)] if place else [])]
+    assert main(words) == 1
+    (line,) = [one for one in capfd.readouterr().err.splitlines() if "stereocell: " in one]
+    assert name.rpartition("/")[2] in line
+    assert "run `stereocell " in line
+    assert digests_of(out) == before
+    assert not place or not (tmp_path / place).exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["specimen.usdz", "looks/F_default.exr", "looks/F_level.json", "tiles/r0_c0/F.vdb"]
+)
+@pytest.mark.parametrize("damage", ["changed", "lost"])
+def test_bundle_names_a_file_of_the_stage_that_is_lost_or_damaged(
+    out: Path, capfd: pytest.CaptureFixture[str], name: str, damage: str
+) -> None:
+    DAMAGES[damage](out / "stage" / name)
+    assert main(["bundle", str(out), "--workers", "0"]) == 1
+    said = capfd.readouterr().err
+    found = "missing" if damage == "lost" else "damaged, not the bytes that files.json says"
+    assert f"{out / 'stage' / name}: {found}: " in said
+    assert "run `stereocell stage OUT`" in said
+
+
+# --- remedies
+
+
+def _follow(out: Path, told: list[str], *, damaged: Path, source: Path) -> None:
+    """Do what the lines of `check` say, and nothing else."""
+    if any(re.search(r"remove (it|what is damaged)", line) for line in told):
+        damaged.unlink(missing_ok=True)
+    named = {name for line in told for name in re.findall(r"`stereocell (\w+) ", line)}
+    for line in told:
+        then = re.search(r"`, then ([\w, ]+)", line)
+        named |= set(re.findall(r"\w+", then[1])) if then else set()
+    for name in ("plan", "units", "stage", "bundle", "report"):
+        if name in named:
+            given = [str(source), "-o", str(out), "--grid", "1x1"]
+            assert main([name, *(given if name == "plan" else [str(out)])]) == 0, name
+
+
+def _told(out: Path) -> list[str]:
+    return [line.detail for line in formats.check(out) if not line.ok]
+
+
+def _names(out: Path) -> list[str]:
+    """Return one file of each kind: all JSON files, and of others one of each ending in a part."""
+    first: dict[object, str] = {}
+    for file in sorted(out.rglob("*")):
+        path = file.relative_to(out)
+        name = re.sub("[0-9a-f]{16,}", "", path.name)
+        kind = name if path.suffix in (".json", ".toml", ".key") else path.suffix
+        if file.is_file():
+            first.setdefault((path.parts[0], kind), path.as_posix())
+    return list(first.values())
+
+
+# one damage a kind of file, in turn; all of them in the sweep
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", sweep([0, 1, 2], kept=[0]))
+def test_remedies_that_check_prints_mend_what_they_name(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, turn: int
+) -> None:
+    monkeypatch.setattr(formats, "_run_node", lambda *_: "")  # validators that take seconds
+    unnoticed = []
+    for i, name in enumerate(_names(built)):
+        out = shutil.copytree(built, tmp_path / "out")
+        kind = list(DAMAGES)[(i + turn) % len(DAMAGES)]
+        DAMAGES[kind](out / name)
+        told = _told(out)
+        if not told:
+            unnoticed.append(name)
+        _follow(out, told, damaged=out / name, source=built.parent / SOURCE)
+        assert _told(out) == [], f"{name} {kind}: {told}"
+        shutil.rmtree(out)
+    # no result rests on these: they say how long a unit took, and which tiles need no work
+    kept = {"seconds.json", "stage.json", "exports.json"}
+    assert {Path(name).name for name in unnoticed} <= kept
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_record_of_the_phases_has_one_remedy(
+    out: Path, built: Path, damage: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    DAMAGES[damage](OutFolder(out).phases_file)
+    told = _told(out)
+    assert {line.partition("run `")[2] for line in told} == {
+        "stereocell units OUT`, then stage, bundle and report, again"
+    }
+    capfd.readouterr()
+    assert main(["export", str(out), str(out.parent / "f.glb")]) == 1
+    assert "run `stereocell units OUT`, then stage, bundle and re" in capfd.readouterr().err
+    _follow(out, told, damaged=OutFolder(out).phases_file, source=built.parent / SOURCE)
+    assert _told(out) == []
+
+
+@pytest.mark.parametrize("lost", [["manifest.json"], ["manifest.json", "files.json"]])
+def test_bundle_that_lost_its_manifest_is_made_anew_and_files_of_others_stay(
+    out: Path, built: Path, capfd: pytest.CaptureFixture[str], lost: list[str]
+) -> None:
+    for name in lost:
+        (out / "bundle" / name).unlink()
+    own = out / "bundle" / "thesis.tex"
+    own.write_text("years of work")
+    assert main(["bundle", str(out)]) == 1
+    assert "found something else (thesis.tex), and no manifest.json: " in capfd.readouterr().err
+    assert own.read_text() == "years of work"
+    own.unlink()
+    assert main(["bundle", str(out)]) == 0
+    bundles = [digests_of(place / "bundle") for place in (out, built)]
+    assert bundles[0] == bundles[1]
