@@ -1,4 +1,4 @@
-"""The page on clusters warns first, and its commands make a cluster that keeps strangers out."""
+"""The page on clusters begins with a warning, and its commands make a cluster with TLS."""
 
 import json
 import os
@@ -63,15 +63,15 @@ def scheduler_of_the_page(folder: Path) -> Iterator[str]:
 
 def test_the_page_begins_with_the_warning() -> None:
     assert PAGE.startswith(
-        "# Clusters and object storage\n\n> **Whoever reaches a Dask scheduler's port can run any "
-        "code as you**"
+        "# Clusters and object storage\n\n> **Everybody who can reach a Dask scheduler's port can "
+        "run any code as you**"
     )
     commands = [line for line in PAGE.splitlines() if line.startswith(("dask ", "stereocell "))]
     assert "--protocol tls" in commands[0]
 
 
 @pytest.mark.slow
-def test_the_cluster_of_the_page_admits_only_those_who_have_the_key(tmp_path: Path) -> None:
+def test_the_cluster_of_the_page_admits_only_clients_with_the_key(tmp_path: Path) -> None:
     folder = tmp_path / "shared"
     folder.mkdir()
     with scheduler_of_the_page(folder) as config:

@@ -1,4 +1,4 @@
-"""A command whose two workers run a task each, for tests that look at it or stop it."""
+"""A command whose two workers run a task each, for tests that examine or stop it."""
 
 import os
 import subprocess
@@ -38,7 +38,7 @@ def start_script(script: str, folder: Path) -> "subprocess.Popen[str]":
 
 
 def started_with_two_tasks(folder: Path) -> "subprocess.Popen[str]":
-    """Return a running command, both of whose workers are at a task that doesn't end by itself."""
+    """Return a running command whose two workers each run a task that doesn't end by itself."""
     command = start_script(_TWO_TASKS_WITHOUT_END, folder)
     end = time.monotonic() + PATIENCE_S
     while not all((folder / name).exists() for name in "ab") and time.monotonic() < end:

@@ -128,16 +128,16 @@ def _export(
     report: Report,
     is_ours: Callable[[Path], bool],
 ) -> tuple[str, list[Path]]:
-    """Write `file` and what goes with it; return the lines about it, and all paths.
+    """Write `file` and the files that go with it; return a line about it, and all paths.
 
-    is_ours  whether what lies at a path may be replaced without --force
+    is_ours  returns whether the file at a path may be replaced without --force
     """
     ending = find_ending(file)
     way = FORMATS[ending]
     _require_takes(ending, way, options)
     if not file.parent.is_dir():
         raise OutputError(f"{file.parent}: no such folder")
-    require_free(file, expected=_EXPECTED, is_ours=is_ours(file))  # before the work
+    require_free(file, expected=_EXPECTED, is_ours=is_ours(file))  # before the long work
     chosen = Chosen(stage_path, options, report)
     if way.is_seen:
         chosen.show_as_viewer()

@@ -1,8 +1,8 @@
-"""The hash that a record of a build holds of itself, in messages."""
+"""The message on a record of a build that does not fit its own hash."""
 
 from pathlib import Path
 
-_DIGITS = 12  # that are shown where they differ
+_DIGITS = 12  # least number of digits of a hash that are shown
 
 
 def damaged(path: Path, digest: str, expected: str, remedy: str) -> str:
