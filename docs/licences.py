@@ -136,14 +136,14 @@ def _lines() -> Iterator[str]:
     yield ""
     yield _ABOUT
     yield ""
-    yield "## What every installation has"
+    yield "## Packages of every installation"
     yield ""
     yield "| package | licence | why it is there |"
     yield "|---|---|---|"
     for one in core:
         yield f"| {one.name} | {licence_of(one.name)} | {one.why} |"
     yield ""
-    yield "## What extras bring"
+    yield "## Packages of the extras"
     yield ""
     yield "| package | extra | licence | why it is there |"
     yield "|---|---|---|---|"
@@ -151,9 +151,9 @@ def _lines() -> Iterator[str]:
         if one.extra:
             yield f"| {one.name} | `{one.extra}` | {licence_of(one.name)} | {one.why} |"
     yield ""
-    yield "## What these bring along"
+    yield "## Packages that these require"
     yield ""
-    yield "On Linux, without extras; other systems may bring a few others."
+    yield "These are installed on Linux without extras; other systems may add a few."
     yield ""
     yield "| package | licence |"
     yield "|---|---|"

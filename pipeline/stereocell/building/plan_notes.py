@@ -50,8 +50,8 @@ def told_of_absent(dataset: Dataset, plan: Plan) -> list[str]:
     found = _absent(dataset, source_of(plan), indices, plan.region, plan.level) if indices else []
     for labels in plan.labels:
         own, whole = open_watched(labels.ref), Box((0, 0, 0), labels.shape)
-        told = _absent(own, labels.ref, [labels.channel], whole, 0)
-        found += [f"labels {labels.name!r}: {note}" for note in told]
+        notes = _absent(own, labels.ref, [labels.channel], whole, 0)
+        found += [f"labels {labels.name!r}: {note}" for note in notes]
     return found
 
 
@@ -112,8 +112,8 @@ def changes_of(there: Plan, plan: Plan) -> str:
     if names != now:
         changes.insert(0, f"channels: {names:.80}, now {now:.80}")
     more = len(changes) - _MAX_CHANGES
-    told = "; ".join(changes[:_MAX_CHANGES]) + (f"; and {more} more" if more > 0 else "")
+    listed = "; ".join(changes[:_MAX_CHANGES]) + (f"; and {more} more" if more > 0 else "")
     return (
         f"OUT holds a build of this input with other settings, whose results are replaced: "
-        f"{told or 'another path of the input'}"
+        f"{listed or 'another path of the input'}"
     )

@@ -1,9 +1,9 @@
 """Run tasks on worker processes of this machine, over pipes.
 
 A pipe has two ends and no address. No port is opened, so nobody else on the machine or in the
-network can reach a worker or the command. (Dask's local cluster listens on ports: without
-certificates, whoever connects to one runs code as the user who builds. A pool over pipes needs no
-certificates, starts sooner, and knows which task killed its worker.)
+network can reach a worker or the command. (Dask's local cluster listens on ports. Without
+certificates, every program that connects to one can run code as the user who builds. A pool over
+pipes needs no certificates, starts sooner, and knows which task killed its worker.)
 
 On Linux, workers are forked from a server that has imported what they need. A process that starts
 from nothing imports for 1.7 s of CPU. The server imports once for all workers of a command, and
