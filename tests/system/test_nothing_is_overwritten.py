@@ -110,7 +110,7 @@ def _run(trial: str, builds: tuple[Path, Path], place: Path, *more: str) -> int:
         if kind != "another build" or trial not in OF_A_BUILD  # they go on with a build
     ],
 )
-def test_foreign_files_at_the_place_of_a_result_stay_and_are_named(
+def test_what_others_put_there_stays_and_is_named(
     builds: tuple[Path, Path],
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],

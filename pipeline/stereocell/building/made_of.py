@@ -77,7 +77,7 @@ def _content_of(out_folder: OutFolder, part: str) -> object:
 
 
 def _remedy(phase: str) -> str:
-    """Return the commands that repeat a phase and all phases after it."""
+    """Return the commands that make a phase and all after it anew."""
     names = list(_MADE_OF)
     first, *others = names[names.index(phase) :]
     *before, last = others or [""]

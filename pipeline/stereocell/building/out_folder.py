@@ -112,8 +112,7 @@ class OutFolder:
     def replaced_plan(self, plan: Plan) -> Plan | None:
         """Return the plan that `plan` would replace; None: there is none.
 
-        Without --force, raises OutputError where the old plan was changed by hand or is of another
-        input.
+        Raises OutputError where it was changed by hand, or is of another input, without --force.
         """
         try:
             there = self.plan() if is_file(self.plan_file) else None

@@ -52,8 +52,8 @@ def require_own_stage(out_folder: OutFolder) -> None:
     edited = sorted(path for path, fault in faults.items() if fault in (CHANGED, DOUBTFUL))
     if edited:
         raise OutputError(
-            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage must be written again: save "
-            f"this layer elsewhere ({ADVICE}), or --force replaces it"
+            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage is to be written anew: save "
+            f"what you edited elsewhere ({ADVICE}), or --force replaces it"
         )
 
 

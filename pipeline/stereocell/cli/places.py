@@ -51,7 +51,7 @@ FORCE = (
 
 
 def require_place(command: str, out: Path, source: str = "") -> None:
-    """Raise OutputError where a command can't read or write the folder OUT.
+    """Raise OutputError where OUT is no folder that a command can read or write.
 
     Imports are lazy, so that --help is quick.
     """

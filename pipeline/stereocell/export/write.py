@@ -130,14 +130,14 @@ def _export(
 ) -> tuple[str, list[Path]]:
     """Write `file` and the files that go with it; return a line about it, and all paths.
 
-    is_ours  returns whether the file at a path may be replaced without --force
+    is_ours  whether what lies at a path may be replaced without --force
     """
     ending = find_ending(file)
     way = FORMATS[ending]
     _require_takes(ending, way, options)
     if not file.parent.is_dir():
         raise OutputError(f"{file.parent}: no such folder")
-    require_free(file, expected=_EXPECTED, is_ours=is_ours(file))  # before the long work
+    require_free(file, expected=_EXPECTED, is_ours=is_ours(file))  # before the work
     chosen = Chosen(stage_path, options, report)
     if way.is_seen:
         chosen.show_as_viewer()

@@ -70,13 +70,13 @@ def publish(
     """
     if url is not None and not url.startswith(("https://", "http://")):
         raise UsageError(f"--url is {url}, expected an address as https://me.example/mine")
-    contents = contents_of(out)
-    bundle = out if contents.kind in (Kind.BUNDLE, Kind.SITE) else out / "bundle"
-    build = contents.build if bundle == out else out
+    held = contents_of(out)
+    bundle = out if held.kind in (Kind.BUNDLE, Kind.SITE) else out / "bundle"
+    build = held.build if bundle == out else out
     if build is not None:
         require_current(OutFolder(build))
     files = _files_of(bundle)
-    specimen = _specimen_of(bundle, contents)
+    specimen = _specimen_of(bundle, held)
     target = target_of(text, is_public=is_public)
     if isinstance(folder := getattr(target, "folder", None), Path):
         _require_apart(folder, out)
@@ -156,11 +156,11 @@ def _require_apart(folder: Path, out: Path) -> None:
         raise OutputError(f"TARGET is {folder}, inside OUT, expected a folder elsewhere")
 
 
-def _specimen_of(bundle: Path, contents: Contents) -> dict[str, str]:
+def _specimen_of(bundle: Path, held: Contents) -> dict[str, str]:
     """Return the name of a bundle's specimen, and its source's fingerprint; empty: unknown."""
-    fingerprint = contents.fingerprint
-    if contents.build is not None:
-        fingerprint = contents_of(contents.build).fingerprint
+    fingerprint = held.fingerprint
+    if held.build is not None:
+        fingerprint = contents_of(held.build).fingerprint
     return {"name": contents_of(bundle).name, "fingerprint": fingerprint}
 
 

@@ -1,7 +1,7 @@
-"""Check that the index of a chunked HDF5 dataset leads to each of its chunks.
+"""Whether the index of a chunked HDF5 dataset leads to each of its chunks.
 
-Most files have an index of version 1, a B-tree without a checksum. If the look-up of a chunk fails,
-HDF5 returns the fill value; if its address is wrong, HDF5 returns other bytes. So the places,
+Most files have an index of version 1, a B-tree without a checksum. HDF5 reads a chunk that its
+look-up does not find as the fill value, and one at a wrong address as other bytes. So the places,
 addresses and sizes in the index are compared with the dataset's shape, the file's size and each
 other, and each chunk that the index lists is looked up.
 """
@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 
-_MOST_CHUNKS = 30_000  # most chunks that are compared: a look-up takes 5.5 us, all of them 0.2 s
+_MOST_CHUNKS = 30_000  # most that are compared: a look-up takes 5.5 us, so this takes 0.2 s
 
 
 def require_sound_index(dataset: h5py.Dataset, where: str) -> None:
     """Raise SourceError where the index of a dataset contradicts itself, the shape or the file.
 
-    An index of more than _MOST_CHUNKS chunks is not checked.
+    An index of more than 30 000 chunks is not looked at.
     """
     if dataset.chunks is None or not _MOST_CHUNKS >= _number(dataset) > 0:
         return
@@ -61,7 +61,7 @@ def require_sound_index(dataset: h5py.Dataset, where: str) -> None:
 
 
 def _number(dataset: h5py.Dataset) -> int:
-    """Return how many chunks cover the shape."""
+    """Return how many chunks the shape takes."""
     return math.prod(-(-n // size) for n, size in zip(dataset.shape, dataset.chunks, strict=True))
 
 
@@ -83,9 +83,9 @@ def _is_apart(starts: NDArray[Any], sizes: NDArray[Any], end: int) -> NDArray[np
 
 
 def _has_size(dataset: h5py.Dataset, listed: list[Any], sizes: NDArray[Any]) -> NDArray[np.bool_]:
-    """Return whether unpacked chunks have the size of their voxels.
+    """Whether chunks that no filter packs have the size of their voxels.
 
-    The mask of an entry has a bit for each filter that was skipped for the chunk.
+    The mask of an entry has a bit for each filter that did not pack the chunk.
     """
     skipped = np.array([one.filter_mask for one in listed], np.uint64)
     filters = dataset.id.get_create_plist().get_nfilters()
@@ -95,13 +95,10 @@ def _has_size(dataset: h5py.Dataset, listed: list[Any], sizes: NDArray[Any]) -> 
 
 
 def _is_found(dataset: h5py.Dataset, place: tuple[int, ...]) -> bool:
-    """Return whether HDF5 finds a chunk by its place.
-
-    The buffer is too small for any chunk, so HDF5 looks the chunk up and reads no byte of it.
-    """
+    """Whether HDF5 finds a chunk by its place. No byte of it is read: the buffer has no room."""
     try:
         dataset.id.read_direct_chunk(place, out=bytearray(1))
-    except ValueError:  # the buffer is too small: HDF5 found the chunk and its size
+    except ValueError:  # too small a buffer: the look-up has told the chunk's size
         return True
     except (RuntimeError, OSError):
         return False

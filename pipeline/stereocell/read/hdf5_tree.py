@@ -163,7 +163,7 @@ class Hdf5Array:
     """A dataset's voxels, read by h5py a window at a time.
 
     Raises SourceError where they lie in other files, are of no standard type, or are packed by a
-    filter that isn't installed. The first window raises it where the index of chunks is damaged.
+    filter that isn't there. The first window raises it where the index of the chunks is damaged.
     """
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:

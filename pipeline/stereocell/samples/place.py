@@ -1,4 +1,4 @@
-"""Check the place of a sample: other content stays there, unless --force is given."""
+"""The place of a sample: anything else that lies there stays, unless --force is given."""
 
 from collections.abc import Mapping
 from pathlib import Path

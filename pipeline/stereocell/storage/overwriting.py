@@ -1,4 +1,4 @@
-"""The guard of all writers: files of other programs or specimens are only replaced with --force.
+"""The guard of all writers: nothing of somebody else is removed or replaced without --force.
 
 A command may replace results of StereoCell of the same specimen. Other content at the place of a
 result ends the command before it writes, with a line that names the content.
@@ -19,7 +19,7 @@ HINT = "choose another place, or --force replaces it"
 
 @contextmanager
 def forcing(is_forced: bool) -> Iterator[None]:
-    """Within the block, let results replace any content at their place if --force is given."""
+    """Within the block, allow that results replace whatever lies at their place (--force)."""
     before = _forced.set(is_forced)
     try:
         yield

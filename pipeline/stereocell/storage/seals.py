@@ -1,8 +1,8 @@
-"""The message on a record of a build that does not fit its own hash."""
+"""The hash that a record of a build holds of itself, in messages."""
 
 from pathlib import Path
 
-_DIGITS = 12  # least number of digits of a hash that are shown
+_DIGITS = 12  # that are shown where they differ
 
 
 def damaged(path: Path, digest: str, expected: str, remedy: str) -> str:
