@@ -92,7 +92,10 @@ def test_no_worker_outlives_a_command_that_is_stopped_or_killed(
     family = psutil.Process(command.pid).children(recursive=True)
     assert len(family) >= 2
     command.send_signal(number)
-    _, text = command.communicate(timeout=PATIENCE_S)
+    try:
+        _, text = command.communicate(timeout=PATIENCE_S)
+    finally:
+        command.kill()
     assert command.returncode == code, text
     _, alive = psutil.wait_procs(family, timeout=PATIENCE_S)
     assert alive == []

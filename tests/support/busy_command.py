@@ -9,12 +9,15 @@ from pathlib import Path
 from support.server.timeouts import PATIENCE_S
 
 _TWO_TASKS_WITHOUT_END = """
+import signal
 from pathlib import Path
 from stereocell.engine.interrupts import answering_sigterm
 from stereocell.engine.run import Engine
 from support.worker_tasks import wait_for_ever
 
 if __name__ == "__main__":
+    # A shell lets the commands that it runs in the background ignore Ctrl-C, and so the tests.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     engine = Engine(2)
     with answering_sigterm():
         try:
