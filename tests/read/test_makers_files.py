@@ -150,6 +150,46 @@ def test_a_lif_without_lengths_asks_for_them(tmp_path: Path) -> None:
     assert "--spacing-um" in refusal(path)
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ('NumberOfElements="16"', "found 55296 bytes of voxels, expected"),
+        ('Memory Size="55296"', "found 55296 bytes of voxels, expected 99999"),
+    ],
+)
+def test_a_lif_that_holds_less_than_its_xml_states_is_refused(
+    tmp_path: Path, change: str, words: str
+) -> None:
+    """The library would read the planes of the next image."""
+    images = {"a": ("ZYX", f_phantom()), "b": ("ZYX", f_phantom()[:9].copy())}
+    path = write_lif(tmp_path / "a.lif", images)
+    other = change.replace('"16"', '"24"').replace("55296", "99999")
+    content = path.read_bytes().replace(change.encode("utf-16-le"), other.encode("utf-16-le"))
+    path.write_bytes(content)
+    assert words in refusal(path, series=1)
+    np.testing.assert_array_equal(whole(read.open(path, series=2)), f_phantom()[:9])
+
+
+def test_a_lif_that_holds_more_than_its_xml_states_is_told(tmp_path: Path) -> None:
+    path = write_lif(tmp_path / "a.lif", {"a": ("ZYX", f_phantom())})
+    fewer = 'NumberOfElements="12"'.encode("utf-16-le")
+    path.write_bytes(path.read_bytes().replace('NumberOfElements="16"'.encode("utf-16-le"), fewer))
+    dataset = read.open(path)
+    np.testing.assert_array_equal(whole(dataset), f_phantom()[:12])
+    (note,) = dataset.notes
+    assert note.startswith("the XML describes 41472 of 55296 bytes of the image's voxels (75.00%)")
+
+
+def test_blocks_of_a_lif_that_share_a_name_are_refused(tmp_path: Path) -> None:
+    images = {"a": ("ZYX", f_phantom()), "b": ("ZYX", f_phantom() + 1)}
+    path = write_lif(tmp_path / "a.lif", images)
+    content = path.read_bytes()
+    name = "Mem1".encode("utf-16-le")
+    at = content.rindex(name)
+    path.write_bytes(content[: at + 6] + b"0" + content[at + 7 :])
+    assert "found the name of another block" in refusal(path)
+
+
 # ND2
 
 ND2 = np.stack([np.stack([five(f_phantom() + 100 * p)[t] for p in (0, 1)]) for t in (0, 1)])
