@@ -103,6 +103,45 @@ def test_a_czi_s_tile_that_is_not_where_the_directory_says_is_refused(tmp_path: 
     assert "a.czi" in refusal(path)
 
 
+def test_tiles_that_a_czi_lacks_are_told_with_their_share(tmp_path: Path) -> None:
+    path = tmp_path / "a.czi"
+    body = five(f_phantom())
+    assert not any("tiles" in note for note in read.open(write_czi(path, {None: body})).notes)
+    body[1, 1, 9:] = 0
+    path.unlink()
+    with czi.create_czi(str(path)) as file:
+        for t, c, z in np.ndindex(2, 2, 16):
+            if (t, c) != (1, 1) or z < 9:
+                plane = {"T": t, "C": c, "Z": z}
+                file.write(data=np.ascontiguousarray(body[t, c, z][..., None]), plane=plane)
+    spacing = {"spacing_um": SIZE_UM}
+    assert not any("tiles" in note for note in read.open(path, **spacing).notes)
+    dataset = read.open(path, time=1, **spacing)
+    np.testing.assert_array_equal(whole(dataset, 1), body[1, 1])
+    (note,) = (note for note in dataset.notes if "tiles" in note)
+    assert note.startswith("7 of 32 tiles (21.88%) are not stored: read as 0")
+
+
+def test_a_czi_without_tiles_at_a_point_in_time_is_refused_there(tmp_path: Path) -> None:
+    path = tmp_path / "a.czi"
+    with czi.create_czi(str(path)) as file:
+        for t, z in np.ndindex(3, 16):
+            if t != 1:
+                data = np.ascontiguousarray(f_phantom()[z][..., None])
+                file.write(data=data, plane={"T": t, "C": 0, "Z": z})
+    whole(read.open(path, time=2, spacing_um=SIZE_UM))
+    assert "time point 1: found no tile" in refusal(path, time=1, spacing_um=SIZE_UM)
+
+
+def test_a_czi_whose_metadata_state_more_than_its_tiles_is_told(tmp_path: Path) -> None:
+    path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
+    content = path.read_bytes()
+    assert content.count(b"<SizeZ>16<") == 1
+    path.write_bytes(content.replace(b"<SizeZ>16<", b"<SizeZ>24<"))
+    (note,) = (note for note in read.open(path).notes if "metadata" in note)
+    assert note.startswith("the metadata state 24 along Z, and tiles are there for 16")
+
+
 def test_a_czi_of_rgb_or_of_one_plane_is_refused(tmp_path: Path) -> None:
     with czi.create_czi(str(tmp_path / "a.czi")) as file:
         file.write(data=np.zeros((9, 9, 3), np.uint8), plane={"C": 0, "Z": 0, "T": 0})
