@@ -69,7 +69,8 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         absent = note_absent(level.pages for level in series.levels)
         if series.kind == "ndtiff":
             files += (index_of(location),)
-    notes = [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
+        notes = _undescribed(tiff, found)
+    notes += [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
     arrays, more = _at_first_place(arrays)
     notes += more
     if axes:
@@ -121,6 +122,21 @@ def _left_out(others: int) -> list[str]:
     if not others:
         return []
     return [f"{others} other image{'s' * (others > 1)} in the file left out: the largest is built"]
+
+
+def _undescribed(tiff: TiffFile, found: Sequence[TiffPageSeries]) -> list[str]:
+    """Return a note on pages that no image has: the file's description counts fewer planes."""
+    if any(one.kind == "ndtiff" for one in found):  # compared with its index already
+        return []
+    levels = [level for one in found for level in one.levels]
+    described = sum(level.size // max(level.keyframe.size, 1) for level in levels)
+    total = len(tiff.pages)
+    if described >= total:
+        return []
+    return [
+        f"the file's description counts {described} of {total} pages; {total - described} are left "
+        f"out ({(total - described) / total:.0%})"
+    ]
 
 
 def _require_imagej_whole(where: str, tiff: TiffFile) -> None:
