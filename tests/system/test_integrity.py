@@ -19,7 +19,8 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import find_damage, is_whole
 from stereocell.cli.__main__ import main
 from stereocell.storage import file_list
-from stereocell.verify.formats import CheckLine, check
+from stereocell.verify.check_line import CheckLine
+from stereocell.verify.formats import check
 from support import phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep

@@ -75,7 +75,7 @@ from stereocell.textures.map_packages import (
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import write_usdz as usdz_writer
 from stereocell.usd import written_files
-from stereocell.usd.read_stage import dependencies, may_be_image
+from stereocell.usd.stage_files import dependencies, may_be_image
 from stereocell.usd.written_files import AsWritten
 
 

@@ -19,7 +19,7 @@ from stereocell.cli.flags import flags_of, numbers
 
 if TYPE_CHECKING:
     from stereocell.engine.run import Engine
-    from stereocell.verify.formats import CheckLine
+    from stereocell.verify.check_line import CheckLine
 
 
 @dataclass(frozen=True, slots=True)

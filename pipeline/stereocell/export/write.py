@@ -29,7 +29,7 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import is_file
-from stereocell.usd.read_stage import dependencies
+from stereocell.usd.stage_files import dependencies
 from stereocell.usd.write_usdz import MAX_TRIANGLES
 from stereocell.usd.written_files import CHANGED
 
