@@ -34,8 +34,8 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         clear_beside(path)
-        temporary.touch()
-        try:
+        try:  # from here on an interruption removes it
+            temporary.touch()
             yield temporary
             with temporary.open("rb+") as file:
                 os.fsync(file.fileno())
@@ -68,8 +68,8 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     try:
         clear_beside(path)
         with making(new, path):
-            new.mkdir(parents=True)
-            try:
+            try:  # from here on an interruption removes it
+                new.mkdir(parents=True)
                 yield new
                 for file in new.rglob("*"):
                     if file.is_file():
@@ -85,12 +85,11 @@ def replacing_folder(path: Path) -> Iterator[Path]:
 
 def _swap(new: Path, path: Path, old: Path) -> None:
     """Rename `new` to `path`; `path` goes to `old` first, since it may be a folder with files."""
-    if path.exists():
-        os.replace(path, old)
     try:
+        if path.exists():
+            os.replace(path, old)
         os.replace(new, path)
-    except OSError:
-        if old.exists():
+    finally:
+        if old.exists() and not path.exists():  # failed, or interrupted between the two
             os.replace(old, path)
-        raise
-    remove_remains(old)
+        remove_remains(old)
