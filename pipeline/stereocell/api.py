@@ -51,6 +51,7 @@ def build(
         built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
     """
     from stereocell.building import phases
+    from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import require_build_or_nothing
     from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.building.setting_names import named_as_settings
@@ -103,7 +104,7 @@ def build(
         print_choice(choice)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
-        phases.run_bundle(folder, engine)
+        run_bundle(folder, engine)
         report_phase.run_report(folder)
     shown = place.source if place.is_local else place.shown.rstrip("/")
     parts = ("stage/stage.usda", "bundle/index.html", "report/index.html")

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building import input_unchanged, model_process, phases
+from stereocell.building import bundle_phase, input_unchanged, model_process
 from stereocell.building import tissue as tissue_channels
 from stereocell.building.open_source import open_source
 from stereocell.building.out_folder import OutFolder
@@ -71,7 +71,7 @@ OTHER_CLASSES = [
 def without_viewer() -> Iterator[None]:
     """The viewer may be built anew meanwhile, and is most of a small bundle."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(phases, "viewer_dist", lambda: None)
+        patch.setattr(bundle_phase, "viewer_dist", lambda: None)
         patch.setattr(tissue_channels, "learn_tissue", learn)
         yield
 
@@ -181,7 +181,7 @@ def run_until(out: str, flags: list[str], event: str, place: str) -> None:
                 os.kill(os.getpid(), signal.SIGKILL)
 
     console.quiet = True
-    phases.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
+    bundle_phase.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
     tissue_channels.learn_tissue = learn  # type: ignore[assignment]
     sys.addaudithook(hook)
     tissue(Path(out), *flags)

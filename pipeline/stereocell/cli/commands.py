@@ -189,13 +189,14 @@ def _run_phases(
     from stereocell.building import phases
     from stereocell.building.out_folder import OutFolder
 
+    from stereocell.building.bundle_phase import run_bundle
     for name in names:
         if name == "units":
             phases.run_units(out, engine, only=getattr(options, "only", None))
         elif name == "stage":
             phases.run_stage(out, engine)
         elif name == "bundle":
-            phases.run_bundle(out, engine, stage=getattr(options, "stage", None))
+            run_bundle(out, engine, stage=getattr(options, "stage", None))
         else:
             from stereocell.report import phase  # slow to import: it draws
 
