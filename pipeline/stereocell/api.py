@@ -61,7 +61,8 @@ def build(
     from stereocell.storage.claim import LOCK
     from stereocell.storage.location import Location, require_apart
     from stereocell.storage.lock import alone_in
-    from stereocell.storage.overwriting import forcing
+    from stereocell.storage.overwriting import IN_PYTHON, forcing
+    from stereocell.storage.shell_commands import as_shown, filling_in
     from stereocell.storage.workspace import opened
 
     leave_if_importing_main()
@@ -87,8 +88,10 @@ def build(
     with named_as_settings():
         wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
     place = Location.of(out)
+    shown = place.source if place.is_local else place.shown.rstrip("/")
     with ExitStack() as stack:
-        stack.enter_context(forcing(force))
+        stack.enter_context(filling_in({"OUT": shown, "INPUT": as_shown(str(source))}))
+        stack.enter_context(forcing(force, IN_PYTHON))
         if place.is_local:
             folder = Path(place.source)
             require_apart(source, folder)
@@ -106,7 +109,6 @@ def build(
         phases.run_stage(folder, engine)
         run_bundle(folder, engine)
         report_phase.run_report(folder)
-    shown = place.source if place.is_local else place.shown.rstrip("/")
     parts = ("stage/stage.usda", "bundle/index.html", "report/index.html")
     return Built(shown, *(f"{shown}/{part}" for part in parts))
 

@@ -357,7 +357,7 @@ def test_damaged_file_is_named_and_made_again(
         assert main([phase[0], str(out), *phase[1:]]) == 1
         line = only_line(capfd)
         assert str(out / name) in line
-        assert "run `stereocell tissue OUT` again" in line
+        assert f"run `stereocell tissue {out}` again" in line
     monkeypatch.setattr(report, "run_report", lambda out: None)
     assert tissue(out) == 0
     assert Path(name).name in capfd.readouterr().err

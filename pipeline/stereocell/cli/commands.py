@@ -297,9 +297,11 @@ def check(options: argparse.Namespace) -> Answer:
 
     lines = []
     for line in chain(run(options.out), _deep(options) if options.deep else ()):
-        lines.append(asdict(line))
-        print_unless_json(options, f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {line.detail}")
+        detail = fill_in(line.detail, options.places)
+        lines.append({**asdict(line), "detail": detail})
+        print_unless_json(options, f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {detail}")
     is_sound = all(line["ok"] for line in lines)
+    from stereocell.storage.shell_commands import fill_in
     return Answer({"ok": is_sound, "checks": lines}, 0 if is_sound else 1)
 
 
