@@ -82,6 +82,8 @@ def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = 
     out_folder = OutFolder(out)
     out_folder.require_name()
     with phase_of(out_folder, "plan") as phase:
+        if engine is not None:
+            require_own_places(out_folder, is_same_plan=True)  # what no plan may replace
         plan = settle(source, settings)
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()

@@ -96,7 +96,11 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     and code. Raises StereoCellError; plan and OUT/tissue are unchanged then.
     """
     out_folder = OutFolder(out)
-    plan = without_tissue(out_folder.plan())
+    there = out_folder.plan()
+    require_own_tissue(out)
+    # classes that are learned again may be the same, so that the plan and the stage stay
+    require_own_places(out_folder, is_same_plan=any(one.source for one in there.channels))
+    plan = without_tissue(there)
     channel = _find_channel(plan, request.channel)
     voxels = math.prod(plan.region.shape)
     if voxels > MAX_VOXELS:
@@ -124,7 +128,6 @@ def _add(
             f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
             "same, or no --classes"
         )
-    require_own_tissue(out)
     is_brain = plan.modality == "MR" and not request.everywhere
     options = TissueOptions(classes=request.classes or "auto", brain=is_brain)
     settings = asdict(options) if network is None else network.settings()
