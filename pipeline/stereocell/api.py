@@ -85,12 +85,11 @@ def build(
             "{'plan': {'level': 1}}"
         )
     file = None if config is None else Path(config)
-    with named_as_settings():
-        wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
     place = Location.of(out)
     shown = place.source if place.is_local else place.shown.rstrip("/")
     with ExitStack() as stack:
         stack.enter_context(filling_in({"OUT": shown, "INPUT": as_shown(str(source))}))
+        stack.enter_context(named_as_settings())
         stack.enter_context(forcing(force, IN_PYTHON))
         if place.is_local:
             folder = Path(place.source)
@@ -100,10 +99,10 @@ def build(
         else:
             folder = stack.enter_context(opened(place.source, command="build"))
             require_build_or_nothing(folder, source)
+        wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
-        with named_as_settings():
-            phases.make(str(source), folder, wanted, engine=engine)
+        phases.make(str(source), folder, wanted, engine=engine)
         print_choice(choice)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)

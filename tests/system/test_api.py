@@ -11,6 +11,7 @@ import pytest
 
 import stereocell
 from stereocell.cli.__main__ import main
+from stereocell.engine.run import TasksFailedError
 from support import phantoms
 from support.digests import digests_of
 
@@ -34,7 +35,7 @@ def test_what_is_wrong_is_an_error_of_one_line(tmp_path: Path) -> None:
         stereocell.build(tmp_path / "none.ome.tif", tmp_path / "out")
     assert "\n" not in str(raised.value)
     with pytest.raises(stereocell.StereoCellError, match="grids"):
-        stereocell.build(tmp_path, tmp_path / "out", settings={"plan": {"grids": "2x1"}})
+        stereocell.build(tmp_path / "f.tif", tmp_path / "out", settings={"plan": {"grids": "2x1"}})
     with pytest.raises(stereocell.StereoCellError, match="workers is -1, expected"):
         stereocell.build(tmp_path, tmp_path / "out", workers=-1)
     assert not (tmp_path / "out").exists()
@@ -90,6 +91,18 @@ def test_functions_that_write_leave_the_files_of_others_and_name_their_own_argum
     assert "thesis.tex" in str(raised.value)
     assert "--" not in str(raised.value)
     assert digests_of(tmp_path) == before
+
+
+def test_error_of_a_later_phase_names_the_argument_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise TasksFailedError("r0_c0/F: its worker was killed: expected fewer --workers")
+
+    source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", phantoms.f_phantom()[None], "CZYX")
+    monkeypatch.setattr("stereocell.building.phases.run_units", fail)
+    with pytest.raises(TasksFailedError, match=r"expected fewer workers$"):
+        stereocell.build(source, tmp_path / "out")
 
 
 def test_every_function_that_writes_takes_force() -> None:
