@@ -1,6 +1,5 @@
 """Write one file of a built OUT for another program: the format is chosen by the file's ending."""
 
-import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -26,6 +25,7 @@ from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import described_by, write_nifti, write_nrrd, write_raw
 from stereocell.export.written import is_own, remember
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.atomic_write import put_in_place
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import is_file
@@ -154,7 +154,7 @@ def _export(
         for place in places:
             require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
         for one, place in zip(made, places, strict=True):
-            _put(one, place)
+            put_in_place(one, place, beside / "old")
     for layer in sorted(chosen.as_written.changed):
         report(f"{layer}: {CHANGED}: taken as it is")
     return line, places
@@ -204,13 +204,6 @@ def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -
         place.is_relative_to(folder.resolve()) for folder in made
     ):
         raise UsageError(f"{file}: a part of the build lies there, expected another place")
-
-
-def _put(made: Path, place: Path) -> None:
-    """Move a file or a folder to its place, instead of what was there."""
-    if place.is_dir():
-        os.replace(place, made.with_name("old"))
-    os.replace(made, place)
 
 
 def find_ending(file: Path) -> str:

@@ -76,17 +76,20 @@ def replacing_folder(path: Path) -> Iterator[Path]:
                         with file.open("rb+") as opened:
                             os.fsync(opened.fileno())
                 require_asked()
-                _swap(new, path, old)
+                put_in_place(new, path, old)
             finally:
                 shutil.rmtree(new, ignore_errors=True)
     except OSError as error:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
 
 
-def _swap(new: Path, path: Path, old: Path) -> None:
-    """Rename `new` to `path`; `path` goes to `old` first, since it may be a folder with files."""
+def put_in_place(new: Path, path: Path, old: Path) -> None:
+    """Rename a file or a folder to `path`; what lies there stays until the new one is there.
+
+    old  an unused path, to which a folder goes first: no folder with files can be replaced at once
+    """
     try:
-        if path.exists():
+        if path.is_dir() or (new.is_dir() and path.exists()):
             os.replace(path, old)
         os.replace(new, path)
     finally:

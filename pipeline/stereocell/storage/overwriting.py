@@ -19,10 +19,10 @@ _force_words: ContextVar[str] = ContextVar("force_words", default="")  # empty: 
 
 
 @contextmanager
-def forcing(is_forced: bool, words: str) -> Iterator[None]:
+def forcing(is_forced: bool, words: str = "") -> Iterator[None]:
     """Within the block, allow that results replace whatever lies at their place, if it is forced.
 
-    words  the caller's way to force it, for remedies: AT_A_PROMPT or IN_PYTHON
+    words  the caller's way to force it, for remedies: AT_A_PROMPT or IN_PYTHON; empty: none
     """
     before, words_before = _forced.set(is_forced), _force_words.set(words)
     try:
