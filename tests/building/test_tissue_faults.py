@@ -29,6 +29,7 @@ from stereocell.storage.cache_key import key_of
 from stereocell.storage.claim import LOCK
 from stereocell.tissue.classify import TissueOptions
 from stereocell.verify import formats as check_module
+from stereocell.verify import node_validators
 from support import phantoms
 from support.exhaustive import sweep
 from support.onnx_models import write_model
@@ -90,7 +91,7 @@ def learn(voxels: NDArray[Any], _: object, *, options: TissueOptions) -> SimpleN
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """The report takes longest and is written last; no fault here is one of glTF or KTX2."""
     monkeypatch.setattr(report, "run_report", lambda out: None)
-    monkeypatch.setattr(check_module, "_run_node", lambda script, paths: "")
+    monkeypatch.setattr(node_validators, "_run_node", lambda script, paths: "")
 
 
 @pytest.fixture(scope="module")
@@ -360,7 +361,9 @@ def test_damaged_file_is_named_and_made_again(
         assert f"run `stereocell tissue {out}` again" in line
     monkeypatch.setattr(report, "run_report", lambda out: None)
     assert tissue(out) == 0
-    assert Path(name).name in capfd.readouterr().err
+    said = capfd.readouterr().err
+    assert Path(name).name in said
+    assert "OUT`" not in said
     assert digests(out) == digests(undisturbed)
     assert faults(out) == []
 

@@ -38,6 +38,7 @@ from stereocell.read.readers import reader_of
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.json_files import write_json, write_sealed
+from stereocell.storage.shell_commands import fill_in
 from stereocell.tissue import classify as tissue_module
 from stereocell.tissue import onnx_classifier as network_module
 from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions, learn_tissue
@@ -181,7 +182,8 @@ def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
     try:
         record = read_whole(folder)
     except OutputError as fault:
-        console.print(f"tissue: {fault}", markup=False)
+        line = fill_in(str(fault), {"OUT": str(folder.parent)})
+        console.print(f"tissue: {line}", markup=False, soft_wrap=True)
         return None
     if record["key"] != key:
         return None
