@@ -108,8 +108,15 @@ def _require_free(path: Path, seed: int, shape: tuple[int, int, int]) -> None:
     is_ours = group is not None and group.attrs.get(SAMPLE) == _about(seed, shape)
     require_free(path, expected=EXPECTED, is_ours=is_ours)
     table = table_beside(path)
-    is_ours = table.is_file() and table.read_bytes().startswith(_HEAD.encode())
-    require_free(table, expected=EXPECTED, is_ours=is_ours)
+    require_free(table, expected=EXPECTED, is_ours=_is_table(table))
+
+
+def _is_table(file: Path) -> bool:
+    """Return whether a file begins as the table of such a sample does."""
+    if not file.is_file():
+        return False
+    with file.open("rb") as opened:
+        return opened.readline(len(_HEAD)) == _HEAD.encode()
 
 
 def _about(seed: int, shape: tuple[int, int, int]) -> dict[str, Any]:
