@@ -11,7 +11,8 @@ from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import StageError
 from stereocell.usd.layer_units import note_missing
-from stereocell.usd.read_stage import loaded, open_stage, read_lods
+from stereocell.usd.read_levels import read_lods
+from stereocell.usd.read_stage import loaded, open_stage
 from support.stages import F_ID, leaf, write_whole
 
 
