@@ -212,7 +212,7 @@ def test_all_units_are_built_again_if_a_chunk_outside_of_the_fingerprint_s_sampl
         assert main(["units", str(out), *INLINE]) == 1
     line = last_line(capsys)
     assert "the first is '0/c/" in line
-    assert "no unit is kept: run `stereocell units OUT` again" in line
+    assert f"no unit is kept: run `stereocell units {out}` again" in line
     assert main(["units", str(out), *INLINE]) == 0
     assert units_of(out) == built(source, tmp_path / "expected", *AS_IMAGE)
 
@@ -338,7 +338,7 @@ def test_a_model_or_its_image_that_changes_while_it_is_read_is_reported(
     assert main(["tissue", str(out), "--model", str(model)]) == 1
     line = last_line(capsys)
     assert "changed while it was read" in line
-    assert "run `stereocell tissue OUT` again" in line
+    assert f"run `stereocell tissue {out}` again" in line
     assert not (out / "tissue").exists()
 
 

@@ -1,6 +1,9 @@
 """Worker processes of this machine: errors, killed workers, and commands that are stopped."""
 
+import os
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -79,6 +82,20 @@ def test_a_script_without_a_main_guard_is_answered_with_the_line_to_write(tmp_pa
     assert script.returncode == 1
     assert "A script that builds needs the line `if __name__ == '__main__':`" in text
     assert text.count("Traceback") == 1  # that of the script itself, and none of its workers
+
+
+def test_a_script_on_standard_input_has_workers(tmp_path: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-"],
+        input=_UNGUARDED + "print('done')",
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])},
+        cwd=tmp_path,
+        text=True,
+        capture_output=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert (run.returncode, run.stdout) == (0, "done\n"), run.stderr
 
 
 @pytest.mark.parametrize(

@@ -181,6 +181,23 @@ def test_floats_alone_part_triangles_of_one_plane(
     assert [len(pairs) for pairs in asked] == [0]
 
 
+@pytest.mark.parametrize("axes", [[0, 1, 2], [1, 2, 0], [2, 0, 1]])
+def test_floats_alone_part_the_triangles_of_a_large_flat_face(
+    axes: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All triangles of a polygon meet at one corner, so exact tests of all pairs would be slow."""
+    asked = []
+    monkeypatch.setattr(
+        self_intersections, "_meet", lambda at, triangles, pairs: asked.append(pairs) or pairs
+    )
+    angle = np.linspace(0, 2 * np.pi, 500, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle), np.full(500, 3.0)], axis=1)
+    around = np.arange(1, 499)
+    triangles = np.stack([0 * around, around, around + 1], axis=1)
+    assert len(find_crossings(ring[:, axes], triangles)) == 0
+    assert [len(pairs) for pairs in asked] == [0]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:

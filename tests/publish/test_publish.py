@@ -143,7 +143,9 @@ def test_a_manifest_of_another_build_is_not_published(out: Path, run: Run, tmp_p
     manifest.write_text(manifest.read_text().replace('"sha256": "', '"sha256": "0'))
     code, _, said = run(out, tmp_path / "site")
     assert code == 1
-    assert "manifest.json: damaged, names another files.json: run `stereocell bundle OUT`" in said
+    assert (
+        f"manifest.json: damaged, names another files.json: run `stereocell bundle '{out}'`" in said
+    )
     manifest.unlink()
     assert "manifest.json is missing" in run(out, tmp_path / "site")[2]
     assert not (tmp_path / "site").exists()
@@ -229,7 +231,7 @@ def test_a_damaged_bundle_is_not_published(out: Path, run: Run, tmp_path: Path) 
     (out / "bundle/sw.js").write_bytes(b"Self;")
     code, _, said = run(out, tmp_path / "site")
     assert code == 1
-    assert "bundle/sw.js: damaged: run `stereocell bundle OUT` first" in said
+    assert f"bundle/sw.js: damaged: run `stereocell bundle '{out}'` first" in said
     assert not (tmp_path / "site").exists()
     assert run(tmp_path / "nothing", tmp_path / "site")[0] == 1
 

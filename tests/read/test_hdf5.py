@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.tiling import Box
 from stereocell.read import hdf5_texts
 from stereocell.read.hdf5_types import require_standard
 from support.array_files import SIZE_UM, characters, write_bdv_xml, write_ims
@@ -326,6 +327,26 @@ def test_an_index_of_chunks_that_contradicts_itself_is_refused(
     line = window_refusal(path)
     assert "/raw: index of chunks: (" in line
     assert told in line
+
+
+def test_an_index_of_many_chunks_is_compared_where_a_window_reads(tmp_path: Path) -> None:
+    body = np.random.default_rng(0).integers(0, 256, (40, 100, 100), np.uint8)
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        raw = file.create_dataset("raw", data=body, chunks=(1, 5, 2))
+        assert raw.id.get_num_chunks() == 40_000
+        place, other = (20, 50, 60), (30, 0, 0)
+        chunk, shared = (raw.id.get_chunk_info_by_coord(at) for at in (place, other))
+    entry = struct.pack("<II5Q", 10, 0, *place, 0, chunk.byte_offset)
+    damage(path, entry, 32, 1)  # the place within a voxel, which is always 0
+    dataset = read.open(path, spacing_um=SIZE_UM)
+    apart, across = Box((0, 0, 0), (19, 100, 100)), Box((19, 48, 58), (22, 56, 63))
+    np.testing.assert_array_equal(dataset.read(0, apart).voxels, body[apart.slices])
+    with pytest.raises(SourceError, match=r"\(20, 50, 60\): found an entry that no look-up finds"):
+        dataset.read(0, across)
+    damage(path, struct.pack("<Q", shared.byte_offset), 0, chunk.byte_offset & 0xFF)
+    with pytest.raises(SourceError, match="bytes beyond the file or of another chunk"):
+        read.open(path, spacing_um=SIZE_UM).read(0, apart)
 
 
 @pytest.mark.parametrize("libver", ["earliest", "latest"])

@@ -76,6 +76,21 @@ def test_the_share_of_pages_that_the_ome_xml_leaves_out_is_reported(tmp_path: Pa
     assert note == "the OME-XML describes 12 of 16 pages in the files; 4 are left out (25%)"
 
 
+@pytest.mark.parametrize("compression", [None, "zlib"])
+def test_pages_that_imagej_s_description_does_not_count_are_told(
+    tmp_path: Path, compression: str | None
+) -> None:
+    path = tmp_path / "a.tif"
+    about = {"axes": "ZYX"}
+    tifffile.imwrite(path, BODY, imagej=True, metadata=about, compression=compression)
+    assert whole(path).notes == ()
+    path.write_bytes(path.read_bytes().replace(b"slices=16", b"slices=12"))
+    dataset = whole(path)
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, BODY[:12])
+    (note,) = dataset.notes
+    assert note == "the file's description counts 12 of 16 pages; 4 are left out (25%)"
+
+
 @pytest.mark.parametrize("name", ["a.ome.tif", "a.tif"])
 def test_the_share_of_tiles_that_are_not_stored_is_reported(tmp_path: Path, name: str) -> None:
     path = tmp_path / name

@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
 
+import stereocell
 from stereocell.model.errors import SourceError
 from stereocell.storage.child_process import Bounds, Child, ChildError, run_in_child
 from support.child_objects import LONG_S, Counter, print_and_return, refuse
@@ -86,3 +88,14 @@ def test_a_child_ends_with_its_parent_even_inside_a_call() -> None:
     parent.communicate()
     gone, _ = psutil.wait_procs([child], timeout=60)
     assert gone == [child]
+
+
+def test_interpreters_are_started_in_one_place_for_libraries_that_may_abort() -> None:
+    package = Path(stereocell.__file__).parent
+    starters = {
+        file.relative_to(package).as_posix()
+        for file in package.rglob("*.py")
+        if "[sys.executable" in file.read_text(encoding="utf-8")
+    }
+    compiling = {"kernels/cache_place.py", "kernels/compile_all.py"}  # run no library on a source
+    assert starters == {"storage/child_process.py", *compiling}

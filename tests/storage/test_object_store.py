@@ -312,8 +312,8 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
         assert main(["units", "s3://bucket/held"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
         assert line == (
-            "stereocell: s3://bucket/held/plan.json is missing: run `stereocell plan INPUT -o OUT`"
-            " first"
+            "stereocell: s3://bucket/held/plan.json is missing: "
+            "run `stereocell plan INPUT -o s3://bucket/held` first"
         )
         assert not fs.exists(lock)
     ended.wait()

@@ -27,12 +27,15 @@ if __name__ == "__main__":
 """
 
 
-def start_script(script: str, folder: Path) -> "subprocess.Popen[str]":
-    """Start a Python script that can import the tests' support; its stderr is a pipe."""
+def start_script(script: str, folder: Path, *words: object) -> "subprocess.Popen[str]":
+    """Start a Python script that can import the tests' support; its stderr is a pipe.
+
+    words  its arguments
+    """
     file = folder / "it's a script.py"
     file.write_text(script)
     return subprocess.Popen(
-        [sys.executable, file],
+        [sys.executable, file, *(str(word) for word in words)],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
         stderr=subprocess.PIPE,

@@ -107,7 +107,7 @@ def test_no_phase_builds_from_a_plan_that_was_edited_by_hand(
     assert main([command[0], str(out), *command[1:]]) == 1
     line = _answer(capfd)
     assert f"{out / 'plan.json'}: damaged or changed by hand" in line
-    assert "remove it and run `stereocell plan INPUT -o OUT`" in line
+    assert f"remove it and run `stereocell plan INPUT -o {out}`" in line
     assert {f: f.read_bytes() for f in out.rglob("*") if f.is_file()} == before
 
 
@@ -141,7 +141,7 @@ def test_whole_build_of_an_earlier_version_goes_on_after_the_remedy(
     assert "is of an earlier version" in _faults(out)
     build = ["build", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
     assert main([*build, "--workers", "0"]) == 1
-    assert "remove it and run `stereocell plan INPUT -o OUT`" in _answer(capfd)
+    assert f"remove it and run `stereocell plan {build[1]} -o {out}`" in _answer(capfd)
     (out / "plan.json").unlink()
     assert main([*build, "--workers", "0"]) == 0
     assert _faults(out) == ""
@@ -152,7 +152,7 @@ def test_phases_that_were_changed_by_hand_are_named_and_done_again(
 ) -> None:
     _change(out / "phases.json")
     assert main(["bundle", str(out), "--workers", "0"]) == 1
-    assert "run `stereocell stage OUT` first" in _answer(capfd)
+    assert f"run `stereocell stage {out}` first" in _answer(capfd)
     assert main(["stage", str(out), "--workers", "0"]) == 0
     assert "phases.json: damaged or changed by hand" in capfd.readouterr().err
     assert main(["bundle", str(out), "--workers", "0"]) == 0
@@ -164,7 +164,7 @@ def test_units_of_another_plan_are_not_taken_for_those_of_this_one(
 ) -> None:
     _change(OutFolder(out).units_plan_file)
     assert main(["stage", str(out), "--workers", "0"]) == 1
-    assert "not built for the plan in plan.json: run `stereocell units OUT`" in _answer(capfd)
+    assert f"not built for the plan in plan.json: run `stereocell units {out}`" in _answer(capfd)
 
 
 @pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])

@@ -56,7 +56,7 @@ def test_a_face_of_a_million_corners_is_refused_in_a_line(cube):
     with pytest.raises(StageError) as caught:
         read_mesh(cube, np.eye(4))
     assert str(caught.value) == (
-        "/Cube: faceVertexCounts[1]: found a face of 1000000 corners, expected at most 1000: "
+        "/Cube: faceVertexCounts[1]: found a face of 1000000 corners, expected at most 20000: "
         "triangulate it in the program that edited it"
     )
 

@@ -77,9 +77,7 @@ def _content_of(out_folder: OutFolder, part: str) -> object:
 
 
 def _remedy(phase: str) -> str:
-    """Return the commands that make a phase and all after it anew."""
+    """Return the commands that make a phase and all after it anew, as one line for a shell."""
     names = list(_MADE_OF)
-    first, *others = names[names.index(phase) :]
-    *before, last = others or [""]
-    then = " and ".join(filter(None, [", ".join(before), last]))
-    return f"run `stereocell {first} OUT`" + (f", then {then}" if then else "")
+    commands = (f"stereocell {name} OUT" for name in names[names.index(phase) :])
+    return f"run `{' && '.join(commands)}`"

@@ -24,7 +24,7 @@ from stereocell.storage.contents import contents_of
 from stereocell.storage.documents import NOT_WRITTEN, SETTINGS, parse
 from stereocell.storage.json_files import find_sealed, read_json, read_sealed, sealed, write_sealed
 from stereocell.storage.kinds import Kind
-from stereocell.storage.overwriting import is_forced, require_free
+from stereocell.storage.overwriting import is_forced, or_force, require_free
 from stereocell.storage.sealed_text import is_sealed_text
 from stereocell.storage.workspace import is_file, names_in, remove, sizes_below
 
@@ -112,7 +112,8 @@ class OutFolder:
     def replaced_plan(self, plan: Plan) -> Plan | None:
         """Return the plan that `plan` would replace; None: there is none.
 
-        Raises OutputError where it was changed by hand, or is of another input, without --force.
+        Raises OutputError, unless it is forced, where that was changed by hand or is of another
+        input.
         """
         try:
             there = self.plan() if is_file(self.plan_file) else None
@@ -125,7 +126,7 @@ class OutFolder:
             found = f"another input (fingerprint {fingerprint[:12]})"
             found = found if there is None else _what_differs(there, plan)
             raise OutputError(
-                f"{self.out}: holds a build of {found}: choose another OUT, or --force replaces it"
+                f"{self.out}: holds a build of {found}: {or_force('choose another OUT')}"
             )
         return there
 
@@ -141,7 +142,7 @@ class OutFolder:
         if found is None or found not in (plan.settings, there and there.settings):
             raise OutputError(
                 f"{file}: was written or changed by hand, expected the record of an earlier plan: "
-                "move it elsewhere and give it by --config, or --force replaces it"
+                + or_force("move it elsewhere and give it by --config")
             )
 
     def require_readable(self, plan: Plan) -> None:

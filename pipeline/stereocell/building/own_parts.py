@@ -13,7 +13,7 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.contents import contents_of, is_ignored, words_for
 from stereocell.storage.file_list import read_list
 from stereocell.storage.kinds import Kind
-from stereocell.storage.overwriting import is_forced, refused
+from stereocell.storage.overwriting import is_forced, or_force, refused
 from stereocell.storage.sealed_text import is_sealed_text
 from stereocell.storage.workspace import is_file, remove, sizes_below
 from stereocell.usd.written_files import ADVICE, CHANGED, DOUBTFUL, find_damage, read_stage_list
@@ -52,15 +52,15 @@ def require_own_stage(out_folder: OutFolder) -> None:
     edited = sorted(path for path, fault in faults.items() if fault in (CHANGED, DOUBTFUL))
     if edited:
         raise OutputError(
-            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage is to be written anew: save "
-            f"what you edited elsewhere ({ADVICE}), or --force replaces it"
+            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage is to be written anew: "
+            + or_force(f"save what you edited elsewhere ({ADVICE})")
         )
 
 
 def require_own_bundle(out_folder: OutFolder) -> None:
     """Raise OutputError where OUT/bundle holds files that no bundle phase wrote.
 
-    With --force a folder that is no bundle is removed.
+    If it is forced, a folder that is no bundle is removed.
     """
     folder = out_folder.bundle_dir
     files = _files(folder)

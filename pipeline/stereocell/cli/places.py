@@ -4,8 +4,8 @@ A test checks that every command has a row, and runs each writing command on a f
 other files.
 """
 
+import argparse
 from dataclasses import dataclass
-from pathlib import Path
 
 from stereocell.storage.kinds import Kind
 
@@ -50,17 +50,24 @@ FORCE = (
 )
 
 
-def require_place(command: str, out: Path, source: str = "") -> None:
-    """Raise OutputError where OUT is no folder that a command can read or write.
+def require_place(options: argparse.Namespace) -> dict[str, str]:
+    """Return the places that remedies may name, where OUT is one that a command reads or writes.
 
-    Imports are lazy, so that --help is quick.
+    options  the command's arguments; `shown` is OUT as it was given: a path or an address
+
+    Raises OutputError where OUT is another folder. Imports are lazy, so that --help is quick.
     """
-    places = PLACES[command]
+    from stereocell.storage.shell_commands import as_shown
+
+    places, out, shown = PLACES[options.command], options.out, as_shown(str(options.shown))
     if places.reads:
         from stereocell.storage.contents import require_kind
+        from stereocell.storage.shell_commands import places_of
 
-        require_kind(out, places.reads)
-    elif command in ("build", "plan"):
+        return places_of(require_kind(out, places.reads), shown)
+    if options.command in ("build", "plan"):
         from stereocell.building.out_folder import require_build_or_nothing
 
-        require_build_or_nothing(out, source)
+        require_build_or_nothing(out, options.input)
+        return {"OUT": shown}
+    return {}

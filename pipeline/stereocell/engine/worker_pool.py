@@ -16,7 +16,7 @@ import pickle
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection
 from multiprocessing.connection import Connection
@@ -133,7 +133,7 @@ class WorkerPool:
         ours, theirs = self._context.Pipe()
         # a daemon: Python ends it where an error keeps the command from calling `close`
         process = self._context.Process(target=serve, args=(theirs,), daemon=True)
-        with children_ignore_interrupts():
+        with children_ignore_interrupts(), _main_from_a_file():
             process.start()
         theirs.close()  # the worker then has the only one, and its end closes the pipe
         return _Worker(process, ours)
@@ -196,6 +196,24 @@ def leave_if_importing_main() -> None:
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing asks
         os._exit(1)  # an exception would print a traceback
+
+
+@contextmanager
+def _main_from_a_file() -> Iterator[None]:
+    """Inside the block, hide the name of a main module that comes from no file.
+
+    A worker would import it by that name. `python - < script.py` is called `<stdin>`.
+    """
+    main = vars(sys.modules["__main__"])
+    name = main.get("__file__")
+    if name is None or os.path.isfile(name):
+        yield
+        return
+    del main["__file__"]
+    try:
+        yield
+    finally:
+        main["__file__"] = name
 
 
 def _choose_context(module: str) -> Any:

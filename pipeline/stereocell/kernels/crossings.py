@@ -125,6 +125,22 @@ def _may_meet_apart(at: Points, triangles: Ints, i: int, j: int) -> bool:
 
 
 @part
+def _are_cones_seen_apart(at: Points, v: int, a: int, b: int, c: int, d: int) -> bool:
+    """Return whether a side at v of the triangle (v, a, b) surely separates it from (v, c, d).
+
+    The triangles are looked at along each axis, so this decides triangles of one plane too.
+    """
+    for j, k in ((0, 1), (1, 2), (2, 0)):
+        for p, q in ((a, b), (b, a)):
+            own = _turn(at, v, p, q, j, k)
+            if own != UNSURE and (
+                _turn(at, v, p, c, j, k) == -own and _turn(at, v, p, d, j, k) == -own
+            ):
+                return True
+    return False
+
+
+@part
 def _may_meet_at_corner(at: Points, v: int, a: int, b: int, c: int, d: int) -> bool:
     """Return whether the triangles (v, a, b) and (v, c, d) may meet beside v."""
     p, q = _orient(at, v, c, d, a), _orient(at, v, c, d, b)
@@ -134,7 +150,9 @@ def _may_meet_at_corner(at: Points, v: int, a: int, b: int, c: int, d: int) -> b
     if r != UNSURE and r == s:
         return False
     if p == UNSURE or q == UNSURE or r == UNSURE or s == UNSURE:
-        return True
+        return not (
+            _are_cones_seen_apart(at, v, a, b, c, d) or _are_cones_seen_apart(at, v, c, d, a, b)
+        )
     return _may_pierce(at, a, b, v, c, d) or _may_pierce(at, c, d, v, a, b)
 
 

@@ -54,6 +54,7 @@ COLORS: tuple[Color, ...] = (
     (255, 255, 255),
 )
 LOOKED_AT = 100_000_000  # voxels that the level is found on; a build takes all
+_EXPECTED = "nothing or a picture of the same source"
 _SOURCE = "Source"  # key of a PNG's text: the fingerprint of the source
 _LONGEST_PX = 900  # pixels, longest side of a slice
 _CHART_PX = 200  # pixels, height of the histogram
@@ -108,11 +109,8 @@ def preview(
     plan = settle(source, settings)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
-    if path.is_dir():
-        raise OutputError(f"{path}: is a folder, expected a file named .png")
-    require_free(
-        path, expected="nothing or a picture of the same source", is_ours=_is_own(path, plan)
-    )
+    require_picture_or_nothing(path)
+    require_free(path, expected=_EXPECTED, is_ours=_source_of_picture(path) == plan.fingerprint)
     window = measure_window(statistics_task(plan, channel))
     tiles = _spread(plan, tile)
     evidence = {
@@ -162,15 +160,23 @@ def _mark(plan: Plan) -> PngInfo:
     return mark
 
 
-def _is_own(path: Path, plan: Plan) -> bool:
-    """Return whether a file is an earlier picture of the same source."""
+def require_picture_or_nothing(path: Path) -> None:
+    """Raise OutputError where a path holds no picture of this command, of whichever source."""
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, expected a file named .png")
+    require_free(path, expected=_EXPECTED, is_ours=_source_of_picture(path) is not None)
+
+
+def _source_of_picture(path: Path) -> str | None:
+    """Return the fingerprint of the source of an earlier picture; None for any other file."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the header of a foreign file may state a huge size
             with Image.open(path) as picture:
-                return picture.info.get(_SOURCE) == plan.fingerprint
+                found = picture.info.get(_SOURCE)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # it is no picture
-        return False
+        return None
+    return found if isinstance(found, str) else None
 
 
 def _spread(plan: Plan, tile: Tile) -> list[Tile]:

@@ -40,6 +40,7 @@ from stereocell.storage.overwriting import require_free
 from stereocell.storage.workspace import names_in
 
 INDEX = "slices.json"
+_EXPECTED = "nothing or slices of the same source"
 FORMAT, VERSION = "stereocell-slices", 2
 
 
@@ -133,6 +134,11 @@ def _line(plan: Plan, cut: Cut) -> str:
     )
 
 
+def require_slices_or_nothing(folder: Path) -> None:
+    """Raise OutputError where a folder holds no slices, of whichever source."""
+    require_free(folder, expected=_EXPECTED, is_ours=contents_of(folder).kind is Kind.SLICES)
+
+
 def _require_own(folder: Path, plan: Plan) -> None:
     """Raise OutputError unless a folder is empty, or holds only slices of the same source."""
     found = contents_of(folder)
@@ -140,7 +146,7 @@ def _require_own(folder: Path, plan: Plan) -> None:
     is_ours = found.kind is Kind.SLICES and found.fingerprint == plan.fingerprint
     if is_ours and (others := sorted(names - {INDEX, *_listed(folder)})):
         require_free(folder, expected="slices and no other file", found=words_for(others))
-    require_free(folder, expected="nothing or slices of the same source", is_ours=is_ours)
+    require_free(folder, expected=_EXPECTED, is_ours=is_ours)
 
 
 def _listed(folder: Path) -> set[str]:

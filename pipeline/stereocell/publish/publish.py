@@ -21,10 +21,10 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.publish.over_http import INDEX, fetch_faults, find_page
 from stereocell.publish.targets import Target, digest, target_of
 from stereocell.storage.contents import PUBLISHED, Contents, contents_of, words_for
-from stereocell.storage.file_list import DAMAGED, find_faults, read_list, to_json
+from stereocell.storage.file_list import DAMAGED, FileList, find_faults, read_list, to_json
 from stereocell.storage.json_files import read_json
 from stereocell.storage.kinds import Kind
-from stereocell.storage.overwriting import HINT, is_forced, refused
+from stereocell.storage.overwriting import is_forced, or_force, refused
 from stereocell.storage.workspace import cached
 
 FILES, MANIFEST = "files.json", "manifest.json"
@@ -75,7 +75,8 @@ def publish(
     build = held.build if bundle == out else out
     if build is not None:
         require_current(OutFolder(build))
-    files = _files_of(bundle)
+    listed = read_list(bundle / FILES, _REMEDY)
+    files = _files_of(bundle, listed)
     specimen = _specimen_of(bundle, held)
     target = target_of(text, is_public=is_public)
     if isinstance(folder := getattr(target, "folder", None), Path):
@@ -83,6 +84,7 @@ def publish(
     there = target.sizes()
     before = _read_published(target, there)
     _require_own(target, files, there, before, specimen)
+    _require_whole(bundle, listed)  # after the guards: it hashes all of the bundle
     changed = [
         path
         for path, file in files.items()
@@ -122,12 +124,25 @@ def publish(
     return Published(page, len(files), size, len(changed), sent, len(gone))
 
 
-def _files_of(bundle: Path) -> dict[str, _File]:
-    """Return the bundle's files by path, and JSON packed for hosts that send such files."""
-    listed = read_list(bundle / FILES, _REMEDY)
-    if faults := find_faults(bundle, listed):
+def _require_whole(bundle: Path, listed: FileList) -> None:
+    """Raise OutputError unless each file of the bundle's list has the bytes that it says."""
+    _raise_on(bundle, find_faults(bundle, listed))
+
+
+def _raise_on(bundle: Path, faults: Mapping[str, str]) -> None:
+    """Raise OutputError with the first fault, if there is one."""
+    if faults:
         path, fault = next(iter(faults.items()))
         raise OutputError(f"{bundle / path}: {fault}: {_REMEDY}")
+
+
+def _files_of(bundle: Path, listed: FileList) -> dict[str, _File]:
+    """Return the bundle's files by path, and JSON packed for hosts that send such files.
+
+    Raises OutputError where a JSON file is damaged.
+    """
+    documents = {path: one for path, one in listed.items() if path.endswith(".json")}
+    _raise_on(bundle, find_faults(bundle, documents))
     files = {path: _File(entry, partial(_content, bundle / path)) for path, entry in listed.items()}
     # the list names all files but itself and the manifest, which names the list
     index = _made(_content(bundle / FILES))
@@ -218,7 +233,7 @@ def _require_own(
         if path in there and path not in before and not _is_same(target, path, file, there):
             raise OutputError(
                 f"{target.shown}/{path}: is there, and was not put there by this command, "
-                f"expected a place of the bundle's own: {HINT}"
+                f"expected a place of the bundle's own: {or_force('choose another place')}"
             )
     others = [path for path in there if path not in files and not _is_of_host(path)]
     if not before and others:

@@ -24,12 +24,15 @@ class CziFacts:
     types     pixel types, by channel
     scenes    numbers and rectangles of the scenes; empty: the file has no scenes
     metadata  XML
+    tiles     number of tiles of the finest level, by scene and plane (c, t, z); empty: an early
+              file, whose tiles are not counted
     """
 
     bounds: dict[str, tuple[int, int]]
     types: tuple[str, ...]
     scenes: tuple[tuple[int, Rectangle], ...]
     metadata: str
+    tiles: dict[tuple[int, tuple[int, ...]], int]
 
 
 class CziFile:
@@ -55,6 +58,7 @@ class CziFile:
                 types=tuple(str(kind) for _, kind in sorted(self._file.pixel_types.items())),
                 scenes=tuple((index, (box.x, box.y, box.w, box.h)) for index, box in scenes),
                 metadata=self._file.raw_metadata,
+                tiles=dict(self._tiles.counts),
             )
 
     def read(self, window: Rectangle, plane: dict[str, int], scene: int | None) -> NDArray[Any]:

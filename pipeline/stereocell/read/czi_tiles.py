@@ -7,6 +7,7 @@ Reference: ZISRAW (CZI) File Format, "SubBlockDirectory" and "DirectoryEntryDV"
 """
 
 import struct
+from collections import Counter
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -42,19 +43,33 @@ class _Entry:
         starts = {name: start for name, start, _, _ in self.axes}
         return tuple(starts.get(axis, 0) for axis in _PLANE)
 
+    @property
+    def scene(self) -> int:
+        return next((start for name, start, _, _ in self.axes if name == "S"), 0)
+
+    @property
+    def is_finest(self) -> bool:
+        """Whether the tile is of the finest level: it is stored as large as it is shown."""
+        return all(size == stored for name, _, size, stored in self.axes if name in "XY")
+
 
 class CziTiles:
     """The entries of a directory, by plane. The tiles of a plane are compared once.
 
     at  place of the directory in the file
+
+    `counts` has the number of tiles of the finest level, by scene and plane (c, t, z); none for an
+    early file.
     """
 
     def __init__(self, path: str, at: int, where: str) -> None:
         self._path, self._where = path, where
         self._waiting: dict[tuple[int, ...], list[_Entry]] = {}
         with open(path, "rb") as file:
-            for entry in _entries(file, at):
-                self._waiting.setdefault(entry.plane, []).append(entry)
+            entries = _entries(file, at)
+        for entry in entries:
+            self._waiting.setdefault(entry.plane, []).append(entry)
+        self.counts = Counter((one.scene, one.plane) for one in entries if one.is_finest)
 
     def require_plane(self, plane: dict[str, int]) -> None:
         """Raise SourceError where a tile of a plane differs from its entry in the directory."""

@@ -20,7 +20,7 @@ from typing import Any
 import h5py
 
 from stereocell.model.errors import SourceError
-from stereocell.read.hdf5_chunks import require_sound_index
+from stereocell.read.hdf5_chunks import ChunkIndex
 from stereocell.read.hdf5_texts import HeapTexts, lies_in_heap
 from stereocell.read.hdf5_types import require_standard
 from stereocell.read.hdf5_windows import PluginWindows, has_plugins
@@ -163,13 +163,13 @@ class Hdf5Array:
     """A dataset's voxels, read by h5py a window at a time.
 
     Raises SourceError where they lie in other files, are of no standard type, or are packed by a
-    filter that isn't there. The first window raises it where the index of the chunks is damaged.
+    filter that isn't there. Windows raise it where the index of the chunks is damaged.
     """
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:
         self.dataset = dataset
         self._where = where
-        self._is_sound = False
+        self._index: ChunkIndex | None = None
         self._windows: Any = dataset
         if require_readable(dataset, where):
             self._windows = PluginWindows(dataset)
@@ -181,9 +181,9 @@ class Hdf5Array:
         )
 
     def __getitem__(self, key: Any) -> Any:
-        if not self._is_sound:
-            require_sound_index(self.dataset, self._where)
-            self._is_sound = True
+        if self._index is None:
+            self._index = ChunkIndex(self.dataset, self._where)
+        self._index.require_found(key)
         return self._windows[key]
 
 

@@ -95,7 +95,9 @@ class N5Array:
                 raise OSError("attributes.json is gone since it was opened")
             return None
         try:
-            return unpack_block(content, self.chunks, self.dtype, self._packing)
+            triples = zip(index, self.chunks, self.shape, strict=True)
+            least = [min(n, size - i * n) for i, n, size in triples]
+            return unpack_block(content, least, self.chunks, self.dtype, self._packing)
         except struct.error:
             raise OSError(f"block {path} is cut short ({len(content)} bytes)") from None
 

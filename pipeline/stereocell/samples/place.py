@@ -1,11 +1,22 @@
-"""The place of a sample: anything else that lies there stays, unless --force is given."""
+"""The place of a sample: anything else that lies there stays, unless it is forced."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
+import zarr
+
 from stereocell.storage.overwriting import require_free
 
 EXPECTED = "nothing or this very sample"
+SAMPLE = "stereocell_sample"  # attribute of a Zarr group that holds the sample's arguments
+
+
+def find_group(place: Path) -> zarr.Group | None:
+    """Return the Zarr group at a path; None where there is none, or it is damaged."""
+    try:
+        return zarr.open_group(place, mode="r")
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
 
 
 def is_there(place: Path, content: bytes | Mapping[str, bytes]) -> bool:

