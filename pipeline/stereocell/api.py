@@ -43,7 +43,7 @@ def build(
     settings   sections and keys that override both, as in the TOML
     workers    processes; 0: this one. A script with more needs `if __name__ == "__main__":`
     scheduler  address or scheduler file of a Dask cluster, used instead of `workers`
-    force      replace whatever lies in OUT; without, only a build of the same source is
+    force      replace all that lies in OUT; otherwise only a build of the same source is replaced
 
     Progress goes to stderr. Raises StereoCellError, whose text is one line (a line for each
     reason where tasks fail).

@@ -49,7 +49,7 @@ def test_an_error_that_cannot_be_pickled_is_reported_by_its_name_and_text(engine
         engine.run("bad", fail_unpicklably, [("a", 1), ("b", 2)])
 
 
-def test_the_answers_of_an_abandoned_run_are_not_taken_for_those_of_the_next() -> None:
+def test_answers_of_an_abandoned_run_do_not_reach_the_next_run() -> None:
     with closing(WorkerPool(2, double.__module__)) as pool:
         next(pool.run(double, [10, 20, 30, 50]))
         assert sorted(pool.run(double, [1, 2])) == [(0, 2, None), (1, 4, None)]
@@ -76,7 +76,7 @@ finally:
 """
 
 
-def test_a_script_without_a_main_guard_is_told_to_have_one(tmp_path: Path) -> None:
+def test_a_script_without_a_main_guard_is_answered_with_the_line_to_write(tmp_path: Path) -> None:
     script = start_script(_UNGUARDED, tmp_path)
     _, text = script.communicate(timeout=PATIENCE_S)
     assert script.returncode == 1
@@ -109,7 +109,10 @@ def test_no_worker_outlives_a_command_that_is_stopped_or_killed(
     family = psutil.Process(command.pid).children(recursive=True)
     assert len(family) >= 2
     command.send_signal(number)
-    _, text = command.communicate(timeout=PATIENCE_S)
+    try:
+        _, text = command.communicate(timeout=PATIENCE_S)
+    finally:
+        command.kill()
     assert command.returncode == code, text
     _, alive = psutil.wait_procs(family, timeout=PATIENCE_S)
     assert alive == []

@@ -1,7 +1,7 @@
-"""Intact sources of every format: small, and of voxels that no two places share.
+"""Intact sources of every format: small, and with a different value in each voxel.
 
-Other libraries than the readers write them where there are some. With each source stands where it
-holds voxels without a checksum: nothing can notice a byte that changes there.
+Other libraries than the readers write them where there are some. Each source states the ranges in
+which it holds voxels without a checksum: a byte that changes there can't be noticed.
 """
 
 import shutil
@@ -49,7 +49,7 @@ class Subject:
     write        writes it into a folder, and returns its path
     format       its title in the table; several subjects may share one
     files        patterns of the files that are changed
-    unprotected  where a file, by name and content, holds voxels without a checksum
+    unprotected  returns the ranges of a file that hold voxels without a checksum
     """
 
     name: str
@@ -84,7 +84,7 @@ def _whole(path: Path) -> Ranges:
 
 
 def _image_of_jpeg(path: Path) -> Ranges:
-    """Return all from the first quantisation table on: tables and codes have no checksum."""
+    """Return the range from the first quantisation table on: JPEG has no checksum there."""
     return [(path.read_bytes().find(b"\xff\xdb"), 1 << 60)]
 
 
@@ -102,7 +102,7 @@ def _chunks_of_hdf5(path: Path) -> Ranges:
 
 
 def _arrays_of_hdf5(path: Path) -> Ranges:
-    """Return where contiguous datasets lie, which hold numbers and the places of texts."""
+    """Return the ranges of contiguous datasets, which hold numbers and the places of texts."""
     found: Ranges = []
 
     def add(_: str, node: Any) -> None:

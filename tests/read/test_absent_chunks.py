@@ -1,4 +1,4 @@
-"""Chunks that are not stored: their share is told, and a level without any is refused."""
+"""The share of chunks that are not stored is reported, and a level without any is refused."""
 
 import shutil
 from pathlib import Path
@@ -50,7 +50,7 @@ def write_hdf5(path: Path, count: int) -> Path:
     return path
 
 
-def test_the_share_of_chunks_that_are_not_stored_is_told(
+def test_the_share_of_chunks_that_are_not_stored_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     chunks = phantoms.write_ome_zarr(tmp_path / "a.ome.zarr", [BODY], chunks=(4, 48, 36))
@@ -59,7 +59,7 @@ def test_the_share_of_chunks_that_are_not_stored_is_told(
         scales=[{"z": 1, "y": 1, "x": 1}],
     )  # fmt: skip
     shards, blocks = write_shards(tmp_path / "c.ome.zarr"), write_n5(tmp_path / "a.n5", BODY)
-    told = "({}) are not stored: read as {}, as the format has it"
+    told = "({}) are not stored: they are read as {}, and the format does not state"
     for path, lost, words in (
         (chunks, "0/c/1/0/0", "1 of 4 chunks of level 0 " + told.format("25.00%", 0)),
         (flat, "0/1/2/0/0", "1 of 8 chunks of level 0 " + told.format("12.50%", 0)),
@@ -105,4 +105,4 @@ def test_a_level_without_any_chunk_is_refused(
     shutil.rmtree(path / "0" / "c")
     code, said = plan(path, tmp_path, capsys)
     assert code == 1
-    assert "level 0: found none of 4 chunks, expected the voxels" in said
+    assert "level 0: found none of 4 chunks, expected those that hold voxels" in said

@@ -222,7 +222,7 @@ def test_bigdataviewer_s_setups_are_channels_of_numbers_without_a_sign(tmp_path:
     assert "BigDataViewer's axes" in refusal(tmp_path / "a b.h5", axes="zyx")
 
 
-# damage to parts of the file that have no checksum
+# --- damage to parts of the file that have no checksum
 
 
 F32 = bytes.fromhex("11201f0004000000 00002000 17080017 7f000000")
@@ -364,10 +364,10 @@ def test_an_index_of_any_kind_is_read_with_chunks_that_are_not_stored(
 
 
 @pytest.mark.parametrize("name", ["axistags", "unit", "label"])
-def test_a_heap_of_texts_on_which_hdf5_never_ends_is_refused_at_a_bound(
+def test_a_heap_of_texts_that_makes_hdf5_loop_without_end_is_refused_at_a_time_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """An object of a heap, of 0 bytes: HDF5 2.0 looks for the next one at the same place."""
+    """A heap object has 0 bytes, so HDF5 2.0 looks for the next object at the same place."""
     path = write(tmp_path / "a.h5", resolution=SIZE_UM)
     with h5py.File(path, "a") as file:
         if name == "label":

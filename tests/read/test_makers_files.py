@@ -94,7 +94,7 @@ def test_a_czi_s_directory_that_differs_from_its_tiles_is_refused(
     assert "as in the directory" in line
 
 
-def test_a_czi_s_tile_that_is_not_where_the_directory_says_is_refused(tmp_path: Path) -> None:
+def test_a_czi_whose_directory_leads_to_no_tile_is_refused(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     content = bytearray(path.read_bytes())
     first = content.index(b"ZISRAWSUBBLOCK\0")

@@ -1,4 +1,4 @@
-"""Packed files: every stream is read on to its checksum, and damage is refused in one line."""
+"""Every packed stream is read to its checksum, and damage is refused in one line."""
 
 import bz2
 import gzip
@@ -55,11 +55,11 @@ def of_numcodecs(name: str, **configuration: Any) -> dict[str, Any]:
     return {"name": f"numcodecs.{name}", "configuration": configuration}
 
 
-NONE = 0  # the stream holds no checksum: a flipped byte gives other voxels, or breaks the decoder
+NONE = 0  # the stream has no checksum: a flipped byte gives other voxels, or the decoder refuses it
 
 
 class Row(NamedTuple):
-    """A packed format, and how many bytes before the stream's end its checksum lies."""
+    """A packed format, and the distance of its checksum from the stream's end in bytes."""
 
     write: Callable[[Path], Stream]
     checksum_at: int
@@ -171,8 +171,8 @@ def test_damage_in_a_packed_file_is_refused_in_one_line(tmp_path: Path, name: st
     flipped[(stream.start + stream.stop) // 2] ^= 0x10
     stream.file.write_bytes(flipped)
     if row.checksum_at == NONE:
-        with suppress(SourceError):  # nothing tells of other voxels, unless the decoder breaks
-            assert digest(stream.source)
+        with suppress(SourceError):  # either outcome is right, and any other error is a fault
+            digest(stream.source)
     else:
         refusal(stream.source)
         flipped = bytearray(content)
@@ -244,7 +244,7 @@ def test_damage_in_the_packed_header_of_a_pair_is_refused(tmp_path: Path, kind: 
 
 
 def test_damage_in_another_time_point_is_refused(tmp_path: Path) -> None:
-    """The checksum covers the whole stream, so nobody knows which voxels are damaged."""
+    """The checksum covers the whole stream, so all time points may be damaged."""
     stream = nifti(tmp_path, times=3)
     content = bytearray(stream.file.read_bytes())
     content[stream.stop - 400] ^= 0x10

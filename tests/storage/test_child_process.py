@@ -1,4 +1,4 @@
-"""A library that ends its process, or never ends, is one error of the parent's."""
+"""A library that ends its process, or never ends, becomes one error in the parent."""
 
 import math
 import os
@@ -24,7 +24,7 @@ def test_an_object_keeps_its_state_between_calls() -> None:
         assert child.call("add", 1) == 8
 
 
-def test_arrays_go_there_and_come_back_as_they_are() -> None:
+def test_arrays_pass_to_the_child_and_back_unchanged() -> None:
     values = np.arange(100_000).reshape(10, 100, 100)[:, ::-1]
     with Child(Counter, 0) as child:
         found = child.call("doubled", values)
@@ -65,7 +65,7 @@ def test_errors_of_ours_and_bugs_are_raised_in_the_parent() -> None:
     assert "Traceback" in caught.value.__notes__[0]
 
 
-def test_a_library_that_prints_disturbs_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+def test_text_that_a_library_prints_is_discarded(capfd: pytest.CaptureFixture[str]) -> None:
     assert run_in_child(print_and_return) == 3
     assert capfd.readouterr() == ("", "")
 

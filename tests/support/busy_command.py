@@ -1,4 +1,4 @@
-"""A command whose two workers run a task each, for tests that look at it or stop it."""
+"""A command whose two workers run a task each, for tests that examine or stop it."""
 
 import os
 import subprocess
@@ -9,12 +9,15 @@ from pathlib import Path
 from support.server.timeouts import PATIENCE_S
 
 _TWO_TASKS_WITHOUT_END = """
+import signal
 from pathlib import Path
 from stereocell.engine.interrupts import answering_sigterm
 from stereocell.engine.run import Engine
 from support.worker_tasks import wait_for_ever
 
 if __name__ == "__main__":
+    # A shell lets the commands that it runs in the background ignore Ctrl-C, and so the tests.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     engine = Engine(2)
     with answering_sigterm():
         try:
@@ -41,7 +44,7 @@ def start_script(script: str, folder: Path, *words: object) -> "subprocess.Popen
 
 
 def started_with_two_tasks(folder: Path) -> "subprocess.Popen[str]":
-    """Return a running command, both of whose workers are at a task that doesn't end by itself."""
+    """Return a running command whose two workers each run a task that doesn't end by itself."""
     command = start_script(_TWO_TASKS_WITHOUT_END, folder)
     end = time.monotonic() + PATIENCE_S
     while not all((folder / name).exists() for name in "ab") and time.monotonic() < end:

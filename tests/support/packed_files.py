@@ -1,4 +1,4 @@
-"""Packed files of every reader, written by other libraries, and where their streams lie.
+"""Write packed files of every reader by other libraries, and return where their streams lie.
 
 The voxels are noise of four values, so that a stream is long and one flipped byte rarely breaks the
 decoder.

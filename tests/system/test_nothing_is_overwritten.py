@@ -1,4 +1,4 @@
-"""Commands that write onto what somebody else has: it stays, and one line says what is there."""
+"""Commands that write never replace foreign files: these stay, and one line names them."""
 
 import shutil
 from collections.abc import Callable
@@ -53,7 +53,7 @@ TRIALS = {
     if places.writes
     for trial, given in _writing(name).items()
 }
-# a folder is made in no file's place, and no picture in a folder's
+# --force does not replace a file by a folder, or a folder by a picture
 NOT_FORCED = {("build", "a file"), ("plan", "a file"), ("publish", "a file")}
 NOT_FORCED |= {("iso", "a folder"), ("iso", "another build")}
 OF_A_BUILD = {name for name, places in PLACES.items() if places.writes == "out" and places.reads}
@@ -165,7 +165,7 @@ def test_what_others_put_there_stays_and_is_named_before_any_work(
 @pytest.mark.usefixtures("few_cells")
 @pytest.mark.parametrize("kind", ["a file", "a folder"])
 @pytest.mark.parametrize("trial", ["iso", "slices", "export .stl", "sample mri", "sample cells"])
-def test_force_replaces_it_as_its_help_says(
+def test_force_replaces_foreign_files_and_is_in_the_help(
     builds: tuple[Path, Path],
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -185,7 +185,7 @@ def test_force_replaces_it_as_its_help_says(
 
 @pytest.mark.usefixtures("few_cells")
 @pytest.mark.parametrize("name", ["mine.csv", "mine.ome.zarr", "mine.truth.json"])
-def test_what_lies_beside_a_sample_is_not_overwritten_either(tmp_path: Path, name: str) -> None:
+def test_a_file_at_the_place_of_any_part_of_a_sample_stays(tmp_path: Path, name: str) -> None:
     sample = "cycif" if "truth" in name else "cells"
     small = ["--grid", "1x1", "--tile-size", "8,16,16"] if sample == "cycif" else []
     (tmp_path / name).write_bytes(WORK)

@@ -1,4 +1,4 @@
-"""Each record of a build holds a hash, and is checked by the same code when written and read."""
+"""Each record of a build has a hash, and is checked by the same code when written and read."""
 
 import json
 import re
@@ -67,9 +67,9 @@ def _answer(capfd: pytest.CaptureFixture[str]) -> str:
     return line
 
 
-def test_every_file_of_a_build_is_held_by_a_hash(built: Path, tmp_path: Path) -> None:
+def test_a_change_of_any_file_of_a_build_is_found_by_check(built: Path, tmp_path: Path) -> None:
     names = {f.relative_to(built).as_posix() for f in built.rglob("*") if f.is_file()}
-    # results rest on neither: the second only says which tiles of the stage need no work
+    # No result depends on these two: the second only records which tiles of the stage are done.
     names = {name for name in names if not name.endswith(("seconds.json", "stage.json"))}
     lists = {"stage/files.json", "bundle/files.json", "bundle/manifest.json"}
     lists |= {name for name in names if name.endswith("unit.json")}
@@ -92,7 +92,7 @@ def test_changed_record_is_named_with_what_was_found_and_expected(out: Path, nam
 
 
 def _thicker(file: Path) -> None:
-    """Double the spacing along z, as a person who believes the plan to be a setting."""
+    """Double the spacing along z, as a person would who takes the plan for a settings file."""
     plan = json.loads(file.read_bytes())
     plan["spacing_um"][0] *= 2
     file.write_text(json.dumps(plan, indent=1))
@@ -168,7 +168,7 @@ def test_units_of_another_plan_are_not_taken_for_those_of_this_one(
 
 
 @pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])
-def test_hashes_in_a_line_differ_though_one_digit_of_the_seal_was_changed(
+def test_shown_hashes_differ_even_if_only_the_last_digit_of_the_seal_was_changed(
     out: Path, name: str
 ) -> None:
     file = out / name
@@ -183,7 +183,7 @@ def test_hashes_in_a_line_differ_though_one_digit_of_the_seal_was_changed(
 
 
 @pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])
-def test_record_that_is_missing_is_not_to_be_removed(out: Path, name: str) -> None:
+def test_remedy_for_a_missing_record_does_not_ask_to_remove_it(out: Path, name: str) -> None:
     (out / name).unlink()
     told = _faults(out)
     assert f"{out / name} is missing: run `stereocell " in told
@@ -212,7 +212,7 @@ def test_document_that_no_command_could_read_is_not_written(
 ) -> None:
     file = tmp_path / _a_name(pattern)
     file.write_text("as it was")
-    with pytest.raises(OutputError, match="not written, as no command could read it"):
+    with pytest.raises(OutputError, match="not written, because no command could read it"):
         write(file, {"of": "another kind"})
     assert file.read_text() == "as it was"
     assert list(tmp_path.iterdir()) == [file]

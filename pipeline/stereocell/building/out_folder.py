@@ -40,7 +40,7 @@ _RUN_UNITS = "run `stereocell units OUT` first"
 
 
 def require_build_or_nothing(out: Path, source: str | Path) -> None:
-    """Raise OutputError where OUT is no place for a build: it holds something else.
+    """Raise OutputError where OUT holds something else than a build.
 
     The source's own file may lie there, and files whose names begin with a dot: no result has such
     a name.
@@ -131,7 +131,7 @@ class OutFolder:
         return there
 
     def require_own_settings(self, plan: Plan, there: Plan | None) -> None:
-        """Raise OutputError where stereocell.toml is no record of a plan, but a person's own."""
+        """Raise OutputError where stereocell.toml is the user's own file, not a plan's record."""
         file = self.settings_file
         if not is_file(file) or is_sealed_text(file) or is_forced():
             return
@@ -146,7 +146,7 @@ class OutFolder:
             )
 
     def require_readable(self, plan: Plan) -> None:
-        """Raise OutputError where no command could read the plan once it is written."""
+        """Raise OutputError where commands could not read the plan once it is written."""
         content = to_json(self._without_place(plan))
         data = json.dumps(sealed(content)).encode()
         from_json(parse(self.plan_file, data, PLAN, NOT_WRITTEN), NOT_WRITTEN)
@@ -250,9 +250,7 @@ class OutFolder:
         return dict.fromkeys(self._begun(), _UNFINISHED) if found is None else found
 
     def phases_fault(self) -> str | None:
-        """Return a line on a record of the phases that can't be trusted; None: it can, or there is
-        none yet.
-        """
+        """Return a line on a damaged record of the phases; None: it is sound, or there is none."""
         if not is_file(self.phases_file):
             return None
         try:
@@ -278,7 +276,7 @@ class OutFolder:
         return not self.phases().get(name, {"key": "done"})["key"]
 
     def require_finished(self, name: str) -> None:
-        """Raise OutputError where a phase began and did not finish, or nothing says whether."""
+        """Raise OutputError where a phase began and did not finish, or its record is damaged."""
         if is_file(self.phases_file):
             read_sealed(self.phases_file, PHASES, f"run `stereocell {name} OUT` first")
         if self.is_begun(name):

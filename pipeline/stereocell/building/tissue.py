@@ -244,7 +244,7 @@ def _learn(
         "libraries": libraries_of(tissue_module, network_module),
     }
     shape = dataset.levels[plan.level].shape
-    # before anything is written; the fingerprint is that of no volume
+    # Checks the plan before anything is written. Its fingerprint is a placeholder of equal length.
     out_folder.require_readable(_with_classes(plan, _source_in(out_folder.out), "0" * 64, record))
     with replacing_folder(out_folder.out / FOLDER) as folder:
         write_probabilities(

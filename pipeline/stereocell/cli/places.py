@@ -1,7 +1,7 @@
-"""Tell what each command reads and writes, for --force and for the answers to a wrong folder.
+"""The table of the folders that each command reads and writes: for --force and for wrong folders.
 
-A test holds that every command has a row, and tries each command that writes onto the files of
-somebody else.
+A test checks that every command has a row, and runs each writing command on a folder that holds
+other files.
 """
 
 import argparse
@@ -17,21 +17,19 @@ _BUNDLE = frozenset({Kind.BUILD, Kind.BUNDLE, Kind.SITE})
 class Places:
     """The places of one command.
 
-    reads        kinds of folders that OUT may be; empty: OUT is not read
-    has_input    INPUT, a volume, is read
-    writes       the argument that names the place of the result; empty: nothing is written
+    reads   kinds of folders that OUT may be; empty: OUT is not read
+    writes  the argument that names the place of the result; empty: nothing is written
     """
 
     reads: frozenset[Kind] = frozenset()
-    has_input: bool = False
     writes: str = ""
 
 
 PLACES = {
-    "build": Places(has_input=True, writes="out"),
-    "plan": Places(has_input=True, writes="out"),
-    "iso": Places(has_input=True, writes="out"),
-    "slices": Places(has_input=True, writes="out"),
+    "build": Places(writes="out"),
+    "plan": Places(writes="out"),
+    "iso": Places(writes="out"),
+    "slices": Places(writes="out"),
     "units": Places(_BUILD, writes="out"),
     "stage": Places(_BUILD, writes="out"),
     "bundle": Places(_BUILD, writes="out"),
@@ -47,8 +45,8 @@ PLACES = {
     "settings": Places(),
 }
 FORCE = (
-    "replace whatever lies at the place of the result; without, only results of StereoCell of the "
-    "same specimen are"
+    "replace all that lies where the result goes; without it, only StereoCell's own results of the "
+    "same specimen are replaced"
 )
 
 

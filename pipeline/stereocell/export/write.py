@@ -132,7 +132,7 @@ def _export(
     report: Report,
     is_ours: Callable[[Path], bool],
 ) -> tuple[str, list[Path]]:
-    """Write `file` and what goes with it; return the lines about it, and all paths.
+    """Write `file` and the files that go with it; return a line about it, and all paths.
 
     is_ours  whether what lies at a path may be replaced unasked
     """

@@ -4,6 +4,7 @@ The level is that of the whole channel, as a build of the same settings finds it
 it is found on tiles spread evenly, and the table says so.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -54,7 +55,7 @@ COLORS: tuple[Color, ...] = (
 )
 LOOKED_AT = 100_000_000  # voxels that the level is found on; a build takes all
 _EXPECTED = "nothing or a picture of the same source"
-_SOURCE = "Source"  # text in a picture: the fingerprint of its source
+_SOURCE = "Source"  # key of a PNG's text: the fingerprint of the source
 _LONGEST_PX = 900  # pixels, longest side of a slice
 _CHART_PX = 200  # pixels, height of the histogram
 _GROUND, _AXIS, _CURVE = (18, 20, 24), (90, 96, 104), (225, 228, 232)
@@ -152,7 +153,7 @@ def preview(
 
 
 def _mark(plan: Plan) -> PngInfo:
-    """Return the texts in a picture by which its program and its source are known again."""
+    """Return the texts of a picture that identify its program and its source."""
     mark = PngInfo()
     mark.add_text("Software", GENERATOR)
     mark.add_text(_SOURCE, plan.fingerprint)
@@ -169,9 +170,11 @@ def require_picture_or_nothing(path: Path) -> None:
 def _source_of_picture(path: Path) -> str | None:
     """Return the fingerprint of the source of an earlier picture; None for any other file."""
     try:
-        with Image.open(path) as picture:
-            found = picture.info.get(_SOURCE)
-    except (OSError, ValueError, SyntaxError):  # PIL's own, of files that are no picture
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the header of a foreign file may state a huge size
+            with Image.open(path) as picture:
+                found = picture.info.get(_SOURCE)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # it is no picture
         return None
     return found if isinstance(found, str) else None
 

@@ -172,7 +172,7 @@ def _require_apart(folder: Path, out: Path) -> None:
 
 
 def _specimen_of(bundle: Path, held: Contents) -> dict[str, str]:
-    """Return the name of a bundle's specimen, and the fingerprint of its source if it is known."""
+    """Return the name of a bundle's specimen, and its source's fingerprint; empty: unknown."""
     fingerprint = held.fingerprint
     if held.build is not None:
         fingerprint = contents_of(held.build).fingerprint
@@ -223,9 +223,9 @@ def _require_own(
     before: Mapping[str, Any],
     specimen: Mapping[str, str],
 ) -> None:
-    """Raise OutputError where the target holds another page, or files that no run has put there.
+    """Raise OutputError where the target holds another page, or files that were not published.
 
-    Files of a host, as CNAME, may lie in a target that nothing was published to before.
+    Files for the web host, such as CNAME, may lie in a target before the first run.
     """
     if is_forced():
         return
@@ -239,17 +239,21 @@ def _require_own(
     if not before and others:
         raise refused(target.shown, words_for(others), "nothing or a published page")
     earlier = _published_specimen(target, there)
-    is_other = earlier.get("name") != specimen["name"] or (
-        earlier.get("fingerprint", "") not in ("", specimen["fingerprint"])
-        and specimen["fingerprint"] != ""
-    )
-    if before and earlier and is_other:
-        found, expected = (
-            f"{one.get('name')!r:.80}"
-            + (f" ({one['fingerprint'][:12]})" if one.get("fingerprint") else "")
-            for one in (earlier, specimen)
-        )
+    if before and earlier and not _is_same_specimen(earlier, specimen):
+        found, expected = (_shown_specimen(one) for one in (earlier, specimen))
         raise refused(target.shown, f"a published page of {found}", f"one of {expected}")
+
+
+def _is_same_specimen(one: Mapping[str, str], other: Mapping[str, str]) -> bool:
+    """Return whether names are equal, and fingerprints where both are known."""
+    prints = {each.get("fingerprint", "") for each in (one, other)} - {""}
+    return one.get("name") == other.get("name") and len(prints) <= 1
+
+
+def _shown_specimen(specimen: Mapping[str, str]) -> str:
+    fingerprint = specimen.get("fingerprint", "")
+    shown = f" ({fingerprint[:12]})" if fingerprint else ""
+    return f"{specimen.get('name')!r:.80}{shown}"
 
 
 def _is_same(target: Target, path: str, file: _File, there: Mapping[str, int]) -> bool:
@@ -258,12 +262,12 @@ def _is_same(target: Target, path: str, file: _File, there: Mapping[str, int]) -
 
 
 def _is_of_host(path: str) -> bool:
-    """Return whether a file in a target is one by which hosts are told how to serve it."""
+    """Return whether a file in a target is for the web host, which reads it to serve the folder."""
     return path in _OF_HOSTS or path.startswith(".")
 
 
 def _published_specimen(target: Target, there: Mapping[str, int]) -> dict[str, str]:
-    """Return the specimen of the page at a target: by its list, of an earlier version by name."""
+    """Return the specimen of the page at a target; an earlier version's page has only its name."""
     for path in (PUBLISHED, MANIFEST):
         if path not in there:
             continue

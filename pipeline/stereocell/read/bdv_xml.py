@@ -32,7 +32,7 @@ class Setup:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """The setups of an XML, by their numbers, and its time points; none where there is no XML."""
+    """The setups of an XML by their numbers, and its time points; both empty without an XML."""
 
     setups: Mapping[int, Setup]
     times: tuple[int, ...] = ()
@@ -65,7 +65,7 @@ class Described:
 
 
 def read_described(path: str) -> Described:
-    """Return what the XML says that names a container on this machine."""
+    """Return the setups and time points in the XML of a container on this machine."""
     container = Path(path)
     for file in islice(sorted(container.parent.glob("*.xml")), _MAX_FILES):
         own = is_own(file, [container.parent.resolve()]) and file.is_file()
@@ -90,7 +90,7 @@ def read_described(path: str) -> Described:
 
 
 def _times(root: ElementTree.Element, setups: Collection[int]) -> tuple[int, ...]:
-    """Return the numbers of the time points, without those of which no view was taken."""
+    """Return the numbers of the time points, except those at which no view was taken."""
     node = root.find("SequenceDescription/Timepoints")
     if node is None:
         return ()

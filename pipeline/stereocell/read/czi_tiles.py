@@ -1,7 +1,7 @@
-"""The directory of a CZI file, compared with the copy of each entry at its tile.
+"""Compare the directory of a CZI file with the copy of each entry at its tile.
 
-libCZI places a tile by the directory, and decodes it by the copy, so that a tile whose two entries
-differ is drawn at another size or place. Neither has a checksum.
+libCZI places a tile by the directory, and decodes it by the copy. A tile whose two entries differ
+is drawn at another size or place. Neither entry has a checksum.
 
 Reference: ZISRAW (CZI) File Format, "SubBlockDirectory" and "DirectoryEntryDV"
 """
@@ -28,9 +28,9 @@ _COMPARED = "CSTXYZ"  # axes by which voxels are read: channel, scene, time and 
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """All of an entry that says which voxels a tile holds.
+    """The fields of an entry that determine which voxels a tile holds.
 
-    axes  of each axis by which voxels are read its name, start, size and stored size
+    axes  name, start, size and stored size of each axis by which voxels are read
     """
 
     place: int
@@ -54,7 +54,7 @@ class _Entry:
 
 
 class CziTiles:
-    """The entries of a directory, by plane; a plane's tiles are compared once.
+    """The entries of a directory, by plane. The tiles of a plane are compared once.
 
     at  place of the directory in the file
 
@@ -89,9 +89,9 @@ class CziTiles:
 
 
 def _entries(file: BinaryIO, at: int) -> list[_Entry]:
-    """Return the entries of a directory; none of an early file's, which are not compared.
+    """Return the entries of a directory; an early file's (DE) are not compared, so it has none.
 
-    Raises ValueError, struct.error where it isn't whole.
+    Raises ValueError or struct.error where the directory isn't whole.
     """
     file.seek(at)
     name, _, used = SEGMENT.unpack(file.read(SEGMENT.size))
@@ -124,7 +124,7 @@ def _entry(content: bytes, start: int) -> tuple[_Entry, int]:
 
 
 def _copy(file: BinaryIO, place: int) -> _Entry:
-    """Return the entry at a tile, with the place that it lies at. Raises ValueError."""
+    """Return the copy of an entry at its tile. Raises ValueError where there is no tile."""
     file.seek(max(0, place))
     head = file.read(SEGMENT.size + _SIZES.size + _ENTRY.size + _MOST_AXES * _AXIS.size)
     if head[: len(_TILE) + 1] != _TILE + b"\0":
@@ -134,7 +134,7 @@ def _copy(file: BinaryIO, place: int) -> _Entry:
 
 
 def _shown(entry: _Entry, other: _Entry) -> str:
-    """Return in words where an entry differs from another one."""
+    """Return the fields of an entry that differ from another one, in words."""
     parts = [
         f"axis {name} start {start}, size {size}, stored size {stored}"
         for name, start, size, stored in sorted(set(entry.axes) - set(other.axes))

@@ -178,7 +178,7 @@ def _container(files: N5Files, setups: Sequence[str], described: Described) -> I
     """Return the image of BigDataViewer's container: setups are channels.
 
     setups     the folders of the setups, each with a slash at its end
-    described  by the XML
+    described  the setups and time points of the XML
     """
     numbers = [int(setup[len("setup") : -1] or 0) for setup in setups]
     times = files.numbered(f"{setups[0]}timepoint")[:_MAX_TIMES]

@@ -1,4 +1,4 @@
-"""A block of N5: its header and codecs. No block unpacks to much more than its voxels.
+"""Decode a block of N5: its header and codecs. A block that unpacks to much more is refused.
 
 The header is of big-endian numbers: mode (16 bits; 0: dense), number of dimensions (16), the size
 along each (32), fastest first. Blocks at the edge are smaller than `blockSize`.

@@ -162,9 +162,9 @@ def _types(centres: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np
 
 def _zarr_files(tissue: CellTissue, seed: int) -> dict[str, bytes]:
     """Return the files of the OME-Zarr by their relative paths."""
-    held: dict[str, Buffer] = {}
-    _write_zarr(MemoryStore(held), tissue, seed)
-    return {name: content.to_bytes() for name, content in sorted(held.items())}
+    buffers: dict[str, Buffer] = {}
+    _write_zarr(MemoryStore(buffers), tissue, seed)
+    return {name: buffer.to_bytes() for name, buffer in sorted(buffers.items())}
 
 
 def _write_zarr(store: MemoryStore, tissue: CellTissue, seed: int) -> None:

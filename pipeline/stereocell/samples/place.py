@@ -20,10 +20,11 @@ def find_group(place: Path) -> zarr.Group | None:
 
 
 def is_there(place: Path, content: bytes | Mapping[str, bytes]) -> bool:
-    """Return whether a file, or a folder of files by their relative paths, is as it would be made.
+    """Return whether a file or folder already holds the sample.
 
-    Files that are missing in a folder are no other content. Raises OutputError where something
-    else lies there.
+    content  bytes of the file, or of a folder's files by their relative paths
+
+    An incomplete folder of the sample returns False. Raises OutputError for other content.
     """
     if isinstance(content, bytes):
         is_same = place.is_file() and place.read_bytes() == content

@@ -1,7 +1,7 @@
 """The guard of all writers: nothing of somebody else is removed or replaced unless it is forced.
 
-A command may replace what StereoCell wrote of the same specimen. Anything else at the place of a
-result ends it before it writes, with a line that says what is there.
+A command may replace results of StereoCell of the same specimen. Other content at the place of a
+result ends the command before it writes, with a line that names the content.
 """
 
 from collections.abc import Iterator
@@ -33,16 +33,16 @@ def forcing(is_forced: bool, words: str = "") -> Iterator[None]:
 
 
 def is_forced() -> bool:
-    """Return whether the user allows that anything is replaced."""
+    """Return whether --force is given."""
     return _forced.get()
 
 
 def require_free(place: Path, *, expected: str, is_ours: bool = False, found: str = "") -> None:
-    """Raise OutputError where a result would replace what isn't ours to replace.
+    """Raise OutputError where a result would replace content that is not its own earlier result.
 
-    expected  what may lie there beside nothing, for the message
-    is_ours   whether the caller knows what lies there for its own result of the same specimen
-    found     what lies there, in words; empty: as it is recognised
+    expected  the allowed content, for the message
+    is_ours   whether the caller has recognised an earlier result of the same specimen
+    found     the content in words; empty: `contents_of` recognises it
     """
     if is_ours or is_forced():
         return

@@ -1,7 +1,6 @@
-"""Check the records of a build against their own hashes: the plan and all that lies beside it.
+"""Check the records of a build against their own hashes: the plan and the files beside it.
 
-Nothing that one of these files says is trusted before its hash fits. The files of units, stage and
-bundle are checked against lists of their own: see formats.py.
+The files of units, stage and bundle are checked against lists of their own: see formats.py.
 """
 
 from collections.abc import Callable
@@ -24,15 +23,15 @@ _REPORT_AGAIN = "run `stereocell report OUT` again"
 
 
 def check_plan(out_folder: OutFolder) -> str:
-    """Check plan.json: its hash, its schema, and the rules that its reader has beyond these."""
+    """Check plan.json: its hash, its schema, and the other rules of its reader."""
     plan = out_folder.plan()
     return f"{out_folder.plan_file.name}: {len(plan.tiles)} tiles x {len(plan.channels)} channels"
 
 
 def check_records(out_folder: OutFolder) -> str:
-    """Check what a plan writes beside plan.json, and the record of the phases.
+    """Check the files that a plan writes beside plan.json, and the record of the phases.
 
-    That says also whether units, stage, bundle and report were made of each other.
+    Also check that units, stage, bundle and report were made of each other.
     """
     settings, provenance = out_folder.settings_file, out_folder.provenance_file
     checks: list[Callable[[], object]] = [
@@ -56,7 +55,7 @@ def check_report(out_folder: OutFolder) -> str:
 
 
 def find_index_faults(out_folder: OutFolder) -> list[str]:
-    """Return the faults of the list of units, and of the hash of the plan that they are of.
+    """Return the faults of the list of units, and of the record of their plan.
 
     They name no remedy: the caller has one for all faults of the units.
     """

@@ -53,7 +53,7 @@ def write_choice(stage, choice, file):
 
     Raises StageProblem if no tile fits, or a channel lacks the transfer function.
     """
-    # a tile that the stage deactivates can't be loaded, and stays as it is
+    # A tile that the stage deactivates can't be loaded, and stays deactivated.
     tiles = stage.GetPrimAtPath(TILES).GetFilteredChildren(Usd.PrimIsActive & Usd.PrimIsDefined)
     chosen = [tile for tile in tiles if _fits(tile.GetName(), choice.tiles)]
     if not chosen:

@@ -1,7 +1,7 @@
-"""Tables of AnnData where they are: in a Zarr store, or in an HDF5 file (.h5ad).
+"""Open tables of AnnData in a Zarr store or in an HDF5 file (.h5ad).
 
-libhdf5 loops without end over some damaged heaps of texts, in C and with Python's lock, so that no
-signal is heard. A .h5ad holds such heaps, so it is read in a child process
+libhdf5 loops without end over some damaged heaps of texts. It does so in C and holds Python's lock,
+so no signal can end it. A .h5ad holds such heaps, so it is read in a child process
 (storage/child_process.py).
 """
 
@@ -25,7 +25,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _EXPECTED = "a table of AnnData (obs, var, X)"
-_MOST_S = 300.0  # seconds for a table of HDF5; one of a million rows takes less than a tenth of it
+_MOST_S = 300.0  # s, longest time for a table of HDF5; a million rows take less than a tenth of it
 _TEXT_BYTES = 1024  # bytes of a text, on average in its chunk
 _LARGEST_CHUNK = 1 << 28  # bytes
 _LONGEST_TEXT = 4096  # bytes, of texts of one length

@@ -85,7 +85,7 @@ def read_ome(
 
 
 def _undescribed(tiff: TiffFile) -> tuple[str, ...]:
-    """Return a note on pages of the files that no image of the OME-XML has."""
+    """Return a note on pages of the files that belong to no image of the OME-XML."""
     pages = [page for one in tiff.series for page in one.pages if page is not None]
     described, total = len(pages), sum(len(file.pages) for file in {page.parent for page in pages})
     if total <= described:
