@@ -386,5 +386,5 @@ platforms: setup ## Resolve the requirements for each system and Python, and wri
 licences: $(READY) ## Write docs/licences.md from the packages that are installed
 	$(BIN)/python docs/licences.py
 
-clean: ## Remove .venv, the viewer's packages and build, and out/
-	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean: ## Remove .venv, the viewer's packages and build, and caches; builds in out/ stay
+	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

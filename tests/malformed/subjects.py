@@ -1,7 +1,7 @@
 """Intact sources of every format: small, and with a different value in each voxel.
 
-They are written by other libraries than the readers, where there are some. Each source states the
-ranges in which it holds voxels without a checksum: a byte that changes there can't be noticed.
+Other libraries than the readers write them where there are some. Each source states the ranges in
+which it holds voxels without a checksum: a byte that changes there can't be noticed.
 """
 
 import shutil
