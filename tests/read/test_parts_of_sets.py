@@ -299,6 +299,17 @@ def test_views_of_bigdataviewer_are_compared_with_its_xml(
         assert len(whole(path).channels) == 3
 
 
+def test_a_group_with_a_huge_number_is_refused_without_a_list_of_those_before(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.h5"
+    write_bdv_hdf5(path)
+    with h5py.File(path, "r+") as file:
+        file.move("t00002", "t999999999999")
+    line = refusal(path)
+    assert "found 3 of 1000000000000 time points up to 999999999999, missing 2, 3, " in line
+
+
 def views(kind: str, part: str, number: int) -> Iterator[str]:
     """Yield the groups of a setup, a time point or a level."""
     if part == "setup":

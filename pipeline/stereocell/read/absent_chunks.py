@@ -102,7 +102,17 @@ def _of_axis(size: int, ranges: Sequence[range]) -> list[int]:
 
 
 def _number(sizes: Sequence[int], spans: Spans) -> int:
-    return math.prod(len(_of_axis(n, ranges)) for n, ranges in zip(sizes, spans, strict=True))
+    return math.prod(_count(n, ranges) for n, ranges in zip(sizes, spans, strict=True))
+
+
+def _count(size: int, ranges: Sequence[range]) -> int:
+    """Return the number of chunks along one axis; without a list of them, which may be long."""
+    count, reached = 0, 0
+    for one in sorted(ranges, key=lambda one: one.start):
+        first, stop = max(one.start // size, reached), -(-one.stop // size)
+        if stop > first:
+            count, reached = count + stop - first, stop
+    return count
 
 
 def _places(sizes: Sequence[int], spans: Spans) -> Iterator[tuple[int, ...]]:

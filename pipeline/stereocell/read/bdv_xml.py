@@ -52,15 +52,19 @@ class Described:
         """
         parts = (("setups", setups, tuple(self.setups)), ("time points", times, self.times))
         for noun, found, listed in parts:
-            expected = listed or range(min(found), max(found) + 1)
-            missing = sorted(set(expected) - set(found))
-            if missing:
-                shown = ", ".join(map(str, missing[:_SHOWN])) + ", ..." * (len(missing) > _SHOWN)
+            present, first, last = set(found), min(found), max(found)
+            # groups may be numbered up to 10^12, so that all numbers in between make no list
+            expected = sorted(set(listed)) if listed else range(first, last + 1)
+            size = len(expected) if listed else last - first + 1
+            count = len(present.intersection(expected)) if listed else len(present)
+            if count < size:
+                missing = (number for number in expected if number not in present)
+                shown = ", ".join(map(str, islice(missing, _SHOWN)))
+                more = ", ..." * (size - count > _SHOWN)
                 source = "in the XML" if listed else f"up to {max(found)}"
                 raise SourceError(
-                    f"{where}: found {len(set(expected)) - len(missing)} of {len(set(expected))} "
-                    f"{noun} {source}, missing {shown}, expected all of them: copy the container "
-                    "again"
+                    f"{where}: found {count} of {size} {noun} {source}, missing "
+                    f"{shown}{more}, expected all of them: copy the container again"
                 )
 
 
