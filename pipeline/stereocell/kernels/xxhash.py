@@ -1,5 +1,8 @@
 """XXH32, the checksum of LZ4's formats, over bytes.
 
+N5 stores it with a seed. Of the required packages only imagecodecs computes XXH32, inside frames of
+LZ4 and without a seed. The package xxhash would be one more compiled requirement for these lines.
+
 Reference: https://github.com/Cyan4973/xxHash/blob/dev/doc/xxhash_spec.md, "XXH32 Algorithm"
 """
 

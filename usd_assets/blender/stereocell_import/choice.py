@@ -39,10 +39,16 @@ def open_stage(path):
         raise StageProblem(f"{path}: no prim {lacking[0]}, expected a StereoCell stage")
     unit = stage.GetMetadata("metersPerUnit")
     if abs(unit / METERS_PER_UNIT - 1) > 1e-6:
-        raise StageProblem(f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}")
+        raise StageProblem(
+            f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}: write it into the "
+            "parentheses at the top of the layer"
+        )
     axis = stage.GetMetadata("upAxis")
     if axis != "Y":
-        raise StageProblem(f"{path}: upAxis is {axis}, expected Y")
+        raise StageProblem(
+            f'{path}: upAxis is {axis}, expected Y: write upAxis = "Y" into the parentheses at the '
+            "top of the layer"
+        )
     return stage
 
 

@@ -14,6 +14,7 @@ import re
 from contextlib import ExitStack, suppress
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -207,7 +208,7 @@ def require_described(
     The OME-XML then names two pages for a plane, or describes the planes of no page.
     """
     order, sizes = _loops(root)
-    pages = list(series.pages)
+    pages: list[Any] = list(series.pages)  # none is missing: that was refused before
     described = 0
     for data, uuid in ome_xml.tiff_data_of(root):
         place = [int(data.get(f"First{axis}", 0)) for axis in order]
@@ -235,8 +236,11 @@ def require_described(
 
 def require_alike(location: Location, series: TiffPageSeries) -> None:
     """Raise SourceError where the files of a set hold planes of another size or number type."""
-    first = series.keyframe
-    for page in {page.parent: page.keyframe for page in series.pages if page is not None}.values():
+    first: Any = series.keyframe
+    keyframes: dict[Any, Any] = {
+        page.parent: page.keyframe for page in series.pages if page is not None
+    }
+    for page in keyframes.values():
         if (page.shape, page.dtype) != (first.shape, first.dtype):
             raise SourceError(
                 f"{location.shown}: {page.parent.filename!r:.100}: found planes of {page.shape} "

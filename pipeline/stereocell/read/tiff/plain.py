@@ -126,16 +126,19 @@ def _left_out(others: int) -> list[str]:
 
 def _undescribed(tiff: TiffFile, found: Sequence[TiffPageSeries]) -> list[str]:
     """Return a note on pages that no image has: the file's description counts fewer planes."""
-    if any(one.kind == "ndtiff" for one in found):  # compared with its index already
+    largest = max(found, key=lambda one: one.size)
+    if largest.kind == "ndtiff":  # compared with its index already
         return []
-    levels = [level for one in found for level in one.levels]
+    levels, total = [level for one in found for level in one.levels], len(tiff.pages)
+    if largest.kind == "lsm":  # every second page is a thumbnail
+        levels, total = [largest], len(largest)
     described = sum(level.size // max(level.keyframe.size, 1) for level in levels)
-    total = len(tiff.pages)
     if described >= total:
         return []
+    share = (total - described) / total
     return [
-        f"the file's description counts {described} of {total} pages; {total - described} are left "
-        f"out ({(total - described) / total:.0%})"
+        f"the file's description counts {described} of {total} pages: the others are left out "
+        f"({share:.0%})"
     ]
 
 
