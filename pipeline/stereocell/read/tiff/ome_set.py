@@ -11,6 +11,7 @@ References: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specificat
 import filecmp
 import os
 import re
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +19,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from tifffile import TiffPageSeries
 
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
@@ -200,15 +200,14 @@ def _stated_uuid(path: str) -> str:
     return ""
 
 
-def require_described(
-    location: Location, root: ElementTree.Element, series: TiffPageSeries
-) -> None:
+def require_described(location: Location, root: ElementTree.Element, pages: Sequence[Any]) -> None:
     """Raise SourceError where a plane of the first image isn't the page that the OME-XML names.
 
     The OME-XML then names two pages for a plane, or describes the planes of no page.
+
+    pages  of the finest level; none is missing
     """
     order, sizes = _loops(root)
-    pages: list[Any] = list(series.pages)  # none is missing: that was refused before
     described = 0
     for data, uuid in ome_xml.tiff_data_of(root):
         place = [int(data.get(f"First{axis}", 0)) for axis in order]
@@ -234,13 +233,32 @@ def require_described(
         )
 
 
-def require_alike(location: Location, series: TiffPageSeries) -> None:
-    """Raise SourceError where the files of a set hold planes of another size or number type."""
-    first: Any = series.keyframe
-    keyframes: dict[Any, Any] = {
-        page.parent: page.keyframe for page in series.pages if page is not None
-    }
-    for page in keyframes.values():
+def require_files(
+    location: Location, root: ElementTree.Element, pages: Sequence[object | None]
+) -> None:
+    """Raise SourceError where planes are missing because a file of the set is.
+
+    pages  of the finest level; None: a missing one
+    """
+    if not location.is_local or all(page is not None for page in pages):
+        return
+    paths = {_path_of(location, root, uuid) for _, uuid in ome_xml.tiff_data_of(root)}
+    missing = sorted(os.path.basename(path) for path in paths if not os.path.exists(path))
+    if missing:
+        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        raise SourceError(
+            f"{location.shown}: found {sum(page is not None for page in pages)} planes, expected "
+            f"{len(pages)}: a file of the set is missing: {missing[0]!r:.100}{more}: copy it again"
+        )
+
+
+def require_alike(location: Location, pages: Sequence[Any]) -> None:
+    """Raise SourceError where the files of a set hold planes of another size or number type.
+
+    pages  of the finest level; none is missing
+    """
+    first = pages[0].keyframe
+    for page in {page.parent: page.keyframe for page in pages}.values():
         if (page.shape, page.dtype) != (first.shape, first.dtype):
             raise SourceError(
                 f"{location.shown}: {page.parent.filename!r:.100}: found planes of {page.shape} "
