@@ -30,7 +30,7 @@ from stereocell.read.tiff.arrays import (
     samples_as_channels,
     with_given_axes,
 )
-from stereocell.read.tiff.ome_set import require_alike, require_described, require_files
+from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
