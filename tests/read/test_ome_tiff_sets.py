@@ -106,6 +106,13 @@ def test_a_file_of_another_set_under_the_right_name_is_refused(tmp_path: Path, n
     refusal(tmp_path / name)
 
 
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    write_set(tmp_path)
+    (tmp_path / "b.ome.tif").unlink()
+    line = refusal(tmp_path / "a.ome.tif")
+    assert "found 8 planes, expected 16: a file of the set is missing: 'b.ome.tif'" in line
+
+
 def test_a_copy_of_a_file_in_the_place_of_another_one_is_refused(tmp_path: Path) -> None:
     write_set(tmp_path)
     shutil.copy(tmp_path / "a.ome.tif", tmp_path / "b.ome.tif")

@@ -11,11 +11,11 @@ from xml.etree import ElementTree
 
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
+from stereocell.read.tiff.open_file import SUFFIXES
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
 
 _SUFFIX = ".companion.ome"
-_TIFF_SUFFIXES = (".tif", ".tiff", ".tf2", ".tf8", ".btf")
 _MAX_BYTES = 64 << 20  # bytes of an OME-XML beside the TIFF files
 
 
@@ -73,7 +73,7 @@ def companion_of(location: Location, root: ElementTree.Element) -> Described | N
     path = os.path.join(location.folder, name)
     if require_own(path, [location.folder], named=named) is None:
         raise SourceError(f"{named}: not found, expected it beside the TIFF file")
-    if name.lower().endswith(_TIFF_SUFFIXES):
+    if name.lower().endswith(SUFFIXES):
         raise SourceError(
             f"{named}: found the OME-XML of the set in another TIFF file, expected that file: "
             "open it in place of this one"

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from itertools import chain
+from typing import Any
 from xml.etree import ElementTree
 
 from tifffile import TiffFile, TiffPage
@@ -29,7 +30,7 @@ from stereocell.read.tiff.arrays import (
     samples_as_channels,
     with_given_axes,
 )
-from stereocell.read.tiff.ome_set import require_alike, require_described
+from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
@@ -72,16 +73,24 @@ def read_ome(
         raise SourceError(
             f"{where}: planes don't match the OME-XML{reason}, expected a page for each plane"
         )
-    for index, level in enumerate(pages):
-        require_pages(f"{where}: level {index}", tiff, level, len(level))
-    with one_line(where, "an OME-XML with whole numbers in TiffData"):
-        require_described(location, root, series)
-    require_alike(location, series)
+    _require_planes(location, tiff, root, pages)
     if axes:
         arrays = with_given_axes(where, arrays, axes)
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
     notes = (*image.notes, *_undescribed(tiff), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
+
+
+def _require_planes(
+    location: Location, tiff: TiffFile, root: ElementTree.Element, levels: list[list[Any]]
+) -> None:
+    """Raise SourceError where planes are missing, or are not those that the OME-XML names."""
+    require_files(location, root, levels[0])
+    for index, level in enumerate(levels):
+        require_pages(f"{location.shown}: level {index}", tiff, level, len(level))
+    with one_line(location.shown, "an OME-XML with whole numbers in TiffData"):
+        require_described(location, root, levels[0])
+    require_alike(location, levels[0])
 
 
 def _undescribed(tiff: TiffFile) -> tuple[str, ...]:

@@ -14,19 +14,14 @@ import re
 from contextlib import ExitStack, suppress
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
-
-import numpy as np
-from tifffile import TiffPageSeries
 
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
-from stereocell.read.tiff.open_file import open_tiff
+from stereocell.read.tiff.open_file import SUFFIXES, open_tiff
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
 
-_TIFF_SUFFIXES = (".tif", ".tiff", ".tf2", ".tf8", ".btf")
 _MOST_SEARCHED = 1000  # files of a folder that are opened to find one by its UUID
 _HEAD = 16_384  # characters of a description in which the first tag of OME-XML lies
 _OF_ANOTHER = "{!r:.100} states the UUID of another file of its set: taken by its name"
@@ -177,7 +172,7 @@ class _Set:
         """The names of the folder's other files, by the UUIDs that they state."""
         found: dict[str, str] = {}
         names = (path.name for path in self._folder.iterdir() if not path.is_symlink())
-        names = (name for name in names if name.lower().endswith(_TIFF_SUFFIXES))
+        names = (name for name in names if name.lower().endswith(SUFFIXES))
         for name in sorted(names)[:_MOST_SEARCHED]:
             uuid = _stated_uuid(str(self._folder / name))
             if uuid:
@@ -198,80 +193,3 @@ def _stated_uuid(path: str) -> str:
         found = _OWN_UUID.search(head)
         return _plain(found[1]) if found else ""
     return ""
-
-
-def require_described(
-    location: Location, root: ElementTree.Element, series: TiffPageSeries
-) -> None:
-    """Raise SourceError where a plane of the first image isn't the page that the OME-XML names.
-
-    The OME-XML then names two pages for a plane, or describes the planes of no page.
-    """
-    order, sizes = _loops(root)
-    pages: list[Any] = list(series.pages)  # none is missing: that was refused before
-    described = 0
-    for data, uuid in ome_xml.tiff_data_of(root):
-        place = [int(data.get(f"First{axis}", 0)) for axis in order]
-        if any(at >= size for at, size in zip(place, sizes, strict=True)):
-            continue  # as ImageJ writes them when it crops; tifffile leaves these out, too
-        described += 1
-        start, first = int(np.ravel_multi_index(place, sizes)), int(data.get("IFD", 0))
-        count = max(int(data.get("PlaneCount", data.get("NumPlanes", 1))), 1)
-        path = _path_of(location, root, uuid)
-        for number, page in enumerate(pages[start : start + count]):
-            found = (os.path.realpath(page.parent.filehandle.path), page.index)
-            expected = (path or found[0], first + number)
-            if found != expected:
-                at = np.unravel_index(start + number, sizes)
-                plane = ", ".join(f"{a} {n}" for a, n in zip(order, at, strict=True))
-                raise SourceError(
-                    f"{location.shown}: OME-XML: TiffData of plane {plane}: found {_words(found)} "
-                    f"and {_words(expected)}, expected one page for each plane"
-                )
-    if not described:
-        raise SourceError(
-            f"{location.shown}: OME-XML: found no TiffData in the first Image, expected its planes"
-        )
-
-
-def require_alike(location: Location, series: TiffPageSeries) -> None:
-    """Raise SourceError where the files of a set hold planes of another size or number type."""
-    first: Any = series.keyframe
-    keyframes: dict[Any, Any] = {
-        page.parent: page.keyframe for page in series.pages if page is not None
-    }
-    for page in keyframes.values():
-        if (page.shape, page.dtype) != (first.shape, first.dtype):
-            raise SourceError(
-                f"{location.shown}: {page.parent.filename!r:.100}: found planes of {page.shape} "
-                f"{page.dtype}, expected {first.shape} {first.dtype} as in "
-                f"{first.parent.filename!r:.100}: it is a file of another set"
-            )
-
-
-def _loops(root: ElementTree.Element) -> tuple[str, list[int]]:
-    """Return the axes over planes, slowest first, and their sizes; samples are no planes."""
-    pixels = ome_xml.pixels_of(root)
-    if pixels is None:
-        return "", []
-    order = pixels.get("DimensionOrder", "XYZCT")[:1:-1]
-    sizes = {axis: int(pixels.get(f"Size{axis}", 1)) for axis in order}
-    if "C" in sizes:
-        sizes["C"] //= ome_xml.samples_of(pixels)
-    return order, list(sizes.values())
-
-
-def _words(page: tuple[str, int]) -> str:
-    return f"page {page[1]} of {os.path.basename(page[0])!r:.100}"
-
-
-def _path_of(
-    location: Location, root: ElementTree.Element, uuid: ElementTree.Element | None
-) -> str:
-    """Return the path of the file that tifffile reads for a UUID; empty: at an address."""
-    if not location.is_local:
-        return ""
-    own = os.path.realpath(location.path)
-    if uuid is None or uuid.text == root.get("UUID"):
-        return own
-    return os.path.realpath(os.path.join(os.path.dirname(own), uuid.get("FileName", "")))

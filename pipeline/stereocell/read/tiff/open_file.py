@@ -23,6 +23,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 MAX_PLANES = 1_000_000
+SUFFIXES = (".tif", ".tiff", ".tf2", ".tf8", ".btf")
 _REMOTE_BLOCK = 1 << 18  # bytes of a remote read; fsspec's default reads 5 MB ahead for every tile
 _DESCRIPTION = 270  # tag ImageDescription, one byte a character
 _MAX_TAGS = 4096  # of a directory; tifffile refuses more
