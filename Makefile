@@ -33,16 +33,16 @@ else
 $(error SAMPLE is $(SAMPLE), expected cycif, brain-cells, mri or cells)
 endif
 
-# A value as one word of bash, for shells that make starts while it reads: no variable of make is
-# in their environment
+# Quotes a value as one word of bash, for shells that make starts while it reads this file: their
+# environment has no variable of make
 define newline
 
 
 endef
 quoted = $$'$(subst $(newline),\n,$(subst ',\',$(subst \,\\,$(1))))'
 
-# .venv belongs to the version of Python that made it. A PYTHON of another version gets its own
-# folder, as .venv-3.13, so that neither environment is used or overwritten in place of the other
+# .venv belongs to the version of Python that made it. A PYTHON of another version gets a folder of
+# its own, such as .venv-3.13, so the two environments never overwrite each other
 VENV := .venv
 ifneq ($(PYTHON),python3)
 ifeq ($(origin VENV),file)
@@ -224,16 +224,16 @@ test-python: setup
 	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
 	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
 
-# CI has no time for all tests with two versions of Python, so that the newest one gets a few: the
-# files that libraries read and write, a full disk, and the wheel by itself from a build to a .glb.
-# pyenv's Python is found even where its plain name is not switched on
+# CI has no time for all tests with two versions of Python, so the newest one gets a few: the files
+# that libraries read and write, a full disk, and the wheel by itself from a build to a .glb. pyenv's
+# Python is found even if pyenv has not activated it
 NEWEST := 3.13
 test-newest: setup ## A few tests with Python 3.13, where it is installed (all: make test PYTHON=python3.13)
 	@for each in python$(NEWEST) "$${PYENV_ROOT:-$$HOME/.pyenv}"/versions/$(NEWEST).*/bin/python$(NEWEST); do \
 	  if "$$each" -c '' 2>/dev/null; then exec $(MAKE) --no-print-directory test-newest-here PYTHON="$$each"; fi; \
 	done; echo "test-newest: skipped: python$(NEWEST) is not installed"
 
-# Tests of another Python run beside these: the list of those that failed is theirs alone
+# These tests run beside those of another Python, so they leave its list of failed tests alone
 test-newest-here: setup
 	$(BEHIND) $(BIN)/pytest -p no:cacheprovider $(addprefix tests/,$(NEWEST_TESTS))
 NEWEST_TESTS := $(patsubst %,read/test_%.py,tiff bare_zarr zarr_collections number_types n5) \
@@ -364,8 +364,8 @@ bench-fps: setup ## Frames a second of the viewer in headless Chromium, volumes 
 wheel: setup out/wheel/constraints.txt ## A wheel and an sdist with the built viewer in them: out/wheel
 	$(BIN)/hatchling build -t wheel -t sdist -d out/wheel
 
-# The versions that the tests run with, for `pip install --constraint`. The hashes are left out: with
-# them pip would want one of the wheel itself
+# The versions that the tests run with, for `pip install --constraint`. The hashes are left out: pip
+# would then require a hash of the wheel itself, too
 out/wheel/constraints.txt: requirements.lock
 	@mkdir -p $(@D)
 	sed -n '/^[A-Za-z0-9]/s/ *\\$$//p' $< > $@
@@ -386,5 +386,5 @@ platforms: setup ## Resolve the requirements for each system and Python, and wri
 licences: $(READY) ## Write docs/licences.md from the packages that are installed
 	$(BIN)/python docs/licences.py
 
-clean: ## Remove .venv, the viewer's packages and build, and out/
-	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean: ## Remove .venv, the viewer's packages and build, and caches; builds in out/ stay
+	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

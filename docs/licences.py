@@ -15,7 +15,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "licences.md"
-# packages whose metadata names no licence, and where theirs stands
+# packages whose metadata names no licence -> the licence in their files
 UNSTATED = {
     "alktx2": "none stated; it holds Basis Universal, Apache-2.0",
     "hdf5plugin": "MIT; its filters have their own (its file LICENSE)",
@@ -34,18 +34,18 @@ _LINE = re.compile(r'^  "(?P<line>[^"]+)", +# (?P<why>.+)$', re.MULTILINE)
 _EXTRA = re.compile(r"^(?P<extra>[a-z0-9-]+) = \[.*\] +# (?P<why>.+)$", re.MULTILINE)
 _ABOUT = """\
 StereoCell is under Apache-2.0. It contains none of these packages: `pip` installs them beside it,
-each under its own licence. No package that every installation has is under the GPL, and a test
-holds that. The packages under the LGPL are used as they are installed, unchanged. This page is made
-by `make licences` from the packages' own metadata."""
+each under its own licence. No package of an installation without extras is under the GPL; a test
+checks that. Packages under the LGPL are used unchanged. `make licences` makes this page from the
+packages' own metadata."""
 _LONGEST = 60  # characters of a licence's name; longer ones are the licence's text
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class DirectRequirement:
     """A requirement of StereoCell itself.
 
-    why    the comment on its line
-    extra  the extra that brings it; empty: every installation has it
+    why    the comment on its line in pyproject.toml
+    extra  the extra that installs it; empty: every installation has it
     """
 
     requirement: Requirement
@@ -57,22 +57,22 @@ class Asked:
         return canonicalize_name(self.requirement.name)
 
 
-def asked() -> list[Asked]:
-    """Return the direct requirements with the comments of pyproject.toml, once each."""
+def direct_requirements() -> list[DirectRequirement]:
+    """Return the direct requirements with the comments of pyproject.toml, each once."""
     text = (ROOT / "pyproject.toml").read_text("utf-8")
     project = tomllib.loads(text)["project"]
     reasons = {match["line"]: match["why"] for match in _LINE.finditer(text)}
     reasons |= {match["extra"]: match["why"] for match in _EXTRA.finditer(text)}
-    found: dict[tuple[str, str], Asked] = {}
+    found: dict[tuple[str, str], DirectRequirement] = {}
     for extra, lines in {"": project["dependencies"], **project["optional-dependencies"]}.items():
         for line in lines:
-            one = Asked(Requirement(line), reasons.get(extra or line, ""), extra)
+            one = DirectRequirement(Requirement(line), reasons.get(extra or line, ""), extra)
             found.setdefault((one.name, extra), one)
     return list(found.values())
 
 
 def licence_of(name: str) -> str:
-    """Return a package's licence as its metadata states it; see UNSTATED for those that do not."""
+    """Return a package's licence as its metadata states it, or as UNSTATED does."""
     metadata = distribution(name).metadata.json
     if expression := metadata.get("license_expression"):
         return str(expression)
@@ -86,9 +86,10 @@ def licence_of(name: str) -> str:
 
 
 def is_gpl(licence: str) -> bool:
-    """Return whether a licence is the GPL or AGPL proper, with no other to choose.
+    """Return whether a licence is the GPL or AGPL, without another licence to choose instead.
 
-    The LGPL is none, nor is the GPL with GCC's exception, as compilers' own libraries have it.
+    The LGPL does not count, nor does the GPL with GCC's exception, which libraries of compilers
+    have.
     """
     alternatives = re.split(r"\s+OR\s+", licence)
     return all(_names_gpl(one) for one in alternatives)
@@ -101,7 +102,7 @@ def _names_gpl(licence: str) -> bool:
 
 
 def closure(requirements: Iterable[Requirement]) -> dict[str, Distribution]:
-    """Return all installed packages that requirements bring, on this system."""
+    """Return all installed packages that the requirements lead to, on this system."""
     seen: set[tuple[str, str]] = set()
     found: dict[str, Distribution] = {}
     waiting = [(one, extra) for one in requirements for extra in ("", *one.extras)]
@@ -129,20 +130,20 @@ def page() -> str:
 
 
 def _lines() -> Iterator[str]:
-    direct = asked()
+    direct = direct_requirements()
     core = [one for one in direct if not one.extra]
     yield "# Licences"
     yield ""
     yield _ABOUT
     yield ""
-    yield "## What every installation has"
+    yield "## Packages of every installation"
     yield ""
     yield "| package | licence | why it is there |"
     yield "|---|---|---|"
     for one in core:
         yield f"| {one.name} | {licence_of(one.name)} | {one.why} |"
     yield ""
-    yield "## What extras bring"
+    yield "## Packages of the extras"
     yield ""
     yield "| package | extra | licence | why it is there |"
     yield "|---|---|---|---|"
@@ -150,9 +151,9 @@ def _lines() -> Iterator[str]:
         if one.extra:
             yield f"| {one.name} | `{one.extra}` | {licence_of(one.name)} | {one.why} |"
     yield ""
-    yield "## What these bring along"
+    yield "## Packages that these require"
     yield ""
-    yield "On Linux, without extras; other systems may bring a few others."
+    yield "These are installed on Linux without extras; other systems may add a few."
     yield ""
     yield "| package | licence |"
     yield "|---|---|"

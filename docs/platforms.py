@@ -1,8 +1,8 @@
 """Resolve the requirements for each system and Python, by wheels alone: `make platforms`.
 
-It writes the table between the markers of docs/install.md. A cell resolves where the newest
-versions that pip would take all have wheels: where only an older one has, pip would compile the
-newer, so that does not count. It asks the package registry, and takes five minutes.
+It writes the table between the markers of docs/install.md. A cell resolves if the versions that pip
+would choose all have wheels. An older version with a wheel does not count, because pip would
+compile the newer one. The command asks the package registry, and takes five minutes.
 """
 
 import re
@@ -20,7 +20,7 @@ PAGE = ROOT / "docs" / "install.md"
 BEGIN, END = "<!-- made by `make platforms` -->", "<!-- end of what it made -->"
 CORE = "StereoCell itself"
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-# system -> names of uv's, from the oldest C library to newer ones that some extras need
+# system -> uv's names for it, from the oldest C library to newer ones that some extras need
 SYSTEMS = {
     "Linux x86-64": ("x86_64-manylinux_2_28", "x86_64-manylinux_2_35"),
     "Linux aarch64": ("aarch64-manylinux_2_28", "aarch64-manylinux_2_35"),
@@ -33,10 +33,10 @@ _JOBS = 4  # resolutions at a time: they mostly wait for the registry
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """How one row resolves on one system with one Python.
+    """The result for one row on one system with one Python.
 
-    lacking  the package that has no wheel; empty: all have
-    newer    whether it takes glibc 2.35
+    lacking  the package that has no wheel; empty: all packages have one
+    newer    whether the packages need glibc 2.35
     """
 
     lacking: str
@@ -50,7 +50,7 @@ def rows() -> dict[str, list[str]]:
 
 
 def resolve(lines: Iterable[str], system: str, python: str, *flags: str) -> tuple[set[str], str]:
-    """Return the pinned versions, and uv's words where there are none."""
+    """Return the pinned versions; if they don't resolve, an empty set and uv's message."""
     done = subprocess.run(
         [
             str(Path(sys.executable).with_name("uv")), "pip", "compile", "-", "--quiet",
@@ -71,7 +71,7 @@ def blamed(words: str) -> str:
 
 
 def find(lines: Iterable[str], systems: Iterable[str], python: str) -> Found:
-    """Return how requirements resolve on a system: by the oldest C library that does."""
+    """Return how requirements resolve on a system, with the oldest C library that suffices."""
     lacking = ""
     for place, system in enumerate(systems):
         wheels, words = resolve(lines, system, python, "--only-binary", ":all:")
@@ -84,7 +84,7 @@ def find(lines: Iterable[str], systems: Iterable[str], python: str) -> Found:
 
 
 def cell(found: Mapping[str, Found]) -> str:
-    """Return a cell of the table: by Python, how it resolves."""
+    """Return a cell of the table: the versions of Python that resolve, and the lacking packages."""
     good = [python for python in PYTHONS if not found[python].lacking]
     lacking = sorted({one.lacking for one in found.values() if one.lacking})
     said = f"{spans(good)}" if good else "no"
@@ -94,7 +94,7 @@ def cell(found: Mapping[str, Found]) -> str:
 
 
 def spans(pythons: Iterable[str]) -> str:
-    """Return versions with ranges for those that follow one another.
+    """Return versions of Python in words; consecutive ones are a range.
 
     >>> spans(["3.11", "3.12", "3.14"])
     '3.11 to 3.12, 3.14'
@@ -109,7 +109,7 @@ def spans(pythons: Iterable[str]) -> str:
 
 
 def table(found: Mapping[tuple[str, str, str], Found], day: date) -> str:
-    """Return what stands between the markers; `found` is by row, system and Python."""
+    """Return the text between the markers; `found` is by row, system and Python."""
     return "\n".join([BEGIN, "", *_lines(found, day), "", END])
 
 

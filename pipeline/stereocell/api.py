@@ -43,7 +43,7 @@ def build(
     settings   sections and keys that override both, as in the TOML
     workers    processes; 0: this one. A script with more needs `if __name__ == "__main__":`
     scheduler  address or scheduler file of a Dask cluster, used instead of `workers`
-    force      replace whatever lies in OUT; without, only a build of the same source is
+    force      replace all that lies in OUT; otherwise only a build of the same source is replaced
 
     Progress goes to stderr. Raises StereoCellError, whose text is one line (a line for each
     reason where tasks fail).
@@ -51,6 +51,7 @@ def build(
         built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
     """
     from stereocell.building import phases
+    from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import require_build_or_nothing
     from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.building.setting_names import named_as_settings
@@ -60,7 +61,8 @@ def build(
     from stereocell.storage.claim import LOCK
     from stereocell.storage.location import Location, require_apart
     from stereocell.storage.lock import alone_in
-    from stereocell.storage.overwriting import forcing
+    from stereocell.storage.overwriting import IN_PYTHON, forcing
+    from stereocell.storage.shell_commands import as_shown, filling_in
     from stereocell.storage.workspace import opened
 
     leave_if_importing_main()
@@ -83,11 +85,12 @@ def build(
             "{'plan': {'level': 1}}"
         )
     file = None if config is None else Path(config)
-    with named_as_settings():
-        wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
     place = Location.of(out)
+    shown = place.source if place.is_local else place.shown.rstrip("/")
     with ExitStack() as stack:
-        stack.enter_context(forcing(force))
+        stack.enter_context(filling_in({"OUT": shown, "INPUT": as_shown(str(source))}))
+        stack.enter_context(named_as_settings())
+        stack.enter_context(forcing(force, IN_PYTHON))
         if place.is_local:
             folder = Path(place.source)
             require_apart(source, folder)
@@ -96,16 +99,15 @@ def build(
         else:
             folder = stack.enter_context(opened(place.source, command="build"))
             require_build_or_nothing(folder, source)
+        wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
-        with named_as_settings():
-            phases.make(str(source), folder, wanted, engine=engine)
+        phases.make(str(source), folder, wanted, engine=engine)
         print_choice(choice)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
-        phases.run_bundle(folder, engine)
+        run_bundle(folder, engine)
         report_phase.run_report(folder)
-    shown = place.source if place.is_local else place.shown.rstrip("/")
     parts = ("stage/stage.usda", "bundle/index.html", "report/index.html")
     return Built(shown, *(f"{shown}/{part}" for part in parts))
 

@@ -1,4 +1,4 @@
-"""Run steps of the tests beside it inside Blender's Python, each in a process of its own.
+"""Run steps of the tests in this folder inside Blender's Python, each in a process of its own.
 
 Each line of standard input names a step, by a file of arguments: {"step", "arguments"}. The step's
 findings go to the file that the arguments name as `result`, as JSON, what it writes to that file

@@ -42,7 +42,7 @@ def _list(*attributes: int) -> ctypes.Array:
 
 
 def draw(stage_path: str, camera: str, picture: str, width: int) -> None:
-    """Draw a stage as a camera of it sees it, without a light that it does not have."""
+    """Draw a stage from one of its cameras, by the lights of the stage alone."""
     import bpy
 
     bpy.utils.expose_bundled_modules()

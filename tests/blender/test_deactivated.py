@@ -18,7 +18,9 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_edits_are_exported_over_it(stage_path: Path, tmp_path: Path, part: str) -> None:
+def test_edits_are_exported_over_a_stage_with_a_deactivated_part(
+    stage_path: Path, tmp_path: Path, part: str
+) -> None:
     layer = deactivate(part, tmp_path / "edited.usda", stage_path)
     overlay = tmp_path / "overlay.usda"
     color = [BALL_ID, [0.25, 0.5, 0.75]]

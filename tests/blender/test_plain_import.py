@@ -1,4 +1,4 @@
-"""A stage in Blender without the add-on: `File > Import > Universal Scene Description`."""
+"""Blender's own importer opens a stage in colour, without the add-on."""
 
 from pathlib import Path
 

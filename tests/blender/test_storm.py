@@ -1,4 +1,4 @@
-"""The stage as Storm draws it, the renderer that ships with USD: by the stage's own lights.
+"""Storm, the renderer that ships with USD, draws the stage by the stage's own lights.
 
 `make test-blender` runs it: Blender's Python has USD with Storm. See blender/storm.py.
 """

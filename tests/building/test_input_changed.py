@@ -1,4 +1,4 @@
-"""An input that changes while tasks read it: told in one line, and nothing made of it is kept."""
+"""An input that changes while tasks read it is reported in one line; no result of it is kept."""
 
 import os
 import shutil
@@ -34,7 +34,7 @@ UM = ["--spacing-um", "0.5,0.2,0.2"]
 
 @pytest.fixture(autouse=True)
 def fresh() -> None:
-    """Nothing of an earlier test is held, as in a process of its own."""
+    """Forget the inputs of earlier tests, as a process of its own would not know them."""
     input_files.forget()
 
 
@@ -57,7 +57,7 @@ SOURCES = {"TIFF": write_tiff, "OME-Zarr": write_zarr, "planes": write_planes}
 
 
 def after_the_first_unit(monkeypatch: pytest.MonkeyPatch, change: Callable[[], object]) -> None:
-    """Let `change` happen once, between the first unit and the second."""
+    """Call `change` once, between the first unit and the second."""
     build, left = passes._run, [change]
 
     def run(task: object) -> None:
@@ -69,14 +69,14 @@ def after_the_first_unit(monkeypatch: pytest.MonkeyPatch, change: Callable[[], o
 
 
 def units_of(out: Path) -> dict[str, str]:
-    """Return the digests of all units, but of how long they took and where the input lies."""
+    """Return the digests of all units' files, except records of times and of the input's path."""
     found = digests_of(out / "units")
     left_out = ("seconds.json", "plan.key")
     return {name: sha for name, sha in found.items() if not name.endswith(left_out)}
 
 
 def built(source: Path, out: Path, *flags: str) -> dict[str, str]:
-    """Return the units of a build of an undisturbed input."""
+    """Build an undisturbed input, and return the digests of its units."""
     input_files.forget()
     assert main(["plan", str(source), "-o", str(out), *GRID, *flags]) == 0
     assert main(["units", str(out), *INLINE]) == 0
@@ -88,7 +88,7 @@ def last_line(capsys: pytest.CaptureFixture[str]) -> str:
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_an_image_that_changes_while_units_are_built_is_told(
+def test_an_image_that_changes_while_units_are_built_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     write, out = SOURCES[name], tmp_path / "out"
@@ -103,7 +103,7 @@ def test_an_image_that_changes_while_units_are_built_is_told(
     assert not list(out.rglob("unit.json"))
 
 
-def test_after_a_change_both_inputs_are_built_as_if_undisturbed(
+def test_after_a_change_the_old_and_the_new_input_are_built_as_if_undisturbed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source, out = write_zarr(tmp_path, BODY), tmp_path / "out"
@@ -121,7 +121,7 @@ def test_after_a_change_both_inputs_are_built_as_if_undisturbed(
     assert units_of(out) == undisturbed
 
 
-def test_a_label_map_that_changes_while_units_are_built_is_told(
+def test_a_label_map_that_changes_while_units_are_built_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source, out = write_tiff(tmp_path, BODY), tmp_path / "out"
@@ -136,7 +136,7 @@ def test_a_label_map_that_changes_while_units_are_built_is_told(
     assert not list(out.rglob("unit.json"))
 
 
-def test_a_change_while_objects_are_located_is_told(
+def test_a_change_while_objects_are_located_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
@@ -154,7 +154,7 @@ def test_a_change_while_objects_are_located_is_told(
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_files_that_are_written_again_with_the_same_voxels_pass(
+def test_files_that_are_written_again_with_the_same_voxels_are_accepted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     write, out = SOURCES[name], tmp_path / "out"
@@ -163,7 +163,7 @@ def test_files_that_are_written_again_with_the_same_voxels_pass(
     assert main(["plan", str(source), "-o", str(out), *GRID, *flags]) == 0
 
     def rewrite() -> None:
-        """Write every file again: with the same bytes, but for a TIFF's, which is packed anew."""
+        """Write every file again: a TIFF may be packed otherwise, all others get the same bytes."""
         write(tmp_path, BODY)
         for file in tmp_path.rglob("*"):
             if out not in file.parents:
@@ -175,7 +175,7 @@ def test_files_that_are_written_again_with_the_same_voxels_pass(
 
 @pytest.fixture
 def sampled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Callable[[], None]]:
-    """An image whose fingerprint covers a sample, and what changes a chunk that is not in it."""
+    """An image whose fingerprint covers a sample, and a function that changes another chunk."""
     monkeypatch.setattr(fingerprint, "BUDGET_BYTES", 10_000)
     monkeypatch.setattr(file_states, "MAX_READ_BYTES", 10_000)
     source = write_zarr(tmp_path, BODY)
@@ -197,13 +197,13 @@ def sampled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Call
 AS_IMAGE = ["--as", "intensity"]
 
 
-def test_voxels_that_no_sample_shows_are_built_again(
+def test_all_units_are_built_again_if_a_chunk_outside_of_the_fingerprint_s_sample_changes(
     sampled: tuple[Path, Callable[[], None]],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The fingerprint is the same: earlier results would count as those of the new voxels."""
+    """The fingerprint is the same, so results of the old voxels would pass for the new ones."""
     source, change = sampled
     out = tmp_path / "out"
     assert main(["plan", str(source), "-o", str(out), *GRID, *AS_IMAGE]) == 0
@@ -211,14 +211,14 @@ def test_voxels_that_no_sample_shows_are_built_again(
         after_the_first_unit(patch, change)
         assert main(["units", str(out), *INLINE]) == 1
     line = last_line(capsys)
-    assert "as '0/c/" in line
-    assert "no unit is kept: run `stereocell units OUT` again" in line
+    assert "the first is '0/c/" in line
+    assert f"no unit is kept: run `stereocell units {out}` again" in line
     assert main(["units", str(out), *INLINE]) == 0
     assert units_of(out) == built(source, tmp_path / "expected", *AS_IMAGE)
 
 
 @pytest.mark.parametrize("is_changed", [True, False])
-def test_what_a_killed_command_made_last_is_made_again_if_the_input_was_written_since(
+def test_last_results_of_a_killed_command_are_made_again_if_the_input_was_written_since(
     sampled: tuple[Path, Callable[[], None]],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -244,12 +244,12 @@ def test_what_a_killed_command_made_last_is_made_again_if_the_input_was_written_
     capsys.readouterr()
     assert main(["units", str(out), *INLINE]) == 0
     said = capsys.readouterr().err
-    assert ("is made again" in said) == is_changed
+    assert ("are made again" in said) == is_changed
     assert f"units: {2 if is_changed else 1}/{2 if is_changed else 1}" in said
     assert not (out / "running.json").exists()
 
 
-def test_a_failure_of_tasks_that_comes_of_the_change_is_told_as_that(
+def test_a_task_that_fails_because_the_input_changed_is_reported_as_a_change(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source, out = write_zarr(tmp_path, BODY), tmp_path / "out"
@@ -259,7 +259,7 @@ def test_a_failure_of_tasks_that_comes_of_the_change_is_told_as_that(
     assert "changed while it was read" in last_line(capsys)
 
 
-def test_a_table_that_changes_while_it_is_read_is_told(
+def test_a_table_that_changes_while_it_is_read_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
@@ -287,7 +287,7 @@ def test_a_table_that_changes_while_it_is_read_is_told(
     )
 
 
-def test_a_table_that_changes_while_units_are_built_is_told(
+def test_a_table_that_changes_while_units_are_built_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
@@ -301,13 +301,13 @@ def test_a_table_that_changes_while_units_are_built_is_told(
     line = last_line(capsys)
     assert "cells.csv: changed since it was planned" in line
     assert "run the same command again" in line
-    # the units don't depend on it, and nothing is lost
+    # units don't depend on the table, so they are kept
     assert main(["units", str(out), *INLINE]) == 0
     assert "units: up to date" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("changes", ["model", "image"])
-def test_a_model_or_its_image_that_changes_while_it_is_read_is_told(
+def test_a_model_or_its_image_that_changes_while_it_is_read_is_reported(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -338,7 +338,7 @@ def test_a_model_or_its_image_that_changes_while_it_is_read_is_told(
     assert main(["tissue", str(out), "--model", str(model)]) == 1
     line = last_line(capsys)
     assert "changed while it was read" in line
-    assert "run `stereocell tissue OUT` again" in line
+    assert f"run `stereocell tissue {out}` again" in line
     assert not (out / "tissue").exists()
 
 

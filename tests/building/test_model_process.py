@@ -1,11 +1,13 @@
-"""A user's network that takes too long, too much memory, or its process with it, is one line."""
+"""A network that exceeds its time or memory, or ends its process, is refused in one line."""
 
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stereocell.building.model_process import ModelBounds, opened_network
+from stereocell.cli.flags import declare_tissue
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.tissue.onnx_classifier import Network, apply_network
 from support.onnx_models import write_endless_model, write_huge_model, write_model
@@ -30,7 +32,7 @@ def test_a_network_gives_the_same_bytes_in_a_process_of_its_own(tmp_path: Path) 
         assert apply_network(apart, voxels).tobytes() == apply_network(here, voxels).tobytes()
 
 
-def test_a_network_that_never_ends_is_ended_at_its_bound(tmp_path: Path) -> None:
+def test_a_network_that_loops_without_end_is_ended_at_its_bound(tmp_path: Path) -> None:
     line = refusal(write_endless_model(tmp_path / "m.onnx"), ModelBounds(seconds=3))
     assert "it did not end within 3 s" in line
     assert "raise --model-seconds" in line
@@ -42,15 +44,22 @@ def test_a_network_of_more_memory_than_its_bound_is_refused(tmp_path: Path) -> N
     assert "--model-memory-gb" in line
 
 
-def test_a_file_that_is_no_network_is_named_as_before(tmp_path: Path) -> None:
+def test_a_file_that_is_no_network_is_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "m.onnx").write_bytes(b"GIF89a")
     line = refusal(tmp_path / "m.onnx", ModelBounds())
     assert line.endswith("found another kind of file, expected an ONNX model")
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_bound_that_is_none_is_refused(value: float) -> None:
+def test_a_bound_that_is_not_a_positive_number_is_refused(value: float) -> None:
     with pytest.raises(UsageError, match="--model-seconds"):
         ModelBounds(seconds=value)
     with pytest.raises(UsageError, match="--model-memory-gb"):
         ModelBounds(memory_gb=value)
+
+
+def test_the_flags_have_the_defaults_of_the_bounds() -> None:
+    parser = ArgumentParser()
+    declare_tissue(parser)
+    flags = parser.parse_args(["OUT"])
+    assert ModelBounds(flags.model_seconds, flags.model_memory_gb) == ModelBounds()

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building import input_unchanged, model_process, phases
+from stereocell.building import bundle_phase, input_unchanged, model_process
 from stereocell.building import tissue as tissue_channels
 from stereocell.building.open_source import open_source
 from stereocell.building.out_folder import OutFolder
@@ -27,8 +27,10 @@ from stereocell.engine.run import console
 from stereocell.report import phase as report
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.claim import LOCK
+from stereocell.storage.documents import NOT_WRITTEN
 from stereocell.tissue.classify import TissueOptions
 from stereocell.verify import formats as check_module
+from stereocell.verify import node_validators
 from support import phantoms
 from support.exhaustive import sweep
 from support.onnx_models import write_model
@@ -71,7 +73,7 @@ OTHER_CLASSES = [
 def without_viewer() -> Iterator[None]:
     """The viewer may be built anew meanwhile, and is most of a small bundle."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(phases, "viewer_dist", lambda: None)
+        patch.setattr(bundle_phase, "viewer_dist", lambda: None)
         patch.setattr(tissue_channels, "learn_tissue", learn)
         yield
 
@@ -90,7 +92,7 @@ def learn(voxels: NDArray[Any], _: object, *, options: TissueOptions) -> SimpleN
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """The report takes longest and is written last; no fault here is one of glTF or KTX2."""
     monkeypatch.setattr(report, "run_report", lambda out: None)
-    monkeypatch.setattr(check_module, "_run_node", lambda script, paths: "")
+    monkeypatch.setattr(node_validators, "_run_node", lambda script, paths: "")
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +183,7 @@ def run_until(out: str, flags: list[str], event: str, place: str) -> None:
                 os.kill(os.getpid(), signal.SIGKILL)
 
     console.quiet = True
-    phases.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
+    bundle_phase.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
     tissue_channels.learn_tissue = learn  # type: ignore[assignment]
     sys.addaudithook(hook)
     tissue(Path(out), *flags)
@@ -357,10 +359,12 @@ def test_damaged_file_is_named_and_made_again(
         assert main([phase[0], str(out), *phase[1:]]) == 1
         line = only_line(capfd)
         assert str(out / name) in line
-        assert "run `stereocell tissue OUT` again" in line
+        assert f"run `stereocell tissue {out}` again" in line
     monkeypatch.setattr(report, "run_report", lambda out: None)
     assert tissue(out) == 0
-    assert Path(name).name in capfd.readouterr().err
+    said = capfd.readouterr().err
+    assert Path(name).name in said
+    assert "OUT`" not in said
     assert digests(out) == digests(undisturbed)
     assert faults(out) == []
 
@@ -434,8 +438,8 @@ def test_a_class_whose_name_no_plan_may_hold_leaves_everything_as_it_was(
     assert tissue(out, "--model", str(model)) == 1
     line = only_line(capfd)
     assert "'bone\\x07', expected" in line
-    assert "can be shown" in line
-    assert ("not written, as no command could read it" in line) == (checked == "by the plan")
+    assert "printable characters" in line
+    assert (NOT_WRITTEN in line) == (checked == "by the plan")
     assert digests(out) == before
 
 

@@ -1,4 +1,4 @@
-"""The page on clusters warns first, and its commands make a cluster that keeps strangers out."""
+"""The page on clusters begins with a warning, and its commands make a cluster with TLS."""
 
 import json
 import os
@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
@@ -28,8 +29,9 @@ def block(kind: str, number: int) -> str:
 
 
 def words_of(command: str, folder: Path) -> list[str]:
-    """Return a command of the page, with this Python and with a folder in the place of /shared."""
+    """Return a command of the page, with this Python, a folder for /shared and a day to come."""
     line = command.split("     #")[0].replace("/shared", str(folder))
+    line = re.sub(r"\d{4}-\d\d-\d\d", str(date.today() + timedelta(days=30)), line)
     first, *others = shlex.split(line)
     return {"dask": [sys.executable, "-m", "dask"], "python": [sys.executable]}.get(
         first, [first]
@@ -63,15 +65,15 @@ def scheduler_of_the_page(folder: Path) -> Iterator[str]:
 
 def test_the_page_begins_with_the_warning() -> None:
     assert PAGE.startswith(
-        "# Clusters and object storage\n\n> **Whoever reaches a Dask scheduler's port can run any "
-        "code as you**"
+        "# Clusters and object storage\n\n> **Everybody who can reach a Dask scheduler's port can "
+        "run any code as you**"
     )
     commands = [line for line in PAGE.splitlines() if line.startswith(("dask ", "stereocell "))]
     assert "--protocol tls" in commands[0]
 
 
 @pytest.mark.slow
-def test_the_cluster_of_the_page_admits_only_those_who_have_the_key(tmp_path: Path) -> None:
+def test_the_cluster_of_the_page_admits_only_clients_with_the_key(tmp_path: Path) -> None:
     folder = tmp_path / "shared"
     folder.mkdir()
     with scheduler_of_the_page(folder) as config:

@@ -34,14 +34,14 @@ def test_no_package_of_an_installation_without_extras_is_under_the_gpl(
     licences: ModuleType,
 ) -> None:
     found = licences.closure(project()[0])
-    assert {"numpy", "pillow", "llvmlite", "botocore"} <= found.keys()  # those of others, too
+    assert {"numpy", "pillow", "llvmlite", "botocore"} <= found.keys()  # indirect ones, too
     assert len(found) > 80
     assert [name for name in found if licences.is_gpl(licences.licence_of(name))] == []
 
 
 def test_packages_of_the_gpl_are_found_among_the_extras(licences: ModuleType) -> None:
-    asked = [one for lines in project()[1].values() for one in lines]
-    names = {canonicalize_name(one.name) for one in asked}
+    of_extras = [one for lines in project()[1].values() for one in lines]
+    names = {canonicalize_name(one.name) for one in of_extras}
     assert {name for name in names if licences.is_gpl(licences.licence_of(name))} == {"pymeshlab"}
 
 
@@ -61,13 +61,13 @@ def test_packages_of_the_gpl_are_found_among_the_extras(licences: ModuleType) ->
         ("MIT", False),
     ],
 )
-def test_the_gpl_is_told_from_the_lgpl_and_from_a_choice(
+def test_the_gpl_is_distinguished_from_the_lgpl_and_from_a_choice(
     licences: ModuleType, licence: str, is_gpl: bool
 ) -> None:
     assert licences.is_gpl(licence) == is_gpl
 
 
-def test_the_page_names_the_requirements_of_today_with_their_reasons(licences: ModuleType) -> None:
+def test_the_page_names_all_requirements_with_their_reasons(licences: ModuleType) -> None:
     page = (ROOT / "docs" / "licences.md").read_text("utf-8")
     parts = dict(zip(["", "core", "extras", "others"], page.split("\n## "), strict=True))
     core, extras = project()
@@ -79,7 +79,7 @@ def test_the_page_names_the_requirements_of_today_with_their_reasons(licences: M
     assert {(name, extra) for name, extra, *_ in of_extras} == {
         (canonicalize_name(one.name), extra) for extra, lines in extras.items() for one in lines
     }
-    for one in licences.asked():
+    for one in licences.direct_requirements():
         assert one.why, f"pyproject.toml: {one.name}: expected a comment that says why it is there"
         assert f" | {one.why} |" in page, f"{one.name}: run `make licences`"
         assert licences.licence_of(one.name)

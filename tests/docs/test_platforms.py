@@ -1,4 +1,4 @@
-"""The table of systems in docs/install.md is of today's requirements (`make platforms`)."""
+"""The table of systems in docs/install.md fits the requirements (`make platforms`)."""
 
 import re
 import tomllib
@@ -42,7 +42,7 @@ def test_the_table_has_a_row_for_each_extra_and_a_column_for_each_system(
             assert CELL.fullmatch(text), f"{name}: {text}"
 
 
-def test_the_table_is_of_the_requirements_of_today(platforms: ModuleType) -> None:
+def test_the_table_is_up_to_date_with_the_requirements(platforms: ModuleType) -> None:
     named = dict(re.findall(r"^- (.+?): (`.+`)$", made(platforms), re.MULTILINE))
     there = {row: re.findall(r"`([^`]+)`", lines) for row, lines in named.items()}
     assert there == platforms.rows(), "run `make platforms`"
@@ -75,7 +75,7 @@ def test_a_package_without_a_wheel_is_named_in_its_cell(platforms: ModuleType) -
         assert platforms.cell(dict(zip(platforms.PYTHONS, found, strict=True))) == text
 
 
-def test_what_is_made_fits_between_the_markers_again(platforms: ModuleType) -> None:
+def test_a_made_table_fits_between_the_markers_again(platforms: ModuleType) -> None:
     found = {
         (row, system, python): platforms.Found("numba" if python == "3.14" else "")
         for row in platforms.rows()

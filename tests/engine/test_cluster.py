@@ -29,7 +29,7 @@ from support.server.timeouts import PATIENCE_S
 from support.validators import make_assets
 
 GRID = "2x1"
-Joined = tuple[str, ObjectStore]  # a scheduler file, and a store that the workers reach, too
+Joined = tuple[str, ObjectStore]  # a scheduler file, and a store that the workers can reach
 
 ROOT = Path(__file__).parents[2]
 # Workers import the tests' functions, and what these import.
@@ -230,7 +230,7 @@ def test_a_client_without_the_key_can_run_nothing_on_a_cluster_with_tls(cluster:
     address = json.loads(Path(cluster[0]).read_text("utf-8"))["address"]
     assert address.startswith("tls://127.0.0.1:")
     for stranger in (address, address.replace("tls://", "tcp://")):
-        # an own process: this one has the certificates
+        # a process of its own, because this one has the certificates
         script = (
             "import os, sys; from distributed import Client; "
             "Client(sys.argv[1], timeout=3).run_on_scheduler(os.getpid)"
@@ -247,7 +247,7 @@ def test_a_client_without_the_key_can_run_nothing_on_a_cluster_with_tls(cluster:
 
 
 @pytest.mark.slow
-def test_a_command_without_certificates_is_told_where_to_name_them(cluster: Joined) -> None:
+def test_a_command_without_certificates_is_refused_with_the_remedy(cluster: Joined) -> None:
     names = ["ca-file", *(f"{role}.cert" for role in ("scheduler", "worker", "client"))]
     nothing = dict.fromkeys((f"distributed.comm.tls.{name}" for name in names), None)
     with (

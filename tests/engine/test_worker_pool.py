@@ -1,6 +1,9 @@
 """Worker processes of this machine: errors, killed workers, and commands that are stopped."""
 
+import os
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -46,7 +49,7 @@ def test_an_error_that_cannot_be_pickled_is_reported_by_its_name_and_text(engine
         engine.run("bad", fail_unpicklably, [("a", 1), ("b", 2)])
 
 
-def test_the_answers_of_an_abandoned_run_are_not_taken_for_those_of_the_next() -> None:
+def test_answers_of_an_abandoned_run_do_not_reach_the_next_run() -> None:
     with closing(WorkerPool(2, double.__module__)) as pool:
         next(pool.run(double, [10, 20, 30, 50]))
         assert sorted(pool.run(double, [1, 2])) == [(0, 2, None), (1, 4, None)]
@@ -73,12 +76,26 @@ finally:
 """
 
 
-def test_a_script_without_a_main_guard_is_told_to_have_one(tmp_path: Path) -> None:
+def test_a_script_without_a_main_guard_is_answered_with_the_line_to_write(tmp_path: Path) -> None:
     script = start_script(_UNGUARDED, tmp_path)
     _, text = script.communicate(timeout=PATIENCE_S)
     assert script.returncode == 1
     assert "A script that builds needs the line `if __name__ == '__main__':`" in text
     assert text.count("Traceback") == 1  # that of the script itself, and none of its workers
+
+
+def test_a_script_on_standard_input_has_workers(tmp_path: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-"],
+        input=_UNGUARDED + "print('done')",
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])},
+        cwd=tmp_path,
+        text=True,
+        capture_output=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert (run.returncode, run.stdout) == (0, "done\n"), run.stderr
 
 
 @pytest.mark.parametrize(
@@ -92,7 +109,10 @@ def test_no_worker_outlives_a_command_that_is_stopped_or_killed(
     family = psutil.Process(command.pid).children(recursive=True)
     assert len(family) >= 2
     command.send_signal(number)
-    _, text = command.communicate(timeout=PATIENCE_S)
+    try:
+        _, text = command.communicate(timeout=PATIENCE_S)
+    finally:
+        command.kill()
     assert command.returncode == code, text
     _, alive = psutil.wait_procs(family, timeout=PATIENCE_S)
     assert alive == []

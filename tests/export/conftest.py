@@ -13,7 +13,7 @@ from support.stages import layer_over
 
 @pytest.fixture(autouse=True)
 def forced() -> Iterator[None]:
-    """Exports replace what lies there: tests of one file's content write it several times."""
+    """Let exports replace any file, because tests of one file's content write it several times."""
     with forcing(True):
         yield
 

@@ -6,7 +6,7 @@ base.py         the sound files that are spoilt
 trial.py        one case in a process of its own, and what is wrong with how it ended
 __main__.py     `python tests/malformed`: all of them, and a table
 
-Beside these cases, which were thought of, there are small changes by chance, by seeds:
+Beside these hand-written cases there are small random changes, repeatable by their seeds:
 
 subjects.py        an intact source of every format
 mutations.py       kinds of changes

@@ -1,9 +1,9 @@
 """One changed source, read whole in a fork, and compared with the intact one.
 
-The outcomes, in the order in which they are asked:
+The outcomes, in the order in which they are checked:
 fault        a traceback, an abort, a hang, too much memory, or words of a library on stderr
 refused      in one line, which names the source and the expected state
-right        read as the intact source: the change was in something that does not matter
+right        read as the intact source: the changed bytes do not matter
 unnoticed    voxels differ, and the changed bytes lie where the format has no checksum for voxels;
              if some lie elsewhere, these alone are read right or refused
 noted        read in part, with a note that the intact source does not have
@@ -38,7 +38,7 @@ Reading = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How a trial ended: one of OUTCOMES, and what to look at."""
+    """The end of a trial: one of OUTCOMES, and words for the person who looks into it."""
 
     subject: Subject
     seed: int
@@ -126,7 +126,7 @@ def _without_changes_in(ranges: Ranges, before: bytes, after: bytes) -> bytes:
 
 
 def _in_fork(source: Path, answer: Path) -> dict[str, Any]:
-    """Return what reading a source in a fork came to: `reading`, `line` or `fault`."""
+    """Read a source in a fork. Return its `reading`, the `line` that refused it, or a `fault`."""
     noise = answer.with_suffix(".noise")
     pid = os.fork()
     if pid == 0:
@@ -184,7 +184,7 @@ def _place_of(error: BaseException) -> str:
 
 
 def _read(source: Path) -> Reading:
-    """Return all that a build would take from a source, as JSON has it."""
+    """Return all that a build would take from a source, as values of JSON."""
     from stereocell import read
     from stereocell.read.tables import read_table
 

@@ -1,8 +1,8 @@
 """Small changes of files, by seeds: a seed gives the same bytes each time.
 
-Changes keep a file's length, but for truncations, and edits of files that are text as a whole. Each
-kind stands for a way in which files come to harm: a bit of memory or of a disk flips, a copy stops,
-a sector is lost, blocks are written in the wrong place, another program writes a field wrongly.
+Only truncations, and edits of text files, change a file's length. Each kind stands for a way in
+which files are damaged: a bit of memory or of a disk flips, a copy stops, a sector is lost, blocks
+are written in the wrong place, another program writes a field wrongly.
 """
 
 import random
@@ -18,7 +18,7 @@ _WORDS = (b"0", b"-1", b"1e999", b"nan", b"9" * 400, b"999999999999", b"2.5", b'
 
 
 def mutate(file: Path, content: bytes, chance: Chance) -> bytes:
-    """Return the changed content of a file; the kind is drawn, too."""
+    """Return the changed content of a file; the kind of change is chosen at random, too."""
     kinds: list[Callable[[bytes, Chance], bytes]] = [*KINDS.values()]
     if file.name.endswith(TEXTS):
         kinds += [_edit_text] * len(kinds)

@@ -1,8 +1,7 @@
-"""Intact sources of every format: small, and of voxels that no two places share.
+"""Intact sources of every format: small, and with a different value in each voxel.
 
-Other libraries than the readers write them where there are some. ND2 is missing: no library writes
-it. With each source stands where it holds voxels without a checksum: nothing can notice a byte that
-changes there.
+Other libraries than the readers write them where there are some. Each source states the ranges in
+which it holds voxels without a checksum: a byte that changes there can't be noticed.
 """
 
 import shutil
@@ -30,6 +29,7 @@ from zarr.codecs import GzipCodec
 from malformed.base import write_anndata
 from support.array_files import write_bdv_xml, write_czi, write_ims, write_lif, write_n5
 from support.dicom_series import compress, grid, write_enhanced, write_series
+from support.nd2_files import write_nd2
 from support.phantoms import write_ome_tiff, write_ome_zarr
 
 SPACING_UM = (0.5, 0.2, 0.25)  # z, y, x
@@ -49,7 +49,7 @@ class Subject:
     write        writes it into a folder, and returns its path
     format       its title in the table; several subjects may share one
     files        patterns of the files that are changed
-    unprotected  where a file, by name and content, holds voxels without a checksum
+    unprotected  returns the ranges of a file that hold voxels without a checksum
     """
 
     name: str
@@ -84,7 +84,7 @@ def _whole(path: Path) -> Ranges:
 
 
 def _image_of_jpeg(path: Path) -> Ranges:
-    """Return all from the first quantisation table on: tables and codes have no checksum."""
+    """Return the range from the first quantisation table on: JPEG has no checksum there."""
     return [(path.read_bytes().find(b"\xff\xdb"), 1 << 60)]
 
 
@@ -102,7 +102,7 @@ def _chunks_of_hdf5(path: Path) -> Ranges:
 
 
 def _arrays_of_hdf5(path: Path) -> Ranges:
-    """Return where contiguous datasets lie, which hold numbers and the places of texts."""
+    """Return the ranges of contiguous datasets, which hold numbers and the places of texts."""
     found: Ranges = []
 
     def add(_: str, node: Any) -> None:
@@ -295,6 +295,14 @@ def _lif(folder: Path) -> Path:
     return write_lif(folder / "a.lif", {"a": ("ZYX", VOXELS)})
 
 
+def _nd2(is_packed: bool) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        write_nd2(folder / "a.nd2", VOXELS[None, None, :, None], SPACING_UM, is_packed=is_packed)
+        return folder / "a.nd2"
+
+    return write
+
+
 def _parquet(folder: Path) -> Path:
     count = 60
     columns = {"label": range(1, count + 1), "area": [n / 7 for n in range(count)]}
@@ -349,6 +357,8 @@ def all_subjects() -> Sequence[Subject]:
         Subject("raw", "MRC", _mrc, unprotected=_rows(VOXELS)),
         Subject("uncompressed", "CZI", _czi, unprotected=_rows(VOXELS)),
         Subject("raw", "LIF", _lif, unprotected=_rows(VOXELS)),
+        Subject("uncompressed", "ND2", _nd2(is_packed=False), unprotected=_rows(VOXELS)),
+        Subject("zlib", "ND2", _nd2(is_packed=True)),
         Subject("snappy", "Parquet (table)", _parquet, unprotected=_pages_of_parquet),
         Subject("contiguous", "AnnData (table)", _h5ad, unprotected=_arrays_of_hdf5),
     )

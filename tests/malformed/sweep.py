@@ -1,8 +1,8 @@
 """`python tests/malformed/sweep.py`: change every format's source by seeds, and print a table.
 
-Each source is changed 80 times, by other seeds with `--first`. The same seed is the same change.
-Exit code 1: a change was read wrongly without a word, or ended otherwise than by a line, and is
-not in KNOWN.
+Each source is changed 80 times; `--first` starts at another seed. The same seed makes the same
+change. Exit code 1: a changed source was read wrongly without a note, or did not end with one line,
+and is not in KNOWN.
 """
 
 import argparse
@@ -21,10 +21,10 @@ from malformed.mutation_trial import OUTCOMES, Ended, Intact  # noqa: E402
 from malformed.subjects import Subject, all_subjects  # noqa: E402
 from malformed.trial import import_package  # noqa: E402
 
-COUNT = 80  # changes of each source: 2640 in all
+COUNT = 80  # changes of each source: 2800 in all
 _BAD = ("wrong", "fault")
-# Changes that are read wrongly, by name, and why nothing notices them: none is known. The table
-# counts them as wrong.
+# Changes that are read wrongly, by name, each with the reason. None is known. The table counts
+# them as wrong.
 KNOWN: dict[str, str] = {}
 
 
@@ -54,7 +54,7 @@ def main() -> int:
 
 
 def trials(subject: Subject, seeds: range, folder: Path) -> list[Ended]:
-    """Return how the changes of one source ended."""
+    """Change one source by each seed, and return how the trials ended."""
     intact = Intact(subject, folder / "intact")
     found = []
     for seed in seeds:

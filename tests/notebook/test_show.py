@@ -11,8 +11,10 @@ import pytest
 from PIL import Image
 
 import stereocell
-from stereocell.model.errors import UsageError
+from stereocell.model.errors import OutputError, UsageError
 from stereocell.notebook import arrays
+from support.digests import digests_of
+from support.outputs import make_source
 
 pytestmark = pytest.mark.slow
 
@@ -106,5 +108,28 @@ def test_what_can_not_be_shown_is_told_in_a_line(
 
 def test_a_build_without_a_bundle_is_named_as_one(built_page, tmp_path):
     (tmp_path / "plan.json").write_text("{}")
-    with pytest.raises(UsageError, match=r"a build without a bundle, .*`stereocell bundle`"):
+    with pytest.raises(UsageError, match="a build without a bundle") as raised:
         stereocell.show(tmp_path)
+    assert f"`stereocell bundle {tmp_path}`" in str(raised.value)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_another_array_takes_the_place_of_a_build_by_force_alone(built_page, tmp_path):
+    made: dict = {}
+    exec(BALLS, made)
+    out = tmp_path / "out"
+    sure = {"spacing_um": (0.5, 0.25, 0.25), "out": out}
+    stereocell.show(made["small"], **sure)
+    before = digests_of(out)
+    stereocell.show(made["small"], **sure)  # the same again is no work
+    assert digests_of(out) == before
+    for given in (made["ball"], str(make_source(tmp_path / "f.ome.tif"))):
+        more = sure if given is made["ball"] else {"out": out}
+        with pytest.raises(OutputError, match=r"force=True replaces it$"):
+            stereocell.show(given, **more)
+        assert digests_of(out) == before
+    with pytest.raises(OutputError, match="expected nothing or a build of this array"):
+        stereocell.show(made["small"], **sure, name="another")
+    assert digests_of(out) == before
+    assert stereocell.show(made["ball"], **sure, force=True).name == "array"
+    assert digests_of(out)["array.ome.tif"] != before["array.ome.tif"]

@@ -1,6 +1,8 @@
 """`stereocell iso`: a picture and a table of one tile's candidates, and nothing else."""
 
 import shlex
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -272,3 +274,28 @@ def test_errors_are_one_clear_line(
     assert message in error
     assert error.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def write_png_that_states_a_huge_size(path: Path) -> bytes:
+    """Write a PNG of one pixel, whose header states 100 000 x 100 000 pixels."""
+    Image.new("L", (1, 1)).save(path)
+    content = bytearray(path.read_bytes())
+    header = content.index(b"IHDR")
+    content[header + 4 : header + 12] = struct.pack(">2I", 100_000, 100_000)
+    checksum = zlib.crc32(content[header : header + 17])
+    content[header + 17 : header + 21] = struct.pack(">I", checksum)
+    path.write_bytes(content)
+    return bytes(content)
+
+
+def test_a_file_that_states_a_huge_picture_is_kept_and_refused_in_one_line(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.png"
+    content = write_png_that_states_a_huge_size(path)
+    assert _iso(source, "--channel", "0", "--tile", "r0_c0", "-o", str(path)) == 1
+    error = capsys.readouterr().err
+    assert f"{path}: holds " in error
+    assert "expected nothing or a picture of the same source" in error
+    assert error.count("\n") == 1
+    assert path.read_bytes() == content

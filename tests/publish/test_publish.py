@@ -161,7 +161,7 @@ def test_a_damaged_bundle_is_not_published(out: Path, run: Run, tmp_path: Path) 
     (out / "bundle/sw.js").write_bytes(b"Self;")
     code, _, said = run(out, tmp_path / "site")
     assert code == 1
-    assert "bundle/sw.js: damaged: run `stereocell bundle OUT` first" in said
+    assert f"bundle/sw.js: damaged: run `stereocell bundle '{out}'` first" in said
     assert not (tmp_path / "site").exists()
     assert run(tmp_path / "nothing", tmp_path / "site")[0] == 1
 

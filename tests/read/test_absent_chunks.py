@@ -1,4 +1,4 @@
-"""Chunks that are not stored: their share is told, and a level without any is refused."""
+"""The share of chunks that are not stored is reported, and a level without any is refused."""
 
 import shutil
 from pathlib import Path
@@ -11,6 +11,7 @@ import zarr
 
 from stereocell.building import input_files
 from stereocell.cli.__main__ import main
+from stereocell.read import absent_chunks
 from support import phantoms
 from support.array_files import write_n5
 
@@ -50,7 +51,7 @@ def write_hdf5(path: Path, count: int) -> Path:
     return path
 
 
-def test_the_share_of_chunks_that_are_not_stored_is_told(
+def test_the_share_of_chunks_that_are_not_stored_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     chunks = phantoms.write_ome_zarr(tmp_path / "a.ome.zarr", [BODY], chunks=(4, 48, 36))
@@ -59,7 +60,7 @@ def test_the_share_of_chunks_that_are_not_stored_is_told(
         scales=[{"z": 1, "y": 1, "x": 1}],
     )  # fmt: skip
     shards, blocks = write_shards(tmp_path / "c.ome.zarr"), write_n5(tmp_path / "a.n5", BODY)
-    told = "({}) are not stored: read as {}, as the format has it"
+    told = "({}) are not stored: they are read as {}, and the format does not state"
     for path, lost, words in (
         (chunks, "0/c/1/0/0", "1 of 4 chunks of level 0 " + told.format("25.00%", 0)),
         (flat, "0/1/2/0/0", "1 of 8 chunks of level 0 " + told.format("12.50%", 0)),
@@ -105,4 +106,13 @@ def test_a_level_without_any_chunk_is_refused(
     shutil.rmtree(path / "0" / "c")
     code, said = plan(path, tmp_path, capsys)
     assert code == 1
-    assert "level 0: found none of 4 chunks, expected the voxels" in said
+    assert "level 0: found none of 4 chunks, expected those that hold voxels" in said
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_chunks_that_ranges_touch_are_counted_as_a_list_of_them_has_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ranges = [range(int(a), int(a + rng.integers(1, 9))) for a in rng.integers(0, 60, 7)]
+    touched = {voxel // 4 for one in ranges for voxel in one}
+    assert absent_chunks._count(4, ranges) == len(touched)
+    assert absent_chunks._count(1, [range(10**15), range(10**14, 10**15 + 1)]) == 10**15 + 1

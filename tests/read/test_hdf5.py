@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.tiling import Box
 from stereocell.read import hdf5_texts
 from stereocell.read.hdf5_types import require_standard
 from support.array_files import SIZE_UM, characters, write_bdv_xml, write_ims
@@ -221,7 +222,7 @@ def test_bigdataviewer_s_setups_are_channels_of_numbers_without_a_sign(tmp_path:
     assert "BigDataViewer's axes" in refusal(tmp_path / "a b.h5", axes="zyx")
 
 
-# damage to parts of the file that have no checksum
+# --- damage to parts of the file that have no checksum
 
 
 F32 = bytes.fromhex("11201f0004000000 00002000 17080017 7f000000")
@@ -328,6 +329,26 @@ def test_an_index_of_chunks_that_contradicts_itself_is_refused(
     assert told in line
 
 
+def test_an_index_of_many_chunks_is_compared_where_a_window_reads(tmp_path: Path) -> None:
+    body = np.random.default_rng(0).integers(0, 256, (40, 100, 100), np.uint8)
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        raw = file.create_dataset("raw", data=body, chunks=(1, 5, 2))
+        assert raw.id.get_num_chunks() == 40_000
+        place, other = (20, 50, 60), (30, 0, 0)
+        chunk, shared = (raw.id.get_chunk_info_by_coord(at) for at in (place, other))
+    entry = struct.pack("<II5Q", 10, 0, *place, 0, chunk.byte_offset)
+    damage(path, entry, 32, 1)  # the place within a voxel, which is always 0
+    dataset = read.open(path, spacing_um=SIZE_UM)
+    apart, across = Box((0, 0, 0), (19, 100, 100)), Box((19, 48, 58), (22, 56, 63))
+    np.testing.assert_array_equal(dataset.read(0, apart).voxels, body[apart.slices])
+    with pytest.raises(SourceError, match=r"\(20, 50, 60\): found an entry that no look-up finds"):
+        dataset.read(0, across)
+    damage(path, struct.pack("<Q", shared.byte_offset), 0, chunk.byte_offset & 0xFF)
+    with pytest.raises(SourceError, match="bytes beyond the file or of another chunk"):
+        read.open(path, spacing_um=SIZE_UM).read(0, apart)
+
+
 @pytest.mark.parametrize("libver", ["earliest", "latest"])
 @pytest.mark.parametrize("most", [None, (None, 48, 36), (None, None, 36), (16, 48, 36)])
 def test_an_index_of_any_kind_is_read_with_chunks_that_are_not_stored(
@@ -343,10 +364,10 @@ def test_an_index_of_any_kind_is_read_with_chunks_that_are_not_stored(
 
 
 @pytest.mark.parametrize("name", ["axistags", "unit", "label"])
-def test_a_heap_of_texts_on_which_hdf5_never_ends_is_refused_at_a_bound(
+def test_a_heap_of_texts_that_makes_hdf5_loop_without_end_is_refused_at_a_time_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """An object of a heap, of 0 bytes: HDF5 2.0 looks for the next one at the same place."""
+    """A heap object has 0 bytes, so HDF5 2.0 looks for the next object at the same place."""
     path = write(tmp_path / "a.h5", resolution=SIZE_UM)
     with h5py.File(path, "a") as file:
         if name == "label":

@@ -1,9 +1,8 @@
-"""CZI, LIF and ND2: CZI written by Zeiss's library, LIF byte by byte; scenes, mosaics, extras."""
+"""CZI, LIF and ND2: CZI written by Zeiss's library, the others byte by byte; scenes, extras."""
 
 import os
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
 from support.array_files import SIZE_UM, write_czi, write_lif
+from support.nd2_files import write_nd2
 from support.phantoms import f_phantom
 
 BOX = Box((1, 7, 3), (9, 30, 20))
@@ -94,13 +94,52 @@ def test_a_czi_s_directory_that_differs_from_its_tiles_is_refused(
     assert "as in the directory" in line
 
 
-def test_a_czi_s_tile_that_is_not_where_the_directory_says_is_refused(tmp_path: Path) -> None:
+def test_a_czi_whose_directory_leads_to_no_tile_is_refused(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     content = bytearray(path.read_bytes())
     first = content.index(b"ZISRAWSUBBLOCK\0")
     content[first + 3] ^= 1
     path.write_bytes(content)
     assert "a.czi" in refusal(path)
+
+
+def test_tiles_that_a_czi_lacks_are_told_with_their_share(tmp_path: Path) -> None:
+    path = tmp_path / "a.czi"
+    body = five(f_phantom())
+    assert not any("tiles" in note for note in read.open(write_czi(path, {None: body})).notes)
+    body[1, 1, 9:] = 0
+    path.unlink()
+    with czi.create_czi(str(path)) as file:
+        for t, c, z in np.ndindex(2, 2, 16):
+            if (t, c) != (1, 1) or z < 9:
+                plane = {"T": t, "C": c, "Z": z}
+                file.write(data=np.ascontiguousarray(body[t, c, z][..., None]), plane=plane)
+    spacing = {"spacing_um": SIZE_UM}
+    assert not any("tiles" in note for note in read.open(path, **spacing).notes)
+    dataset = read.open(path, time=1, **spacing)
+    np.testing.assert_array_equal(whole(dataset, 1), body[1, 1])
+    (note,) = (note for note in dataset.notes if "tiles" in note)
+    assert note.startswith("7 of 32 tiles (21.88%) are not stored: read as 0")
+
+
+def test_a_czi_without_tiles_at_a_point_in_time_is_refused_there(tmp_path: Path) -> None:
+    path = tmp_path / "a.czi"
+    with czi.create_czi(str(path)) as file:
+        for t, z in np.ndindex(3, 16):
+            if t != 1:
+                data = np.ascontiguousarray(f_phantom()[z][..., None])
+                file.write(data=data, plane={"T": t, "C": 0, "Z": z})
+    whole(read.open(path, time=2, spacing_um=SIZE_UM))
+    assert "time point 1: found no tile" in refusal(path, time=1, spacing_um=SIZE_UM)
+
+
+def test_a_czi_whose_metadata_state_more_than_its_tiles_is_told(tmp_path: Path) -> None:
+    path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
+    content = path.read_bytes()
+    assert content.count(b"<SizeZ>16<") == 1
+    path.write_bytes(content.replace(b"<SizeZ>16<", b"<SizeZ>24<"))
+    (note,) = (note for note in read.open(path).notes if "metadata" in note)
+    assert note.startswith("the metadata state 24 along Z, and tiles are there for 16")
 
 
 def test_a_czi_of_rgb_or_of_one_plane_is_refused(tmp_path: Path) -> None:
@@ -150,50 +189,112 @@ def test_a_lif_without_lengths_asks_for_them(tmp_path: Path) -> None:
     assert "--spacing-um" in refusal(path)
 
 
-# ND2: there is no writer, so a stand-in of the library's class
-
-
-class Nd2:
-    """The part of nd2.ND2File that is used; frames are numbered as `sizes` has the loops."""
-
-    def __init__(self, path: str) -> None:
-        self.sizes = {"T": 2, "P": 2, "Z": 16, "C": 2, "Y": 48, "X": 36}
-        self.dtype = np.dtype(np.uint16)
-        names = [SimpleNamespace(name="DAPI", color=SimpleNamespace(r=0, g=0, b=255)),
-                 SimpleNamespace(name="", color=None)]  # fmt: skip
-        self.metadata = SimpleNamespace(channels=[SimpleNamespace(channel=one) for one in names])
-
-    def __enter__(self) -> "Nd2":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        pass
-
-    def voxel_size(self) -> Any:
-        return SimpleNamespace(**dict(zip("zyx", SIZE_UM, strict=True)))
-
-    def read_frame(self, number: int) -> NDArray[Any]:
-        t, p, z = np.unravel_index(number, (2, 2, 16))
-        return np.stack([f_phantom()[z] + 100 * p + 10 * t + c for c in (0, 1)]).astype(np.uint16)
-
-
-def test_nd2_has_positions_times_and_channels(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ('NumberOfElements="16"', "found 55296 bytes of voxels, expected"),
+        ('Memory Size="55296"', "found 55296 bytes of voxels, expected 99999"),
+    ],
+)
+def test_a_lif_that_holds_less_than_its_xml_states_is_refused(
+    tmp_path: Path, change: str, words: str
 ) -> None:
-    import nd2
+    """The library would read the planes of the next image."""
+    images = {"a": ("ZYX", f_phantom()), "b": ("ZYX", f_phantom()[:9].copy())}
+    path = write_lif(tmp_path / "a.lif", images)
+    other = change.replace('"16"', '"24"').replace("55296", "99999")
+    content = path.read_bytes().replace(change.encode("utf-16-le"), other.encode("utf-16-le"))
+    path.write_bytes(content)
+    assert words in refusal(path, series=1)
+    np.testing.assert_array_equal(whole(read.open(path, series=2)), f_phantom()[:9])
 
-    monkeypatch.setattr(nd2, "ND2File", Nd2)
-    (tmp_path / "a.nd2").write_bytes(
-        b"\xda\xce\xbe\n" + bytes(40) + b"ND2 CHUNK MAP SIGNATURE 0000001!" + bytes(8)
-    )
-    dataset = read.open(tmp_path / "a.nd2", series=2, time=1)
-    assert dataset.levels[0].spacing_um == SIZE_UM
-    assert [channel.name for channel in dataset.channels] == ["DAPI", "Channel1"]
-    assert [channel.color for channel in dataset.channels] == [(0, 0, 1), None]
+
+def test_a_lif_that_holds_more_than_its_xml_states_is_told(tmp_path: Path) -> None:
+    path = write_lif(tmp_path / "a.lif", {"a": ("ZYX", f_phantom())})
+    fewer = 'NumberOfElements="12"'.encode("utf-16-le")
+    path.write_bytes(path.read_bytes().replace('NumberOfElements="16"'.encode("utf-16-le"), fewer))
+    dataset = read.open(path)
+    np.testing.assert_array_equal(whole(dataset), f_phantom()[:12])
+    (note,) = dataset.notes
+    assert note.startswith("the XML describes 41472 of 55296 bytes of the image's voxels (75.00%)")
+
+
+def test_blocks_of_a_lif_that_share_a_name_are_refused(tmp_path: Path) -> None:
+    images = {"a": ("ZYX", f_phantom()), "b": ("ZYX", f_phantom() + 1)}
+    path = write_lif(tmp_path / "a.lif", images)
+    content = path.read_bytes()
+    name = "Mem1".encode("utf-16-le")
+    at = content.rindex(name)
+    path.write_bytes(content[: at + 6] + b"0" + content[at + 7 :])
+    assert "found the name of another block" in refusal(path)
+
+
+# ND2
+
+ND2 = np.stack([np.stack([five(f_phantom() + 100 * p)[t] for p in (0, 1)]) for t in (0, 1)])
+ND2 = ND2.transpose(0, 1, 3, 2, 4, 5).astype(np.uint16)  # t, p, z, c, y, x
+ND2_UM = (0.5, 0.25, 0.25)
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_nd2_has_positions_times_and_channels(tmp_path: Path, is_packed: bool) -> None:
+    path = tmp_path / "a.nd2"
+    write_nd2(path, ND2, ND2_UM, is_packed=is_packed)
+    dataset = read.open(path, series=2, time=1)
+    assert dataset.levels[0].spacing_um == ND2_UM
+    assert [channel.name for channel in dataset.channels] == ["DAPI", "GFP"]
+    assert [channel.color for channel in dataset.channels] == [(0, 0, 1), (0, 1, 0)]
     for channel in (0, 1):
         np.testing.assert_array_equal(whole(dataset, channel), f_phantom() + 110 + channel)
-    assert "building --series 1" in read.open(tmp_path / "a.nd2").notes[0]
-    assert len(read.list_series(tmp_path / "a.nd2")) == 2
+    assert "building --series 1" in read.open(path).notes[0]
+    assert len(read.list_series(path)) == 2
+    assert not any("missing" in note for note in dataset.notes)
+
+
+def test_frames_that_an_nd2_lacks_are_told_or_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.nd2"
+    write_nd2(path, ND2, ND2_UM, without=range(60, 64))  # of the last point in time
+    np.testing.assert_array_equal(whole(read.open(path)), f_phantom())
+    whole(read.open(path, time=1))
+    (note,) = (note for note in read.open(path, series=2).notes if "missing" in note)
+    assert note == "4 of 32 frames (12.50%) are missing, all at other points in time"
+    line = refusal(path, series=2, time=1)
+    assert "time point 1: found 12 of 16 frames" in line
+    assert line.endswith("--time 0 is whole")
+    write_nd2(path, ND2[:1], ND2_UM, without=[5])
+    assert "time point 0: found 15 of 16 frames" in refusal(path)
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+@pytest.mark.parametrize(
+    ("part", "offset", "words"),
+    [
+        (b"\xda\xce\xbe\n", 0, "no frame of that number"),
+        (b"ImageDataSeq|3!", 13, "no frame of that number"),
+        (b"", 12, "the frame ends at"),
+    ],
+)
+def test_a_frame_that_is_not_where_an_nd2_s_map_says_is_refused(
+    tmp_path: Path, is_packed: bool, part: bytes, offset: int, words: str
+) -> None:
+    path = tmp_path / "a.nd2"
+    places = write_nd2(path, ND2, ND2_UM, is_packed=is_packed)
+    content = bytearray(path.read_bytes())
+    content[content.index(part, places[3]) + offset] ^= 0x10
+    path.write_bytes(content)
+    line = refusal(path)
+    assert f"frame 3 at byte {places[3]}" in line
+    assert words in line
+    assert "as in the map of chunks" in line
+
+
+def test_a_frame_of_fewer_bytes_than_an_nd2_states_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.nd2"
+    places = write_nd2(path, ND2, ND2_UM)
+    content = bytearray(path.read_bytes())
+    content[places[3] + 9] ^= 0x10
+    path.write_bytes(content)
+    assert "fewer than its" in refusal(path)
 
 
 @pytest.mark.skipif("STEREOCELL_DATA" not in os.environ, reason="STEREOCELL_DATA is not set")

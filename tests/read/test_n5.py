@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numcodecs
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -51,22 +50,15 @@ def test_every_codec_and_number_is_read(tmp_path: Path, packing: str, dtype: str
     assert dataset.arrays[0].chunk == BLOCK[::-1]
 
 
-def test_lz4_of_java_is_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize("size", [0, 3, 5])
+def test_a_block_of_fewer_voxels_than_its_place_takes_is_refused(tmp_path: Path, size: int) -> None:
     path = write(tmp_path / "a.n5", packing={"type": "raw"}, **NM)
-    about = path / "attributes.json"
-    fields = json.loads(about.read_text())
-    about.write_text(json.dumps(fields | {"compression": {"type": "lz4", "blockSize": 65536}}))
-    for file in path.rglob("*"):
-        if file.is_file() and file != about:
-            content = file.read_bytes()
-            raw = content[16:]
-            halves = raw[:1000], raw[1000:]  # a packed part, then one as it is
-            packed = numcodecs.lz4.compress(halves[0])[4:]
-            first = struct.pack("<8sBiii", b"LZ4Block", 0x26, len(packed), 1000, 0) + packed
-            size = len(halves[1])
-            second = struct.pack("<8sBiii", b"LZ4Block", 0x16, size, size, 0) + halves[1]
-            file.write_bytes(content[:16] + first + second)
-    np.testing.assert_array_equal(whole(read.open(path)), f_phantom())
+    block = path / "1" / "0" / "0"
+    content = bytearray(block.read_bytes())
+    assert struct.unpack_from(">3I", content, 4) == (16, 12, 8)
+    struct.pack_into(">I", content, 4 + 8, size)
+    block.write_bytes(content[: 16 + 16 * 12 * size * 2])
+    assert f"a block of ({size}, 12, 16) voxels, fewer than the (8, 12, 16)" in refusal(path)
 
 
 def test_an_absent_block_is_zero(tmp_path: Path) -> None:

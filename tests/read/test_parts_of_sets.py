@@ -1,4 +1,4 @@
-"""Parts of a set: an index is compared with the files it describes, and a lost part is told."""
+"""The index of a set is compared with the files that it describes; missing parts are reported."""
 
 import re
 import shutil
@@ -67,7 +67,7 @@ def test_a_file_of_ndtiff_that_the_index_does_not_name_is_refused(tmp_path: Path
     assert "found 32 of 64 images (0 of 32 in 'x_NDTiffStack_1.tif')" in refusal(path)
 
 
-def test_pages_that_no_image_of_the_ome_xml_has_are_told_with_their_share(tmp_path: Path) -> None:
+def test_the_share_of_pages_that_the_ome_xml_leaves_out_is_reported(tmp_path: Path) -> None:
     path = phantoms.write_ome_tiff(tmp_path / "a.ome.tif", BODY)
     assert not any("OME-XML" in note for note in whole(path).notes)
     content = path.read_bytes()
@@ -76,8 +76,24 @@ def test_pages_that_no_image_of_the_ome_xml_has_are_told_with_their_share(tmp_pa
     assert note == "the OME-XML describes 12 of 16 pages in the files; 4 are left out (25%)"
 
 
+@pytest.mark.parametrize("compression", [None, "zlib"])
+def test_pages_that_imagej_s_description_does_not_count_are_told(
+    tmp_path: Path, compression: str | None
+) -> None:
+    path = tmp_path / "a.tif"
+    about = {"axes": "ZYX"}
+    tifffile.imwrite(path, BODY, imagej=True, metadata=about, compression=compression)
+    assert whole(path).notes == ()
+    damaged = path.read_bytes().replace(b"slices=16", b"slices=12")
+    path.write_bytes(damaged.replace(b"images=16", b"images=12"))
+    dataset = whole(path)
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, BODY[:12])
+    (note,) = dataset.notes
+    assert note == "the file's description counts 12 of 16 pages: the others are left out (25%)"
+
+
 @pytest.mark.parametrize("name", ["a.ome.tif", "a.tif"])
-def test_tiles_that_are_not_stored_are_told_with_their_share(tmp_path: Path, name: str) -> None:
+def test_the_share_of_tiles_that_are_not_stored_is_reported(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     body = np.random.default_rng(0).integers(0, 99, (2, 32, 32)).astype(np.uint16)
     tifffile.imwrite(path, body, tile=(16, 16), metadata={"axes": "ZYX"})
@@ -92,7 +108,7 @@ def test_tiles_that_are_not_stored_are_told_with_their_share(tmp_path: Path, nam
     assert note.startswith("2 of 8 strips or tiles (25.00%) are not stored: read as 0")
 
 
-def test_tiles_that_a_smaller_level_does_not_store_are_told(tmp_path: Path) -> None:
+def test_tiles_that_a_smaller_level_does_not_store_are_reported(tmp_path: Path) -> None:
     path = phantoms.write_ome_tiff(tmp_path / "a.ome.tif", BODY, tile=(16, 16), levels=2)
     with tifffile.TiffFile(path, mode="r+") as tiff:
         page = tiff.series[0].levels[1].pages[0]
@@ -184,7 +200,7 @@ def count_times(file: h5py.File) -> None:
         (cut_planes, "ImageSizeZ: found 8, expected 16 as Z of /DataSetInfo/Image"),
     ],
 )
-def test_what_imaris_counts_is_compared_with_its_datasets(
+def test_counts_in_the_metadata_of_imaris_are_compared_with_its_datasets(
     tmp_path: Path, change: Callable[[h5py.File], None], words: str
 ) -> None:
     path = write_ims(tmp_path / "a.ims", BOTH)
@@ -284,6 +300,17 @@ def test_views_of_bigdataviewer_are_compared_with_its_xml(
         assert len(whole(path).channels) == 3
 
 
+def test_a_group_with_a_huge_number_is_refused_without_a_list_of_those_before(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.h5"
+    write_bdv_hdf5(path)
+    with h5py.File(path, "r+") as file:
+        file.move("t00002", "t999999999999")
+    line = refusal(path)
+    assert "found 3 of 1000000000000 time points up to 999999999999, missing 2, 3, " in line
+
+
 def views(kind: str, part: str, number: int) -> Iterator[str]:
     """Yield the groups of a setup, a time point or a level."""
     if part == "setup":
@@ -308,7 +335,7 @@ def views(kind: str, part: str, number: int) -> Iterator[str]:
 
 @pytest.mark.parametrize("place", ["start", "end"])
 @pytest.mark.parametrize("inner", [None, BloscCodec(), ZstdCodec(), GzipCodec()])
-def test_a_shard_is_read_and_refused_where_it_is_shorter_than_its_index_says(
+def test_a_whole_shard_is_read_and_one_that_is_cut_short_is_refused(
     tmp_path: Path, place: str, inner: Any
 ) -> None:
     path = phantoms.write_ome_zarr(tmp_path / "a.ome.zarr", [BODY])

@@ -251,6 +251,21 @@ def test_missing_planes_are_refused_by_name(tmp_path: Path) -> None:
     assert "missing 'x_z008_ch0.tif', 'x_z004_ch1.tif'" in line
 
 
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ([f"x_z{z}.tif" for z in (0, 2, 4, 6)], "4 planes (0 to 6; no file is numbered 1, 3, 5)"),
+        ([f"x_z{z}_c{c}.tif" for z in range(3) for c in (1, 3)], "(c1, c3; no file is numbered 2)"),
+        ([f"x_t{t}_z{z}.tif" for z in range(3) for t in (0, 1, 4)], "(no file is numbered 2, 3)"),
+        ([f"x_z{z}.tif" for z in (10, 11, 12)], "3 planes (10 to 12)"),
+    ],
+)
+def test_numbers_that_no_name_has_are_told(tmp_path: Path, names: list[str], told: str) -> None:
+    folder = fill(tmp_path, dict.fromkeys(names, volume(4, 4)))
+    notes = read.open(folder, spacing_um=GIVEN).notes
+    assert any(told in note for note in notes), notes
+
+
 def test_numbers_that_are_no_row_are_refused(tmp_path: Path) -> None:
     for numbers in ((1, 2, 900_000_000_000), (20240101, 31, 7), (1, 2, 4, 10**30)):
         folder = fill(tmp_path / str(numbers), {f"x{n}.tif": volume(4, 4) for n in numbers})

@@ -1,5 +1,6 @@
 """TIFF without OME-XML: axes, spacings, names and colours of files that tifffile writes."""
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -227,6 +228,18 @@ def test_colour_pixels_of_an_ome_tiff(tmp_path: Path) -> None:
     assert [channel.name for channel in dataset.channels] == ["Red", "Green", "Blue"]
     assert dataset.levels[0].spacing_um == (2.0, 1.0, 1.0)
     hold_voxels(dataset, stored, "ZYXS")
+
+
+def test_planes_that_an_lsm_s_description_does_not_count_are_told(tmp_path: Path) -> None:
+    stored = np.random.default_rng(5).integers(0, 250, (5, 3, 48, 36)).astype(np.uint8)
+    channels = {"a": (0, 255, 0), "b": (255, 0, 0), "c": (255, 255, 255)}
+    path = write_lsm(tmp_path / "a.lsm", stored, (1.5, 0.4, 0.3), channels)
+    content = bytearray(path.read_bytes())
+    depth = content.index(struct.pack("<I", 67127628)) + 16
+    struct.pack_into("<i", content, depth, 4)
+    path.write_bytes(content)
+    (note,) = read.open(path).notes
+    assert note == "the file's description counts 4 of 5 pages: the others are left out (20%)"
 
 
 @pytest.mark.parametrize("suffix", [".lsm", ".LSM", ".tif"])

@@ -1,4 +1,4 @@
-"""Strips and tiles of damaged TIFF files: offsets and sizes that can't be those of one file."""
+"""Damaged TIFF files: offsets, sizes and counts that can't be those of one file."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
-from tifffile import TiffFile, TiffWriter
+from tifffile import TiffFile, TiffWriter, imwrite
 
 from stereocell import read
 from stereocell.model.errors import SourceError
@@ -99,3 +99,22 @@ def test_files_of_libtiff_are_read(tmp_path: Path, compression: str | None) -> N
     path = tmp_path / "a.tif"
     planes[0].save(path, save_all=True, append_images=planes[1:], compression=compression)
     np.testing.assert_array_equal(_read(path), _STACK)
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "found"),
+    [
+        ("slices", 2, "found images=4 and 2 slices"),
+        ("images", 2, "found images=2 and 4 slices"),
+    ],
+)
+def test_counts_of_imagej_that_contradict_each_other_are_refused(
+    tmp_path: Path, name: str, number: int, found: str
+) -> None:
+    path = tmp_path / "a.tif"
+    imwrite(path, _STACK, imagej=True, metadata={"axes": "ZYX"})
+    whole = path.read_bytes()
+    assert whole.count(f"{name}=4".encode()) == 1
+    path.write_bytes(whole.replace(f"{name}=4".encode(), f"{name}={number}".encode()))
+    with pytest.raises(SourceError, match=found):
+        _read(path)

@@ -77,7 +77,7 @@ def test_cycif_again_is_a_no_op_and_anything_else_stays(cycif: Path, tmp_path: P
     times = {file: file.stat().st_mtime_ns for file in cycif.parent.rglob("*")}
     write_cycif(cycif, **SMALL)
     assert {file: file.stat().st_mtime_ns for file in cycif.parent.rglob("*")} == times
-    with pytest.raises(OutputError, match=r"something else.*--force replaces it"):
+    with pytest.raises(OutputError, match=r"something else.*: choose another place$"):
         write_cycif(cycif, **{**SMALL, "seed": 4})
     assert digests_of(cycif.parent) == before
     (tmp_path / "mine.ome.zarr").mkdir()

@@ -351,7 +351,7 @@ def test_a_missing_bundle_is_one_line_that_says_how_to_make_it(
         assert main([command, str(tmp_path), "--port", "0"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
         assert "manifest.json: expected a built bundle, found no such file" in line
-        assert "`stereocell bundle OUT`" in line
+        assert f"`stereocell bundle {tmp_path}`" in line
 
 
 def test_a_bundle_is_served_by_its_own_folder_with_bricks_where_it_is_a_builds(

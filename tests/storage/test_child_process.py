@@ -1,4 +1,4 @@
-"""A library that ends its process, or never ends, is one error of the parent's."""
+"""A library that ends its process, or never ends, becomes one error in the parent."""
 
 import math
 import os
@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
 
+import stereocell
 from stereocell.model.errors import SourceError
 from stereocell.storage.child_process import Bounds, Child, ChildError, run_in_child
 from support.child_objects import LONG_S, Counter, print_and_return, refuse
@@ -22,7 +24,7 @@ def test_an_object_keeps_its_state_between_calls() -> None:
         assert child.call("add", 1) == 8
 
 
-def test_arrays_go_there_and_come_back_as_they_are() -> None:
+def test_arrays_pass_to_the_child_and_back_unchanged() -> None:
     values = np.arange(100_000).reshape(10, 100, 100)[:, ::-1]
     with Child(Counter, 0) as child:
         found = child.call("doubled", values)
@@ -63,7 +65,7 @@ def test_errors_of_ours_and_bugs_are_raised_in_the_parent() -> None:
     assert "Traceback" in caught.value.__notes__[0]
 
 
-def test_a_library_that_prints_disturbs_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+def test_text_that_a_library_prints_is_discarded(capfd: pytest.CaptureFixture[str]) -> None:
     assert run_in_child(print_and_return) == 3
     assert capfd.readouterr() == ("", "")
 
@@ -86,3 +88,14 @@ def test_a_child_ends_with_its_parent_even_inside_a_call() -> None:
     parent.communicate()
     gone, _ = psutil.wait_procs([child], timeout=60)
     assert gone == [child]
+
+
+def test_interpreters_are_started_in_one_place_for_libraries_that_may_abort() -> None:
+    package = Path(stereocell.__file__).parent
+    starters = {
+        file.relative_to(package).as_posix()
+        for file in package.rglob("*.py")
+        if "[sys.executable" in file.read_text(encoding="utf-8")
+    }
+    compiling = {"kernels/cache_place.py", "kernels/compile_all.py"}  # run no library on a source
+    assert starters == {"storage/child_process.py", *compiling}

@@ -1,4 +1,4 @@
-"""Files are told by their first bytes where the format of their ending has a mark."""
+"""Files are recognised by their first bytes where the format of their ending has a mark."""
 
 from pathlib import Path
 
@@ -13,12 +13,12 @@ MARKED = (".glb", ".ply", ".3mf", ".usda", ".usdc", ".usd", ".usdz")
 
 
 @pytest.mark.parametrize("ending", [*MARKED, ".GLB"])
-def test_a_text_with_the_ending_of_another_format_is_none_of_it(
+def test_a_text_with_the_ending_of_another_format_is_said_to_have_other_content(
     tmp_path: Path, ending: str
 ) -> None:
     file = tmp_path / f"mine{ending}"
     file.write_text("hi")
-    assert contents_of(file).words == f"a file named {ending.lower()} that is none"
+    assert contents_of(file).words == f"a file that is named {ending.lower()} and has other content"
 
 
 @pytest.mark.parametrize("ending", [".usda", ".usdc", ".usd"])

@@ -1,4 +1,4 @@
-"""Exceptions of a library over a damaged file become one line; bugs of our own keep theirs."""
+"""Exceptions of a library on a damaged file become one line; our own bugs keep their traceback."""
 
 import gzip
 import io
@@ -38,7 +38,7 @@ CLASSES = (
 
 
 def raised_in_the_package(error: Exception) -> None:
-    """Raise an exception as a bug of our own would: from a file of the package."""
+    """Raise an exception as a bug of ours would: from a file of the package."""
     file = Path(library_errors.__file__).with_name("a_bug.py")
     code = compile("def bug(error):\n    raise error\n", str(file), "exec")
     names: dict[str, Callable[[Exception], None]] = {}
@@ -126,7 +126,7 @@ def test_a_bug_of_our_own_keeps_its_traceback(boundary: Callable, error: Excepti
     assert traceback.extract_tb(error.__traceback__)[-1].name == "bug"
 
 
-def test_the_boundary_of_a_reader_takes_no_error_of_our_own_parsing_for_the_librarys() -> None:
+def test_the_boundary_of_a_reader_lets_errors_of_our_own_parsing_pass() -> None:
     with pytest.raises(ValueError, match="ours"), library_boundary("a.tif", "a TIFF file, whole"):
         raised_in_the_package(ValueError("ours"))
 

@@ -1,4 +1,4 @@
-"""Nothing that a library warns or logs reaches the terminal while it reads a source."""
+"""Warnings and log lines of libraries do not reach the terminal while a source is read."""
 
 import logging
 import subprocess

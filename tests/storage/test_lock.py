@@ -5,6 +5,8 @@ import signal
 import subprocess
 import sys
 import threading
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,9 @@ from stereocell.storage.atomic_write import replacing, replacing_folder, write_b
 from stereocell.storage.claim import LOCK, held, working_for
 from stereocell.storage.lock import alone_in
 from stereocell.storage.processes import machine
+from support.busy_command import start_script
+from support.ctrl_c import heeded
+from support.server.timeouts import PATIENCE_S
 
 HOLD = """
 import sys, time
@@ -184,3 +189,65 @@ def test_a_file_in_its_place_is_said_in_a_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="can't be written"), alone_in(tmp_path / "file", "build"):
         pass
+
+
+HALVES = """
+import sys
+from contextlib import closing
+from pathlib import Path
+from stereocell.engine.interrupts import answering_sigterm
+from stereocell.engine.run import Engine
+from stereocell.storage.lock import alone_in
+from support.worker_tasks import write_for_ever
+
+if __name__ == "__main__":
+    out = Path(sys.argv[1])
+    with answering_sigterm(), alone_in(out, "units"), closing(Engine(2)) as engine:
+        engine.run("never", write_for_ever, [(name, out / name) for name in "ab"])
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_command_leaves_finished_files_and_no_halves(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    out = tmp_path / "out"
+    with heeded():
+        command = start_script(HALVES, tmp_path, out)
+    end = time.monotonic() + PATIENCE_S
+    while not all((out / f"{name}.begun").exists() for name in "ab") and time.monotonic() < end:
+        time.sleep(0.02)
+    halves = {file.name for file in out.glob(".*")}
+    command.send_signal(number)
+    _, said = command.communicate(timeout=PATIENCE_S)
+    assert len(halves) == 5, said  # a file and a folder of each worker, and the lock
+    assert "KeyboardInterrupt" in said or "Terminated" in said
+    assert {file.name for file in out.iterdir()} == {
+        f"{name}.{ending}" for name in "ab" for ending in ("whole", "begun")
+    }
+
+
+@pytest.mark.parametrize("call", range(4))
+def test_ctrl_c_at_any_rename_leaves_the_old_folder_or_the_new_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: int
+) -> None:
+    place = tmp_path / "place"
+    place.mkdir()
+    (place / "old").touch()
+    calls = iter(range(100))
+    rename = os.replace
+
+    def interrupted(source: Path, target: Path) -> None:
+        number = next(calls)
+        if number == call and call % 2 == 0:
+            raise KeyboardInterrupt
+        rename(source, target)
+        if number == call // 2 and call % 2 == 1:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", interrupted)
+        with suppress(KeyboardInterrupt), replacing_folder(place) as folder:
+            (folder / "new").touch()
+    assert [file.name for file in place.iterdir()] in (["old"], ["new"])
+    assert [file.name for file in tmp_path.iterdir()] == ["place"]

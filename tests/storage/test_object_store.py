@@ -87,7 +87,7 @@ def marks(store: ObjectStore, prefix: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("is_other", [True, False])
-def test_an_input_that_is_written_while_units_are_built_is_told_where_its_bytes_are_others(
+def test_an_input_written_during_a_build_is_reported_if_its_bytes_differ(
     store: ObjectStore,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -114,7 +114,8 @@ def test_an_input_that_is_written_while_units_are_built_is_told_where_its_bytes_
     assert main(["plan", f"s3://{source}", "-o", str(out), "--grid", GRID]) == 0
     assert main(["units", str(out), "--workers", "0"]) == int(is_other)
     said = capsys.readouterr().err
-    assert (f"changed while it was read: 1 of 10 files, as '{chunk}'" in said) == is_other
+    words = f"changed while it was read: 1 of 10 files, the first is '{chunk}'"
+    assert (words in said) == is_other
     assert bool(list(out.rglob("unit.json"))) != is_other
     if is_other:
         assert "plan into another OUT" in said
@@ -313,8 +314,8 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
         assert main(["units", "s3://bucket/held"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
         assert line == (
-            "stereocell: s3://bucket/held/plan.json is missing: run `stereocell plan INPUT -o OUT`"
-            " first"
+            "stereocell: s3://bucket/held/plan.json is missing: "
+            "run `stereocell plan INPUT -o s3://bucket/held` first"
         )
         assert not fs.exists(lock)
     ended.wait()
@@ -413,7 +414,7 @@ def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.M
 
     monkeypatch.setattr("stereocell.serve.server.serve", serve)
     assert main(["serve", there]) == 0
-    # and the small records that say what OUT is
+    # the two records are small; OUT is recognised by them
     assert seen == [{"bundle", "plan.json", "provenance.json"}]
 
 

@@ -40,7 +40,7 @@ def blender() -> subprocess.Popen[str]:
 
 
 def run(step: str, folder: Path, **arguments: Any) -> Any:
-    """Run one step in a Blender that nothing has been done in and return what it found."""
+    """Run one step in an unused Blender, and return its findings."""
     turn = next(_turns)
     result, file = folder / f"result{turn}.json", folder / f"arguments{turn}.json"
     file.write_text(json.dumps({**arguments, "result": str(result)}, default=str))
@@ -56,6 +56,6 @@ def run(step: str, folder: Path, **arguments: Any) -> Any:
     said = Path(f"{result}.txt").read_text()
     assert code == "0", said[-3000:]
     found = json.loads(result.read_text())
-    # how an operator's report reaches a terminal
+    # Blender prints the report of an operator like this
     told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", said, re.MULTILINE)
     return {**found, "told": told} if step.startswith("edit") else found

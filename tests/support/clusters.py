@@ -1,4 +1,4 @@
-"""A Dask cluster for tests: it listens on loopback only, and admits nobody without its key."""
+"""A Dask cluster for tests: it listens on loopback only, and refuses clients without its key."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ import trustme
 
 from support.server.timeouts import PATIENCE_S
 
-# the dashboard, too: `--no-dashboard` leaves its pages of numbers open to the network
+# The dashboard needs an address: `--no-dashboard` leaves some of its pages open to the network.
 _ON_LOOPBACK = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
 
 
@@ -54,10 +54,11 @@ def as_variables(settings: Mapping[str, object]) -> dict[str, str]:
 def running_cluster(
     folder: Path, workers: int, environment: Mapping[str, str] | None = None
 ) -> Iterator[Cluster]:
-    """Run a scheduler and workers of one thread, with TLS, which this process has joined, too.
+    """Run a scheduler and workers of one thread, with TLS.
 
-    The folder is theirs; what they do with it is written there. Commands that this process starts
-    within the block have the certificates by their environment.
+    folder  holds the certificates and the scheduler file, and is the workers' working folder
+
+    Within the block, this process and the commands that it starts have the certificates.
     """
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)

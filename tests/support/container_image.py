@@ -1,8 +1,8 @@
 """A Containerfile's steps, carried out in a folder that stands for the root of the image.
 
-There is no container engine: paths in the steps are moved below that folder, and the Python of the
-tests stands for the image's. Packages come from uv's cache, as wheels alone and in the versions of
-requirements.lock, so that neither a network nor a compiler is used.
+There is no container engine. Paths in the steps are moved below that folder, and the Python of the
+tests stands for the image's. Packages come from uv's cache, as wheels and in the versions of
+requirements.lock, so neither a network nor a compiler is used.
 """
 
 import json
@@ -34,7 +34,7 @@ COMPILERS = (
     "nvcc",
     "cl",
 )
-# all that the steps call besides Python and pip
+# all programs that the steps call besides Python and pip
 PROGRAMS = ("sh", "mkdir", "rm", "chmod")
 PIP = """#!/bin/sh
 for word do shift; [ "$word" = --no-cache-dir ] || set -- "$@" "$word"; done
@@ -89,7 +89,7 @@ class Image:
         return found
 
     def environment(self) -> dict[str, str]:
-        """No program but those of the image is found; a compiler asked for by name fails."""
+        """The environment of the image: only its own programs are found, and compilers fail."""
         ours = ("PYTHONPATH", "VIRTUAL_ENV", "PYTHONHOME", "NUMBA_CACHE_DIR", "PYTHONWARNINGS")
         inherited = {name: value for name, value in os.environ.items() if name not in ours}
         path = f"{self.venv / 'bin'}:{self.root / 'programs'}"
@@ -113,7 +113,7 @@ class Image:
         return self.run(*self.entrypoint, *(words or self.command))
 
     def carry_out(self, step: Step) -> None:
-        """Carry out an instruction. Skips the test if a wheel is not at hand."""
+        """Carry out an instruction. Skips the test if a wheel is not in uv's cache."""
         match step.instruction:
             case "FROM":
                 self.base = step.text

@@ -8,13 +8,13 @@ import numpy as np
 from stereocell.cli.__main__ import main
 from support import phantoms
 
-# exported once each; films take long, and are refused as any file of an unknown kind is
+# Endings that are exported once each. Films are left out: they take long.
 EXPORTS = (".glb", ".stl", ".obj", ".usda", ".usdz", ".png", ".nrrd", ".nii.gz", ".raw")
 
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Paths by names; `source`: the volume that all are made of."""
+    """The outputs' paths by their names, and the volume that all are made of."""
 
     source: Path
     paths: dict[str, Path]

@@ -1,11 +1,13 @@
-"""Packed files of every reader, written by other libraries, and where their streams lie.
+"""Write packed files of every reader by other libraries, and return where their streams lie.
 
 The voxels are noise of four values, so that a stream is long and one flipped byte rarely breaks the
 decoder.
 """
 
 import gzip
+import json
 import struct
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +16,7 @@ import h5py
 import mrcfile
 import nibabel
 import nrrd
+import numcodecs
 import numpy as np
 import SimpleITK
 import tensorstore
@@ -23,6 +26,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydicom.uid import RLELossless
 
+from stereocell.kernels.xxhash import xxh32
 from support.dicom_series import compress, grid, write_series
 
 SHAPE = (6, 40, 48)  # z, y, x
@@ -124,8 +128,9 @@ def planes(folder: Path, suffix: str) -> Stream:
 def _image_zarr(folder: Path, version: int, **codecs: Any) -> Stream:
     path = folder / "a.ome.zarr"
     group = zarr.open_group(path, mode="w", zarr_format=version)
-    array = group.create_array("0", shape=SHAPE, dtype="u2", chunks=(3, 40, 48), **codecs)
-    array[:] = NOISE
+    with warnings.catch_warnings(action="ignore"):  # zarr warns of codecs that only numcodecs has
+        array = group.create_array("0", shape=SHAPE, dtype="u2", chunks=(3, 40, 48), **codecs)
+        array[:] = NOISE
     axes = [{"name": a, "type": "space", "unit": "micrometer"} for a in "zyx"]
     level = {"path": "0", "coordinateTransformations": [{"type": "scale", "scale": [1, 1, 1]}]}
     about = {"axes": axes, "datasets": [level], "version": "0.4" if version == 2 else "0.5"}
@@ -163,6 +168,28 @@ def n5(folder: Path, packing: dict[str, Any]) -> Stream:
     }
     tensorstore.open(spec, create=True).result().write(NOISE.T).result()
     return _whole(path, path / "0/0/1", start=16)
+
+
+def n5_of(folder: Path, compression: dict[str, Any], pack: Callable[[bytes], bytes]) -> Stream:
+    """Write N5 whose blocks, behind their headers, are packed by a function."""
+    stream = n5(folder, {"type": "raw"})
+    about = stream.source / "attributes.json"
+    about.write_text(json.dumps(json.loads(about.read_text()) | {"compression": compression}))
+    for file in stream.source.glob("*/*/*"):
+        content = file.read_bytes()
+        file.write_bytes(content[:16] + pack(content[16:]))
+    return _whole(stream.source, stream.file, start=16)
+
+
+def java_lz4(raw: bytes) -> bytes:
+    """Return a stream of Java's LZ4BlockOutputStream: a packed part, one as it is, and the end."""
+    parts = b""
+    for part, token in ((raw[:1000], 0x26), (raw[1000:], 0x16)):
+        packed = part if token == 0x16 else numcodecs.lz4.compress(part)[4:]
+        checksum = xxh32(part, 0x9747B28C) & 0x0FFFFFFF
+        parts += struct.pack("<8sB3I", b"LZ4Block", token, len(packed), len(part), checksum)
+        parts += packed
+    return parts + struct.pack("<8sB3I", b"LZ4Block", 0x16, 0, 0, 0)
 
 
 def hdf5(folder: Path, **filters: Any) -> Stream:

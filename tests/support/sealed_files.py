@@ -1,4 +1,4 @@
-"""Edits of sealed JSON that leave it with a hash of its own content, as a forger would."""
+"""Edits of sealed JSON that give it the hash of its new content, as a forger would."""
 
 import hashlib
 import json
@@ -15,7 +15,7 @@ def seal(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def edit_sealed(file: Path, change: Callable[[dict[str, Any]], object]) -> None:
-    """Change the content of a file in place, and seal it anew."""
+    """Change the content of a file in place, and seal it again."""
     content = json.loads(file.read_bytes())
     change(content)
     file.write_text(json.dumps(seal(content), indent=1) + "\n")

@@ -1,4 +1,4 @@
-"""Wheels and sdists of a checkout, and the compiled kernels for an installation of one."""
+"""Build wheels and sdists of a checkout, and copy its compiled kernels to an installation."""
 
 import hashlib
 import os
@@ -29,7 +29,7 @@ def take_compiled(kernels: Path, cache: Path) -> None:
     """Copy the checkout's compiled kernels to the cache of another installation.
 
     To compile them takes half a minute. numba finds them by the folder and times of the sources, so
-    that the installed sources get the times of the checkout. It compiles whatever it does not find.
+    the installed sources get the times of the checkout. It compiles the kernels that it can't find.
     """
     ours = ROOT / "pipeline" / "stereocell" / "kernels"
     name = f"kernels_{hashlib.sha1(str(kernels).encode()).hexdigest()}"

@@ -50,3 +50,15 @@ def wait_for_ever(begun: Path) -> None:
     begun.touch()
     while True:
         time.sleep(60)
+
+
+def write_for_ever(file: Path) -> None:
+    """Finish one file, and stay in the middle of the next one, and of a folder."""
+    from stereocell.storage.atomic_write import replacing, replacing_folder, write_bytes
+
+    write_bytes(file.with_name(f"{file.name}.whole"), b"finished")
+    with replacing_folder(file.with_name(f"{file.name}.folder")) as folder:
+        (folder / "part").write_bytes(b"half")
+        with replacing(file) as half:
+            half.write_bytes(b"half")
+            wait_for_ever(file.with_name(f"{file.name}.begun"))

@@ -1,14 +1,19 @@
 """`stereocell.build` from Python does what the command does."""
 
+import inspect
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import stereocell
 from stereocell.cli.__main__ import main
+from stereocell.engine.run import TasksFailedError
 from support import phantoms
+from support.digests import digests_of
 
 
 @pytest.mark.slow
@@ -30,7 +35,7 @@ def test_what_is_wrong_is_an_error_of_one_line(tmp_path: Path) -> None:
         stereocell.build(tmp_path / "none.ome.tif", tmp_path / "out")
     assert "\n" not in str(raised.value)
     with pytest.raises(stereocell.StereoCellError, match="grids"):
-        stereocell.build(tmp_path, tmp_path / "out", settings={"plan": {"grids": "2x1"}})
+        stereocell.build(tmp_path / "f.tif", tmp_path / "out", settings={"plan": {"grids": "2x1"}})
     with pytest.raises(stereocell.StereoCellError, match="workers is -1, expected"):
         stereocell.build(tmp_path, tmp_path / "out", workers=-1)
     assert not (tmp_path / "out").exists()
@@ -62,3 +67,50 @@ def test_a_source_is_read_where_it_is_asked_for(tmp_path: Path) -> None:
     dataset = stereocell.open_volume(source)
     volume = dataset.read(0, dataset.levels[0].box, 0)
     assert (volume.voxels == body).all()
+
+
+ARRAY = np.arange(4 * 8 * 8, dtype=np.uint16).reshape(4, 8, 8)
+
+
+@pytest.mark.parametrize("name", ["build", "show", "show an array"])
+def test_functions_that_write_leave_the_files_of_others_and_name_their_own_argument(
+    tmp_path: Path, name: str
+) -> None:
+    source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", phantoms.f_phantom()[None], "CZYX")
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "thesis.tex").write_text("years of work")
+    before = digests_of(tmp_path)
+    write = {
+        "build": partial(stereocell.build, source, out),
+        "show": partial(stereocell.show, source, out=out),
+        "show an array": partial(stereocell.show, ARRAY, spacing_um=(1, 1, 1), out=out),
+    }[name]
+    with pytest.raises(stereocell.StereoCellError, match=r"force=True replaces it$") as raised:
+        write()
+    assert "thesis.tex" in str(raised.value)
+    assert "--" not in str(raised.value)
+    assert digests_of(tmp_path) == before
+
+
+def test_error_of_a_later_phase_names_the_argument_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise TasksFailedError("r0_c0/F: its worker was killed: expected fewer --workers")
+
+    source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", phantoms.f_phantom()[None], "CZYX")
+    monkeypatch.setattr("stereocell.building.phases.run_units", fail)
+    with pytest.raises(TasksFailedError, match=r"expected fewer workers$"):
+        stereocell.build(source, tmp_path / "out")
+
+
+def test_every_function_that_writes_takes_force() -> None:
+    public = (getattr(stereocell, name) for name in stereocell.__all__)
+    taking = {
+        one.__name__: inspect.signature(one).parameters
+        for one in public
+        if inspect.isfunction(one) and "out" in inspect.signature(one).parameters
+    }
+    assert taking.keys() == {"build", "show"}
+    assert all(parameters["force"].default is False for parameters in taking.values())

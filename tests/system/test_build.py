@@ -335,7 +335,7 @@ def test_stage_of_another_plan_than_the_units_is_refused(
     for phase in ("stage", "report"):
         capsys.readouterr()
         assert main([phase, str(out)]) == 1
-        assert "run `stereocell units OUT`" in _one_line(capsys)
+        assert f"run `stereocell units {out}`" in _one_line(capsys)
 
 
 @pytest.mark.parametrize("value", ["nan", "inf"])
@@ -370,6 +370,6 @@ def test_one_unit_alone_does_not_pass_for_all(
     assert not OutFolder(out).index_file.exists()
     capsys.readouterr()
     assert main(["stage", str(out)]) == 1
-    assert "run `stereocell units OUT`" in _one_line(capsys)
+    assert f"run `stereocell units {out}`" in _one_line(capsys)
     assert main(["units", str(out), "--workers", "0"]) == 0
     assert main(["stage", str(out), "--workers", "0"]) == 0

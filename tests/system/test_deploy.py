@@ -1,6 +1,6 @@
-"""Files of deploy/ agree with the package, and versions of Python are tested ones everywhere.
+"""Files of deploy/ agree with the package, and name only versions of Python that are tested.
 
-No container engine is at hand: test_empty_environment.py carries out the Containerfile's steps.
+There is no container engine here: test_empty_environment.py carries out the Containerfile's steps.
 """
 
 import re
@@ -115,7 +115,7 @@ def test_commands_in_comments_are_those_of_the_package() -> None:
     assert set(shown) <= COMMANDS.keys()
 
 
-def test_versions_of_python_are_tested_ones() -> None:
+def test_all_files_name_only_versions_of_python_that_are_tested() -> None:
     prefix = "Programming Language :: Python :: 3."
     minors = {
         one.removeprefix(prefix) for one in project()["classifiers"] if one.startswith(prefix)

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.slow
 
 
 def give_kernels(image: Image) -> None:
-    """Spare the environment the compiling of all kernels but one."""
+    """Give the environment all compiled kernels except one, which it compiles by itself."""
     cache = Path(image.variables["NUMBA_CACHE_DIR"])
     take_compiled(image.package / "kernels", cache)
     (left_out,) = cache.glob(f"{LEFT_OUT}*")
@@ -107,7 +107,7 @@ def test_nothing_in_the_environment_can_compile(image: Image) -> None:
 
 
 def test_the_wheel_is_complete_and_its_packages_are_those_of_the_lock(image: Image) -> None:
-    assert (image.package / "py.typed").is_file()  # PEP 561: who imports it gets its types
+    assert (image.package / "py.typed").is_file()  # PEP 561: importers get the package's types
     code = (
         "import json; from importlib.metadata import distributions; "
         "print(json.dumps({d.name: d.version for d in distributions()}))"
@@ -121,7 +121,7 @@ def test_the_wheel_is_complete_and_its_packages_are_those_of_the_lock(image: Ima
     assert not {"pytest", "mypy", "pymeshlab"} & installed.keys()
 
 
-def test_the_image_is_what_its_user_needs(image: Image) -> None:
+def test_the_image_runs_as_a_plain_user_and_lets_all_users_share_its_kernels(image: Image) -> None:
     assert not (image.root / "wheel").exists()
     assert image.workdir is not None
     assert image.workdir.stat().st_mode & 0o7777 == 0o1777  # a mounted folder's stand-in

@@ -1,4 +1,4 @@
-"""Each command's output is given to each other command: it works, or one line says what fits."""
+"""Each command takes the output of each other command, or one line names what it expects."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -45,7 +45,7 @@ def test_every_command_is_tried() -> None:
 
 
 @pytest.mark.parametrize("command", GIVEN)
-def test_each_output_is_taken_or_answered_by_one_line(
+def test_a_command_takes_each_output_or_answers_in_one_line(
     outputs: Outputs,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],

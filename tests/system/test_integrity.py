@@ -19,7 +19,8 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.unit_files import find_damage, is_whole
 from stereocell.cli.__main__ import main
 from stereocell.storage import file_list
-from stereocell.verify.formats import CheckLine, check
+from stereocell.verify.check_line import CheckLine
+from stereocell.verify.formats import check
 from support import phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep
@@ -122,7 +123,7 @@ def test_no_flipped_bit_of_a_unit_gets_into_the_stage(
     assert main(["stage", str(out), *FLAGS]) == 1
     said = capfd.readouterr().err
     assert f"{_unit(out) / name}: damaged" in said
-    assert f"remove {_unit(out)} and run `stereocell units OUT`" in said
+    assert f"remove {_unit(out)} and run `stereocell units {out}`" in said
     assert "Traceback" not in said
     shutil.rmtree(_unit(out))
     _go_on(out)
@@ -175,7 +176,7 @@ def test_what_the_units_rest_on_is_named_and_found_anew(
         assert main(["stage", str(out), *FLAGS]) == 1
         said = capfd.readouterr().err
         assert f"{file}: damaged or changed by hand: its content has SHA-256" in said
-        assert "run `stereocell units OUT`" in said
+        assert f"run `stereocell units {out}`" in said
     _go_on(out)
     assert _assets(out) == _assets(built)
 
@@ -224,7 +225,7 @@ def test_no_flipped_bit_of_the_stage_gets_into_the_bundle(
     assert main(["bundle", str(out), *FLAGS]) == 1
     said = capfd.readouterr().err
     assert f"{name}: damaged, not the bytes that files.json says: remove it and run" in said
-    assert "`stereocell stage OUT`" in said
+    assert f"`stereocell stage {out}`" in said
     assert "Traceback" not in said
     assert not (out / "bundle").exists()
     (out / "stage" / name).unlink()
@@ -318,7 +319,7 @@ def test_binary_layer_with_a_flipped_bit_gets_into_no_bundle_and_is_not_overwrit
     capfd.readouterr()
     assert main(["bundle", str(out), *FLAGS]) == 1
     said = capfd.readouterr().err
-    assert f"{both}: remove it and run `stereocell stage OUT`" in said
+    assert f"{both}: remove it and run `stereocell stage {out}`" in said
     assert file.read_bytes() == flipped
     file.unlink()
     _go_on(out)

@@ -268,7 +268,7 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
     assert not (checkout / "pwned").exists()
 
 
-def test_the_newest_python_is_found_at_pyenv_or_said_to_be_missing(
+def test_the_newest_python_is_found_in_pyenv_or_reported_as_missing(
     checkout: Path, make: Make
 ) -> None:
     for name in ("requirements.lock", "pyproject.toml", "viewer_gltf"):

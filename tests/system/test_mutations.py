@@ -1,6 +1,7 @@
-"""Small changes of a source of every format; `make torture` makes them all, and prints a table.
+"""A few small changes of a source of every format; `make torture` makes all, and prints a table.
 
-In a process of their own: each change is read in a fork, and a process that forks has no threads.
+They run in a process of their own: each change is read in a fork, and a process that forks must
+have no threads.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Commands that write onto what somebody else has: it stays, and one line says what is there."""
+"""Commands that write never replace foreign files: these stay, and one line names them."""
 
 import shutil
 from collections.abc import Callable
@@ -53,15 +53,41 @@ TRIALS = {
     if places.writes
     for trial, given in _writing(name).items()
 }
-# a folder is made in no file's place, and no picture in a folder's
+# --force does not replace a file by a folder, or a folder by a picture
 NOT_FORCED = {("build", "a file"), ("plan", "a file"), ("publish", "a file")}
 NOT_FORCED |= {("iso", "a folder"), ("iso", "another build")}
 OF_A_BUILD = {name for name, places in PLACES.items() if places.writes == "out" and places.reads}
 
 
-@pytest.fixture(autouse=True)
+# the functions with which the work of the commands begins; a guard comes before each of them
+BEGINNINGS = (
+    "building.phases.run_passes",
+    "building.stage_tasks.run_tile",
+    "building.tissue._learn",
+    "bundle.write.write_bundle",
+    "export.write.Chosen",
+    "preview.iso_value.measure_window",
+    "preview.png_slices.cut_planes",
+    "publish.publish._require_whole",
+    "report.page.write_report",
+    "samples.brain_cells.replacing",
+    "samples.cells.make_tissue",
+    "samples.cycif.grow_tissue",
+    "samples.head_dicom.make_head",
+)
+
+
+# and those that open the source: only its fingerprint tells whether a build is another's
+OPENINGS = (
+    "building.phases.settle",
+    "building.preset_choice.open_source",
+    "preview.iso_value.settle",
+)
+
+
+@pytest.fixture
 def few_cells(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sample `cells` has few cells here: all 1500 take seconds."""
+    """The sample `cells` has few cells here: all 300 take seconds."""
     few = partial(samples.write_cells, shape=(12, 30, 30))
     monkeypatch.setattr(samples, "write_cells", few)
 
@@ -110,13 +136,20 @@ def _run(trial: str, builds: tuple[Path, Path], place: Path, *more: str) -> int:
         if kind != "another build" or trial not in OF_A_BUILD  # they go on with a build
     ],
 )
-def test_what_others_put_there_stays_and_is_named(
+def test_what_others_put_there_stays_and_is_named_before_any_work(
     builds: tuple[Path, Path],
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
     trial: str,
     kind: str,
 ) -> None:
+    def begin(*_: object, **__: object) -> None:
+        pytest.fail("the work began before the place was refused")
+
+    is_build = kind == "another build" and trial in ("build", "plan")
+    for name in (*BEGINNINGS, *(() if is_build else OPENINGS)):
+        monkeypatch.setattr(f"stereocell.{name}", begin)
     place = tmp_path / f"mine{TRIALS[trial][0]}"
     _lay(kind, place, builds[1])
     before = digests_of(tmp_path)
@@ -129,9 +162,10 @@ def test_what_others_put_there_stays_and_is_named(
     assert digests_of(tmp_path) == before
 
 
+@pytest.mark.usefixtures("few_cells")
 @pytest.mark.parametrize("kind", ["a file", "a folder"])
 @pytest.mark.parametrize("trial", ["iso", "slices", "export .stl", "sample mri", "sample cells"])
-def test_force_replaces_it_as_its_help_says(
+def test_force_replaces_foreign_files_and_is_in_the_help(
     builds: tuple[Path, Path],
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -149,8 +183,9 @@ def test_force_replaces_it_as_its_help_says(
     assert "--force" in capfd.readouterr().out
 
 
+@pytest.mark.usefixtures("few_cells")
 @pytest.mark.parametrize("name", ["mine.csv", "mine.ome.zarr", "mine.truth.json"])
-def test_what_lies_beside_a_sample_is_not_overwritten_either(tmp_path: Path, name: str) -> None:
+def test_a_file_at_the_place_of_any_part_of_a_sample_stays(tmp_path: Path, name: str) -> None:
     sample = "cycif" if "truth" in name else "cells"
     small = ["--grid", "1x1", "--tile-size", "8,16,16"] if sample == "cycif" else []
     (tmp_path / name).write_bytes(WORK)
@@ -163,3 +198,65 @@ def test_what_lies_beside_a_sample_is_not_overwritten_either(tmp_path: Path, nam
         "mine.ome.zarr",
         "mine.truth.json" if sample == "cycif" else "mine.csv",
     }
+
+
+@pytest.mark.parametrize(
+    ("name", "ending", "work"),
+    [
+        ("cycif", ".ome.zarr", "cycif.grow_tissue"),
+        ("cells", ".ome.zarr", "cells.make_tissue"),
+        ("mri", "", "head_dicom.make_head"),
+    ],
+)
+@pytest.mark.usefixtures("few_cells")
+def test_sample_of_another_seed_is_refused_before_it_is_made(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    ending: str,
+    work: str,
+) -> None:
+    words = [name, str(tmp_path / f"mine{ending}")]
+    words += ["--grid", "1x1", "--tile-size", "8,16,16"] if name == "cycif" else []
+    assert main(["sample", *words]) == 0
+    before = digests_of(tmp_path)
+    capfd.readouterr()
+    monkeypatch.setattr(f"stereocell.samples.{work}", lambda *_, **__: pytest.fail("it is made"))
+    assert main(["sample", *words, "--seed", "7"]) == 1
+    assert "expected nothing or this very sample" in _line(capfd)
+    assert digests_of(tmp_path) == before
+
+
+@pytest.mark.parametrize("more", [[], ["--unity"]])
+def test_text_beside_exported_voxels_is_guarded_before_the_work(
+    builds: tuple[Path, Path],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    more: list[str],
+) -> None:
+    words = ["export", str(builds[0]), str(tmp_path / "mine.raw"), *more]
+    assert main(words) == 0
+    (beside,) = {file.name for file in tmp_path.iterdir()} - {"mine.raw"}
+    (tmp_path / "mine.raw").unlink()
+    (tmp_path / beside).write_bytes(WORK)
+    monkeypatch.setattr("stereocell.export.write.Chosen", lambda *_: pytest.fail("it is made"))
+    assert main(words) == 1
+    assert beside in _line(capfd)
+    assert (tmp_path / beside).read_bytes() == WORK
+
+
+def test_tissue_is_not_learned_where_the_bundle_is_of_somebody_else(
+    builds: tuple[Path, Path],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out = Path(shutil.copytree(builds[0], tmp_path / "out"))
+    (out / "bundle" / "thesis.tex").write_bytes(WORK)
+    before = digests_of(out)
+    monkeypatch.setattr("stereocell.building.tissue._learn", lambda *_: pytest.fail("it learns"))
+    assert main(["tissue", str(out), "--classes", "2"]) == 1
+    assert "thesis.tex" in _line(capfd)
+    assert digests_of(out) == before

@@ -152,7 +152,7 @@ def test_damaged_json_is_made_again_by_a_build_and_named_by_the_phase(
             assert main([phase[0], str(out), *phase[1:]]) == 1
             line = capsys.readouterr().err
             assert name in line
-            assert "run `stereocell units OUT`" in line
+            assert f"run `stereocell units {out}`" in line
             assert "Traceback" not in line
     _go_on(out)
     assert json.loads(file.read_text()) != json.loads("{}")
@@ -183,7 +183,7 @@ def test_cut_unit_file_is_named_with_the_remedy(
     lines = capsys.readouterr().err.splitlines()
     (line,) = [line for line in lines if line.startswith("stereocell: ")]
     assert "damaged" in line
-    assert "run `stereocell units OUT`" in line
+    assert f"run `stereocell units {out}`" in line
 
 
 def test_an_artist_s_edit_in_place_stays_and_reaches_the_bundle(out: Path) -> None:
@@ -247,7 +247,7 @@ def test_stage_that_was_not_finished_is_not_exported(
     assert main(["stage", str(out), "--workers", "0"]) == 1
     capsys.readouterr()
     assert main(["bundle", str(out), "--workers", "0"]) == 1
-    assert "stage: begun and not finished: run `stereocell stage OUT`" in capsys.readouterr().err
+    assert f"stage: begun and not finished: run `stereocell stage {out}`" in capsys.readouterr().err
     assert main(["check", str(out)]) == 1
     (_unit(out) / "volume.npy").write_bytes(whole)
     assert main(["stage", str(out), "--workers", "0"]) == 0

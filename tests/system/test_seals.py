@@ -1,4 +1,4 @@
-"""Each record of a build holds a hash, and is checked by the same code when written and read."""
+"""Each record of a build has a hash, and is checked by the same code when written and read."""
 
 import json
 import re
@@ -68,9 +68,9 @@ def _answer(capfd: pytest.CaptureFixture[str]) -> str:
     return line
 
 
-def test_every_file_of_a_build_is_held_by_a_hash(built: Path, tmp_path: Path) -> None:
+def test_a_change_of_any_file_of_a_build_is_found_by_check(built: Path, tmp_path: Path) -> None:
     names = {f.relative_to(built).as_posix() for f in built.rglob("*") if f.is_file()}
-    # results rest on neither: the second only says which tiles of the stage need no work
+    # No result depends on these two: the second only records which tiles of the stage are done.
     names = {name for name in names if not name.endswith(("seconds.json", "stage.json"))}
     lists = {"stage/files.json", "bundle/files.json", "bundle/manifest.json"}
     lists |= {name for name in names if name.endswith("unit.json")}
@@ -93,7 +93,7 @@ def test_changed_record_is_named_with_what_was_found_and_expected(out: Path, nam
 
 
 def _thicker(file: Path) -> None:
-    """Double the spacing along z, as a person who believes the plan to be a setting."""
+    """Double the spacing along z, as a person would who takes the plan for a settings file."""
     plan = json.loads(file.read_bytes())
     plan["spacing_um"][0] *= 2
     file.write_text(json.dumps(plan, indent=1))
@@ -108,7 +108,7 @@ def test_no_phase_builds_from_a_plan_that_was_edited_by_hand(
     assert main([command[0], str(out), *command[1:]]) == 1
     line = _answer(capfd)
     assert f"{out / 'plan.json'}: damaged or changed by hand" in line
-    assert "remove it and run `stereocell plan INPUT -o OUT`" in line
+    assert f"remove it and run `stereocell plan INPUT -o {out}`" in line
     assert {f: f.read_bytes() for f in out.rglob("*") if f.is_file()} == before
 
 
@@ -142,7 +142,7 @@ def test_whole_build_of_an_earlier_version_goes_on_after_the_remedy(
     assert "is of an earlier version" in _faults(out)
     build = ["build", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
     assert main([*build, "--workers", "0"]) == 1
-    assert "remove it and run `stereocell plan INPUT -o OUT`" in _answer(capfd)
+    assert f"remove it and run `stereocell plan {build[1]} -o {out}`" in _answer(capfd)
     (out / "plan.json").unlink()
     assert main([*build, "--workers", "0"]) == 0
     assert _faults(out) == ""
@@ -153,7 +153,7 @@ def test_phases_that_were_changed_by_hand_are_named_and_done_again(
 ) -> None:
     _change(out / "phases.json")
     assert main(["bundle", str(out), "--workers", "0"]) == 1
-    assert "run `stereocell units OUT`, then stage, bundle and report" in _answer(capfd)
+    assert f"run `stereocell units {out} && stereocell stage {out} && " in _answer(capfd)
     assert main(["stage", str(out), "--workers", "0"]) == 0
     assert "phases.json: damaged or changed by hand" in capfd.readouterr().err
     assert main(["bundle", str(out), "--workers", "0"]) == 0
@@ -165,11 +165,11 @@ def test_units_of_another_plan_are_not_taken_for_those_of_this_one(
 ) -> None:
     edit_sealed(OutFolder(out).units_plan_file, lambda signed: signed.update(key="0123abcd"))
     assert main(["stage", str(out), "--workers", "0"]) == 1
-    assert "not built for the plan in plan.json: run `stereocell units OUT`" in _answer(capfd)
+    assert f"not built for the plan in plan.json: run `stereocell units {out}`" in _answer(capfd)
 
 
 @pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])
-def test_hashes_in_a_line_differ_though_one_digit_of_the_seal_was_changed(
+def test_shown_hashes_differ_even_if_only_the_last_digit_of_the_seal_was_changed(
     out: Path, name: str
 ) -> None:
     file = out / name
@@ -184,7 +184,7 @@ def test_hashes_in_a_line_differ_though_one_digit_of_the_seal_was_changed(
 
 
 @pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])
-def test_record_that_is_missing_is_not_to_be_removed(out: Path, name: str) -> None:
+def test_remedy_for_a_missing_record_does_not_ask_to_remove_it(out: Path, name: str) -> None:
     (out / name).unlink()
     told = _faults(out)
     assert f"{out / name} is missing: run `stereocell " in told
@@ -213,7 +213,7 @@ def test_document_that_no_command_could_read_is_not_written(
 ) -> None:
     file = tmp_path / _a_name(pattern)
     file.write_text("as it was")
-    with pytest.raises(OutputError, match="not written, as no command could read it"):
+    with pytest.raises(OutputError, match="not written, because no command could read it"):
         write(file, {"of": "another kind"})
     assert file.read_text() == "as it was"
     assert list(tmp_path.iterdir()) == [file]

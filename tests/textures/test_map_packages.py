@@ -1,4 +1,4 @@
-"""The extra `maps`: builds without maps need none of it, and `--maps` names it before any work."""
+"""Builds without maps don't need the extra `maps`, and `--maps` names it before any work."""
 
 import sys
 from pathlib import Path
@@ -36,7 +36,7 @@ def keys(out: Path) -> tuple[dict[str, str], str]:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_maps_without_a_package_of_theirs_are_refused_before_any_work(
+def test_maps_are_refused_before_any_work_if_a_package_of_the_extra_is_missing(
     source: str,
     package: str,
     tmp_path: Path,
@@ -59,7 +59,7 @@ def test_no_result_imports_a_package_of_maps_by_itself() -> None:
 
 
 @pytest.mark.slow
-def test_a_build_without_maps_is_the_same_where_their_packages_are_missing(
+def test_a_build_without_maps_does_not_depend_on_the_packages_of_the_extra(
     source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
@@ -77,14 +77,14 @@ def test_a_build_without_maps_is_the_same_where_their_packages_are_missing(
 
 
 @pytest.mark.slow
-def test_another_version_of_a_package_of_maps_makes_their_results_anew(
+def test_another_version_of_a_package_of_the_extra_makes_results_with_maps_again(
     source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
     command = ["build", source, "-o", str(out), "--workers", "1", "--maps"]
     assert main(command) == 0
     units, bundle = keys(out)
-    monkeypatch.setattr("stereocell.building.phases.encoder_version", lambda: "99")
+    monkeypatch.setattr("stereocell.building.bundle_phase.encoder_version", lambda: "99")
     assert main(command) == 0
     assert keys(out)[0] == units
     assert keys(out)[1] != bundle

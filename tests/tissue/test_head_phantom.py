@@ -225,7 +225,7 @@ def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
     (folder / "IM0007.dcm").unlink()  # it lost a file: it is made again
     write_head(folder, seed=2)
     assert {file.name for file in folder.iterdir()} == {file.name for file in before}
-    with pytest.raises(OutputError, match=r"something else.*--force replaces it"):
+    with pytest.raises(OutputError, match=r"something else.*: choose another place$"):
         write_head(folder, seed=5)
     mine = tmp_path / "mine.txt"
     mine.write_text("mine")

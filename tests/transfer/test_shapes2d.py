@@ -34,7 +34,8 @@ from stereocell.transfer.shapes2d import (
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_stage import open_stage
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
-from stereocell.verify.formats import CheckLine, check
+from stereocell.verify.check_line import CheckLine
+from stereocell.verify.formats import check
 from support import spheres
 from support.bundles import channel, load
 from support.phantoms import as_counts, blurred_ball, write_ome_tiff

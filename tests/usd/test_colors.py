@@ -1,4 +1,4 @@
-"""A channel's colour: plain for programs that follow no connection, and edited in one place.
+"""Shaders repeat a channel's colour for programs that follow no connection; one edit changes it.
 
 Blender's importer and the renderer Storm draw it in tests/blender.
 """
@@ -83,7 +83,7 @@ def test_shaders_state_the_colour_themselves(stage_path: Path) -> None:
         ({f"{CHANNEL}.{INTERFACE}": GREEN, f"{LOOK}.{INTERFACE}": BLUE}, (GREEN, GREEN, BLUE)),
     ],
 )
-def test_the_edited_colour_is_taken_and_the_interface_first(
+def test_an_edited_colour_is_read_and_that_of_the_interface_has_precedence(
     edited: Callable[[dict[str, Gf.Vec3f]], Path],
     colors: dict[str, Gf.Vec3f],
     expected: tuple[tuple[float, ...], ...],

@@ -1,4 +1,4 @@
-"""Bundle and exports leave out prims that a layer deactivates, and go on."""
+"""Bundle and exports leave out the prims that a layer deactivates."""
 
 from pathlib import Path
 
@@ -31,7 +31,9 @@ GONE = {
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_a_flattened_stage_leaves_it_out(stage_path: Path, tmp_path: Path, part: str) -> None:
+def test_a_flattened_stage_leaves_out_a_deactivated_part(
+    stage_path: Path, tmp_path: Path, part: str
+) -> None:
     layer = deactivate(part, tmp_path / "edited.usda", stage_path)
     flat = tmp_path / "flat.usdc"
     export_stage(layer, flat, options=ExportOptions(lod=0))
@@ -43,7 +45,9 @@ def test_a_flattened_stage_leaves_it_out(stage_path: Path, tmp_path: Path, part:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", PARTS)
-def test_a_bundle_leaves_it_out(stage_path: Path, tmp_path: Path, part: str) -> None:
+def test_a_bundle_leaves_out_a_deactivated_part(
+    stage_path: Path, tmp_path: Path, part: str
+) -> None:
     layer = deactivate(part, tmp_path / "edited.usda", stage_path)
     write_bundle(layer, tmp_path / "bundle", None, run=Engine(0).run)
     manifest = load(tmp_path / "bundle" / "manifest.json")

@@ -1,4 +1,4 @@
-"""A layer over the stage that states no units, or others, is told with the lines to write."""
+"""A layer over the stage without units, or with other ones, is reported with the lines to write."""
 
 from pathlib import Path
 
@@ -11,7 +11,8 @@ from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import StageError
 from stereocell.usd.layer_units import note_missing
-from stereocell.usd.read_stage import loaded, open_stage, read_lods
+from stereocell.usd.read_levels import read_lods
+from stereocell.usd.read_stage import loaded, open_stage
 from support.stages import F_ID, leaf, write_whole
 
 
@@ -36,26 +37,25 @@ def test_the_note_names_the_layer_and_the_lines_that_it_lacks(
     layer = write_over(stage_path, tmp_path / "edit.usda", "\n".join(kept))
     line = note_missing(open_stage(layer))
     assert line.startswith(f"{layer}: states no {lost[0].split()[0]}")
-    assert line.endswith(f"each on a line: {', '.join(lost)}")
+    assert line.endswith(f"at the top of the layer: {', '.join(lost)}")
     assert ("10000 times too large" in line) == ("metersPerUnit = 1e-6" in lost)
     assert "\n" not in line
     whole = write_over(stage_path, tmp_path / "whole.usda", "\n".join([*kept, *lost]))
     assert note_missing(open_stage(whole)) == ""
 
 
-def test_a_layer_without_units_is_told_by_a_bundle_and_an_export(
-    stage_path: Path, tmp_path: Path
-) -> None:
+def test_bundle_and_export_report_a_layer_without_units(stage_path: Path, tmp_path: Path) -> None:
     layer = write_over(stage_path, tmp_path / "edit.usda", "")
-    told: list[str] = []
-    write_bundle(layer, tmp_path / "b", None, run=Engine(0).run, report_line=told.append)
-    assert sum("states no metersPerUnit, no upAxis, no defaultPrim" in line for line in told) == 1
-    told.clear()
-    export_stage(layer, tmp_path / "flat.usdc", options=ExportOptions(), report=told.append)
-    assert sum("states no metersPerUnit, no upAxis, no defaultPrim" in line for line in told) == 1
-    told.clear()
-    export_stage(stage_path, tmp_path / "own.usdc", options=ExportOptions(), report=told.append)
-    assert not any("states no" in line for line in told)
+    note = "states no metersPerUnit, no upAxis, no defaultPrim"
+    lines: list[str] = []
+    write_bundle(layer, tmp_path / "b", None, run=Engine(0).run, report_line=lines.append)
+    assert sum(note in line for line in lines) == 1
+    lines.clear()
+    export_stage(layer, tmp_path / "flat.usdc", options=ExportOptions(), report=lines.append)
+    assert sum(note in line for line in lines) == 1
+    lines.clear()
+    export_stage(stage_path, tmp_path / "own.usdc", options=ExportOptions(), report=lines.append)
+    assert not any("states no" in line for line in lines)
 
 
 @pytest.mark.parametrize(

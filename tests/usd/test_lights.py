@@ -79,7 +79,7 @@ def test_a_grey_surface_is_lit_neither_too_little_nor_too_much(stage_path: Path)
     assert 0.15 < luminance(Usd.Stage.Open(str(stage_path))) < 0.7
 
 
-def test_each_distant_light_counts(stage_path: Path) -> None:
+def test_each_distant_light_makes_the_specimen_brighter(stage_path: Path) -> None:
     """Without `normalize`, a light of 2 degrees is divided by a thousand."""
     stage = Usd.Stage.Open(str(stage_path))
     whole = luminance(stage)

@@ -1,4 +1,4 @@
-"""Rules of another maker find nothing in the samples' stages and usdz: usd-validation-nvidia."""
+"""The rules of usd-validation-nvidia find no fault in the stages and usdz of the samples."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ SAMPLES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sample", SAMPLES)
-def test_they_find_nothing_in_a_sample(tmp_path: Path, sample: str) -> None:
+def test_the_rules_find_no_fault_in_a_sample(tmp_path: Path, sample: str) -> None:
     out = str(tmp_path / "out")
     assert main(["plan", *SAMPLES[sample](tmp_path), "-o", out]) == 0
     assert main(["units", out, "--workers", "0"]) == 0
@@ -68,7 +68,7 @@ def test_they_find_nothing_in_a_sample(tmp_path: Path, sample: str) -> None:
         assert [str(issue) for issue in issues if issue.severity != IssueSeverity.INFO] == []
 
 
-def test_a_fault_is_found(tmp_path: Path) -> None:
+def test_the_rules_find_a_missing_default_prim(tmp_path: Path) -> None:
     faulty = tmp_path / "faulty.usda"
     faulty.write_text('#usda 1.0\n(upAxis = "Y")\ndef Xform "A"\n{\n}\n')
     issues = [str(issue) for issue in ValidationEngine().validate(str(faulty)).issues()]

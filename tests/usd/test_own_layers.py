@@ -12,7 +12,7 @@ from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import StageError
-from stereocell.usd.read_stage import dependencies
+from stereocell.usd.stage_files import dependencies
 from support.phantoms import f_phantom, write_ome_zarr
 
 TILE = "/Specimen/Tiles/r0_c0"

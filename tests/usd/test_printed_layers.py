@@ -1,4 +1,4 @@
-"""Each layer that README.md and docs/ print is sound, in the stage's units, and is taken over."""
+"""Each layer that README.md and docs/ print is valid, has the stage's units, and can be bundled."""
 
 from pathlib import Path
 

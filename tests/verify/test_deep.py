@@ -20,8 +20,8 @@ from stereocell.model.errors import SourceError
 from stereocell.usd.written_files import write_list
 from stereocell.verify import deep
 from stereocell.verify.bundle_files import read_texels
+from stereocell.verify.check_line import CheckLine
 from stereocell.verify.deep import check_deep
-from stereocell.verify.formats import CheckLine
 from support import phantoms
 from support.exhaustive import sweep
 from support.sealed_files import edit_sealed

@@ -19,7 +19,7 @@ from stereocell.read import Level
 from stereocell.storage.assets import find_asset
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.usd.written_files import write_list
-from stereocell.verify import formats
+from stereocell.verify import node_validators
 from stereocell.verify.formats import check
 from support import object_bundle, spheres
 from support.sealed_files import edit_sealed
@@ -72,8 +72,8 @@ def node_finds_nothing(request, monkeypatch):
     """To start node takes longest: only tests that ask for it look at what it finds."""
     if "node" not in request.fixturenames:
         answer = subprocess.CompletedProcess([], 0, "[]", "")
-        monkeypatch.setattr(formats, "subprocess", SimpleNamespace(**vars(subprocess)))
-        monkeypatch.setattr(formats.subprocess, "run", lambda *args, **options: answer)
+        monkeypatch.setattr(node_validators, "subprocess", SimpleNamespace(**vars(subprocess)))
+        monkeypatch.setattr(node_validators.subprocess, "run", lambda *args, **options: answer)
 
 
 @pytest.mark.slow
@@ -332,7 +332,7 @@ def test_missing_node_is_named(made, monkeypatch):
 
 def test_missing_packages_are_named(made, monkeypatch):
     answer = subprocess.CompletedProcess([], 1, "", "Error [ERR_MODULE_NOT_FOUND]: no package")
-    monkeypatch.setattr(formats.subprocess, "run", lambda *args, **options: answer)
+    monkeypatch.setattr(node_validators.subprocess, "run", lambda *args, **options: answer)
     found = lines(made)
     assert "run `make setup`" in found["glTF validator"].detail
 

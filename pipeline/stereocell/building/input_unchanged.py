@@ -1,7 +1,7 @@
 """Check that a plan's inputs are unchanged: since the plan, and again once tasks have read them.
 
-The fingerprint of a large volume covers a sample of its voxels. So the files are compared too, by
-size and date: one that was written while tasks ran may hold other voxels that no sample shows.
+The fingerprint of a large volume covers a sample of its voxels. Size and date of its files are
+therefore compared, too: a file written while tasks ran may differ in voxels outside of the sample.
 """
 
 from collections.abc import Iterator
@@ -18,20 +18,20 @@ from stereocell.read.readers import format_of
 from stereocell.read.remarks import LEFT_OUT
 from stereocell.storage.file_states import FileStates
 
-# formats whose files are called by numbers; those of others may be called by a patient's name
+# Formats whose files are named by numbers. Other formats' file names may contain a patient's name.
 _NAMED = ("ome-zarr", "n5", "planes", "tiff")
 _SHOWN = 100  # characters of a path in a message
 
 
 class InputChangedError(SourceError):
-    """An input changed while tasks read it: their results may be of both.
+    """An input changed while tasks read it: their results may mix the old and the new input.
 
-    is_told  whether the fingerprint tells the two inputs apart, and so do the names of results
+    has_new_fingerprint  whether the fingerprint differs, and thus the names of the results, too
     """
 
-    def __init__(self, text: str, *, is_told: bool) -> None:
+    def __init__(self, text: str, *, has_new_fingerprint: bool) -> None:
         super().__init__(text)
-        self.is_told = is_told
+        self.has_new_fingerprint = has_new_fingerprint
 
 
 def require_input(plan: Plan) -> None:
@@ -39,8 +39,8 @@ def require_input(plan: Plan) -> None:
     dataset = open_watched(source_of(plan))
     if dataset.fingerprint != plan.fingerprint:
         # A DICOM file that was cut short is left out, which explains another fingerprint.
-        lost = (remark for remark in dataset.remarks if remark.startswith(LEFT_OUT))
-        remarks = "".join(f"; {remark}" for remark in lost)
+        left_out = (remark for remark in dataset.remarks if remark.startswith(LEFT_OUT))
+        remarks = "".join(f"; {remark}" for remark in left_out)
         raise SourceError(
             f"{plan.name}: changed since it was planned (fingerprint {dataset.fingerprint[:12]}, "
             f"expected {plan.fingerprint[:12]}{remarks}): plan into another OUT"
@@ -85,11 +85,11 @@ def require_added(plan: Plan) -> None:
 def require_still(plan: Plan, *, again: str = "stereocell units OUT", is_last: bool = True) -> None:
     """Raise InputChangedError where the image or a label map changed since it was first opened.
 
-    again    the command that reads it anew
-    is_last  whether an input that can't be listed is compared too, by its fingerprint
+    again    the command that reads the input again
+    is_last  whether an input whose files can't be listed is compared, too, by its fingerprint
 
-    A file that was written again with the same bytes, or of which the fingerprint covers all
-    voxels, may have another date. Raises SourceError or OutputError where added channels changed.
+    Another date is accepted if the fingerprint covers all voxels and is the same. Raises
+    SourceError or OutputError where added channels changed.
     """
     for name, ref in _inputs(plan):
         states = first_states(ref)
@@ -97,7 +97,8 @@ def require_still(plan: Plan, *, again: str = "stereocell units OUT", is_last: b
             continue
         changed = states.changed()
         if changed or (is_last and not states.is_complete):
-            _require_same(name, ref, _in_words(ref, states, changed), again, bool(changed))
+            words = f"{name}: changed while it was read: {_in_words(ref, states, changed)}"
+            _require_same(ref, words, again, is_written=bool(changed))
     added = [source_of(plan, channel=channel) for channel in plan.channels if channel.source]
     if any(one.changed() for ref in added if (one := first_states(ref)) is not None):
         forget()
@@ -110,13 +111,13 @@ def _inputs(plan: Plan) -> Iterator[tuple[str, SourceRef]]:
         yield f"labels {labels.name!r}", labels.ref
 
 
-def _require_same(name: str, ref: SourceRef, told: str, again: str, is_written: bool) -> None:
+def _require_same(ref: SourceRef, words: str, again: str, *, is_written: bool) -> None:
     """Raise InputChangedError unless the voxels are those of the reference's fingerprint.
 
-    told        which files changed
-    is_written  whether one did, by its date or size
+    words       first words of the message: the input and the files that changed
+    again       the command that reads the input again
+    is_written  whether the date or size of a file changed
     """
-    told = f"{name}: changed while it was read: {told}"
     remedy = (
         "no result of this pass is kept: plan into another OUT (`stereocell build INPUT -o "
         f"ANOTHER_OUT`), or put back the input that was planned and run `{again}` again"
@@ -126,22 +127,23 @@ def _require_same(name: str, ref: SourceRef, told: str, again: str, is_written: 
         found = now.fingerprint
     except SourceError as error:
         forget()
-        raise InputChangedError(f"{told}, and now {error}; {remedy}", is_told=True) from error
+        text = f"{words}, and now {error}; {remedy}"
+        raise InputChangedError(text, has_new_fingerprint=True) from error
     if found != ref.fingerprint:
         forget()
         prints = f"fingerprint {found[:12]}, expected {ref.fingerprint[:12]}"
-        raise InputChangedError(f"{told} ({prints}); {remedy}", is_told=True)
+        raise InputChangedError(f"{words} ({prints}); {remedy}", has_new_fingerprint=True)
     if is_written and not covers_all(now):
         forget()
         raise InputChangedError(
-            f"{told}; the fingerprint, a sample, can't tell whether the voxels are the same, so "
-            f"that no unit is kept: run `{again}` again",
-            is_told=False,
+            f"{words}; the fingerprint is of a sample, which can't show whether all voxels are the "
+            f"same, so no unit is kept: run `{again}` again",
+            has_new_fingerprint=False,
         )
 
 
 def _in_words(ref: SourceRef, states: FileStates, changed: list[str]) -> str:
-    """Return how many files changed, and which is the first, unless that may name a patient."""
+    """Return how many files changed, and the first one's name unless it may name a patient."""
     count, total = len(changed), len({*states.states, *changed})
     words = f"{count} of {total} files"
     if not changed:
@@ -150,4 +152,4 @@ def _in_words(ref: SourceRef, states: FileStates, changed: list[str]) -> str:
         return words if total > 1 else "its file"
     root = ref.source.partition("://")[2] or ref.source
     first = changed[0].removeprefix(root).lstrip("/") or changed[0].rpartition("/")[2]
-    return f"{words}, as {first!r:.{_SHOWN}}"
+    return f"{words}, the first is {first!r:.{_SHOWN}}"

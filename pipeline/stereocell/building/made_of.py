@@ -1,8 +1,8 @@
-"""Whether what a phase left was made of the plan, the units and the stage that lie in OUT now.
+"""Compare the results of each phase with the plan, the units and the stage that lie in OUT now.
 
-Each phase records a digest of the documents in OUT that it was made of, free of code and versions:
-so the results of an earlier version stay as good as they were. A rebuild that is stopped between
-two phases leaves the results of an earlier plan behind it, each whole by itself.
+Each phase records a digest of the documents in OUT that it was made of. The digest does not depend
+on code or versions, so results of an earlier version stay valid. A rebuild that is stopped between
+two phases leaves results of an earlier plan behind, each of which is whole by itself.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ from stereocell.storage.json_files import find_sealed
 from stereocell.usd.written_files import digest_of, read_stage_list
 
 FIELD = "made_of"
-# each phase after the plan, in the order of a build, and what it is made of
+# phases after the plan in the order of a build, each with the parts of OUT that it is made of
 _MADE_OF = {
     "units": ("plan",),
     "stage": ("plan", "units"),
@@ -24,7 +24,7 @@ _MADE_OF = {
 
 
 def made_of(out_folder: OutFolder, phase: str) -> str:
-    """Return a digest of what a phase would be made of now; empty: a part can't be read."""
+    """Return a digest of the parts that a phase would be made of now; empty: one is unreadable."""
     parts = [_content_of(out_folder, part) for part in _MADE_OF.get(phase, ())]
     if not parts or None in parts:
         return ""
@@ -32,9 +32,10 @@ def made_of(out_folder: OutFolder, phase: str) -> str:
 
 
 def find_stale(out_folder: OutFolder) -> str | None:
-    """Return a line on the first phase whose results are not of what lies in OUT; None: all are.
+    """Return a line on the first phase whose results are of an earlier plan, units or stage.
 
-    A record of an earlier version says nothing on it; damaged documents are named elsewhere.
+    None: there is no such phase. The record of an earlier version has no digest, and is accepted.
+    Damaged documents are reported elsewhere.
     """
     if out_folder.phases_fault() is not None:
         return None
@@ -43,7 +44,7 @@ def find_stale(out_folder: OutFolder) -> str | None:
         entry = phases.get(name)
         if entry is None:
             continue
-        if not entry["key"] and name != "units":  # units have no beginning: each is whole or none
+        if not entry["key"] and name != "units":  # each unit is written whole or not at all
             return f"{out_folder.out / name}: begun and not finished: {_remedy(name)}"
         now = made_of(out_folder, name)
         if now and entry.get(FIELD, now) != now:
@@ -56,13 +57,13 @@ def find_stale(out_folder: OutFolder) -> str | None:
 
 
 def require_current(out_folder: OutFolder) -> None:
-    """Raise OutputError where a phase's results are not of what lies in OUT."""
+    """Raise OutputError where results of a phase are of an earlier plan, units or stage."""
     if (fault := find_stale(out_folder)) is not None:
         raise OutputError(fault)
 
 
 def _content_of(out_folder: OutFolder, part: str) -> object:
-    """Return the content of the documents by which a part of OUT is known; None: unreadable."""
+    """Return the content of the documents that identify a part of OUT; None: unreadable."""
     if part == "plan":
         return find_sealed(out_folder.plan_file, PLAN)
     if part == "units":
@@ -76,9 +77,7 @@ def _content_of(out_folder: OutFolder, part: str) -> object:
 
 
 def _remedy(phase: str) -> str:
-    """Return the commands that make a phase and all after it anew."""
+    """Return the commands that make a phase and all after it anew, as one line for a shell."""
     names = list(_MADE_OF)
-    first, *others = names[names.index(phase) :]
-    *before, last = others or [""]
-    then = " and ".join(filter(None, [", ".join(before), last]))
-    return f"run `stereocell {first} OUT`" + (f", then {then}" if then else "")
+    commands = (f"stereocell {name} OUT" for name in names[names.index(phase) :])
+    return f"run `{' && '.join(commands)}`"

@@ -1,7 +1,7 @@
-"""A user's network in a process of its own, with bounds of its time and memory.
+"""Run a user's network in a process of its own, with bounds on its time and memory.
 
-The bounds hold for each call: loading, and each patch. Real networks stay far below the defaults: a
-3D U-Net of 30 million weights takes a minute and 3 GB for a patch of 128^3 voxels.
+The bounds hold for each call: loading, and each patch. Usual networks stay below the defaults: a 3D
+U-Net of 30 million weights takes a minute and 3 GB for a patch of 128^3 voxels.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,10 +23,10 @@ from stereocell.tissue.onnx_session import OnnxSession, Tensor
 
 @dataclass(frozen=True, slots=True)
 class ModelBounds:
-    """The most that a network may take.
+    """Bounds on a network.
 
-    seconds    for loading it, and for each patch
-    memory_gb  resident, 10^9 bytes
+    seconds    most time in s for loading it, and for each patch
+    memory_gb  most resident memory, 10^9 bytes
     """
 
     seconds: float = 300.0
@@ -43,9 +43,9 @@ class ModelBounds:
 
 @contextmanager
 def opened_network(path: Path, bounds: ModelBounds) -> Iterator[Network]:
-    """Yield the network of a file, which runs in a process that ends with the block.
+    """Yield the network of a file. Its process ends with the block.
 
-    Raises SourceError, UsageError as `Network.load` does, and SourceError beyond the bounds.
+    Raises SourceError and UsageError as `Network.load` does, and SourceError beyond the bounds.
     """
     with unchanged_while_read(Location.of(path), "run `stereocell tissue OUT` again"):
         try:
@@ -62,11 +62,12 @@ def opened_network(path: Path, bounds: ModelBounds) -> Iterator[Network]:
 
 
 def _require_printable(path: Path, network: Network) -> None:
-    """Raise SourceError where a class has a name that can't be shown."""
+    """Raise SourceError where the name of a class has a character that can't be printed."""
     for name in network.classes:
         if not name.isprintable():
             raise SourceError(
-                f"{path}: names of classes: found {name!r:.80}, expected names that can be shown"
+                f"{path}: name of a class: found {name!r:.80}, expected printable characters: "
+                "rename it in the model's metadata"
             )
 
 

@@ -36,7 +36,7 @@ def open_source(ref: SourceRef) -> read.Dataset:
 
 
 def open_afresh(ref: SourceRef) -> read.Dataset:
-    """Return the dataset as the files are now, whatever this process opened before."""
+    """Return the dataset as the files are now, even if this process opened it before."""
     fetch(Path(ref.source))  # an added channel's source lies in OUT
     given = None
     if ref.spacing_um:

@@ -24,7 +24,7 @@ from stereocell.storage.contents import contents_of
 from stereocell.storage.documents import NOT_WRITTEN, SETTINGS, parse
 from stereocell.storage.json_files import find_sealed, read_json, read_sealed, sealed, write_sealed
 from stereocell.storage.kinds import Kind
-from stereocell.storage.overwriting import is_forced, require_free
+from stereocell.storage.overwriting import is_forced, or_force, require_free
 from stereocell.storage.sealed_text import is_sealed_text
 from stereocell.storage.workspace import is_file, names_in, remove, sizes_below
 
@@ -37,11 +37,14 @@ _NAMES = {"plan", "units", "stage", "bundle", "report"}  # of the phases
 _UNFINISHED = {"key": "", "results": "", "seconds": 0.0, "about": ""}
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
-PHASES_AGAIN = "run `stereocell units OUT`, then stage, bundle and report, again"
+PHASES_AGAIN = (
+    "run `stereocell units OUT && stereocell stage OUT && stereocell bundle OUT && "
+    "stereocell report OUT` again"
+)
 
 
 def require_build_or_nothing(out: Path, source: str | Path) -> None:
-    """Raise OutputError where OUT is no place for a build: it holds something else.
+    """Raise OutputError where OUT holds something else than a build.
 
     The source's own file may lie there, and files whose names begin with a dot: no result has such
     a name.
@@ -113,7 +116,8 @@ class OutFolder:
     def replaced_plan(self, plan: Plan) -> Plan | None:
         """Return the plan that `plan` would replace; None: there is none.
 
-        Raises OutputError where it was changed by hand, or is of another input, without --force.
+        Raises OutputError, unless it is forced, where that was changed by hand or is of another
+        input.
         """
         try:
             there = self.plan() if is_file(self.plan_file) else None
@@ -126,12 +130,12 @@ class OutFolder:
             found = f"another input (fingerprint {fingerprint[:12]})"
             found = found if there is None else _what_differs(there, plan)
             raise OutputError(
-                f"{self.out}: holds a build of {found}: choose another OUT, or --force replaces it"
+                f"{self.out}: holds a build of {found}: {or_force('choose another OUT')}"
             )
         return there
 
     def require_own_settings(self, plan: Plan, there: Plan | None) -> None:
-        """Raise OutputError where stereocell.toml is no record of a plan, but a person's own."""
+        """Raise OutputError where stereocell.toml is the user's own file, not a plan's record."""
         file = self.settings_file
         if not is_file(file) or is_sealed_text(file) or is_forced():
             return
@@ -142,11 +146,11 @@ class OutFolder:
         if found is None or found not in (plan.settings, there and there.settings):
             raise OutputError(
                 f"{file}: was written or changed by hand, expected the record of an earlier plan: "
-                "move it elsewhere and give it by --config, or --force replaces it"
+                + or_force("move it elsewhere and give it by --config")
             )
 
     def require_readable(self, plan: Plan) -> None:
-        """Raise OutputError where no command could read the plan once it is written."""
+        """Raise OutputError where commands could not read the plan once it is written."""
         content = to_json(self._without_place(plan))
         data = json.dumps(sealed(content)).encode()
         from_json(parse(self.plan_file, data, PLAN, NOT_WRITTEN), NOT_WRITTEN)
@@ -250,9 +254,7 @@ class OutFolder:
         return dict.fromkeys(self._begun(), _UNFINISHED) if found is None else found
 
     def phases_fault(self) -> str | None:
-        """Return a line on a record of the phases that can't be trusted; None: it can, or there is
-        none yet.
-        """
+        """Return a line on a damaged record of the phases; None: it is sound, or there is none."""
         if not is_file(self.phases_file):
             return None
         try:
@@ -278,7 +280,7 @@ class OutFolder:
         return not self.phases().get(name, {"key": "done"})["key"]
 
     def require_finished(self, name: str) -> None:
-        """Raise OutputError where a phase began and did not finish, or nothing says whether."""
+        """Raise OutputError where a phase began and did not finish, or its record is damaged."""
         if is_file(self.phases_file):
             read_sealed(self.phases_file, PHASES, PHASES_AGAIN)
         if self.is_begun(name):

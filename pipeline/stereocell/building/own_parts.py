@@ -1,6 +1,6 @@
-"""Whether a part of OUT is a build's own: what somebody else put there is not replaced unasked.
+"""Refuse to replace parts of OUT that no phase of a build wrote.
 
-A part that a phase wrote, damaged or not, is made again where it must be. Files that no phase
+A part that a phase wrote is written again if it is out of date or damaged. Files that no phase
 wrote, and layers of the stage that were edited in place, end the phase before it writes.
 """
 
@@ -10,9 +10,9 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.tissue_files import FOLDER, RECORD
 from stereocell.bundle.manifest import MANIFEST, find_others, require_bundle
 from stereocell.model.errors import OutputError
-from stereocell.storage.contents import contents_of, is_nobodys, words_for
+from stereocell.storage.contents import contents_of, is_ignored, words_for
 from stereocell.storage.kinds import Kind
-from stereocell.storage.overwriting import is_forced, refused
+from stereocell.storage.overwriting import is_forced, or_force, refused
 from stereocell.storage.sealed_text import is_sealed_text
 from stereocell.storage.workspace import is_file, remove, sizes_below
 from stereocell.usd.written_files import ADVICE, CHANGED, DOUBTFUL, find_damage, read_stage_list
@@ -23,13 +23,14 @@ def require_own_places(out_folder: OutFolder, *, is_same_plan: bool) -> None:
 
     is_same_plan  whether the plan stays as it is: then edited layers of the stage stay, too
 
-    A build that is refused half-way would leave the units of one plan beside the bundle of another.
+    All phases are checked before the first one writes. A build that ends half-way would leave the
+    units of one plan beside the bundle of another.
     """
     if is_forced():
         return
     if not is_same_plan:
         require_own_stage(out_folder)
-    if not out_folder.is_begun("bundle"):  # a bundle that was put there by halves has no manifest
+    if not out_folder.is_begun("bundle"):  # an unfinished bundle has no manifest yet
         require_bundle(out_folder.bundle_dir)
     require_own_bundle(out_folder)
     require_own_report(out_folder)
@@ -50,15 +51,15 @@ def require_own_stage(out_folder: OutFolder) -> None:
     edited = sorted(path for path, fault in faults.items() if fault in (CHANGED, DOUBTFUL))
     if edited:
         raise OutputError(
-            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage is to be written anew: save "
-            f"what you edited elsewhere ({ADVICE}), or --force replaces it"
+            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage is to be written anew: "
+            + or_force(f"save what you edited elsewhere ({ADVICE})")
         )
 
 
 def require_own_bundle(out_folder: OutFolder) -> None:
     """Raise OutputError where OUT/bundle holds files that no bundle phase wrote.
 
-    With --force a folder that is no bundle is removed.
+    If it is forced, a folder that is no bundle is removed.
     """
     folder = out_folder.bundle_dir
     files = _files(folder)
@@ -72,33 +73,36 @@ def require_own_bundle(out_folder: OutFolder) -> None:
 
 
 def no_layer(path: Path, *, is_given: bool) -> OutputError:
-    """Return the error of a stage that is no file: OUT's own, or the layer of --stage."""
+    """Return the error of a stage that is no file.
+
+    is_given  whether --stage named the path; otherwise it is OUT's own stage
+    """
     found = contents_of(path)
-    words = "is missing" if found.kind is Kind.NOTHING else f"found {found.words}"
+    fault = f"{path} is missing" if found.kind is Kind.NOTHING else f"{path}: found {found.words}"
     remedy = "expected a USD layer" if is_given else "run `stereocell stage OUT` first"
-    return OutputError(f"{path}{'' if words.startswith('is') else ':'} {words}: {remedy}")
+    return OutputError(f"{fault}: {remedy}")
 
 
 def require_own_report(out_folder: OutFolder) -> None:
-    """Raise OutputError where the report's place holds a page that no report phase wrote."""
+    """Raise OutputError where report.html is a page that no report phase wrote."""
     file = out_folder.report_file
     if is_file(file) and not (
         is_sealed_text(file) or out_folder.has_begun("report") or is_forced()
     ):
-        raise refused(file, "a page of somebody else", "nothing or a report of this build")
+        raise refused(file, "another page", "nothing or a report of this build")
 
 
 def require_own_tissue(out: Path) -> None:
-    """Raise OutputError where OUT/tissue holds files, and no record of `stereocell tissue`."""
+    """Raise OutputError where OUT/tissue holds files without the record of `stereocell tissue`."""
     folder = out / FOLDER
     if _files(folder) and not is_file(folder / RECORD) and not is_forced():
         raise refused(folder, _words(folder), "nothing or tissue classes of this build")
 
 
 def _files(folder: Path) -> set[str]:
-    """Return the files below a folder, except those that are nobody's, by their relative paths."""
+    """Return the relative paths of the files below a folder, except files of the system."""
     found = (file.relative_to(folder) for file in sizes_below(folder) if file != folder)
-    return {file.as_posix() for file in found if not is_nobodys(file.name)}
+    return {file.as_posix() for file in found if not is_ignored(file.name)}
 
 
 def _words(folder: Path) -> str:

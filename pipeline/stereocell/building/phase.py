@@ -25,7 +25,7 @@ class Phase:
         self.key, self.about = "done", ""
         self.results: Callable[[], str] = str
         self.is_up_to_date = False
-        self.is_whole = True  # False: a part of the results is still to be made
+        self.is_whole = True  # False: some results are still missing
 
     def is_done(
         self, key: str, results: Callable[[], str], *, require_own: Callable[[OutFolder], None]
@@ -34,8 +34,8 @@ class Phase:
 
         key          digest of the inputs
         results      returns a digest of the results
-        require_own  raises OutputError where the phase would replace what it did not write; it is
-                     called where there is work to do, before the phase is recorded as begun
+        require_own  raises OutputError where the phase would replace files that it did not write.
+                     It is called if there is work to do, before the phase is recorded as begun
         """
         self.key, self.results = key, results
         entry = self.out_folder.phases().get(self.name, {})
@@ -55,7 +55,7 @@ class Phase:
         self.out_folder.save_phase(self.name, {**entry, FIELD: of})
 
     def keep(self) -> None:
-        """Save that the results, which stay, would be made the same of what lies in OUT now."""
+        """Record that the results are up to date with the plan, units and stage in OUT now."""
         entry = self.out_folder.phases().get(self.name)
         of = made_of(self.out_folder, self.name) if self.is_whole else ""
         if entry is not None and entry.get(FIELD, "") != of:

@@ -1,6 +1,7 @@
-"""The phases of a build, each a function on OUT: plan -> units -> stage -> bundle (-> report).
+"""The first phases of a build, each a function on OUT: plan -> units -> stage.
 
-Every phase skips finished work: a result is named by everything that it depends on.
+The bundle and the report follow: bundle_phase.py, report/phase.py. Every phase skips finished
+work: a result is named by everything that it depends on.
 """
 
 from collections.abc import Mapping
@@ -23,17 +24,13 @@ from stereocell.building.object_tables import (
 from stereocell.building.open_source import as_asked
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import (
-    no_layer,
-    require_own_bundle,
     require_own_places,
     require_own_stage,
 )
 from stereocell.building.passes import run_passes
 from stereocell.building.phase import (
-    digest_of_bundle,
     digest_of_stage,
     phase_of,
-    states_of,
 )
 from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
 from stereocell.building.plan_notes import (
@@ -47,8 +44,6 @@ from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
 from stereocell.building.survey_file import appearance_to_json, read_survey
 from stereocell.building.tasks import components, evidence, unit, window
 from stereocell.building.unit_files import load_objects
-from stereocell.bundle import write as bundle_writer
-from stereocell.bundle.manifest import require_bundle
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
@@ -57,26 +52,21 @@ from stereocell.model.extra_packages import version_of
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
-from stereocell.read.image import printable
 from stereocell.read.readers import format_of, module_of, reader_of
 from stereocell.read.remarks import CAST
-from stereocell.storage.assets import viewer_dist
 from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.location import Location, require_apart
-from stereocell.storage.overwriting import is_forced
 from stereocell.storage.sealed_text import write_sealed_text
-from stereocell.storage.workspace import is_file, objects_below, remove
+from stereocell.storage.workspace import remove
 from stereocell.textures.map_packages import (
     UNWRAPPER,
-    encoder_version,
     require_map_packages,
 )
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import write_usdz as usdz_writer
 from stereocell.usd import written_files
-from stereocell.usd.read_stage import dependencies, may_be_image
 from stereocell.usd.written_files import AsWritten
 
 
@@ -92,6 +82,8 @@ def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = 
     out_folder = OutFolder(out)
     out_folder.require_name()
     with phase_of(out_folder, "plan") as phase:
+        if engine is not None:
+            require_own_places(out_folder, is_same_plan=True)  # what no plan may replace
         plan = settle(source, settings)
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()
@@ -361,65 +353,3 @@ def _tell_size(tiles: FileList, measured: int) -> None:
             f"stage: {measured / 1e6:.1f} of {whole / 1e6:.1f} MB are voxels as measured, for "
             "other windows; --bits 8 leaves them out"
         )
-
-
-def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
-    """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it (`stage`).
-
-    Raises OutputError where the stage is missing, StageError where it can't be read.
-    """
-    out_folder = OutFolder(out)
-    with phase_of(out_folder, "bundle") as phase:
-        out_folder.require_finished("stage")
-        _require_whole_stage(out_folder)
-        if is_file(out_folder.plan_file):
-            plan = out_folder.plan()  # no phase goes on beside a plan that was changed by hand
-            if plan.settings.unwrap.maps:
-                require_map_packages()
-        path = stage if stage is not None else out_folder.stage_file
-        if not is_file(path):
-            raise no_layer(path, is_given=stage is not None)
-        viewer = viewer_dist()
-        kept = objects_below(path.parent)
-        files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
-        made_of = [str(path.absolute()), states_of(files)] if kept is None else kept
-        # an image may feed a surface, and is encoded then: by this version, or not at all
-        encoder = encoder_version() if any(map(may_be_image, files)) else None
-        page = [] if viewer is None else states_of(sorted(viewer.rglob("*")))
-        key = key_of([made_of, page, encoder], bundle_writer)
-        if kept is not None and out_folder.is_begun("bundle"):
-            bundle_writer.remove_half(out_folder.bundle_dir)
-        if not is_forced():
-            require_bundle(out_folder.bundle_dir)  # before the phase is begun
-        done = partial(digest_of_bundle, out_folder)
-        if not phase.is_done(key, done, require_own=require_own_bundle):
-            out_folder.remove_other_folders(out_folder.parts_dir, {key})
-            parts = out_folder.parts_dir / key
-            bundle_writer.write_bundle(
-                path,
-                out_folder.bundle_dir,
-                viewer,
-                run=engine.run,
-                parts=parts,
-                report_line=_print_line,
-            )
-            phase.about = "" if stage is None else f"of {printable(path.name)}"
-    remove(out_folder.parts_dir)
-    if viewer is None and not phase.is_up_to_date:
-        console.print(
-            "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
-        )
-
-
-def _require_whole_stage(out_folder: OutFolder) -> None:
-    """Raise OutputError or StageError where a file that the stage's phase wrote is not as it was.
-
-    A layer that may have been edited in place passes; the bundle's writer names it.
-    """
-    if out_folder.has_begun("stage"):
-        listed = written_files.read_stage_list(out_folder.stage_dir)
-        written_files.require_kept(out_folder.stage_dir, listed, out_folder.stage_list)
-
-
-def _print_line(line: str) -> None:
-    console.print(f"bundle: {line}", markup=False, soft_wrap=True)

@@ -56,7 +56,7 @@ def _find_fault(plan: Plan) -> str | None:
     names = [*(one.name for one in plan.channels), *(one.name for one in plan.labels)]
     for name in (plan.name, *names):
         if not name.isprintable():
-            return f"name: found {name!r:.80}, expected one that can be shown"
+            return f"name: found {name!r:.80}, expected printable characters"
     if not _is_inside(plan.region, Box((0, 0, 0), plan.region.stop)):
         return f"region: found {plan.region!s:.100}, expected voxels in it"
     for tile in plan.tiles:

@@ -15,7 +15,7 @@ from stereocell.read import Dataset
 from stereocell.read.absent_chunks import count_absent
 from stereocell.transfer.joint_histogram import sample_boxes
 
-_MAX_CHANGES = 4  # settings that are named
+_MAX_CHANGES = 4  # most changed settings that a line names
 _LOOKED_AT = 16_000_000  # voxels of all channels that are looked at for NaN
 
 
@@ -42,16 +42,16 @@ def told_of_gaps(dataset: Dataset, plan: Plan) -> list[str]:
 
 
 def told_of_absent(dataset: Dataset, plan: Plan) -> list[str]:
-    """Return what is said of chunks that are not stored, of the image and of the label maps.
+    """Return a note on the chunks that are not stored, for the image and for each label map.
 
-    Raises SourceError where none is stored.
+    Raises SourceError where no chunk is stored.
     """
     indices = list(dict.fromkeys(channel.index for channel in plan.channels if not channel.source))
     found = _absent(dataset, source_of(plan), indices, plan.region, plan.level) if indices else []
     for labels in plan.labels:
         own, whole = open_watched(labels.ref), Box((0, 0, 0), labels.shape)
-        told = _absent(own, labels.ref, [labels.channel], whole, 0)
-        found += [f"labels {labels.name!r}: {note}" for note in told]
+        notes = _absent(own, labels.ref, [labels.channel], whole, 0)
+        found += [f"labels {labels.name!r}: {note}" for note in notes]
     return found
 
 
@@ -65,13 +65,14 @@ def _absent(
     nouns = f"{absent.noun}s"
     if absent.count == absent.total:
         raise SourceError(
-            f"{dataset.shown}: level {level}: found none of {absent.total} {nouns}, expected the "
-            "voxels: they are lost, or lie elsewhere than the metadata say"
+            f"{dataset.shown}: level {level}: found none of {absent.total} {nouns}, expected those "
+            "that hold voxels: copy the volume again, or take another --level"
         )
     share = max(absent.count / absent.total, 1e-4)
     return [
         f"{absent.count} of {absent.total} {nouns} of level {level} ({share:.2%}) are not stored: "
-        f"read as {absent.fill}, as the format has it for empty ones and as lost ones are"
+        f"they are read as {absent.fill}, and the format does not state whether they are empty or "
+        "missing"
     ]
 
 
@@ -94,9 +95,9 @@ def told_in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[st
 
 
 def changes_of(there: Plan, plan: Plan) -> str:
-    """Return a line on a plan of the same input that another one replaces; empty: they are equal.
+    """Return a line on the settings in which two plans of the same input differ; empty: none.
 
-    The results of a build are then replaced where the changes reach them.
+    there  the plan in OUT, which `plan` replaces. Results that depend on the changes follow
     """
     if there == plan:
         return ""
@@ -111,8 +112,8 @@ def changes_of(there: Plan, plan: Plan) -> str:
     if names != now:
         changes.insert(0, f"channels: {names:.80}, now {now:.80}")
     more = len(changes) - _MAX_CHANGES
-    told = "; ".join(changes[:_MAX_CHANGES]) + (f"; and {more} more" if more > 0 else "")
+    listed = "; ".join(changes[:_MAX_CHANGES]) + (f"; and {more} more" if more > 0 else "")
     return (
         f"OUT holds a build of this input with other settings, whose results are replaced: "
-        f"{told or 'where the input lies'}"
+        f"{listed or 'another path of the input'}"
     )

@@ -1,7 +1,7 @@
-"""The pass that reads the inputs now, noted in OUT: a killed command leaves the note behind.
+"""A note in OUT on the pass that reads the inputs now. A killed command leaves the note behind.
 
-Results of a killed pass may be of an input that changed under it. So the next command compares the
-inputs with those of the note, and removes the results of that pass where they differ.
+The input may have changed during a killed pass. The next command therefore compares the inputs with
+the note, and removes the results of that pass where they differ.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ _SCHEMA = "units.schema.json#Running"
 
 
 def begin(out_folder: OutFolder, plan: Plan, results: Sequence[Path]) -> None:
-    """Note the inputs, and the results that a pass is about to make."""
+    """Write the note: the inputs, and the results that a pass is about to make."""
     names = [result.relative_to(out_folder.out).as_posix() for result in results]
     write_json(out_folder.running_file, {"inputs": _digest(plan), "results": names})
 
@@ -31,14 +31,14 @@ def end(out_folder: OutFolder) -> None:
 
 
 def remove_mixed(out_folder: OutFolder, plan: Plan) -> None:
-    """Remove the results of a pass that was killed, where an input was written since it began."""
+    """Remove the results of a killed pass if an input was written to since the pass began."""
     left = find_json(out_folder.running_file, _SCHEMA)
     if left is None:
         return
     if left["inputs"] != _digest(plan):
         console.print(
-            "units: an input was written to since a command was stopped that read it: what that "
-            "one made last is made again"
+            "units: an input was written to after an earlier command began to read it and was "
+            "stopped: the last results of that command are made again"
         )
         for result in (out_folder.out / name for name in left["results"]):
             if result.is_relative_to(out_folder.units_dir) and ".." not in result.parts:
@@ -47,7 +47,7 @@ def remove_mixed(out_folder: OutFolder, plan: Plan) -> None:
 
 
 def _digest(plan: Plan) -> str:
-    """Return a digest of the files of image and label maps: by content where they are small."""
+    """Return a digest of the files of image and label maps. Small files count by their content."""
     digest = hashlib.sha256()
     for ref in (source_of(plan), *(labels.ref for labels in plan.labels)):
         digest.update("".join(open_states(ref).lines()).encode())

@@ -60,7 +60,5 @@ def named_as_settings(*, has_sections: bool = True) -> Iterator[None]:
     try:
         yield
     except StereoCellError as error:
-        line = in_settings(str(error), has_sections=has_sections)
-        if line == str(error):
-            raise
-        raise type(error)(line) from error
+        error.args = (in_settings(str(error), has_sections=has_sections),)
+        raise

@@ -393,13 +393,12 @@ def to_toml(settings: Settings, *, header: str = RECORD) -> str:
 
 
 def to_readable_toml(settings: Settings) -> str:
-    """Return the settings as `to_toml` does, after a check that `load` reads the same from them.
-
-    Raises UsageError where it would not.
-    """
+    """Return the settings as `to_toml` does. Raises UsageError where `load` would read others."""
     text = to_toml(settings)
     if apply(Settings(), tomllib.loads(text), SETTINGS) != settings:
-        raise UsageError(f"{SETTINGS}: would be read as other settings than those of the plan")
+        raise UsageError(
+            f"{SETTINGS}: these settings can't be written to it: they would be read as other ones"
+        )
     return text
 
 

@@ -29,13 +29,13 @@ def run_on_input(
     *,
     is_last: bool = False,
 ) -> None:
-    """Run tasks that read the inputs and write results; without results nothing is run.
+    """Run tasks that read the inputs and write results; an empty list of results runs nothing.
 
-    is_last  whether no pass follows
+    is_last  whether no other pass follows
 
-    Raises SourceError where an input changed since the plan, and where it changed while the tasks
-    ran: their results are removed then. Where the fingerprint doesn't tell the two inputs apart,
-    earlier results would be taken for those of the new one, so that all are removed.
+    Raises SourceError where an input changed since the plan or while the tasks ran. In the second
+    case their results are removed. If the fingerprint did not change, results of the old and the
+    new input have the same names, so all results are removed.
     """
     if not results:
         return
@@ -45,7 +45,7 @@ def run_on_input(
     begin(out_folder, plan, results)
     try:
         run()
-    except BaseException:  # which may come of the change: that is said instead
+    except BaseException:  # a changed input may be its cause, and is then reported instead
         _require_still(out_folder, plan, results, is_last=False)
         raise
     _require_still(out_folder, plan, results, is_last=is_last)
@@ -57,7 +57,7 @@ def _require_still(
     try:
         require_still(plan, is_last=is_last)
     except InputChangedError as error:
-        for result in results if error.is_told else [out_folder.units_dir]:
+        for result in results if error.has_new_fingerprint else [out_folder.units_dir]:
             remove(result)
         raise
     finally:

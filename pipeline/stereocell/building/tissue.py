@@ -39,6 +39,7 @@ from stereocell.read.readers import reader_of
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.json_files import write_json, write_sealed
+from stereocell.storage.shell_commands import fill_in
 from stereocell.tissue import classify as tissue_module
 from stereocell.tissue import onnx_classifier as network_module
 from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions, learn_tissue
@@ -98,7 +99,11 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     """
     out_folder = OutFolder(out)
     require_documents(out_folder, "tissue")
-    plan = without_tissue(out_folder.plan())
+    there = out_folder.plan()
+    require_own_tissue(out)
+    # classes that are learned again may be the same, so that the plan and the stage stay
+    require_own_places(out_folder, is_same_plan=any(one.source for one in there.channels))
+    plan = without_tissue(there)
     channel = _find_channel(plan, request.channel)
     voxels = math.prod(plan.region.shape)
     if voxels > MAX_VOXELS:
@@ -126,7 +131,6 @@ def _add(
             f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
             "same, or no --classes"
         )
-    require_own_tissue(out)
     is_brain = plan.modality == "MR" and not request.everywhere
     options = TissueOptions(classes=request.classes or "auto", brain=is_brain)
     settings = asdict(options) if network is None else network.settings()
@@ -180,7 +184,8 @@ def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
     try:
         record = read_whole(folder)
     except OutputError as fault:
-        console.print(f"tissue: {fault}", markup=False)
+        line = fill_in(str(fault), {"OUT": str(folder.parent)})
+        console.print(f"tissue: {line}", markup=False, soft_wrap=True)
         return None
     if record["key"] != key:
         return None
@@ -241,7 +246,7 @@ def _learn(
         "libraries": libraries_of(tissue_module, network_module),
     }
     shape = dataset.levels[plan.level].shape
-    # before anything is written; the fingerprint is that of no volume
+    # Checks the plan before anything is written. Its fingerprint is a placeholder of equal length.
     out_folder.require_readable(_with_classes(plan, _source_in(out_folder.out), "0" * 64, record))
     with replacing_folder(out_folder.out / FOLDER) as folder:
         write_probabilities(

@@ -39,8 +39,7 @@ from stereocell.textures.lod_chain import make_levels
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.texture_lod import Texturer, VertexValues
 from stereocell.usd.layer import METERS_PER_UNIT
-from stereocell.usd.read_mesh import move_mesh
-from stereocell.usd.read_stage import (
+from stereocell.usd.read_levels import (
     ComposedLod,
     MadeMaps,
     find_emptied,
@@ -48,6 +47,7 @@ from stereocell.usd.read_stage import (
     read_local,
     read_lods,
 )
+from stereocell.usd.read_mesh import move_mesh
 from stereocell.usd.read_textures import ComposedMaps, read_image
 
 T = TypeVar("T")

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.model.errors import OutputError
-from stereocell.storage.contents import is_nobodys, words_for
+from stereocell.storage.contents import is_ignored, words_for
 from stereocell.storage.file_list import read_list
 from stereocell.storage.json_files import read_sealed
-from stereocell.storage.overwriting import HINT
+from stereocell.storage.overwriting import or_force
 from stereocell.storage.workspace import is_file, sizes_below
 
 MANIFEST = "manifest.json"
@@ -40,7 +40,7 @@ def find_others(bundle: Path) -> list[str]:
     Its list says which are its own; where that is lost or damaged, their paths do.
     """
     found = (file.relative_to(bundle) for file in sizes_below(bundle) if file != bundle)
-    names = {file.as_posix() for file in found if not is_nobodys(file.name)}
+    names = {file.as_posix() for file in found if not is_ignored(file.name)}
     try:
         return sorted(names - read_list(bundle / FILES, "").keys() - {MANIFEST, FILES})
     except OutputError:
@@ -53,4 +53,6 @@ def require_bundle(place: Path) -> None:
     if is_file(place / MANIFEST) or not (is_other or (others := find_others(place))):
         return
     words = "a file" if is_other else f"{words_for(others)}, and no {MANIFEST}"
-    raise OutputError(f"{place}: exists and is no bundle: found {words}: {HINT}")
+    raise OutputError(
+        f"{place}: exists and is no bundle: found {words}: {or_force('move it elsewhere')}"
+    )

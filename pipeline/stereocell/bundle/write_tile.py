@@ -38,18 +38,12 @@ from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd.layer import move_box
 from stereocell.usd.read_appearances import ComposedAppearance
 from stereocell.usd.read_attributes import Point
+from stereocell.usd.read_levels import ComposedLod, mesh_at
 from stereocell.usd.read_objects import read_columns, read_tile_objects
-from stereocell.usd.read_stage import (
-    ComposedLod,
-    ComposedVolume,
-    hinted_box,
-    loaded,
-    mesh_at,
-    open_stage,
-    read_volume,
-)
+from stereocell.usd.read_stage import hinted_box, loaded, open_stage
 from stereocell.usd.read_textures import read_image
 from stereocell.usd.read_variants import Representation
+from stereocell.usd.read_volume import ComposedVolume, read_volume
 from stereocell.usd.written_files import AsWritten
 
 _RECORD = "tile.json"

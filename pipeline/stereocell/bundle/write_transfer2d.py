@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from stereocell.formats.ktx2 import encode_2d
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
 from stereocell.usd.read_appearances import ComposedAppearance
-from stereocell.usd.read_stage import ComposedVolume
+from stereocell.usd.read_volume import ComposedVolume
 
 COUNTED_VOXELS = 4_000_000  # voxels of a tile; a larger tile is counted in part
 _STORED = np.dtype("<u4")

@@ -54,7 +54,10 @@ def _main(words: Sequence[str]) -> int:
         with answering_sigterm():
             return _run(options)
     except StereoCellError as error:
-        return _fail(options, flags.as_typed(options, str(error)), error.exit_code)
+        from stereocell.storage.shell_commands import fill_in
+
+        line = fill_in(flags.as_typed(options, str(error)), getattr(options, "places", {}))
+        return _fail(options, line, error.exit_code)
     except (MemoryError, RuntimeError, ImportError, OSError) as error:
         return _fail(options, _reason(error), 1)
     except KeyboardInterrupt as stop:
@@ -109,11 +112,12 @@ def _run(options: argparse.Namespace) -> int:
     options.shown = out
     if name not in LIGHT:
         require_address_space(name)
+        options.places = _given_places(options)
     with ExitStack() as stack:
         if PLACES[name].writes:
-            from stereocell.storage.overwriting import forcing
+            from stereocell.storage.overwriting import AT_A_PROMPT, forcing
 
-            stack.enter_context(forcing(options.force))
+            stack.enter_context(forcing(options.force, AT_A_PROMPT))
         if isinstance(out, str):  # an address
             if name not in WRITERS | READERS.keys():
                 from stereocell.storage.location import Location
@@ -126,19 +130,26 @@ def _run(options: argparse.Namespace) -> int:
             options.out = stack.enter_context(
                 opened(out, command=name) if is_writer else opened(out, only=READERS[name])
             )
-            require_place(name, options.out, getattr(options, "input", ""))
-        elif name in WRITERS | READERS.keys():
-            if hasattr(options, "input"):
-                from stereocell.storage.location import require_apart
+        elif name in WRITERS and hasattr(options, "input"):
+            from stereocell.storage.location import require_apart
 
-                require_apart(options.input, options.out)
-            require_place(name, options.out, getattr(options, "input", ""))
+            require_apart(options.input, options.out)
+        if name in WRITERS | READERS.keys():
+            options.places |= require_place(options)
         if isinstance(out, Path) and name in WRITERS:
             from stereocell.storage.lock import alone_in
 
             stack.enter_context(alone_in(options.out, name))
         handler: Handler = options.handler
         return commands.answer(options, handler(options))
+
+
+def _given_places(options: argparse.Namespace) -> dict[str, str]:
+    """Return the places that the words of a command name, by the words that remedies have."""
+    from stereocell.storage.shell_commands import as_shown
+
+    given = {"INPUT": getattr(options, "input", None), "TARGET": getattr(options, "target", None)}
+    return {word: as_shown(place) for word, place in given.items() if place}
 
 
 class _Parser(argparse.ArgumentParser):

@@ -19,7 +19,7 @@ from stereocell.cli.flags import flags_of, numbers
 
 if TYPE_CHECKING:
     from stereocell.engine.run import Engine
-    from stereocell.verify.formats import CheckLine
+    from stereocell.verify.check_line import CheckLine
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +146,8 @@ def iso(options: argparse.Namespace) -> Answer:
     from stereocell.building.preset_choice import load_for, print_choice
     from stereocell.preview import iso_value as iso_preview
 
+    if options.out is not None:
+        iso_preview.require_picture_or_nothing(options.out)
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
     found, path = iso_preview.preview(
@@ -187,6 +189,7 @@ def _run_phases(
     options: argparse.Namespace, out: Path, engine: "Engine", names: Sequence[str]
 ) -> Answer:
     from stereocell.building import phases
+    from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import OutFolder
 
     for name in names:
@@ -195,7 +198,7 @@ def _run_phases(
         elif name == "stage":
             phases.run_stage(out, engine)
         elif name == "bundle":
-            phases.run_bundle(out, engine, stage=getattr(options, "stage", None))
+            run_bundle(out, engine, stage=getattr(options, "stage", None))
         else:
             from stereocell.report import phase  # slow to import: it draws
 
@@ -237,12 +240,17 @@ def slices(options: argparse.Namespace) -> Answer:
         return listed
     from stereocell.building import phases
     from stereocell.building.preset_choice import load_for, print_choice
-    from stereocell.preview.png_slices import without_surface, write_slices
+    from stereocell.preview.png_slices import (
+        require_slices_or_nothing,
+        without_surface,
+        write_slices,
+    )
     from stereocell.storage.location import require_apart
 
+    require_apart(options.input, options.out)
+    require_slices_or_nothing(options.out)
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    require_apart(options.input, options.out)
     plan = phases.settle(options.input, without_surface(wanted))
     print_choice(choice)
     written = write_slices(plan, options.out, plane=options.plane)
@@ -292,12 +300,14 @@ def tissue(options: argparse.Namespace) -> Answer:
 
 def check(options: argparse.Namespace) -> Answer:
     """Check the results; the exit code is 1 where a check fails."""
+    from stereocell.storage.shell_commands import fill_in
     from stereocell.verify.formats import check as run
 
     lines = []
     for line in chain(run(options.out), _deep(options) if options.deep else ()):
-        lines.append(asdict(line))
-        print_unless_json(options, f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {line.detail}")
+        detail = fill_in(line.detail, options.places)
+        lines.append({**asdict(line), "detail": detail})
+        print_unless_json(options, f"{'ok  ' if line.ok else 'FAIL'} {line.name}: {detail}")
     is_sound = all(line["ok"] for line in lines)
     return Answer({"ok": is_sound, "checks": lines}, 0 if is_sound else 1)
 

@@ -167,7 +167,11 @@ def _gpu() -> Finding:
 
 
 def _extra(name: str, work: str, *modules: str) -> Callable[[], Finding]:
-    """Return a look at an extra, for `work`, which installs `modules`."""
+    """Return the check of an extra.
+
+    work     the commands that need the extra, in words
+    modules  names of the modules that it installs
+    """
 
     def look() -> Finding:
         missing = [module for module in modules if find_spec(module) is None]

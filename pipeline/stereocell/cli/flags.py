@@ -307,14 +307,14 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=300,
         metavar="S",
-        help="most seconds that the network may take for a patch (default %(default)s)",
+        help="longest time for one patch of the network, in s (default %(default)s)",
     )
     parser.add_argument(
         "--model-memory-gb",
         type=float,
         default=4,
         metavar="GB",
-        help="most memory that the network may take (default %(default)s)",
+        help="most memory for the network, in GB (default %(default)s)",
     )
     parser.add_argument(
         "--everywhere",

@@ -1,11 +1,11 @@
-"""Tell what each command reads and writes, for --force and for the answers to a wrong folder.
+"""The table of the folders that each command reads and writes: for --force and for wrong folders.
 
-A test holds that every command has a row, and tries each command that writes onto the files of
-somebody else.
+A test checks that every command has a row, and runs each writing command on a folder that holds
+other files.
 """
 
+import argparse
 from dataclasses import dataclass
-from pathlib import Path
 
 from stereocell.storage.kinds import Kind
 
@@ -17,21 +17,19 @@ _BUNDLE = frozenset({Kind.BUILD, Kind.BUNDLE, Kind.SITE})
 class Places:
     """The places of one command.
 
-    reads        kinds of folders that OUT may be; empty: OUT is not read
-    has_input    INPUT, a volume, is read
-    writes       the argument that names the place of the result; empty: nothing is written
+    reads   kinds of folders that OUT may be; empty: OUT is not read
+    writes  the argument that names the place of the result; empty: nothing is written
     """
 
     reads: frozenset[Kind] = frozenset()
-    has_input: bool = False
     writes: str = ""
 
 
 PLACES = {
-    "build": Places(has_input=True, writes="out"),
-    "plan": Places(has_input=True, writes="out"),
-    "iso": Places(has_input=True, writes="out"),
-    "slices": Places(has_input=True, writes="out"),
+    "build": Places(writes="out"),
+    "plan": Places(writes="out"),
+    "iso": Places(writes="out"),
+    "slices": Places(writes="out"),
     "units": Places(_BUILD, writes="out"),
     "stage": Places(_BUILD, writes="out"),
     "bundle": Places(_BUILD, writes="out"),
@@ -47,22 +45,29 @@ PLACES = {
     "settings": Places(),
 }
 FORCE = (
-    "replace whatever lies at the place of the result; without, only results of StereoCell of the "
-    "same specimen are"
+    "replace all that lies where the result goes; without it, only StereoCell's own results of the "
+    "same specimen are replaced"
 )
 
 
-def require_place(command: str, out: Path, source: str = "") -> None:
-    """Raise OutputError where OUT is no folder that a command can read or write.
+def require_place(options: argparse.Namespace) -> dict[str, str]:
+    """Return the places that remedies may name, where OUT is one that a command reads or writes.
 
-    Imports are lazy, so that --help is quick.
+    options  the command's arguments; `shown` is OUT as it was given: a path or an address
+
+    Raises OutputError where OUT is another folder. Imports are lazy, so that --help is quick.
     """
-    places = PLACES[command]
+    from stereocell.storage.shell_commands import as_shown
+
+    places, out, shown = PLACES[options.command], options.out, as_shown(str(options.shown))
     if places.reads:
         from stereocell.storage.contents import require_kind
+        from stereocell.storage.shell_commands import places_of
 
-        require_kind(out, places.reads)
-    elif command in ("build", "plan"):
+        return places_of(require_kind(out, places.reads), shown)
+    if options.command in ("build", "plan"):
         from stereocell.building.out_folder import require_build_or_nothing
 
-        require_build_or_nothing(out, source)
+        require_build_or_nothing(out, options.input)
+        return {"OUT": shown}
+    return {}

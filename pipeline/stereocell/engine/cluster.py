@@ -60,7 +60,7 @@ def join(scheduler: str, shared: Path | None) -> Any:
     from distributed import Client
 
     try:
-        # not the default one: a caller's own computations with Dask stay where they are
+        # The client is not the default one, so that a caller's own use of Dask stays as it is.
         client = Client(address, timeout=_ANSWER_S, set_as_default=False)
     except (OSError, OverflowError, ValueError, TypeError, KeyError, RuntimeError) as error:
         raise ClusterError(f"--scheduler {scheduler}: {_reason(error)}") from None
@@ -73,14 +73,14 @@ def join(scheduler: str, shared: Path | None) -> Any:
 
 
 def is_open_to_all(client: Any) -> bool:
-    """Return whether a cluster's scheduler takes orders from everybody who reaches its port."""
+    """Return whether a cluster runs the code of everybody who can reach its scheduler's port."""
     return not str(client.scheduler.address).startswith("tls://")
 
 
 def _reason(error: Exception) -> str:
-    """Return a line on why a scheduler can't be joined, and what to do."""
+    """Return why a scheduler can't be joined, and a remedy."""
     text = str(error).splitlines()[0] if str(error) else "it does not answer"
-    if isinstance(error, TypeError) and "ssl_context" in text:  # as Dask says it
+    if isinstance(error, TypeError) and "ssl_context" in text:  # Dask's message
         return f"it admits only clients with a certificate, and this command has none; {_TLS_HELP}"
     return f"{text}; {_EXPECTED}"
 
@@ -124,8 +124,8 @@ def able(function: Callable[[T], R], shared: Path | None) -> Callable[[T], R]:
 class _Sight:
     """A worker: versions of StereoCell and libraries, a digest of our code, access to a file.
 
-    extras  versions of the packages of extras that make results; empty: not installed. A worker may
-            lack one, since few builds use it: such a build names it then
+    extras  versions of packages of extras that make results; empty: not installed. A worker may
+            lack one, because few builds use it. A build that needs it reports that by itself
     """
 
     host: str

@@ -12,9 +12,10 @@ from stereocell.model.errors import StereoCellError
 
 T = TypeVar("T")
 
-_LOOK_S, _LOOKS = 15, 12  # s between looks for workers, and looks until they count as gone
+_LOOK_S = 15  # s between looks for workers
+_LOOKS = 12  # looks without a worker until the workers count as gone
 _POLL_S = 0.05  # s between looks at finished tasks
-_AHEAD = 64  # tasks that wait for a worker
+_AHEAD = 64  # least number of tasks that wait for a worker
 _GONE = "its workers are gone and did not come back: the same command goes on from here"
 
 
@@ -61,8 +62,8 @@ def _is_killed(error: BaseException | None) -> bool:
 def _completed(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
     """Yield the futures that `submit` returns, in the order of completion, until it returns None.
 
-    At most twice as many tasks as workers wait at a time, because each takes memory of the
-    scheduler. The iterator ends early once the workers have been absent for long.
+    At most `_AHEAD` tasks, or twice as many as workers if that is more, wait at a time: each takes
+    memory of the scheduler. The iterator ends early once the workers have been absent for long.
     """
     from distributed import as_completed
 

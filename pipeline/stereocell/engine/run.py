@@ -126,7 +126,7 @@ class Engine:
         """Run the tasks on the cluster, or on processes of this machine.
 
         function  the task by itself
-        work      the same, with what a worker needs around it
+        work      the same, wrapped for a worker
         """
         if self._scheduler:
             self.join()

@@ -1,9 +1,9 @@
 """Run tasks on worker processes of this machine, over pipes.
 
 A pipe has two ends and no address. No port is opened, so nobody else on the machine or in the
-network can reach a worker or the command. (Dask's local cluster listens on ports: without
-certificates, whoever connects to one runs code as the user who builds. A pool over pipes needs no
-certificates, starts sooner, and knows which task killed its worker.)
+network can reach a worker or the command. (Dask's local cluster listens on ports. Without
+certificates, every program that connects to one can run code as the user who builds. A pool over
+pipes needs no certificates, starts sooner, and knows which task killed its worker.)
 
 On Linux, workers are forked from a server that has imported what they need. A process that starts
 from nothing imports for 1.7 s of CPU. The server imports once for all workers of a command, and
@@ -16,7 +16,7 @@ import pickle
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection
 from multiprocessing.connection import Connection
@@ -81,7 +81,7 @@ class WorkerPool:
                 self._workers.append(self._start())
             yield from self._outcomes(function, tasks)
         finally:
-            # Busy workers are left where the caller stops early. Nobody waits for their answers.
+            # Workers are still busy if the caller stopped early. Nobody waits for their answers.
             if self._busy():
                 self.close()
 
@@ -133,7 +133,7 @@ class WorkerPool:
         ours, theirs = self._context.Pipe()
         # a daemon: Python ends it where an error keeps the command from calling `close`
         process = self._context.Process(target=serve, args=(theirs,), daemon=True)
-        with children_ignore_interrupts():
+        with children_ignore_interrupts(), _main_from_a_file():
             process.start()
         theirs.close()  # the worker then has the only one, and its end closes the pipe
         return _Worker(process, ours)
@@ -147,7 +147,7 @@ class WorkerPool:
         request = pickle.dumps((function, tasks[task]))
         worker.task = task
         # a worker that has died is noticed by the next attempt to receive its answer
-        with suppress(BrokenPipeError):
+        with suppress(ConnectionError):
             worker.pipe.send_bytes(request)
 
     def _heard(self) -> list[_Worker]:
@@ -198,17 +198,36 @@ def leave_if_importing_main() -> None:
         os._exit(1)  # an exception would print a traceback
 
 
+@contextmanager
+def _main_from_a_file() -> Iterator[None]:
+    """Inside the block, hide the name of a main module that comes from no file.
+
+    A worker would import it by that name. `python - < script.py` is called `<stdin>`.
+    """
+    main = vars(sys.modules["__main__"])
+    name = main.get("__file__")
+    if name is None or os.path.isfile(name):
+        yield
+        return
+    del main["__file__"]
+    try:
+        yield
+    finally:
+        main["__file__"] = name
+
+
 def _choose_context(module: str) -> Any:
     """Return multiprocessing's context of a fork server, or the one that starts from nothing.
 
-    Workers start from nothing where the system has no such server (Windows; macOS, whose libraries
-    don't bear a fork), where it can't have its socket (the folder of temporary files has a long
-    name or is full), and where the environment has changed since the server started. Before Python
-    3.11.1 the server's socket was open to all users of the machine (CVE-2022-42919).
+    Workers start from nothing in three cases. The system has no such server (Windows), or its
+    libraries fail after a fork (macOS). The server can't have its socket, because the folder of
+    temporary files has a long name or is full. The environment has changed since the server
+    started. Before Python 3.11.1 the server's socket was open to all users of the machine
+    (CVE-2022-42919).
     """
     is_safe = sys.platform == "linux" and sys.version_info >= (3, 11, 1)
-    way = "forkserver" if is_safe and _has_server(module) else "spawn"
-    return multiprocessing.get_context(way)
+    method = "forkserver" if is_safe and _has_server(module) else "spawn"
+    return multiprocessing.get_context(method)
 
 
 def _has_server(module: str) -> bool:

@@ -23,17 +23,11 @@ from stereocell.model.mesh import Mesh
 from stereocell.usd.layer import move_box
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
+from stereocell.usd.read_levels import mesh_at
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
-from stereocell.usd.read_stage import (
-    ComposedVolume,
-    hinted_box,
-    loaded,
-    mesh_at,
-    open_stage,
-    read_volume,
-    tile_prims,
-)
+from stereocell.usd.read_stage import hinted_box, loaded, open_stage, tile_prims
 from stereocell.usd.read_variants import TileChoice, lod_levels
+from stereocell.usd.read_volume import ComposedVolume, read_volume
 from stereocell.usd.written_files import AsWritten
 
 Report = Callable[[str], None]

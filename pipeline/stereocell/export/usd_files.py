@@ -67,12 +67,12 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def _state_colors(stage: Usd.Stage, flat: Sdf.Layer) -> None:
-    """Give shaders the colour of a material's edited interface: many programs read theirs alone."""
+    """Copy the edited colour of each material to its shader: many programs read only that one."""
     for prim in stage.Traverse():
         edited = edited_color(prim) if prim.IsA(UsdShade.Material) else None
         if edited is not None:
-            plain = flat.GetAttributeAtPath(f"{prim.GetPath()}/surface.inputs:diffuseColor")
-            plain.default = edited.Get()
+            color = flat.GetAttributeAtPath(f"{prim.GetPath()}/surface.inputs:diffuseColor")
+            color.default = edited.Get()
 
 
 def _channels(stage: Usd.Stage, place: Sdf.Path) -> list[str]:

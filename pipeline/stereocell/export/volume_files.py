@@ -7,6 +7,7 @@ import nibabel
 import numpy as np
 
 from stereocell.export.chosen import Chosen
+from stereocell.export.options import ExportOptions
 from stereocell.export.voxels import Layout, fill, find_layout, map_file
 from stereocell.formats.nrrd_write import nrrd_head
 from stereocell.model.errors import UsageError
@@ -33,17 +34,21 @@ def write_raw(chosen: Chosen, path: Path, _: int) -> str:
     path.touch()
     fill(layout, chosen, map_file(path, layout, 0))
     x, y, z = layout.grid.size
+    beside = described_by(path, chosen.options)
     if chosen.options.unity:
         lines = [f"dimx:{x}", f"dimy:{y}", f"dimz:{z}", "skip:0", f"format:{layout.dtype.name}"]
-        beside = path.with_name(f"{path.name}.ini")
         beside.write_bytes("\n".join([*lines, "endianness:LittleEndian", ""]).encode("ascii"))
         across = ", ".join(
             f"{n * s:.6g}" for n, s in zip((x, y, z), layout.grid.spacing, strict=True)
         )
         return f"{layout.about}; {beside.name} describes it; {across} {layout.grid.unit} across"
-    beside = path.with_suffix(".nhdr")
     beside.write_bytes(nrrd_head(layout.grid, layout.dtype, layout.names, data_file=path.name))
     return f"{layout.about}; {beside.name} describes it"
+
+
+def described_by(path: Path, options: ExportOptions) -> Path:
+    """Return the path of the text beside a .raw that says how its voxels lie."""
+    return path.with_name(f"{path.name}.ini") if options.unity else path.with_suffix(".nhdr")
 
 
 def write_nifti(chosen: Chosen, path: Path, _: int) -> str:

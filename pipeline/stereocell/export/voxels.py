@@ -22,7 +22,8 @@ from stereocell.formats.voxel_grid import VoxelGrid
 from stereocell.model.errors import StageError, UsageError
 from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_appearances import ComposedAppearance
-from stereocell.usd.read_stage import ComposedVolume, sides_of
+from stereocell.usd.read_stage import sides_of
+from stereocell.usd.read_volume import ComposedVolume
 
 _OFF = 1e-2  # voxels by which a tile may lie beside the lattice of the first
 _IMAGE_AXES = np.diag([1.0, -1.0, 1.0])  # places in an image, of the world's

@@ -1,6 +1,5 @@
 """Write one file of a built OUT for another program: the format is chosen by the file's ending."""
 
-import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -24,13 +23,14 @@ from stereocell.export.pictures import (
 )
 from stereocell.export.print_solids import write_print
 from stereocell.export.usd_files import write_flattened, write_light_copy
-from stereocell.export.volume_files import write_nifti, write_nrrd, write_raw
+from stereocell.export.volume_files import described_by, write_nifti, write_nrrd, write_raw
 from stereocell.export.written import is_own, remember
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.storage.atomic_write import put_in_place
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import is_file
-from stereocell.usd.read_stage import dependencies
+from stereocell.usd.stage_files import dependencies
 from stereocell.usd.write_usdz import MAX_TRIANGLES
 from stereocell.usd.written_files import CHANGED
 
@@ -46,12 +46,14 @@ class Format:
                file
     triangles  the most that are wanted if nothing is said; a coarsest level of more is taken
     is_seen    made to be looked at: without --channels it has those that the viewer opens with
+    beside     returns the paths of what goes with the file
     """
 
     write: Callable[[Chosen, Path, int], str]
     takes: frozenset[str]
     triangles: int | None = None
     is_seen: bool = False
+    beside: Callable[[Path, ExportOptions], list[Path]] = lambda _path, _options: []
 
     @property
     def has_levels(self) -> bool:
@@ -77,7 +79,9 @@ FORMATS = {
     ".mp4": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
     ".webm": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
     ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}),
-    ".raw": Format(write_raw, _VOLUME | {"unity"}),
+    ".raw": Format(
+        write_raw, _VOLUME | {"unity"}, beside=lambda file, options: [described_by(file, options)]
+    ),
     ".nii.gz": Format(write_nifti, _VOLUME),
     ".nii": Format(write_nifti, _VOLUME),
     ".precomputed": Format(write_precomputed, frozenset({"tiles", "region", "bits"})),
@@ -130,16 +134,17 @@ def _export(
     report: Report,
     is_ours: Callable[[Path], bool],
 ) -> tuple[str, list[Path]]:
-    """Write `file` and what goes with it; return the lines about it, and all paths.
+    """Write `file` and the files that go with it; return a line about it, and all paths.
 
-    is_ours  whether what lies at a path may be replaced without --force
+    is_ours  whether what lies at a path may be replaced unasked
     """
     ending = find_ending(file)
     way = FORMATS[ending]
     _require_takes(ending, way, options)
     if not file.parent.is_dir():
         raise OutputError(f"{file.parent}: no such folder")
-    require_free(file, expected=_EXPECTED, is_ours=is_ours(file))  # before the work
+    for place in (file, *way.beside(file, options)):  # before the work
+        require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
     chosen = Chosen(stage_path, options, report)
     if way.is_seen:
         chosen.show_as_viewer()
@@ -151,7 +156,7 @@ def _export(
         for place in places:
             require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
         for one, place in zip(made, places, strict=True):
-            _put(one, place)
+            put_in_place(one, place, beside / "old")
     for layer in sorted(chosen.as_written.changed):
         report(f"{layer}: {CHANGED}: taken as it is")
     return line, places
@@ -201,13 +206,6 @@ def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -
         place.is_relative_to(folder.resolve()) for folder in made
     ):
         raise UsageError(f"{file}: a part of the build lies there, expected another place")
-
-
-def _put(made: Path, place: Path) -> None:
-    """Move a file or a folder to its place, instead of what was there."""
-    if place.is_dir():
-        os.replace(place, made.with_name("old"))
-    os.replace(made, place)
 
 
 def find_ending(file: Path) -> str:

@@ -1,7 +1,7 @@
 """OUT/exports.json: the files that were exported from a build, with the hash of each.
 
-Most formats have no place that says who wrote a file and of which specimen. By this list an export
-may replace its own earlier file, and not one that somebody else wrote or has edited since.
+Most formats have no field for the program and the specimen of a file. With this list an export
+replaces its own earlier file, and no file that another program wrote or that was edited since.
 """
 
 import hashlib
@@ -17,15 +17,15 @@ from stereocell.storage.workspace import is_mirrored
 
 
 def is_own(out: Path, file: Path) -> bool:
-    """Return whether a file or folder is as an export of OUT left it."""
+    """Return whether a file or folder is unchanged since it was exported from OUT."""
     found = find_sealed(OutFolder(out).exports_file, EXPORTS)
     return found is not None and found["files"].get(_key(file), "") == _digest(file)
 
 
 def remember(out: Path, files: Iterable[Path]) -> None:
-    """Add exported files to OUT's list; where OUT can't be written, there is none.
+    """Add exported files to OUT's list; an OUT that can't be written has no list.
 
-    An OUT on object storage has no list: an export only reads it.
+    An OUT on object storage has no list either: an export only reads it.
     """
     if is_mirrored(out):
         return

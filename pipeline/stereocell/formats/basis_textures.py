@@ -1,4 +1,4 @@
-"""Baked maps as KTX2 textures of Basis Universal, by alktx2: a package of the extra `maps`."""
+"""Write baked maps as KTX2 textures of Basis Universal, by alktx2 of the extra `maps`."""
 
 import io
 from typing import Any

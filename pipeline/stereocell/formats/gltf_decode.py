@@ -20,7 +20,7 @@ _TYPES = {
     5126: np.float32,
 }
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-_MAX_BYTES = 1 << 30  # bytes, most of a decoded bufferView: memory is taken before it is decoded
+_MAX_BYTES = 1 << 30  # bytes, largest decoded bufferView: its memory is allocated before decoding
 _HEAD = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
 

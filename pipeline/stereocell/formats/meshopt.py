@@ -16,9 +16,9 @@ def reorder(
     """Return the triangles in an order that suits the GPU's vertex cache, and the vertices to keep.
 
     triangles  uint32 (m, 3)
-    objects    int32, the object of each vertex. Objects come one after another then
-    result     indices uint32 (3m,), by the kept vertices; kept vertices int64 (k,), in the order of
-               their first use. Unused vertices are left out
+    objects    int32, the object of each vertex; the triangles are then grouped by object
+    result     indices uint32 (3m,) into the kept vertices; kept vertices int64 (k,), in the order
+               of their first use. Unused vertices are left out
     """
     indices, order = _renumbered(np.asarray(triangles, dtype=np.uint32), is_reordered=True)
     if objects is None:

@@ -51,6 +51,7 @@ from stereocell.kernels.walls import (
     slope_volumes,
     smooth_walls,
 )
+from stereocell.kernels.xxhash import xxh32
 
 OF_MESHES = "of-meshes"  # the argument of the process that compiles these
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
@@ -120,6 +121,7 @@ def compile_others() -> None:
     _, nearest, parts = find_nearest(at, at, triangles, *cells, np.full(4, -1, np.int32), 0)
     find_sides(at, nearest, parts, at, triangles, twins)
 
+    xxh32(bytes(7))
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
     find_downhill(voxels, points.astype(np.float64), np.ones(3))
     pixel = np.zeros((1, 2), np.int64)

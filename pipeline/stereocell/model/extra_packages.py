@@ -1,7 +1,7 @@
 """Packages that an extra of StereoCell installs, such as `pip install 'stereocell[draco]'`.
 
-They are imported by name, where they are used. So results that do not use them have names (cache
-keys) that do not depend on them; a result that does puts the version into its own key.
+They are imported by name, where they are used. So the cache keys of results that do not use them do
+not depend on them. A result that uses one puts its version into its own key.
 """
 
 from importlib import import_module
@@ -18,7 +18,7 @@ def import_extra(module: str, *, extra: str, wanted_by: str) -> Any:
 
     wanted_by  the flag or the work that needs it, the subject of the error's sentence
 
-    Raises UsageError, with the command that installs it, where it can't be imported.
+    Raises UsageError, with the command that installs the extra, where the import fails.
     """
     try:
         return import_module(module)
@@ -30,7 +30,7 @@ def import_extra(module: str, *, extra: str, wanted_by: str) -> Any:
 
 def version_of(package: str) -> str:
     """Return the version of an installed package; empty: it is not installed."""
-    from importlib.metadata import PackageNotFoundError, version  # brings 40 modules more
+    from importlib.metadata import PackageNotFoundError, version  # imports 40 more modules
 
     try:
         return version(package)

@@ -5,11 +5,13 @@ A larger array is made coarser by means over blocks of voxels, whose edges are a
 be; it is read a block of planes at a time, so that no more of it is in memory.
 """
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, isfinite, prod
 from pathlib import Path
 from typing import Any
+from uuid import NAMESPACE_OID, uuid5
 
 import numpy as np
 import tifffile
@@ -180,7 +182,10 @@ def say_quality(source: ArraySource, blocks: tuple[int, int, int]) -> str:
 
 
 def write_source(source: ArraySource, path: Path, blocks: tuple[int, int, int]) -> None:
-    """Write an array as OME-TIFF. Raises UsageError for values that no file holds."""
+    """Write an array as OME-TIFF; the same array gives the same bytes.
+
+    Raises UsageError for values that no file holds.
+    """
     count, depth, *_ = source.shape
     coarse = [
         np.concatenate([_mean(part, blocks) for part in _parts(source, channel, depth, blocks[0])])
@@ -188,7 +193,11 @@ def write_source(source: ArraySource, path: Path, blocks: tuple[int, int, int]) 
     ]
     voxels = _as_stored(np.stack(coarse))
     spacing = [s * b for s, b in zip(source.spacing_um, blocks, strict=True)]
+    content = hashlib.sha256(np.ascontiguousarray(voxels).data)
+    content.update(repr((spacing, source.channels)).encode())
     metadata = {
+        # tifffile would draw one at random
+        "UUID": str(uuid5(NAMESPACE_OID, content.hexdigest())),
         "axes": "CZYX",
         "Channel": {"Name": list(source.channels)},
         **{f"PhysicalSize{axis}": edge for axis, edge in zip("ZYX", spacing, strict=True)},

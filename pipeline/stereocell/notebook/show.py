@@ -6,10 +6,12 @@ Imports are lazy: `import stereocell` takes none of them.
 import atexit
 import io
 import re
+import shlex
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr
+from filecmp import cmp
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +21,7 @@ from stereocell.model.errors import UsageError
 from stereocell.model.extra_packages import import_extra
 
 if TYPE_CHECKING:
+    from stereocell.notebook.arrays import ArraySource
     from stereocell.notebook.widget import Viewer
 
 _MANIFEST = "manifest.json"
@@ -35,6 +38,7 @@ def show(
     out: str | Path | None = None,
     preset: str | None = None,
     settings: Mapping[str, Any] | None = None,
+    force: bool = False,
     height: int = 520,
     **state: Any,
 ) -> "Viewer":
@@ -48,6 +52,7 @@ def show(
     quality     auto: means of voxels where an array, or a level where a source, is large; full
     out         where the build of a source or an array stays; else it goes when Python ends
     preset, settings  of the build, as `stereocell.build` takes them
+    force       replace whatever lies in `out`; without, only a build of the same source or array is
     height      CSS pixels
     state       `link`, `channels`, `view`, `picked`: what the viewer opens with
 
@@ -61,6 +66,7 @@ def show(
     from stereocell.notebook.arrays import is_array
     from stereocell.notebook.page import find_page
     from stereocell.storage.location import Location
+    from stereocell.storage.overwriting import IN_PYTHON, forcing
 
     if quality not in _QUALITIES:
         raise UsageError(f"quality is {quality!r:.40}, expected one of {', '.join(_QUALITIES)}")
@@ -76,16 +82,17 @@ def show(
     kept = None if out is None else Path(out)
     folder = kept or Path(tempfile.mkdtemp(prefix="stereocell-"))
     try:
-        chosen, told = _build(
-            source,
-            folder,
-            spacing_um=spacing_um,
-            channels=channels,
-            name=name,
-            is_full=quality == "full",
-            preset=preset,
-            settings=settings or {},
-        )
+        with forcing(force, IN_PYTHON):
+            chosen, told = _build(
+                source,
+                folder,
+                spacing_um=spacing_um,
+                channels=channels,
+                name=name,
+                is_full=quality == "full",
+                preset=preset,
+                settings=settings or {},
+            )
         bundle = folder / "bundle"
         viewer = _viewer(bundle, folder, quality=chosen, told=told, height=height, state=state)
     except BaseException:
@@ -109,7 +116,7 @@ def _find_bundle(path: Path) -> tuple[Path, Path | None] | None:
     if (path / "plan.json").is_file():
         raise UsageError(
             f"{path}: a build without a bundle, expected {path / 'bundle' / _MANIFEST}: "
-            "`stereocell bundle` writes it"
+            f"run `stereocell bundle {shlex.quote(str(path))}` first"
         )
     return None
 
@@ -126,9 +133,12 @@ def _viewer(
     from stereocell.notebook.bundle_files import NotebookBundle
     from stereocell.notebook.picture import draw, no_picture
     from stereocell.notebook.widget import Viewer
+    from stereocell.storage.shell_commands import filling_in
 
+    with filling_in({} if out is None else {"OUT": str(out)}):
+        files = NotebookBundle(bundle)
     viewer = Viewer(
-        NotebookBundle(bundle),
+        files,
         quality=quality,
         told=told,
         draw=no_picture if out is None else partial(draw, out),
@@ -152,9 +162,7 @@ def _build(
 ) -> tuple[str, str]:
     """Build a source or an array in a folder; return words about its quality, and what was said."""
     from stereocell.notebook import arrays
-    from stereocell.storage.contents import contents_of
-    from stereocell.storage.kinds import Kind
-    from stereocell.storage.overwriting import require_free
+    from stereocell.storage.overwriting import is_forced
 
     chosen = ""
     wanted = {
@@ -165,13 +173,8 @@ def _build(
         given = arrays.as_source(source, spacing_um, channels)
         blocks = (1, 1, 1) if is_full else arrays.find_blocks(given)
         chosen = arrays.say_quality(given, blocks)
-        folder.mkdir(parents=True, exist_ok=True)
-        # the build is called as its file is
-        called = re.sub(r"[^\w .-]", "_", name)[:60].strip(" .") or "array"
-        source = folder / f"{called}.ome.tif"
-        if contents_of(folder).kind is not Kind.BUILD:
-            require_free(source, expected="nothing or a build of an array")
-        arrays.write_source(given, source, blocks)
+        source = folder / f"{_file_name(name)}.ome.tif"
+        _keep_source(given, source, blocks)
     else:
         plan = wanted.setdefault("plan", {})
         if spacing_um is not None:
@@ -179,8 +182,35 @@ def _build(
         if channels is not None:
             plan["channels"] = tuple(channels)
     with _heard() as said:
-        build(source, folder, preset=preset, settings=wanted)
+        build(source, folder, preset=preset, settings=wanted, force=is_forced())
     return chosen, said.getvalue()
+
+
+def _file_name(name: str) -> str:
+    """Return a file's name without an ending; the build is named after its file."""
+    return re.sub(r"[^\w .-]", "_", name)[:60].strip(" .") or "array"
+
+
+def _keep_source(given: "ArraySource", source: Path, blocks: tuple[int, int, int]) -> None:
+    """Write an array into the folder of its build.
+
+    Raises OutputError where the folder holds anything but a build of this very array.
+    """
+    from stereocell.building.out_folder import require_build_or_nothing
+    from stereocell.notebook.arrays import write_source
+    from stereocell.storage.atomic_write import replacing
+    from stereocell.storage.contents import contents_of
+    from stereocell.storage.kinds import Kind
+    from stereocell.storage.overwriting import require_free
+
+    expected = "nothing or a build of this array"
+    require_build_or_nothing(source.parent, source)
+    if contents_of(source.parent).kind is Kind.BUILD and not source.exists():
+        require_free(source.parent, expected=expected)
+    with replacing(source) as file:
+        write_source(given, file, blocks)
+        is_same = source.is_file() and cmp(file, source, shallow=False)
+        require_free(source, expected=expected, is_ours=is_same)
 
 
 @contextmanager

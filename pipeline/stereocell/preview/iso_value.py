@@ -4,6 +4,7 @@ The level is that of the whole channel, as a build of the same settings finds it
 it is found on tiles spread evenly, and the table says so.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -53,7 +54,8 @@ COLORS: tuple[Color, ...] = (
     (255, 255, 255),
 )
 LOOKED_AT = 100_000_000  # voxels that the level is found on; a build takes all
-_SOURCE = "Source"  # text in a picture: the fingerprint of its source
+_EXPECTED = "nothing or a picture of the same source"
+_SOURCE = "Source"  # key of a PNG's text: the fingerprint of the source
 _LONGEST_PX = 900  # pixels, longest side of a slice
 _CHART_PX = 200  # pixels, height of the histogram
 _GROUND, _AXIS, _CURVE = (18, 20, 24), (90, 96, 104), (225, 228, 232)
@@ -107,11 +109,8 @@ def preview(
     plan = settle(source, settings)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
-    if path.is_dir():
-        raise OutputError(f"{path}: is a folder, expected a file named .png")
-    require_free(
-        path, expected="nothing or a picture of the same source", is_ours=_is_own(path, plan)
-    )
+    require_picture_or_nothing(path)
+    require_free(path, expected=_EXPECTED, is_ours=_source_of_picture(path) == plan.fingerprint)
     window = measure_window(statistics_task(plan, channel))
     tiles = _spread(plan, tile)
     evidence = {
@@ -154,20 +153,30 @@ def preview(
 
 
 def _mark(plan: Plan) -> PngInfo:
-    """Return the texts in a picture by which its program and its source are known again."""
+    """Return the texts of a picture that identify its program and its source."""
     mark = PngInfo()
     mark.add_text("Software", GENERATOR)
     mark.add_text(_SOURCE, plan.fingerprint)
     return mark
 
 
-def _is_own(path: Path, plan: Plan) -> bool:
-    """Return whether a file is an earlier picture of the same source."""
+def require_picture_or_nothing(path: Path) -> None:
+    """Raise OutputError where a path holds no picture of this command, of whichever source."""
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, expected a file named .png")
+    require_free(path, expected=_EXPECTED, is_ours=_source_of_picture(path) is not None)
+
+
+def _source_of_picture(path: Path) -> str | None:
+    """Return the fingerprint of the source of an earlier picture; None for any other file."""
     try:
-        with Image.open(path) as picture:
-            return picture.info.get(_SOURCE) == plan.fingerprint
-    except (OSError, ValueError, SyntaxError):  # PIL's own, of files that are no picture
-        return False
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the header of a foreign file may state a huge size
+            with Image.open(path) as picture:
+                found = picture.info.get(_SOURCE)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # it is no picture
+        return None
+    return found if isinstance(found, str) else None
 
 
 def _spread(plan: Plan, tile: Tile) -> list[Tile]:

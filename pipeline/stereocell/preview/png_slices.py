@@ -33,13 +33,14 @@ from stereocell.preview.cut_planes import (
 )
 from stereocell.preview.views import views_of
 from stereocell.storage.atomic_write import replacing_folder
-from stereocell.storage.contents import contents_of, is_nobodys, words_for
+from stereocell.storage.contents import contents_of, is_ignored, words_for
 from stereocell.storage.json_files import find_json, write_json
 from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.workspace import names_in
 
 INDEX = "slices.json"
+_EXPECTED = "nothing or slices of the same source"
 FORMAT, VERSION = "stereocell-slices", 2
 
 
@@ -133,14 +134,19 @@ def _line(plan: Plan, cut: Cut) -> str:
     )
 
 
+def require_slices_or_nothing(folder: Path) -> None:
+    """Raise OutputError where a folder holds no slices, of whichever source."""
+    require_free(folder, expected=_EXPECTED, is_ours=contents_of(folder).kind is Kind.SLICES)
+
+
 def _require_own(folder: Path, plan: Plan) -> None:
-    """Raise OutputError unless a folder holds nothing, or slices of the same source alone."""
+    """Raise OutputError unless a folder is empty, or holds only slices of the same source."""
     found = contents_of(folder)
-    names = {name for name in names_in(folder) if not is_nobodys(name)}
+    names = {name for name in names_in(folder) if not is_ignored(name)}
     is_ours = found.kind is Kind.SLICES and found.fingerprint == plan.fingerprint
     if is_ours and (others := sorted(names - {INDEX, *_listed(folder)})):
         require_free(folder, expected="slices and no other file", found=words_for(others))
-    require_free(folder, expected="nothing or slices of the same source", is_ours=is_ours)
+    require_free(folder, expected=_EXPECTED, is_ours=is_ours)
 
 
 def _listed(folder: Path) -> set[str]:

@@ -7,7 +7,7 @@ earlier one or the new one.
 """
 
 import gzip
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -22,9 +22,9 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.publish.over_http import INDEX, fetch_faults, find_page
 from stereocell.publish.published_page import (
     CHANGED,
-    REPLACES,
     Entries,
     find_changed,
+    keep_copy,
     list_of,
     read_published,
     require_own,
@@ -32,7 +32,7 @@ from stereocell.publish.published_page import (
 )
 from stereocell.publish.targets import Target, digest, target_of
 from stereocell.storage.contents import PUBLISHED, Contents, contents_of
-from stereocell.storage.file_list import DAMAGED, find_faults, read_list
+from stereocell.storage.file_list import DAMAGED, FileList, find_faults, read_list
 from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import is_forced
 from stereocell.storage.workspace import cached
@@ -63,11 +63,19 @@ class _File:
 
 
 @dataclass(frozen=True, slots=True)
-class _OfRun:
-    """The paths that a run has uploaded, and the specimen that it has published."""
+class _Work:
+    """What there is to do at a target.
 
-    uploaded: Sequence[str]
-    specimen: Mapping[str, str]
+    there    bytes of each file at the target
+    before   the entries of the files that an earlier run has put there
+    changed  paths that are to be uploaded
+    gone     paths that the bundle has no more
+    """
+
+    there: Mapping[str, int]
+    before: Entries
+    changed: Sequence[str]
+    gone: Sequence[str]
 
 
 def publish(
@@ -92,13 +100,16 @@ def publish(
     if build is not None:
         require_documents(OutFolder(build), "publish")
         require_current(OutFolder(build))
-    files = _files_of(bundle)
+    listed = read_list(bundle / FILES, _REMEDY)
+    files = _files_of(bundle, listed)
     specimen = _specimen_of(bundle, held)
     target = target_of(text, is_public=is_public)
     if isinstance(folder := getattr(target, "folder", None), Path):
         _require_apart(folder, out)
     entries = {path: file.entry for path, file in files.items()}
-    changed, gone = _put(target, files, entries, specimen, report)
+    work = _compare(target, entries, specimen)
+    _require_whole(bundle, listed)  # after the guards: it hashes all of the bundle
+    _put(target, files, work, specimen, report)
     address = (url and url.rstrip("/") + "/") or target.address
     faults = (
         fetch_faults(address, entries, report)
@@ -106,79 +117,101 @@ def publish(
         else {p: "is another" for p in files if digest(target.read(p)) != entries[p]["sha256"]}
     )
     if faults:
-        raise _fault_of(target, address, faults, entries, _OfRun(changed, specimen))
+        other = {p for p in faults if digest(target.read(p)) != entries[p]["sha256"]}
+        _mark_spoilt(target, other & {*work.changed}, entries, specimen)
+        raise _error_of(address or f"{target.shown}/", faults, entries, other, work)
     size = sum(entry["bytes"] for entry in entries.values())
-    sent = sum(entries[path]["bytes"] for path in changed)
+    sent = sum(entries[path]["bytes"] for path in work.changed)
     page = address and find_page(address, entries)
-    return Published(page, len(files), size, len(changed), sent, len(gone))
+    return Published(page, len(files), size, len(work.changed), sent, len(work.gone))
+
+
+def _compare(target: Target, entries: Entries, specimen: Mapping[str, str]) -> _Work:
+    """Return the work that there is to do at a target.
+
+    Raises OutputError where the target holds what is not ours, or what somebody edited.
+    """
+    there = target.sizes()
+    before = read_published(target, there)
+    require_own(target, entries, there, before, specimen)
+    edited = find_changed(target, entries, there, before) if is_forced() else []
+    changed = [
+        path
+        for path, entry in entries.items()
+        if before.get(path) != entry or there.get(path) != entry["bytes"] or path in edited
+    ]
+    gone = [path for path in before if path not in entries]
+    require_unchanged(target, [*changed, *gone], there, before)
+    return _Work(there, before, changed, gone)
 
 
 def _put(
     target: Target,
     files: Mapping[str, _File],
-    entries: Entries,
+    work: _Work,
     specimen: Mapping[str, str],
     report: Callable[[str], None],
-) -> tuple[list[str], list[str]]:
-    """Upload what has changed and remove what has gone; return the paths of both.
-
-    Raises OutputError, before anything is written, where the target holds what is not ours.
-    """
-    there = target.sizes()
-    before = read_published(target, there)
-    require_own(target, entries, there, before, specimen)
-    other = find_changed(target, entries, there, before) if is_forced() else []
-    changed = [
-        path
-        for path, entry in entries.items()
-        if before.get(path) != entry or there.get(path) != entry["bytes"] or path in other
-    ]
-    gone = [path for path in before if path not in files]
-    require_unchanged(target, [*changed, *gone], there, before)
-    if changed or gone or before != entries:
-        # what is about to be there is ours, too, should this run be killed
-        unsure = dict.fromkeys((*gone, *changed))
-        target.write(PUBLISHED, list_of({**before, **entries, **unsure}, specimen))
-        _upload(target, files, changed, report)
-        for path in gone:
-            if path in there:
-                target.remove(path)
-        target.write(PUBLISHED, list_of(entries, specimen))
-    return changed, gone
+) -> None:
+    """Upload what has changed, and remove what the bundle has no more."""
+    entries = {path: file.entry for path, file in files.items()}
+    if not (work.changed or work.gone or work.before != entries):
+        return
+    # what is about to be there is ours, too, should this run be killed
+    unsure = dict.fromkeys((*work.gone, *work.changed))
+    target.write(PUBLISHED, list_of({**work.before, **entries, **unsure}, specimen))
+    _upload(target, files, work.changed, report)
+    for path in work.gone:
+        if path in work.there:
+            target.remove(path)
+    target.write(PUBLISHED, list_of(entries, specimen))
 
 
-def _fault_of(
-    target: Target, address: str | None, faults: Mapping[str, str], entries: Entries, run: _OfRun
+def _mark_spoilt(
+    target: Target, spoilt: Iterable[str], entries: Entries, specimen: Mapping[str, str]
+) -> None:
+    """Note at the target which files the next run is to put there again."""
+    if unsure := dict.fromkeys(spoilt):
+        target.write(PUBLISHED, list_of({**entries, **unsure}, specimen))
+
+
+def _error_of(
+    where: str, faults: Mapping[str, str], entries: Entries, other: Collection[str], work: _Work
 ) -> OutputError:
-    """Return the error of files that are not as they were put there, or not sent so.
+    """Return the error of files that are not sent as they were put there.
 
-    What this run has put there and the target has otherwise is put there anew by the next run.
-    Anything else that the target has otherwise was changed by somebody: only --force replaces it.
+    other  the files that the target itself has otherwise: those that this run has put there were
+           spoilt on their way, and the next run puts them there again; somebody edited the others
     """
-    other = [p for p in faults if digest(target.read(p)) != entries[p]["sha256"]]
-    spoilt = [path for path in other if path in run.uploaded]
-    if spoilt:
-        target.write(PUBLISHED, list_of({**entries, **dict.fromkeys(spoilt)}, run.specimen))
     path, fault = next(iter(sorted(faults.items())))
-    remedy = ""
-    if path in other:
-        remedy = f"{CHANGED}: {REPLACES}"
-    if path in spoilt:
-        remedy = "the same command puts it there again"
+    remedy = f": {CHANGED}: {keep_copy()}" if path in other else ""
+    if path in other and path in work.changed:
+        remedy = ": the same command puts it there again"
+    more = f" ({len(faults)} such)" if len(faults) > 1 else ""
+    size = entries[path]["bytes"]
     return OutputError(
-        f"{address or target.shown + '/'}{path}: {fault}, expected the bundle's file of "
-        f"{entries[path]['bytes']} bytes"
-        + (f" ({len(faults)} such)" if len(faults) > 1 else "")
-        + (f": {remedy}" if remedy else "")
+        f"{where}{path}: {fault}, expected the bundle's file of {size} bytes{more}{remedy}"
     )
 
 
-def _files_of(bundle: Path) -> dict[str, _File]:
-    """Return the bundle's files by path, and JSON packed for hosts that send such files."""
-    listed = read_list(bundle / FILES, _REMEDY)
-    if faults := find_faults(bundle, listed):
+def _require_whole(bundle: Path, listed: FileList) -> None:
+    """Raise OutputError unless each file of the bundle's list has the bytes that it says."""
+    _raise_on(bundle, find_faults(bundle, listed))
+
+
+def _raise_on(bundle: Path, faults: Mapping[str, str]) -> None:
+    """Raise OutputError with the first fault, if there is one."""
+    if faults:
         path, fault = next(iter(faults.items()))
         raise OutputError(f"{bundle / path}: {fault}: {_REMEDY}")
+
+
+def _files_of(bundle: Path, listed: FileList) -> dict[str, _File]:
+    """Return the bundle's files by path, and JSON packed for hosts that send such files.
+
+    Raises OutputError where a JSON file is damaged.
+    """
+    documents = {path: one for path, one in listed.items() if path.endswith(".json")}
+    _raise_on(bundle, find_faults(bundle, documents))
     files = {path: _File(entry, partial(_content, bundle / path)) for path, entry in listed.items()}
     # the list names all files but itself and the manifest, which names the list
     index = _made(_content(bundle / FILES))

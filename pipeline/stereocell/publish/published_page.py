@@ -15,13 +15,12 @@ from stereocell.model.errors import OutputError
 from stereocell.publish.targets import Target, digest
 from stereocell.storage.contents import PUBLISHED, words_for
 from stereocell.storage.file_list import to_json
-from stereocell.storage.overwriting import HINT, is_forced, refused
+from stereocell.storage.overwriting import is_forced, or_force, refused
 
 # path -> bytes and sha256; None: a run that was stopped may or may not have put it there
 Entries = Mapping[str, Any]
 _OF_HOSTS = ("CNAME", "README.md", "LICENSE", "robots.txt", "404.html")
 CHANGED = "changed since it was published"
-REPLACES = "keep a copy of what you changed, then --force replaces it"
 
 
 def list_of(entries: Entries, specimen: Mapping[str, str]) -> bytes:
@@ -84,7 +83,7 @@ def require_own(
         if path in there and path not in before and not _is_same(target, path, entry, there):
             raise OutputError(
                 f"{target.shown}/{path}: is there, and was not put there by this command, "
-                f"expected a place of the bundle's own: {HINT}"
+                f"expected a place of the bundle's own: {or_force('choose another place')}"
             )
     others = [path for path in there if path not in entries and not _is_of_host(path)]
     if not before and others:
@@ -119,7 +118,12 @@ def require_unchanged(
     changed = [] if is_forced() else find_changed(target, paths, there, before)
     if changed:
         more = f" ({len(changed)} such files)" if len(changed) > 1 else ""
-        raise OutputError(f"{target.shown}/{min(changed)}: {CHANGED}{more}: {REPLACES}")
+        raise OutputError(f"{target.shown}/{min(changed)}: {CHANGED}{more}: {keep_copy()}")
+
+
+def keep_copy() -> str:
+    """Return the remedy where a file of the page was edited at the target."""
+    return or_force("keep a copy of the edited file elsewhere and remove it there")
 
 
 def _is_same(target: Target, path: str, entry: Mapping[str, Any], there: Mapping[str, int]) -> bool:

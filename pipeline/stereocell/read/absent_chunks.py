@@ -1,7 +1,7 @@
-"""Chunks that are not stored: Zarr, N5 and HDF5 read them as a fill value, and so a lost one, too.
+"""Count the chunks that are not stored. Zarr, N5 and HDF5 read them as a fill value.
 
-Formats allow it, since writers leave out empty chunks. So their share is told. A level of which no
-chunk is where its metadata say holds nothing, and is refused.
+Formats allow this, because writers leave out empty chunks. A chunk that was lost looks the same, so
+the share of absent chunks is reported. A level without any stored chunk is refused by the caller.
 """
 
 import math
@@ -15,16 +15,18 @@ from stereocell.read.dataset import Dataset, VoxelArray
 from stereocell.read.readers import format_of
 from stereocell.storage.file_states import FileStates
 
-_MOST_COUNTED = 2_000_000  # most chunks that are looked for
-Spans = Sequence[Sequence[range]]  # of each axis the ranges of indices that are read
+_MOST_COUNTED = 2_000_000  # most chunks that are looked for; a part with more is not counted
+Spans = Sequence[Sequence[range]]  # for each axis the ranges of indices that are read
 
 
 @dataclass(frozen=True, slots=True)
 class Absent:
-    """How many chunks of a part of a level are not stored.
+    """The number of chunks of a part of a level that are not stored.
 
-    noun  `chunk`, `shard` or `block`
-    fill  the value that is read for them
+    count  chunks that are absent
+    total  all chunks of the part
+    noun   `chunk`, `shard` or `block`
+    fill   the value that is read for absent chunks
     """
 
     count: int
@@ -36,7 +38,7 @@ class Absent:
 def count_absent(
     dataset: Dataset, channels: Sequence[int], box: Box, level: int, states: FileStates
 ) -> Absent | None:
-    """Return how many chunks of a box of some channels are absent; None: it can't be counted.
+    """Return how many chunks of a box of some channels are absent; None: they can't be counted.
 
     states  the source's files, as they were listed
     """
@@ -68,7 +70,7 @@ def _in_n5(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
 
 
 def _in_hdf5(stored: Any, _: Spans, __: FileStates) -> Absent | None:
-    """Count in a dataset as a whole."""
+    """Count the chunks of the whole dataset: HDF5 gives their number at no cost."""
     dataset = getattr(stored, "dataset", None)
     if dataset is None or dataset.chunks is None:
         return None
@@ -85,7 +87,7 @@ _COUNTERS: dict[str, Callable[[Any, Spans, FileStates], Absent | None]] = {
 
 
 def _spans(array: VoxelArray, time: int, channels: Sequence[int], box: Box) -> Spans:
-    """Return, of each axis, the ranges of indices that are read."""
+    """Return for each axis the ranges of indices that are read."""
     wanted = {
         **{axis: [range(a, b)] for axis, a, b in zip("zyx", box.start, box.stop, strict=True)},
         "t": [range(time, time + 1)],
@@ -100,7 +102,17 @@ def _of_axis(size: int, ranges: Sequence[range]) -> list[int]:
 
 
 def _number(sizes: Sequence[int], spans: Spans) -> int:
-    return math.prod(len(_of_axis(n, ranges)) for n, ranges in zip(sizes, spans, strict=True))
+    return math.prod(_count(n, ranges) for n, ranges in zip(sizes, spans, strict=True))
+
+
+def _count(size: int, ranges: Sequence[range]) -> int:
+    """Return the number of chunks along one axis; without a list of them, which may be long."""
+    count, reached = 0, 0
+    for one in sorted(ranges, key=lambda one: one.start):
+        first, stop = max(one.start // size, reached), -(-one.stop // size)
+        if stop > first:
+            count, reached = count + stop - first, stop
+    return count
 
 
 def _places(sizes: Sequence[int], spans: Spans) -> Iterator[tuple[int, ...]]:

@@ -32,7 +32,7 @@ class Setup:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """The setups of an XML, by their numbers, and its time points; none where there is no XML."""
+    """The setups of an XML by their numbers, and its time points; both empty without an XML."""
 
     setups: Mapping[int, Setup]
     times: tuple[int, ...] = ()
@@ -52,20 +52,24 @@ class Described:
         """
         parts = (("setups", setups, tuple(self.setups)), ("time points", times, self.times))
         for noun, found, listed in parts:
-            expected = listed or range(min(found), max(found) + 1)
-            missing = sorted(set(expected) - set(found))
-            if missing:
-                shown = ", ".join(map(str, missing[:_SHOWN])) + ", ..." * (len(missing) > _SHOWN)
+            present, first, last = set(found), min(found), max(found)
+            # groups may be numbered up to 10^12, so that all numbers in between make no list
+            expected = sorted(set(listed)) if listed else range(first, last + 1)
+            size = len(expected) if listed else last - first + 1
+            count = len(present.intersection(expected)) if listed else len(present)
+            if count < size:
+                missing = (number for number in expected if number not in present)
+                shown = ", ".join(map(str, islice(missing, _SHOWN)))
+                more = ", ..." * (size - count > _SHOWN)
                 source = "in the XML" if listed else f"up to {max(found)}"
                 raise SourceError(
-                    f"{where}: found {len(set(expected)) - len(missing)} of {len(set(expected))} "
-                    f"{noun} {source}, missing {shown}, expected all of them: copy the container "
-                    "again"
+                    f"{where}: found {count} of {size} {noun} {source}, missing "
+                    f"{shown}{more}, expected all of them: copy the container again"
                 )
 
 
 def read_described(path: str) -> Described:
-    """Return what the XML says that names a container on this machine."""
+    """Return the setups and time points in the XML of a container on this machine."""
     container = Path(path)
     for file in islice(sorted(container.parent.glob("*.xml")), _MAX_FILES):
         own = is_own(file, [container.parent.resolve()]) and file.is_file()
@@ -90,7 +94,7 @@ def read_described(path: str) -> Described:
 
 
 def _times(root: ElementTree.Element, setups: Collection[int]) -> tuple[int, ...]:
-    """Return the numbers of the time points, without those of which no view was taken."""
+    """Return the numbers of the time points, except those at which no view was taken."""
     node = root.find("SequenceDescription/Timepoints")
     if node is None:
         return ()

@@ -9,6 +9,7 @@ References: https://zeiss.github.io/libczi/
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -34,6 +35,8 @@ from stereocell.storage.location import Location, require_file
 _TYPES = {"Gray8": "u1", "Gray16": "u2", "Gray32Float": "f4"}
 _OTHERS = {"V": "views", "H": "phases", "I": "illuminations", "R": "rotations", "B": "blocks"}
 _UM_PER_METER = 1e6
+_ABSENT = "read as 0, as the format has it for tiles that were not acquired, and as lost ones are"
+_MAX_DIGITS = 10  # of a size in the metadata
 
 
 class _File:
@@ -47,7 +50,7 @@ class _File:
             self._child = stack.enter_context(Child(CziFile, location.path, self.where))
             facts: CziFacts = self._child.call("facts")
             self.metadata = _parsed(facts.metadata)
-        self.bounds, self.types = facts.bounds, facts.types
+        self.bounds, self.types, self._tiles = facts.bounds, facts.types, facts.tiles
         x, y = self.bounds.get("X", (0, 0)), self.bounds.get("Y", (0, 0))
         all_of_it = (x[0], y[0], x[1] - x[0], y[1] - y[0])
         self.scenes: Sequence[tuple[int | None, Rectangle]] = facts.scenes or [(None, all_of_it)]
@@ -61,6 +64,30 @@ class _File:
     def size(self, axis: str) -> int:
         low, high = self.bounds.get(axis, (0, 1))
         return high - low
+
+    def absent_notes(self, scene: int | None, time: int) -> tuple[str, ...]:
+        """Return a note on tiles that are not there at a point in time, which are read as 0.
+
+        Each plane is compared with the one that has most tiles. Raises SourceError where no plane
+        has one.
+        """
+        if not self._tiles:
+            return ()
+        first, last = self.bounds.get("T", (0, 1))
+        held = {time: Counter[tuple[int, ...]]() for time in range(first, last)}
+        for (of_scene, (channel, at, depth)), count in self._tiles.items():
+            if at in held and scene in (None, of_scene):
+                held[at][channel, depth] += count
+        most = max((count for planes in held.values() for count in planes.values()), default=0)
+        total = most * self.size("C") * self.size("Z")
+        absent = total - held[first + time].total()
+        if absent == total:
+            raise SourceError(
+                f"{self.where}: time point {time}: found no tile, expected {total}: the "
+                "acquisition ended early, or the file is damaged: choose another --time"
+            )
+        note = f"{absent} of {total} tiles ({absent / total:.2%}) are not stored: {_ABSENT}"
+        return (note,) if absent else ()
 
     def candidates(self) -> list[Candidate]:
         return [
@@ -119,8 +146,29 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
     array = VoxelArray(PlaneArray(shape, np.dtype(_TYPES[found[0]]), read), tuple("tczyx"))
     names, colors = _channels(file.metadata, shape[1])
     return Image(
-        (array,), (Grid(array.shape, file.spacing),), names, colors, 1, stack.close, notes=notes
+        (array,),
+        (Grid(array.shape, file.spacing),),
+        names,
+        colors,
+        1,
+        stack.close,
+        notes=(*notes, *_size_notes(file)),
+        notes_at=partial(file.absent_notes, scene),
     )
+
+
+def _size_notes(file: _File) -> tuple[str, ...]:
+    """Return a note for each axis along which the metadata state more than the tiles have."""
+    notes = []
+    for axis in "CZT":
+        text = file.metadata.findtext(f"Metadata/Information/Image/Size{axis}", "")
+        stated = int(text) if text.isdecimal() and len(text) < _MAX_DIGITS else 0
+        if stated > file.size(axis):
+            notes.append(
+                f"the metadata state {stated} along {axis}, and tiles are there for "
+                f"{file.size(axis)}: the acquisition ended early, or a part is missing"
+            )
+    return tuple(notes)
 
 
 def _parsed(text: str) -> ElementTree.Element:

@@ -1,4 +1,4 @@
-"""An open CZI file, by pylibCZIrw: the object that lives in a child process (read/czi.py)."""
+"""An open CZI file, read by pylibCZIrw. The object lives in a child process (read/czi.py)."""
 
 import os
 import struct
@@ -18,18 +18,21 @@ Rectangle = tuple[int, int, int, int]  # x, y, width, height
 
 @dataclass(frozen=True, slots=True)
 class CziFacts:
-    """The facts that a file states of itself.
+    """The metadata of a file.
 
-    bounds    first index and the one behind the last, by axis
+    bounds    first index and the index behind the last one, by axis
     types     pixel types, by channel
-    scenes    their numbers and places; empty: the file has no scenes
+    scenes    numbers and rectangles of the scenes; empty: the file has no scenes
     metadata  XML
+    tiles     number of tiles of the finest level, by scene and plane (c, t, z); empty: an early
+              file, whose tiles are not counted
     """
 
     bounds: dict[str, tuple[int, int]]
     types: tuple[str, ...]
     scenes: tuple[tuple[int, Rectangle], ...]
     metadata: str
+    tiles: dict[tuple[int, tuple[int, ...]], int]
 
 
 class CziFile:
@@ -47,7 +50,7 @@ class CziFile:
             self._file = self._opened.__enter__()
 
     def facts(self) -> CziFacts:
-        """Return what the file states. Raises SourceError."""
+        """Return the file's metadata. Raises SourceError."""
         with one_line(self._where, "a CZI file that is whole"):
             scenes = sorted(self._file.scenes_bounding_rectangle.items())
             return CziFacts(
@@ -55,6 +58,7 @@ class CziFile:
                 types=tuple(str(kind) for _, kind in sorted(self._file.pixel_types.items())),
                 scenes=tuple((index, (box.x, box.y, box.w, box.h)) for index, box in scenes),
                 metadata=self._file.raw_metadata,
+                tiles=dict(self._tiles.counts),
             )
 
     def read(self, window: Rectangle, plane: dict[str, int], scene: int | None) -> NDArray[Any]:
@@ -66,9 +70,10 @@ class CziFile:
 
 
 def _require_whole(path: str, where: str) -> int:
-    """Return where the directory lies. Raise SourceError where it or the metadata is not there.
+    """Return the byte at which the directory begins.
 
-    Both are mostly written last.
+    Raises SourceError where the file ends before the directory or the metadata, which most writers
+    write last.
     """
     size, directory = os.path.getsize(path), 0
     with open(path, "rb") as file:

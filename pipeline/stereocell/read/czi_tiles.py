@@ -1,12 +1,13 @@
-"""The directory of a CZI file, compared with the copy of each entry at its tile.
+"""Compare the directory of a CZI file with the copy of each entry at its tile.
 
-libCZI places a tile by the directory, and decodes it by the copy, so that a tile whose two entries
-differ is drawn at another size or place. Neither has a checksum.
+libCZI places a tile by the directory, and decodes it by the copy. A tile whose two entries differ
+is drawn at another size or place. Neither entry has a checksum.
 
 Reference: ZISRAW (CZI) File Format, "SubBlockDirectory" and "DirectoryEntryDV"
 """
 
 import struct
+from collections import Counter
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -27,9 +28,9 @@ _COMPARED = "CSTXYZ"  # axes by which voxels are read: channel, scene, time and 
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """All of an entry that says which voxels a tile holds.
+    """The fields of an entry that determine which voxels a tile holds.
 
-    axes  of each axis by which voxels are read its name, start, size and stored size
+    axes  name, start, size and stored size of each axis by which voxels are read
     """
 
     place: int
@@ -42,19 +43,33 @@ class _Entry:
         starts = {name: start for name, start, _, _ in self.axes}
         return tuple(starts.get(axis, 0) for axis in _PLANE)
 
+    @property
+    def scene(self) -> int:
+        return next((start for name, start, _, _ in self.axes if name == "S"), 0)
+
+    @property
+    def is_finest(self) -> bool:
+        """Whether the tile is of the finest level: it is stored as large as it is shown."""
+        return all(size == stored for name, _, size, stored in self.axes if name in "XY")
+
 
 class CziTiles:
-    """The entries of a directory, by plane; a plane's tiles are compared once.
+    """The entries of a directory, by plane. The tiles of a plane are compared once.
 
     at  place of the directory in the file
+
+    `counts` has the number of tiles of the finest level, by scene and plane (c, t, z); none for an
+    early file.
     """
 
     def __init__(self, path: str, at: int, where: str) -> None:
         self._path, self._where = path, where
         self._waiting: dict[tuple[int, ...], list[_Entry]] = {}
         with open(path, "rb") as file:
-            for entry in _entries(file, at):
-                self._waiting.setdefault(entry.plane, []).append(entry)
+            entries = _entries(file, at)
+        for entry in entries:
+            self._waiting.setdefault(entry.plane, []).append(entry)
+        self.counts = Counter((one.scene, one.plane) for one in entries if one.is_finest)
 
     def require_plane(self, plane: dict[str, int]) -> None:
         """Raise SourceError where a tile of a plane differs from its entry in the directory."""
@@ -74,9 +89,9 @@ class CziTiles:
 
 
 def _entries(file: BinaryIO, at: int) -> list[_Entry]:
-    """Return the entries of a directory; none of an early file's, which are not compared.
+    """Return the entries of a directory; an early file's (DE) are not compared, so it has none.
 
-    Raises ValueError, struct.error where it isn't whole.
+    Raises ValueError or struct.error where the directory isn't whole.
     """
     file.seek(at)
     name, _, used = SEGMENT.unpack(file.read(SEGMENT.size))
@@ -109,7 +124,7 @@ def _entry(content: bytes, start: int) -> tuple[_Entry, int]:
 
 
 def _copy(file: BinaryIO, place: int) -> _Entry:
-    """Return the entry at a tile, with the place that it lies at. Raises ValueError."""
+    """Return the copy of an entry at its tile. Raises ValueError where there is no tile."""
     file.seek(max(0, place))
     head = file.read(SEGMENT.size + _SIZES.size + _ENTRY.size + _MOST_AXES * _AXIS.size)
     if head[: len(_TILE) + 1] != _TILE + b"\0":
@@ -119,7 +134,7 @@ def _copy(file: BinaryIO, place: int) -> _Entry:
 
 
 def _shown(entry: _Entry, other: _Entry) -> str:
-    """Return in words where an entry differs from another one."""
+    """Return the fields of an entry that differ from another one, in words."""
     parts = [
         f"axis {name} start {start}, size {size}, stored size {stored}"
         for name, start, size, stored in sorted(set(entry.axes) - set(other.axes))

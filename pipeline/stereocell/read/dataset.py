@@ -123,7 +123,7 @@ class Dataset:
     acquired     the source's own images: the axis across which they lie
     labels       what in the metadata says that the voxels number objects; empty: nothing does
     objects      what the file says of these objects
-    files        paths or addresses of the files, and of the folders, that hold all that is read
+    files        paths or addresses of all files and folders that the source is read from
     offset_um    where the source puts the centre of level 0's voxel (0, 0, 0), (z, y, x), um;
                  results count from that voxel, and only two sources together need it
     """

@@ -17,7 +17,7 @@ def required(extra: str, where: str, title: str) -> Iterator[None]:
 
 
 def require_installed(library: str, extra: str, where: str, title: str) -> None:
-    """Raise as `required` where a library can't be found, without importing it: a child will."""
+    """Raise as `required` where a library is missing. A child process imports it later."""
     if find_spec(library) is None:
         raise _missing(extra, where, title)
 

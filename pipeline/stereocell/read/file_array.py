@@ -105,7 +105,7 @@ def unpack_array(
     *,
     skip: int = 0,
 ) -> NDArray[Any]:
-    """Return the voxels of a packed stretch of a file, which ends with the file.
+    """Return the voxels of the packed stretch at the end of a file.
 
     packing  one of packed_stream.PACKINGS
     offset   bytes before the stretch

@@ -63,7 +63,7 @@ def fingerprint_of(dataset: Fingerprinted) -> str:
 
 
 def covers_all(dataset: Fingerprinted) -> bool:
-    """Whether the digest covers every voxel of every level, not a sample of them."""
+    """Return whether the fingerprint covers every voxel of every level, not a sample of them."""
     count = len(dataset.levels)
     budget = BUDGET_BYTES // min(count, 2)
     voxels = (len(dataset.channels) * math.prod(level.shape) for level in dataset.levels)

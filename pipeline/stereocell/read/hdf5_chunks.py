@@ -4,10 +4,15 @@ Most files have an index of version 1, a B-tree without a checksum. HDF5 reads a
 look-up does not find as the fill value, and one at a wrong address as other bytes. So the places,
 addresses and sizes in the index are compared with the dataset's shape, the file's size and each
 other, and each chunk that the index lists is looked up.
+
+The index is listed once, which takes about 2 us a chunk. A look-up takes 5.5 us, so a chunk is
+looked up as a window first touches it: to read it takes longer.
 """
 
 import math
-from typing import Any
+from array import array
+from collections.abc import Sequence
+from typing import Any, NoReturn
 
 import h5py
 import numpy as np
@@ -15,63 +20,105 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 
-_MOST_CHUNKS = 30_000  # most that are compared: a look-up takes 5.5 us, so this takes 0.2 s
+_MOST_CHUNKS = 10_000_000  # most that are compared: the list takes about 100 bytes a chunk
+_MOST_PLACES = 1 << 63  # most places for chunks that a number counts
 
 
-def require_sound_index(dataset: h5py.Dataset, where: str) -> None:
-    """Raise SourceError where the index of a dataset contradicts itself, the shape or the file.
+class ChunkIndex:
+    """The chunks that the index of a dataset lists.
 
-    An index of more than 30 000 chunks is not looked at.
+    Raises SourceError where the index contradicts itself, the shape or the file. An index of more
+    than 10 million chunks, and one of a dataset without chunks, isn't looked at.
     """
-    if dataset.chunks is None or not _MOST_CHUNKS >= _number(dataset) > 0:
-        return
-    listed: list[Any] = []
-    dataset.id.chunk_iter(listed.append)
-    listed = [one for one in listed if one.byte_offset is not None]
-    if not listed:
-        return
-    places = np.array([one.chunk_offset for one in listed], np.uint64)
-    starts = np.array([one.byte_offset for one in listed], np.uint64)
-    sizes = np.array([one.size for one in listed], np.uint64)
-    checks = (
-        (_has_place(dataset, places), "that place twice or off the grid", "each place once"),
-        (
-            _is_apart(starts, sizes, int(dataset.file.id.get_filesize())),
-            "bytes beyond the file or of another chunk",
-            "bytes of its own",
-        ),
-        (
-            _has_size(dataset, listed, sizes),
-            "an unpacked chunk of another size",
-            "the size of its voxels",
-        ),
-        (
-            np.array([_is_found(dataset, one.chunk_offset) for one in listed]),
-            "an entry that no look-up finds",
-            "one that leads to the chunk",
-        ),
-    )
-    for is_sound, found, expected in checks:
-        if not is_sound.all():
-            place = tuple(int(n) for n in places[np.argmin(is_sound)])
-            raise SourceError(
-                f"{where}: index of chunks: {place}: found {found}, expected {expected}: the file "
-                "is damaged: copy it again"
-            )
+
+    def __init__(self, dataset: h5py.Dataset, where: str) -> None:
+        self._dataset, self._where = dataset, where
+        self._numbers = np.empty(0, np.int64)  # of the listed chunks' places, in order
+        if dataset.chunks is None or dataset.id.get_num_chunks() > _MOST_CHUNKS:
+            return
+        pairs = zip(dataset.shape, dataset.chunks, strict=True)
+        self._grid = tuple(-(-n // size) for n, size in pairs)
+        if 0 < math.prod(self._grid) < _MOST_PLACES:
+            self._list()
+        self._is_found = np.zeros(len(self._numbers), bool)
+
+    def require_found(self, window: Sequence[slice | int] | None = None) -> None:
+        """Look up the chunks that a window touches, each once; None: all of them.
+
+        Raises SourceError where HDF5 doesn't find one that the index lists.
+        """
+        if not len(self._numbers):
+            return
+        which = np.arange(len(self._numbers)) if window is None else self._touched(window)
+        which = which[~self._is_found[which]]
+        places = np.stack(np.unravel_index(self._numbers[which], self._grid), axis=1)
+        for place in map(tuple, (places * self._dataset.chunks).tolist()):
+            if not _is_found(self._dataset, place):
+                self._refuse(place, "an entry that no look-up finds", "one that leads to the chunk")
+        self._is_found[which] = True
+
+    def _touched(self, window: Sequence[slice | int]) -> NDArray[Any]:
+        """Return where the listed chunks that a window touches lie in the list."""
+        spans = []
+        for part, n, size in zip(window, self._dataset.shape, self._dataset.chunks, strict=True):
+            start, stop, _ = (part if isinstance(part, slice) else slice(part, part + 1)).indices(n)
+            spans.append(np.arange(start // size, -(-stop // size)))
+        wanted = np.ravel_multi_index(np.meshgrid(*spans, indexing="ij"), self._grid).ravel()
+        at = np.searchsorted(self._numbers, wanted).clip(max=len(self._numbers) - 1)
+        return np.asarray(at[self._numbers[at] == wanted])
+
+    def _list(self) -> None:
+        """List the chunks by the index, and compare the entries."""
+        rank = len(self._dataset.chunks)
+        listed = array("Q")
+
+        def add(entry: Any) -> None:
+            if entry.byte_offset is not None:
+                listed.extend(
+                    (*entry.chunk_offset, entry.byte_offset, entry.size, entry.filter_mask)
+                )
+
+        self._dataset.id.chunk_iter(add)
+        rows = np.frombuffer(listed, np.uint64).reshape(-1, rank + 3)
+        places, (starts, sizes, skipped) = rows[:, :rank], rows[:, rank:].T
+        is_placed = _is_placed(self._dataset, places)
+        chunks = np.array(self._dataset.chunks, np.uint64)
+        inside = np.where(is_placed[:, None], places // chunks, 0).astype(np.int64)
+        numbers = np.ravel_multi_index(tuple(inside.T), self._grid)
+        end = int(self._dataset.file.id.get_filesize())
+        checks = (
+            (is_placed, "a place off the grid", "one of the shape's"),
+            (_is_first(numbers), "that place twice", "each place once"),
+            (_is_apart(starts, sizes, end), _SHARED, "bytes of its own"),
+            (_has_size(self._dataset, skipped, sizes), _OTHER_SIZE, "the size of its voxels"),
+        )
+        for is_sound, found, expected in checks:
+            if not is_sound.all():
+                self._refuse(places[np.argmin(is_sound)], found, expected)
+        self._numbers = np.sort(numbers)
+
+    def _refuse(self, place: Sequence[Any], found: str, expected: str) -> NoReturn:
+        raise SourceError(
+            f"{self._where}: index of chunks: {tuple(int(n) for n in place)}: found {found}, "
+            f"expected {expected}: the file is damaged: copy it again"
+        )
 
 
-def _number(dataset: h5py.Dataset) -> int:
-    """Return how many chunks the shape takes."""
-    return math.prod(-(-n // size) for n, size in zip(dataset.shape, dataset.chunks, strict=True))
+_SHARED = "bytes beyond the file or of another chunk"
+_OTHER_SIZE = "an unpacked chunk of another size"
 
 
-def _has_place(dataset: h5py.Dataset, places: NDArray[Any]) -> NDArray[np.bool_]:
-    _, first = np.unique(places, axis=0, return_index=True)
-    is_first = np.zeros(len(places), bool)
-    is_first[first] = True
+def _is_placed(dataset: h5py.Dataset, places: NDArray[Any]) -> NDArray[np.bool_]:
     is_inside = (places < np.array(dataset.shape, np.uint64)).all(axis=1)
     is_aligned = (places % np.array(dataset.chunks, np.uint64) == 0).all(axis=1)
-    return np.asarray(is_first & is_inside & is_aligned)
+    return np.asarray(is_inside & is_aligned)
+
+
+def _is_first(numbers: NDArray[Any]) -> NDArray[np.bool_]:
+    _, first = np.unique(numbers, return_index=True)
+    is_first = np.zeros(len(numbers), bool)
+    is_first[first] = True
+    return is_first
 
 
 def _is_apart(starts: NDArray[Any], sizes: NDArray[Any], end: int) -> NDArray[np.bool_]:
@@ -82,12 +129,13 @@ def _is_apart(starts: NDArray[Any], sizes: NDArray[Any], end: int) -> NDArray[np
     return is_apart
 
 
-def _has_size(dataset: h5py.Dataset, listed: list[Any], sizes: NDArray[Any]) -> NDArray[np.bool_]:
+def _has_size(
+    dataset: h5py.Dataset, skipped: NDArray[Any], sizes: NDArray[Any]
+) -> NDArray[np.bool_]:
     """Whether chunks that no filter packs have the size of their voxels.
 
-    The mask of an entry has a bit for each filter that did not pack the chunk.
+    skipped  the entries' masks: a bit for each filter that did not pack the chunk
     """
-    skipped = np.array([one.filter_mask for one in listed], np.uint64)
     filters = dataset.id.get_create_plist().get_nfilters()
     every = np.uint64((1 << filters) - 1)
     unpacked = math.prod(dataset.chunks) * dataset.id.get_type().get_size()

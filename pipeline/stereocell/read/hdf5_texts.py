@@ -1,7 +1,7 @@
-"""Attributes of HDF5 that are texts of any length, read in a child process with a time limit.
+"""Read HDF5's attributes of variable-length text in a child process with a time limit.
 
-Such texts lie in heaps, and libhdf5 loops without end over some damaged heaps, in C and with
-Python's lock, so that no signal is heard. Other attributes lie in the object itself.
+Such texts lie in heaps. libhdf5 loops without end over some damaged heaps. It does so in C and
+holds Python's lock, so no signal can end it. Other attributes lie in the object itself.
 """
 
 from typing import Any
@@ -36,7 +36,7 @@ class HeapTexts:
 
 
 def lies_in_heap(stored: h5py.h5t.TypeID) -> bool:
-    """Whether values of a type lie in a heap, apart from the attribute or dataset."""
+    """Return whether values of a type lie in a heap, not in the attribute or dataset itself."""
     if isinstance(stored, h5py.h5t.TypeStringID):
         return bool(stored.is_variable_str())
     return not isinstance(stored, _PLAIN)

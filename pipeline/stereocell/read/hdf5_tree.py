@@ -20,7 +20,7 @@ from typing import Any
 import h5py
 
 from stereocell.model.errors import SourceError
-from stereocell.read.hdf5_chunks import require_sound_index
+from stereocell.read.hdf5_chunks import ChunkIndex
 from stereocell.read.hdf5_texts import HeapTexts, lies_in_heap
 from stereocell.read.hdf5_types import require_standard
 from stereocell.read.hdf5_windows import PluginWindows, has_plugins
@@ -32,7 +32,7 @@ _MAX_NODES = 20_000  # groups and datasets that a search visits
 _LISTED = 12  # names in a message
 _NUMBERS = "biuf"  # kinds of dtype
 _CUT = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")  # in HDF5's words
-_FIRST_PLUGIN = 256  # number of a filter; smaller ones are of HDF5 itself
+_FIRST_PLUGIN = 256  # number of a filter; HDF5's own filters have smaller numbers
 _EXTRA = 'pip install "stereocell[hdf5]"'
 
 
@@ -106,7 +106,7 @@ class Hdf5Tree:
         raise SourceError(f"{self.where}: {path!r:.200}: links in a circle, expected a dataset")
 
     def attribute(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
-        """Return an attribute; text as str, also Imaris's arrays of characters; None: it lacks."""
+        """Return an attribute; text as str, also Imaris's arrays of characters; None: absent."""
         if name not in node.attrs:
             return None
         where = f"{node.file.filename}: attribute {name!r} of {node.name}"
@@ -163,13 +163,13 @@ class Hdf5Array:
     """A dataset's voxels, read by h5py a window at a time.
 
     Raises SourceError where they lie in other files, are of no standard type, or are packed by a
-    filter that isn't there. The first window raises it where the index of the chunks is damaged.
+    filter that isn't there. Windows raise it where the index of the chunks is damaged.
     """
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:
         self.dataset = dataset
         self._where = where
-        self._is_sound = False
+        self._index: ChunkIndex | None = None
         self._windows: Any = dataset
         if require_readable(dataset, where):
             self._windows = PluginWindows(dataset)
@@ -181,16 +181,16 @@ class Hdf5Array:
         )
 
     def __getitem__(self, key: Any) -> Any:
-        if not self._is_sound:
-            require_sound_index(self.dataset, self._where)
-            self._is_sound = True
+        if self._index is None:
+            self._index = ChunkIndex(self.dataset, self._where)
+        self._index.require_found(key)
         return self._windows[key]
 
 
 def require_readable(dataset: h5py.Dataset, where: str) -> bool:
-    """Return whether a dataset's voxels are packed by a filter that is not of HDF5 itself.
+    """Return whether a dataset's voxels are packed by a plugin filter, not by one of HDF5 itself.
 
-    Raises SourceError where they can't be had from its own file, or are of no standard type.
+    Raises SourceError where they can't be read from its own file, or are of no standard type.
     """
     is_plugin = False
     if dataset.external or dataset.is_virtual:
@@ -200,7 +200,7 @@ def require_readable(dataset: h5py.Dataset, where: str) -> bool:
         )
     creation = dataset.id.get_create_plist()
     filters = {creation.get_filter(index)[0] for index in range(creation.get_nfilters())}
-    if h5py.h5z.FILTER_NBIT not in filters:  # it packs numbers of any bits
+    if h5py.h5z.FILTER_NBIT not in filters:  # that filter packs numbers of any width
         require_standard(dataset.id.get_type(), where)
     for index in range(creation.get_nfilters()):
         code, _, _, name = creation.get_filter(index)

@@ -1,7 +1,8 @@
-"""Whether HDF5's description of a number is that of a type which programs write.
+"""Check that HDF5's description of a number is that of a standard type.
 
 HDF5 describes a number by its bits: the places of sign, exponent and mantissa, the exponent's bias,
-the bits in use. No checksum protects the description in most files, and HDF5 converts by any.
+the bits in use. In most files no checksum protects the description, and HDF5 converts by any
+description without an error.
 """
 
 import h5py
@@ -10,7 +11,7 @@ from stereocell.model.errors import SourceError
 
 
 def require_standard(stored: h5py.h5t.TypeID, where: str) -> None:
-    """Raise SourceError for a number that is neither of IEEE nor an integer of all its bits."""
+    """Raise SourceError for a number that is neither an IEEE float nor an integer of all bits."""
     if isinstance(stored, h5py.h5t.TypeEnumID):
         stored = stored.get_super()
     if not isinstance(stored, h5py.h5t.TypeFloatID | h5py.h5t.TypeIntegerID):

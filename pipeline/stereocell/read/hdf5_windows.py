@@ -14,7 +14,7 @@ _lock = Lock()
 
 
 class PluginWindows:
-    """A dataset's voxels. The child starts with the first window, and ends with the last reader."""
+    """A dataset's voxels. The child starts at the first window, and ends with its last user."""
 
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._path, self._name = str(dataset.file.filename), str(dataset.name)

@@ -24,8 +24,7 @@ class Image:
     title          the image's name; None: the file's name is used
     modality, placement, has_sides, acquired, labels, objects  as in Dataset
     notes          become Dataset's `remarks`
-    files          paths or addresses of files, and of folders, that hold all that is read; none:
-                   the source as a whole
+    files          paths or addresses of all files and folders that are read; empty: the source
     notes_at       returns more notes, about one time point; it may read that point's voxels
     """
 

@@ -93,9 +93,9 @@ def _image(tree: Hdf5Tree) -> Image:
 
 
 def _require_stated(tree: Hdf5Tree, times: int, channels: int) -> None:
-    """Raise SourceError where the metadata count more time points or channels than there are.
+    """Raise SourceError where the metadata state more time points or channels than the file has.
 
-    FileTimePoints is the number in this file, of a series of files fewer than DatasetTimePoints.
+    FileTimePoints counts those of this file; in a series of files DatasetTimePoints is larger.
     """
     info = tree.find("/DataSetInfo")
     names = set(info) if isinstance(info, h5py.Group) else set()
@@ -159,7 +159,7 @@ def _level(tree: Hdf5Tree, level: int, times: int, channels: int) -> VoxelArray:
 
 
 def _require_size(tree: Hdf5Tree, group: str, stated: list[float | None]) -> None:
-    """Raise SourceError where the finest level is smaller than DataSetInfo says.
+    """Raise SourceError where the finest level is smaller than DataSetInfo states.
 
     stated  sizes (z, y, x) beside the dataset
     """

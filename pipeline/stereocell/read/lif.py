@@ -8,7 +8,7 @@ import os
 import struct
 from contextlib import ExitStack
 from functools import partial
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,11 @@ from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
-_BLOCK = struct.Struct("<2I")  # 0x70, and the length of what says what follows
+_BLOCK = struct.Struct("<2I")  # 0x70, and the length of the description behind it
+_ABOUT = struct.Struct("<BQBI")  # of a block: 0x2A, bytes of voxels, 0x2A, characters of its name
+_EARLY = struct.Struct("<BIBI")
+_MAX_NAME = 1000  # characters
+_AGAIN = "copy or download it again"
 _MARK, _TEST = 0x70, 0x2A
 _MAX_BLOCKS = 100_000
 _UM_PER_METER = 1e6
@@ -78,11 +82,13 @@ def _images(location: Location, stack: ExitStack) -> tuple[list[Any], list[Candi
 
 
 def _require_whole(path: str, where: str) -> None:
-    """Raise SourceError where a block ends behind the end of the file.
+    """Raise SourceError where a block ends behind the end of the file, or two have the same name.
 
-    A file is a chain of blocks: first the XML, then voxels, each behind their length.
+    A file is a chain of blocks: first the XML, then voxels, each behind their length. The library
+    reads the last block of a name for all images that have it.
     """
     size, at = os.path.getsize(path), 0
+    names: set[bytes] = set()
     with open(path, "rb") as file:
         for _ in range(_MAX_BLOCKS):
             file.seek(at)
@@ -91,18 +97,55 @@ def _require_whole(path: str, where: str) -> None:
                 return
             if len(head) < _BLOCK.size or int.from_bytes(head[:4], "little") != _MARK:
                 break
-            length = _BLOCK.unpack(head)[1]
-            end = at + _BLOCK.size + length
-            about = file.read(14)
-            if at and len(about) >= 10:  # the length of voxels has 4 bytes, or 8
-                is_short = about[5] == _TEST
-                end += int.from_bytes(about[1 : 5 if is_short else 9], "little")
+            end = at + _BLOCK.size + _BLOCK.unpack(head)[1]
+            if at:
+                voxel_bytes, name = _named_block(file)
+                end += voxel_bytes
+                if name in names:
+                    raise SourceError(
+                        f"{where}: block of voxels at byte {at}: found the name of another block, "
+                        f"expected a name of its own: the file is damaged ({_AGAIN})"
+                    )
+                names |= {name} if name else set()
             if end > size:
                 raise SourceError(
                     f"{where}: cut short at byte {size} of {end} or more, expected a LIF file that "
-                    "is whole (copy or download it again)"
+                    f"is whole ({_AGAIN})"
                 )
             at = end
+
+
+def _named_block(file: BinaryIO) -> tuple[int, bytes]:
+    """Return the length of a block's voxels, and its name; of an early file it has 4 bytes."""
+    about = file.read(_ABOUT.size)
+    if len(about) < _EARLY.size:
+        return 0, b""
+    form = _EARLY if about[5] == _TEST else _ABOUT
+    _, voxel_bytes, _, count = form.unpack(about[: form.size].ljust(form.size, b"\0"))
+    name = about[form.size :] + file.read(2 * min(count, _MAX_NAME))
+    return voxel_bytes, name[: 2 * count]
+
+
+def _memory_notes(where: str, image: Any) -> tuple[str, ...]:
+    """Return a note where the file holds more of an image than the XML describes.
+
+    Raises SourceError where it holds less: the library would read on in the next image.
+    """
+    memory = image.xml_element.find("./Memory")
+    stated = image.memory_block.size if memory is None else int(memory.get("Size", 0))
+    held, described = image.memory_block.size, image.nbytes
+    if held < max(described, stated):
+        raise SourceError(
+            f"{where}: found {held} bytes of voxels, expected {max(described, stated)} as in the "
+            f"XML: the acquisition ended early, or the file is damaged ({_AGAIN}), or take "
+            "another --series (`--series list` shows them)"
+        )
+    if described == held:
+        return ()
+    return (
+        f"the XML describes {described} of {held} bytes of the image's voxels "
+        f"({described / held:.2%}): the others are left out",
+    )
 
 
 def _candidate(image: Any) -> Candidate:
@@ -139,6 +182,8 @@ def _image(where: str, image: Any, notes: tuple[str, ...], stack: ExitStack) -> 
 
     axes = tuple(axis.lower() for axis in dims)
     array = VoxelArray(PlaneArray(image.shape, np.dtype(image.dtype), read), axes)
+    with one_line(where, "a LIF file whose XML fits its voxels"):
+        notes = (*notes, *_memory_notes(where, image))
     if (count := array.size("c")) > MAX_CHANNELS:
         raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
     names, colors = _channels(image, count)

@@ -95,7 +95,9 @@ class N5Array:
                 raise OSError("attributes.json is gone since it was opened")
             return None
         try:
-            return unpack_block(content, self.chunks, self.dtype, self._packing)
+            triples = zip(index, self.chunks, self.shape, strict=True)
+            least = [min(n, size - i * n) for i, n, size in triples]
+            return unpack_block(content, least, self.chunks, self.dtype, self._packing)
         except struct.error:
             raise OSError(f"block {path} is cut short ({len(content)} bytes)") from None
 
@@ -176,7 +178,7 @@ def _container(files: N5Files, setups: Sequence[str], described: Described) -> I
     """Return the image of BigDataViewer's container: setups are channels.
 
     setups     the folders of the setups, each with a slash at its end
-    described  by the XML
+    described  the setups and time points of the XML
     """
     numbers = [int(setup[len("setup") : -1] or 0) for setup in setups]
     times = files.numbered(f"{setups[0]}timepoint")[:_MAX_TIMES]

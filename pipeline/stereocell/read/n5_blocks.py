@@ -1,4 +1,4 @@
-"""A block of N5: its header and codecs. No block unpacks to much more than its voxels.
+"""Decode a block of N5: its header and codecs. A block that unpacks to much more is refused.
 
 The header is of big-endian numbers: mode (16 bits; 0: dense), number of dimensions (16), the size
 along each (32), fastest first. Blocks at the edge are smaller than `blockSize`.
@@ -18,16 +18,24 @@ from stereocell.read.packed_stream import PACKINGS, unpack
 
 _MOST_BEHIND = 1 << 20  # bytes that a block may unpack to beyond its voxels
 _LZ4_HEADER = struct.Struct("<8sBiii")  # magic, token, packed and unpacked bytes, checksum
+_LZ4_MAGIC = b"LZ4Block"
 _LZ4_RAW = 0x10  # token of a part that is stored as it is
+_LZ4_SEED, _LZ4_BITS = 0x9747B28C, 0x0FFFFFFF  # of the checksum: XXH32 of the unpacked bytes
+_ZSTD_UNKNOWN = 1 << 62  # sizes from here on mean that a frame states none
 _BLOSC_HEADER = struct.Struct("<4B3I")  # last three, bytes: unpacked, of a block, packed
 
 
 def unpack_block(
-    content: bytes, most: Sequence[int], dtype: np.dtype[Any], packing: Mapping[str, Any]
+    content: bytes,
+    least: Sequence[int],
+    most: Sequence[int],
+    dtype: np.dtype[Any],
+    packing: Mapping[str, Any],
 ) -> NDArray[Any]:
     """Return a block's voxels, axes slowest first.
 
-    most     the largest block's size, slowest first
+    least    the size of the part of the dataset at the block's place, slowest first
+    most     the largest block's size
     packing  `compression` of the attributes
 
     Raises OSError, ValueError or a codec's error for damage, struct.error for a header cut short.
@@ -38,6 +46,8 @@ def unpack_block(
     shape = struct.unpack_from(f">{dimensions}I", content, 4)[::-1]
     if any(n > m for n, m in zip(shape, most, strict=True)):
         raise OSError(f"a block of {shape} voxels, over the {tuple(most)} of its attributes")
+    if any(n < m for n, m in zip(shape, least, strict=True)):
+        raise OSError(f"a block of {shape} voxels, fewer than the {tuple(least)} of its place")
     size = math.prod(shape) * dtype.itemsize
     found = _unpack(content[4 + 4 * dimensions :], size, packing)
     if len(found) < size:
@@ -54,7 +64,7 @@ def _unpack(data: bytes, size: int, packing: Mapping[str, Any]) -> bytes:
     if kind in PACKINGS:
         return unpack(data, size, kind, most_behind=_MOST_BEHIND)
     if kind == "zstd":
-        return zstandard.ZstdDecompressor().decompress(_fitting_zstd(data, size))
+        return _unpack_zstd(data, size)
     if kind == "blosc":
         *_, unpacked, _, packed = _BLOSC_HEADER.unpack_from(data)
         if unpacked > size or packed > len(data):
@@ -65,23 +75,35 @@ def _unpack(data: bytes, size: int, packing: Mapping[str, Any]) -> bytes:
     raise OSError(f"compression {kind!r:.40}, not raw, gzip, bzip2, xz, zstd, blosc or lz4")
 
 
-def _fitting_zstd(data: bytes, size: int) -> bytes:
+def _unpack_zstd(data: bytes, size: int) -> bytes:
+    """Return the content of a frame, which may not state its size: Java's streams don't."""
     stated: int = zstandard.get_frame_parameters(data).content_size
-    if stated > size:  # so too where it isn't stated
+    if size < stated < _ZSTD_UNKNOWN:
         raise OSError(f"a block of {stated} bytes, {size} are expected")
-    return data
+    if stated < _ZSTD_UNKNOWN:
+        return zstandard.ZstdDecompressor().decompress(data)
+    return zstandard.ZstdDecompressor().stream_reader(data).read(size + _MOST_BEHIND)
 
 
 def _unpack_lz4(data: bytes, size: int) -> bytes:
     """Return the content of Java's LZ4BlockOutputStream, a run of packed parts."""
+    from stereocell.kernels.xxhash import xxh32  # numba takes long to import
+
     parts, left, at = [], size, 0
     while left > 0:
-        magic, token, packed, unpacked, _ = _LZ4_HEADER.unpack_from(data, at)
+        magic, token, packed, unpacked, checksum = _LZ4_HEADER.unpack_from(data, at)
         at += _LZ4_HEADER.size
-        if magic != b"LZ4Block" or not 0 < unpacked <= left or not 0 < packed <= len(data) - at:
+        if magic != _LZ4_MAGIC or not 0 < unpacked <= left or not 0 < packed <= len(data) - at:
             raise OSError("a block is damaged, or cut short")
         part = data[at : at + packed]
         is_raw = token & 0xF0 == _LZ4_RAW
-        parts.append(part if is_raw else lz4.decompress(struct.pack("<I", unpacked) + part))
+        part = part if is_raw else bytes(lz4.decompress(struct.pack("<I", unpacked) + part))
+        if len(part) != unpacked or xxh32(part, _LZ4_SEED) & _LZ4_BITS != checksum:
+            raise OSError("a block is damaged: its checksum differs")
+        parts.append(part)
         left, at = left - unpacked, at + packed
-    return b"".join(bytes(part) for part in parts)
+    if at < len(data):  # the mark of the end, an empty part
+        magic, _, packed, unpacked, _ = _LZ4_HEADER.unpack_from(data, at)
+        if magic != _LZ4_MAGIC or packed or unpacked:
+            raise OSError("a block is damaged behind its voxels")
+    return b"".join(parts)

@@ -53,7 +53,7 @@ class N5Files:
         return content
 
     def address(self, path: str) -> str:
-        """Return the folder of a dataset; at an address of `http`, which lists none, a file."""
+        """Return the folder of a dataset; for `http`, which can't list it, its attributes' file."""
         folder = f"{self._location.source.rstrip('/')}/{path}".rstrip("/")
         is_listed = not self._location.source.startswith("http")
         return folder if is_listed else f"{folder}/{_NAME}"

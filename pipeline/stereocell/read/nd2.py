@@ -13,13 +13,14 @@ from stereocell.model.errors import SourceError
 from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image
+from stereocell.read.nd2_frames import BEGIN, Nd2Frames
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
-_BEGIN, _END = b"\xda\xce\xbe\n", b"ND2 CHUNK MAP SIGNATURE 0000001!"
+_END = b"ND2 CHUNK MAP SIGNATURE 0000001!"
 _END_BYTES = 40  # bytes of the signature and of the chunk map's place, last in a file
 _IN_FRAME = "CYXS"  # axes inside a frame
 
@@ -39,6 +40,8 @@ class _File:
             self.sizes = {str(axis): int(size) for axis, size in self.nd2.sizes.items()}
             self.dtype = np.dtype(self.nd2.dtype)
             self.spacing = _spacing(self.nd2, self.sizes)
+            frame_bytes = _frame_bytes(self.nd2.attributes)
+        self.frames = Nd2Frames(path, self.where, frame_bytes)
 
     def size(self, axis: str) -> int:
         return self.sizes.get(axis, 1)
@@ -51,13 +54,21 @@ class _File:
         return [one] * self.size("P")
 
 
+def _frame_bytes(stated: Any) -> int:
+    """Return the bytes of a frame's voxels; 0: they are compressed. Rows may be padded."""
+    if stated.compressionType is not None:
+        return 0
+    row = stated.widthPx * stated.componentCount * stated.bitsPerComponentInMemory // 8
+    return int(row + (stated.heightPx - 1) * max(stated.widthBytes or 0, row))
+
+
 def _require_end(path: str, where: str) -> None:
     """Raise SourceError for a file without the map of its chunks, which is written last."""
     with open(path, "rb") as file:
-        begins = file.read(len(_BEGIN))
+        begins = file.read(len(BEGIN))
         file.seek(max(0, os.path.getsize(path) - _END_BYTES))
         ends = file.read()
-    if begins == _BEGIN and not ends.startswith(_END):
+    if begins == BEGIN and not ends.startswith(_END):
         raise SourceError(
             f"{where}: cut short at byte {os.path.getsize(path)}, or never closed: the map of its "
             "chunks, which ends an ND2 file, is missing; expected an ND2 file that is whole: copy "
@@ -93,20 +104,57 @@ def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack)
     loops = [axis for axis in file.sizes if axis not in _IN_FRAME]
     lengths = [file.sizes[axis] for axis in loops]
 
-    def read(place: tuple[int, ...], rows: slice, columns: slice) -> NDArray[Any]:
-        wanted = {"P": position, **dict(zip("TZC", place, strict=True))}
+    def number(time: int, depth: int) -> int:
+        wanted = {"P": position, "T": time, "Z": depth}
         at = [wanted.get(axis, 0) for axis in loops]
-        number = int(np.ravel_multi_index(at, lengths)) if loops else 0
-        frame = np.asarray(file.nd2.read_frame(number)).squeeze()
-        return (frame[wanted["C"]] if count > 1 else frame)[rows, columns]
+        return int(np.ravel_multi_index(at, lengths)) if loops else 0
+
+    def read(place: tuple[int, ...], rows: slice, columns: slice) -> NDArray[Any]:
+        time, depth, channel = place
+        file.frames.require(number(time, depth))
+        frame = np.asarray(file.nd2.read_frame(number(time, depth))).squeeze()
+        return (frame[channel] if count > 1 else frame)[rows, columns]
 
     shape = (file.size("T"), file.size("Z"), count, file.size("Y"), file.size("X"))
     array = VoxelArray(PlaneArray(shape, file.dtype, read), tuple("tzcyx"))
     with one_line(file.where, "an ND2 file with metadata of its channels"):
         names, colors = _channels(file.nd2, count)
+    numbers = [[number(t, z) for z in range(file.size("Z"))] for t in range(file.size("T"))]
     return Image(
-        (array,), (Grid(array.shape, file.spacing),), names, colors, 1, stack.close, notes=notes
+        (array,),
+        (Grid(array.shape, file.spacing),),
+        names,
+        colors,
+        1,
+        stack.close,
+        notes=notes,
+        notes_at=partial(_missing_notes, file, numbers),
     )
+
+
+def _missing_notes(file: _File, numbers: list[list[int]], time: int) -> tuple[str, ...]:
+    """Return a note on frames that the file lacks at other points in time.
+
+    An acquisition may end early. Raises SourceError where frames of the chosen point are missing.
+
+    numbers  of the frames of each point in time
+    """
+    held = [len(some) - len(file.frames.missing(some)) for some in numbers]
+    depth, count = len(numbers[0]), len(numbers)
+    if held[time] < depth:
+        whole = [t for t, found in enumerate(held) if found == depth]
+        instead = f": --time {whole[-1]} is whole" if whole else ""
+        raise SourceError(
+            f"{file.where}: time point {time}: found {held[time]} of {depth} frames, expected all "
+            f"of them: the acquisition ended early, or the file is damaged{instead}"
+        )
+    for number in numbers[time]:
+        file.frames.require(number)
+    total = depth * count
+    missing = total - sum(held)
+    share = f"{missing} of {total} frames ({missing / total:.2%})"
+    note = f"{share} are missing, all at other points in time"
+    return (note,) if missing else ()
 
 
 def _spacing(nd2: Any, sizes: dict[str, int]) -> Triple | None:

@@ -131,14 +131,14 @@ def read_image(location: Location) -> Image:
 
 
 def _files(image: Any) -> set[str]:
-    """Return the paths of the file or of the pair, and of SPM's matrix beside a pair."""
+    """Return the paths of the file or the pair, and of SPM's matrix file beside a pair."""
     held = [one.filename for one in image.file_map.values() if one.filename]
     return {name for name in held if os.path.exists(name)}
 
 
 def _require_whole(image: Any, where: str) -> None:
-    """Raise SourceError where an unpacked file ends before its voxels, or where the packed header
-    of a pair is damaged. A packed file of voxels is checked when they are read.
+    """Raise SourceError where an unpacked file ends before its voxels, or where a pair's packed
+    header is damaged. Packed voxels are checked when they are read.
     """
     name, data = image.file_map["image"].filename, image.dataobj
     held = image.file_map.get("header")
@@ -293,7 +293,7 @@ def _load(
 
 
 def _stored(name: str, data: Any, time: int) -> NDArray[Any]:
-    """Return the voxels of a time point, (x, y, z), as they lie in a file.
+    """Return the voxels of a time point, (x, y, z), as they are stored in a file.
 
     data  nibabel's proxy of all voxels
     """

@@ -208,7 +208,7 @@ def _turned(spatial: NDArray[np.float64]) -> tuple[str, ...]:
 
 
 def _files(location: Location, fields: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the paths of the header and of the voxels beside it, if they are beside it."""
+    """Return the path of the header, and that of a separate file of voxels."""
     named = fields.get("data file", fields.get("datafile"))
     if named is None:
         return (location.path,)

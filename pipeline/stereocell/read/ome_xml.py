@@ -56,17 +56,41 @@ def parse(text: str, where: str) -> ElementTree.Element:
     return root
 
 
-def companion_of(root: ElementTree.Element) -> str:
-    """Return the name of the file that holds the metadata instead; empty: they are here."""
+def metadata_file_of(root: ElementTree.Element) -> tuple[str, str]:
+    """Return the name and UUID of the file that holds the OME-XML; empty: it is here."""
     other = next(_children(root, "BinaryOnly"), None)
-    return "" if other is None else other.get("MetadataFile", "")
+    return ("", "") if other is None else (other.get("MetadataFile", ""), other.get("UUID", ""))
+
+
+def uuids_of(root: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    """Yield the UUID of the file of each plane, or of a run of them, with its name."""
+    return (element for element in root.iter() if _local(element) == "UUID")
 
 
 def files_of(root: ElementTree.Element) -> Iterator[str]:
     """Yield the name of the file of each plane, or of a run of them."""
-    for element in root.iter():
-        if _local(element) == "UUID" and element.get("FileName"):
-            yield element.get("FileName", "")
+    return (uuid.get("FileName", "") for uuid in uuids_of(root) if uuid.get("FileName"))
+
+
+def pixels_of(root: ElementTree.Element) -> ElementTree.Element | None:
+    """Return the Pixels of the first image; None: there are none."""
+    image = next(_children(root, "Image"), None)
+    return None if image is None else next(_children(image, "Pixels"), None)
+
+
+def samples_of(pixels: ElementTree.Element) -> int:
+    """Return the samples in each pixel (3 of RGB) of the first channel."""
+    channel = next(_children(pixels, "Channel"), None)
+    return max(int(channel.get("SamplesPerPixel", 1)), 1) if channel is not None else 1
+
+
+def tiff_data_of(
+    root: ElementTree.Element,
+) -> Iterator[tuple[ElementTree.Element, ElementTree.Element | None]]:
+    """Yield each TiffData of the first image with its UUID, or None where it has none."""
+    pixels = pixels_of(root)
+    for data in () if pixels is None else _children(pixels, "TiffData"):
+        yield data, next(_children(data, "UUID"), None)
 
 
 def images_of(root: ElementTree.Element, where: str) -> list[OmeImage]:

@@ -1,11 +1,11 @@
-"""Unpack a stream of gzip, zlib, bzip2 or xz, and read it on to its end, where its checksum stands.
+"""Unpack a stream of gzip, zlib, bzip2 or xz, and read it to its end, where its checksum stands.
 
 A reader that stops at the last voxel never compares the checksum (CRC-32 of gzip and bzip2,
-Adler-32 of zlib, CRC-64 of xz), and builds a damaged file with other voxels. So every reader that
-unpacks by itself does so here. Bytes behind the voxels are unpacked piece by piece and dropped.
+Adler-32 of zlib, CRC-64 of xz). A damaged file would be built with other voxels. So all readers
+unpack streams with this module. Bytes behind the voxels are unpacked piece by piece and dropped.
 
-gzip may consist of several members, and zeros or other bytes may follow the last one, as gzip's own
-tools allow.
+A gzip stream may consist of several members, and zeros or other bytes may follow the last member,
+as gzip's own tools allow.
 """
 
 import bz2
@@ -16,7 +16,7 @@ from typing import IO, Protocol
 
 PACKINGS = ("zlib", "gzip", "bzip2", "xz")
 _PIECE = 1 << 24  # bytes that are unpacked at once
-_MOST_BEHIND = 1 << 32  # bytes behind the last voxel, unpacked; more than that is a bomb
+_MOST_BEHIND = 1 << 32  # unpacked bytes behind the last voxel; a stream with more is refused
 _MEMBER = b"\x1f\x8b"  # the first bytes of each member of gzip
 _AGAIN = "copy or download it again"
 
@@ -33,14 +33,14 @@ def unpack(
     skip: int = 0,
     most_behind: int = _MOST_BEHIND,
 ) -> bytes:
-    """Return `size` unpacked bytes, after the whole stream agreed with its checksum.
+    """Return `size` unpacked bytes, after the checksum of the whole stream was compared.
 
     file         at the stream's first byte, or the stream itself
     packing      one of PACKINGS
     skip         unpacked bytes before those that are returned
     most_behind  largest number of unpacked bytes behind them
 
-    Raises OSError, in words for the user, for a stream that is damaged, cut short or a bomb.
+    Raises OSError, in words for the user, for a stream that is damaged, cut short or too long.
     """
     stream = _opened(io.BytesIO(file) if isinstance(file, bytes) else file, packing)
     parts: list[bytes] = []
@@ -71,7 +71,7 @@ def unpack(
     return b"".join(parts)
 
 
-_BZIP2_FAULT = "Invalid data stream"  # Python's words, which the checksum's error has as well
+_BZIP2_FAULT = "Invalid data stream"  # Python's message, also where a checksum of bzip2 differs
 
 
 def _short(packing: str, found: int, size: int) -> str:
@@ -94,7 +94,7 @@ def _opened(file: IO[bytes], packing: str) -> _Stream:
 
 
 class _Deflated:
-    """A stream of zlib or of gzip, of which zlib compares the checksum of each member."""
+    """A stream of zlib or gzip. zlib compares the checksum of each member."""
 
     def __init__(self, file: IO[bytes], *, is_gzip: bool) -> None:
         self._file, self._is_gzip = file, is_gzip
@@ -121,7 +121,7 @@ class _Deflated:
             packed = self._stream.unconsumed_tail
 
     def _next_member(self) -> bytes:
-        """Return the first bytes of the next member of gzip; none where there is none."""
+        """Return the first bytes of the next member of gzip; empty: there is no other one."""
         if not self._is_gzip:
             return b""
         rest = self._stream.unused_data.lstrip(b"\0")

@@ -24,7 +24,7 @@ _SURFACES = (
     *(".usda", ".usdc", ".usdz"),
 )
 _PICTURES = (".png", ".jpg", ".jpeg")  # which are planes of a folder
-_FOLDERS = ("planes", "dicom")  # formats of folders that hold files by any name
+_FOLDERS = ("planes", "dicom")  # formats of folders whose files may have any name
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 
 
@@ -48,7 +48,7 @@ class Reader:
 
     @property
     def name(self) -> str:
-        """The title without what stands in brackets, for messages."""
+        """The title without its part in brackets, for messages."""
         return self.title.partition(" (")[0]
 
     def read_image(
@@ -145,7 +145,7 @@ def find_reader(source: str | Path) -> tuple[Location, Reader]:
 
 
 def _require_no_result(location: Location) -> None:
-    """Raise SourceError where a folder is a result of ours: its pictures would pass for planes."""
+    """Raise SourceError where a folder is a result of StereoCell: its images look like planes."""
     found = contents_of(Path(location.path))
     if found.kind in (Kind.BUILD, Kind.STAGE, Kind.BUNDLE, Kind.SITE, Kind.PART):
         raise SourceError(

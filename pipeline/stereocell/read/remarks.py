@@ -6,7 +6,7 @@ import numpy as np
 
 from stereocell.read.cast import built_dtype
 
-LEFT_OUT = "files left out"  # how the note on files of a set that are not read begins
+LEFT_OUT = "files left out"  # first words of the note on files of a set that are not read
 CAST = "voxels are"  # how the note on a cast begins
 
 

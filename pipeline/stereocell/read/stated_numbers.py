@@ -1,4 +1,4 @@
-"""Numbers that a file states, as floats. JSON and attributes may hold integers of any length."""
+"""Convert numbers that a file states to floats. JSON and attributes hold integers of any length."""
 
 import math
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ def number_of(value: Any) -> float:
 
 
 def numbers_of(values: Iterable[Any] | None) -> list[float]:
-    """Return a list of stated numbers; empty where one of them is none, or nothing is stated."""
+    """Return stated numbers as floats; empty: nothing is stated, or one value is not a number."""
     try:
         return [number_of(value) for value in (() if values is None else values)]
     except (TypeError, ValueError):

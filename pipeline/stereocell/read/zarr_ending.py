@@ -2,8 +2,8 @@
 
 zarr reads the chunks of a window side by side. The first damaged chunk ends the read, and the other
 reads stay in zarr's event loop. zarr closes that loop as Python ends, and each read that is still
-there then prints a traceback of its own behind the one line that tells of the damage. Modules that
-read through zarr import this one.
+in it then prints a traceback of its own after the line on the damage. Modules that read through
+zarr import this one.
 """
 
 import asyncio

@@ -22,7 +22,7 @@ from zarr.abc.store import ByteRequest, RangeByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
-from stereocell.read import zarr_ending  # noqa: F401  (it acts as Python ends)
+from stereocell.read import zarr_ending  # noqa: F401  (it registers a function for Python's end)
 from stereocell.storage.first_bytes import HEAD_BYTES, pointer_words
 from stereocell.storage.library_errors import (
     DamagedError,
@@ -81,7 +81,7 @@ class GuardedStore(WrapperStore[Store]):
             self._require_fit(key, value)
         if value is not None and isinstance(byte_range, RangeByteRequest):
             asked = byte_range.end - byte_range.start
-            if len(value) < asked:  # of a shard whose index states more than the file has
+            if len(value) < asked:  # the shard's index leads beyond the end of its file
                 raise OSError(
                     f"shard {key} is cut short ({len(value)} of {asked} bytes of a chunk)"
                 )
@@ -199,9 +199,9 @@ def open_store(location: Location) -> Store:
 
 
 def files_of(location: Location, arrays: Sequence[str]) -> tuple[str, ...]:
-    """Return the folders of a group's arrays, and its own metadata: all that is read of it.
+    """Return all that is read of a group: the folders of its arrays, and its own metadata.
 
-    Of an address of `http`, which can't list a folder, they are the arrays' metadata.
+    An address of `http` can't list a folder, so it has the arrays' metadata in their place.
     """
     root = location.source.rstrip("/")
     metadata = [f"{root}/{name}" for name in _METADATA]
@@ -229,7 +229,7 @@ def open_array(
     with quiet(), one_line(where, "a Zarr array"):
         guard = GuardedStore(store, location)
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
-        # a shard is no stream of the codecs of its inner chunks
+        # The codecs of a sharded array pack its inner chunks, not the shard as a whole.
         codecs = () if array.shards else tuple(codec_name(codec) for codec in array.compressors)
         size = math.prod(array.shards or array.chunks) * (item_bytes or array.dtype.itemsize)
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"

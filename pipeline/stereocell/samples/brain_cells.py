@@ -21,8 +21,11 @@ def write_brain_cells(path: Path) -> None:
     if not path.name.endswith(SUFFIX) or path.name == SUFFIX:
         raise UsageError(f"{path}: the sample is an OME-TIFF, expected a name like NAME{SUFFIX}")
     licence = path.with_name(path.name.removesuffix(SUFFIX) + ".LICENSE")
+    contents = {
+        licence: (_FOLDER / "LICENSE").read_bytes(),
+        path: (_FOLDER / "brain_cells.ome.tif").read_bytes(),
+    }
+    missing = [place for place, content in contents.items() if not is_there(place, content)]
     with ExitStack() as stack:
-        for name, target in (("LICENSE", licence), ("brain_cells.ome.tif", path)):
-            content = (_FOLDER / name).read_bytes()
-            if not is_there(target, content):
-                stack.enter_context(replacing(target)).write_bytes(content)
+        for place in missing:
+            stack.enter_context(replacing(place)).write_bytes(contents[place])

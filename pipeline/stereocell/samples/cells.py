@@ -23,8 +23,9 @@ from zarr.codecs import ZstdCodec
 from zarr.storage import MemoryStore
 
 from stereocell.model.errors import UsageError
-from stereocell.samples.place import is_there
+from stereocell.samples.place import EXPECTED, SAMPLE, find_group, is_there
 from stereocell.storage.atomic_write import replacing_folder, write_bytes
+from stereocell.storage.overwriting import require_free
 
 SUFFIX = ".ome.zarr"
 SHAPE = (44, 176, 264)  # voxels (z, y, x)
@@ -50,6 +51,8 @@ MARKERS = {
     "HLADR": (0.15, 0.2, 0.8, 0.9),
     "SOX10": (0.7, 0.02, 0.02, 0.02),
 }
+_COLUMNS = ("CellID", "cell_type", *MARKERS)  # of the table
+_HEAD = ",".join(_COLUMNS) + "\n"  # first line of the table
 _FULL, _OFFSET, _NOISE = 3000.0, 120.0, 18.0  # counts
 _MEMBRANE_UM = 0.8
 _INSIDE = 0.35  # brightness of a marker inside a cell, as a share of that at the membrane
@@ -83,6 +86,7 @@ def write_cells(path: Path, *, seed: int = 1, shape: tuple[int, int, int] = SHAP
     """
     if not path.name.endswith(SUFFIX):
         raise UsageError(f"{path}: expected a name that ends in {SUFFIX}")
+    _require_free(path, seed, shape)
     tissue = make_tissue(shape, seed)
     files, table = _zarr_files(tissue, seed), _table(tissue).encode()
     has_volume, has_table = is_there(path, files), is_there(table_beside(path), table)
@@ -93,6 +97,31 @@ def write_cells(path: Path, *, seed: int = 1, shape: tuple[int, int, int] = SHAP
                 (folder / name).write_bytes(content)
     if not has_table:
         write_bytes(table_beside(path), table)
+
+
+def _require_free(path: Path, seed: int, shape: tuple[int, int, int]) -> None:
+    """Raise OutputError where another volume or table lies, before the sample is made.
+
+    The volume's attributes tell its arguments. A table is told by its first line.
+    """
+    group = find_group(path)
+    is_ours = group is not None and group.attrs.get(SAMPLE) == _about(seed, shape)
+    require_free(path, expected=EXPECTED, is_ours=is_ours)
+    table = table_beside(path)
+    require_free(table, expected=EXPECTED, is_ours=_is_table(table))
+
+
+def _is_table(file: Path) -> bool:
+    """Return whether a file begins as the table of such a sample does."""
+    if not file.is_file():
+        return False
+    with file.open("rb") as opened:
+        return opened.readline(len(_HEAD)) == _HEAD.encode()
+
+
+def _about(seed: int, shape: tuple[int, int, int]) -> dict[str, Any]:
+    """Return the sample's arguments, as the volume's attributes have them."""
+    return {"name": "cells", "seed": seed, "shape": list(shape)}
 
 
 def table_beside(path: Path) -> Path:
@@ -133,9 +162,9 @@ def _types(centres: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np
 
 def _zarr_files(tissue: CellTissue, seed: int) -> dict[str, bytes]:
     """Return the files of the OME-Zarr by their relative paths."""
-    held: dict[str, Buffer] = {}
-    _write_zarr(MemoryStore(held), tissue, seed)
-    return {name: content.to_bytes() for name, content in sorted(held.items())}
+    buffers: dict[str, Buffer] = {}
+    _write_zarr(MemoryStore(buffers), tissue, seed)
+    return {name: buffer.to_bytes() for name, buffer in sorted(buffers.items())}
 
 
 def _write_zarr(store: MemoryStore, tissue: CellTissue, seed: int) -> None:
@@ -156,6 +185,7 @@ def _write_zarr(store: MemoryStore, tissue: CellTissue, seed: int) -> None:
         "omero": {"channels": [{"label": name, "active": True} for name in names]},
     }
     group.attrs["ome"] = about
+    group.attrs[SAMPLE] = _about(seed, shape)
     array = group.create_array(
         "0",
         shape=(len(names), *shape),
@@ -233,7 +263,7 @@ def _record(
 def _table(tissue: CellTissue) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["CellID", "cell_type", *MARKERS])
+    writer.writerow(_COLUMNS)
     for row, (kind, levels) in enumerate(zip(tissue.types, tissue.levels, strict=True)):
         writer.writerow([row + 1, TYPES[kind], *(f"{_FULL * level:.1f}" for level in levels)])
     return text.getvalue()

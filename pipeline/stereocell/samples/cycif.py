@@ -17,8 +17,9 @@ from stereocell.model.tiling import Box
 from stereocell.samples import microscope
 from stereocell.samples.cycif_geometry import Tissue, grow_tissue
 from stereocell.samples.microscope import BLUR_UM, SPACING_UM, STAINS
-from stereocell.samples.place import EXPECTED
+from stereocell.samples.place import EXPECTED, SAMPLE, find_group
 from stereocell.storage.atomic_write import replacing, replacing_folder
+from stereocell.storage.json_files import read_json
 from stereocell.storage.overwriting import require_free
 
 SUFFIX = ".ome.zarr"
@@ -60,6 +61,7 @@ def write_cycif(
         is_there = _is_there(path, attributes)
         if is_there and truth_path.exists():
             return
+        _require_free(truth_path, settings)
         tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed, brightness_spread)
         truth = json.dumps(_truth(tissue, shape, settings), indent=1) + "\n"
         is_same = truth_path.is_file() and truth_path.read_bytes() == truth.encode()
@@ -71,6 +73,24 @@ def write_cycif(
                     _write_zarr(folder, tissue, shape, tile_size, attributes, seed)
     except OSError as error:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
+
+
+def _about(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return the sample's name and arguments, as its volume and its truth have them."""
+    return {"name": "cycif", **settings}
+
+
+def _require_free(truth_path: Path, settings: dict[str, Any]) -> None:
+    """Raise OutputError where another file lies at the truth's place, before it is made.
+
+    The sample's arguments stand in a truth, so it is read as far as that.
+    """
+    try:
+        found = read_json(truth_path, None, "")
+    except OutputError:
+        found = None
+    is_ours = isinstance(found, dict) and found.get("sample") == _about(settings)
+    require_free(truth_path, expected=EXPECTED, is_ours=is_ours)
 
 
 def _check(
@@ -96,14 +116,10 @@ def _check(
 def _is_there(path: Path, attributes: dict[str, Any]) -> bool:
     if not path.exists():
         return False
-    try:
-        group = zarr.open_group(path, mode="r")
-        found = group.attrs.asdict()
-    except (OSError, ValueError, LookupError, TypeError):  # no group, or a damaged one
-        found = {}
-    if found != attributes:
+    group = find_group(path)
+    if group is None or group.attrs.asdict() != attributes:
         require_free(path, expected=EXPECTED)
-        return False  # --force
+        return False  # it is forced
     levels = [array for _, array in group.arrays()]
     return bool(levels) and all(level.nchunks == level.nchunks_initialized for level in levels)
 
@@ -148,7 +164,7 @@ def _attributes(shape: tuple[int, int, int], settings: dict[str, Any]) -> dict[s
             ],
             "omero": {"channels": channels},
         },
-        "stereocell_sample": {"name": "cycif", **settings},
+        SAMPLE: _about(settings),
     }
 
 
@@ -217,7 +233,7 @@ def _truth(tissue: Tissue, shape: tuple[int, int, int], settings: dict[str, Any]
     z, y, x = centers.T
     levels = microscope.background(STAINS[0], waves[0], (z, y, x))
     return {
-        "sample": {"name": "cycif", **settings},
+        "sample": _about(settings),
         "note": "positions are (z, y, x) in um; the centre of voxel (0, 0, 0) is the origin. "
         "A dye's boundary lies where the voxels hold background + amplitude * brightness / 2.",
         "shape": list(shape),

@@ -9,20 +9,25 @@ derived from hashes of the content.
 References: DICOM PS3.3 A.4 (MR Image IOD); PS3.5 B.2 (UUID derived UIDs).
 """
 
+import re
 from io import BytesIO
 from pathlib import Path
 from uuid import UUID, uuid5
 
 import numpy as np
 from numpy.typing import NDArray
+from pydicom import dcmread
 from pydicom.dataset import Dataset, FileMetaDataset
+from pydicom.errors import InvalidDicomError
 from pydicom.filewriter import dcmwrite
 from pydicom.uid import UID, ExplicitVRLittleEndian, MRImageStorage
 
 from stereocell.model.errors import UsageError
 from stereocell.samples.head import HeadPhantom, make_head
-from stereocell.samples.place import is_there
+from stereocell.samples.place import EXPECTED, is_there
 from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.overwriting import require_free
+from stereocell.storage.workspace import names_in
 
 _UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # namespace of this sample's UIDs
 PATIENT = "Ovoidsen^Emmeline"
@@ -43,6 +48,7 @@ IDENTITY = {  # a made-up patient
 # Tilt of the head: nod, turn and lean, degrees about (left, posterior, superior).
 TURN_DEG = (4.0, -3.0, 6.0)
 ISOCENTRE_MM = (3.0, -12.0, 21.0)  # LPS of the middle of the grid
+_FILE = re.compile(r"IM\d{4}\.dcm")  # names of the sample's files
 SLICE_THICKNESS_MM = 5.0  # differs from the spacing of this series
 
 
@@ -54,6 +60,7 @@ def write_head(path: Path, *, seed: int = 0) -> None:
     """
     if seed < 0:
         raise UsageError(f"--seed: found {seed}, expected 0 or more")
+    _require_free(path, seed)
     write_dicom(path, make_head(seed=seed), seed=seed)
 
 
@@ -68,6 +75,22 @@ def write_dicom(path: Path, head: HeadPhantom, *, seed: int = 0) -> None:
     with replacing_folder(path) as folder:
         for name, content in files.items():
             (folder / name).write_bytes(content)
+
+
+def _require_free(path: Path, seed: int) -> None:
+    """Raise OutputError where a folder holds more than files of this sample, before it is made.
+
+    Each file tells its series, and the series its seed.
+    """
+    names = names_in(path)
+    is_ours = not path.is_file() and all(_FILE.fullmatch(name) for name in names)
+    if is_ours and names:
+        try:
+            head = dcmread(path / names[0], specific_tags=["SeriesInstanceUID"])
+            is_ours = head.SeriesInstanceUID == _uid(seed, "series")
+        except (OSError, InvalidDicomError, AttributeError):
+            is_ours = False
+    require_free(path, expected=EXPECTED, is_ours=is_ours)
 
 
 def affine_of(head: HeadPhantom) -> NDArray[np.float64]:

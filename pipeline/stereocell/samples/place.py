@@ -1,18 +1,30 @@
-"""The place of a sample: anything else that lies there stays, unless --force is given."""
+"""The place of a sample: anything else that lies there stays, unless it is forced."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
+import zarr
+
 from stereocell.storage.overwriting import require_free
 
 EXPECTED = "nothing or this very sample"
+SAMPLE = "stereocell_sample"  # attribute of a Zarr group that holds the sample's arguments
+
+
+def find_group(place: Path) -> zarr.Group | None:
+    """Return the Zarr group at a path; None where there is none, or it is damaged."""
+    try:
+        return zarr.open_group(place, mode="r")
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
 
 
 def is_there(place: Path, content: bytes | Mapping[str, bytes]) -> bool:
-    """Return whether a file, or a folder of files by their relative paths, is as it would be made.
+    """Return whether a file or folder already holds the sample.
 
-    Files that are missing in a folder are no other content. Raises OutputError where something
-    else lies there.
+    content  bytes of the file, or of a folder's files by their relative paths
+
+    An incomplete folder of the sample returns False. Raises OutputError for other content.
     """
     if isinstance(content, bytes):
         is_same = place.is_file() and place.read_bytes() == content

@@ -34,8 +34,8 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         clear_beside(path)
-        temporary.touch()
-        try:
+        try:  # from here on an interruption removes it
+            temporary.touch()
             yield temporary
             with temporary.open("rb+") as file:
                 os.fsync(file.fileno())
@@ -68,29 +68,31 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     try:
         clear_beside(path)
         with making(new, path):
-            new.mkdir(parents=True)
-            try:
+            try:  # from here on an interruption removes it
+                new.mkdir(parents=True)
                 yield new
                 for file in new.rglob("*"):
                     if file.is_file():
                         with file.open("rb+") as opened:
                             os.fsync(opened.fileno())
                 require_asked()
-                _swap(new, path, old)
+                put_in_place(new, path, old)
             finally:
                 shutil.rmtree(new, ignore_errors=True)
     except OSError as error:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
 
 
-def _swap(new: Path, path: Path, old: Path) -> None:
-    """Rename `new` to `path`; `path` goes to `old` first, since it may be a folder with files."""
-    if path.exists():
-        os.replace(path, old)
+def put_in_place(new: Path, path: Path, old: Path) -> None:
+    """Rename a file or a folder to `path`; what lies there stays until the new one is there.
+
+    old  an unused path, to which a folder goes first: no folder with files can be replaced at once
+    """
     try:
+        if path.is_dir() or (new.is_dir() and path.exists()):
+            os.replace(path, old)
         os.replace(new, path)
-    except OSError:
-        if old.exists():
+    finally:
+        if old.exists() and not path.exists():  # failed, or interrupted between the two
             os.replace(old, path)
-        raise
-    remove_remains(old)
+        remove_remains(old)

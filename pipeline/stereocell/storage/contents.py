@@ -1,8 +1,8 @@
-"""The one place that recognises what lies at a path: a build, a part of one, a published page, ...
+"""Recognise the contents of a path: a build, a part of a build, a published page, ...
 
-All commands ask here: those that read, so that a folder is not taken for another kind, and those
-that write, so that nothing of somebody else is replaced. Damaged results are still recognised, by
-the names of their files: their command names the fault and the remedy.
+All commands use this module. Commands that read refuse folders of another kind, and commands that
+write replace no foreign files. A damaged result is still recognised, by the names of its files, so
+that the command which reads it can name the fault and the remedy.
 """
 
 import json
@@ -32,13 +32,13 @@ _PARTS = {
     "bundle_parts": "unfinished tiles of a build's bundle",
     "bricks": "bricks that `stereocell serve` keeps",
 }
-# endings of files that hold surfaces -> words: most begin as other files do
+# endings of files that hold surfaces -> words; the first bytes of most are not their own
 _BY_ENDING = {
     (".glb", ".gltf"): "a glTF file of surfaces",
     (".stl", ".3mf", ".ply", ".obj"): "a file of surfaces",
     (".usda", ".usdc", ".usdz", ".usd"): "a USD file",
 }
-# endings of those whose formats have a mark -> the first bytes, one of them
+# endings of surface files whose format has a mark -> the mark, or several, at their first byte
 _USDA, _USDC, _ZIP = b"#usda", b"PXR-USDC", b"PK\x03\x04"
 _MARKS: dict[str, bytes | tuple[bytes, ...]] = {
     ".glb": b"glTF",
@@ -49,20 +49,20 @@ _MARKS: dict[str, bytes | tuple[bytes, ...]] = {
     ".usdz": _ZIP,
     ".usd": (_USDA, _USDC, _ZIP),
 }
-# files that are nobody's: locks and halves of ours, and those that systems leave in each folder
-_NOBODYS = re.compile(r"\.lock|\.writable\..*|\..+\.[0-9a-f]{8}\b.*|\.DS_Store|Thumbs\.db")
-_MAX_BYTES = 64 << 20  # bytes: a larger JSON file is none of ours
-_MAX_NAMED = 3  # files of a folder that are named
+# files that belong to no one: locks and temporary files of StereoCell, and files of file managers
+_IGNORED = re.compile(r"\.lock|\.writable\..*|\..+\.[0-9a-f]{8}\b.*|\.DS_Store|Thumbs\.db")
+_MAX_BYTES = 64 << 20  # bytes; StereoCell writes no larger JSON file
+_MAX_NAMED = 3  # most files of a folder that a message names
 
 
 @dataclass(frozen=True, slots=True)
 class Contents:
     """The contents of a path.
 
-    words        for messages, with an article
-    name         of the specimen; empty: not known
-    fingerprint  of the specimen's source; empty: not known
-    build        the build that it is a part of; None: of none
+    words        the contents for messages, with an article
+    name         name of the specimen; empty: unknown
+    fingerprint  fingerprint of the specimen's source; empty: unknown
+    build        the build that contains the path; None: it is in no build
     """
 
     kind: Kind
@@ -73,12 +73,12 @@ class Contents:
 
 
 def contents_of(path: Path) -> Contents:
-    """Return what lies at a path of this machine, or in an OUT on object storage."""
+    """Return the contents of a path of this machine, or of an OUT on object storage."""
     if os.path.islink(path) and not path.exists():
         return Contents(Kind.FILE, "a link to nothing")
     if path.is_file():
         return Contents(Kind.FILE, _file_words(path))
-    names = {name for name in names_in(path) if not is_nobodys(name)}
+    names = {name for name in names_in(path) if not is_ignored(name)}
     if not names:
         return Contents(Kind.NOTHING, "nothing")
     for recognise in (_site, _bundle, _build, _stage, _slices, _part):
@@ -89,18 +89,18 @@ def contents_of(path: Path) -> Contents:
 
 
 def words_for(names: Sequence[str]) -> str:
-    """Return words for files that are none of ours, with the names of a few."""
+    """Return words for files that StereoCell did not write, with the names of a few."""
     more = f" and {len(names) - _MAX_NAMED} more" if len(names) > _MAX_NAMED else ""
     return f"something else ({', '.join(names[:_MAX_NAMED])}{more})"
 
 
-def is_nobodys(name: str) -> bool:
-    """Return whether a file of this name is a lock or a half of ours, or what systems leave."""
-    return _NOBODYS.fullmatch(name) is not None
+def is_ignored(name: str) -> bool:
+    """Return whether a name is that of a lock, a temporary file or a file manager's own file."""
+    return _IGNORED.fullmatch(name) is not None
 
 
 def _file_words(path: Path) -> str:
-    """Return what a file is, in words: by its own mark, its ending or its first bytes."""
+    """Return words for a file: by its seal, its ending or its first bytes."""
     if path.suffix == ".html" and is_sealed_text(path):
         return "the report of a build"
     head, ending = first_bytes(str(path)), path.suffix.lower()
@@ -108,15 +108,15 @@ def _file_words(path: Path) -> str:
     if content.format or not head:
         return content.words
     if not head.startswith(_MARKS.get(ending, b"")):
-        return f"a file named {ending} that is none"
+        return f"a file that is named {ending} and has other content"
     named = (words for endings, words in _BY_ENDING.items() if ending in endings)
     return next(named, content.words)
 
 
 def require_kind(path: Path, kinds: Collection[Kind]) -> Contents:
-    """Return what lies at a path. Raises OutputError where it is of none of some kinds.
+    """Return the contents of a path. Raises OutputError unless its kind is one of `kinds`.
 
-    Nothing at all passes: the command says which file it misses, and how that is made.
+    An empty or missing folder passes: the command itself names the missing file and the remedy.
     """
     found = contents_of(path)
     if found.kind is Kind.NOTHING or found.kind in kinds:
@@ -130,7 +130,7 @@ def require_kind(path: Path, kinds: Collection[Kind]) -> Contents:
 
 
 def _site(path: Path, names: set[str]) -> Contents | None:
-    """Recognise what `stereocell publish` wrote."""
+    """Recognise a page that `stereocell publish` wrote."""
     listed = _read(path / PUBLISHED) if PUBLISHED in names else {}
     if listed.get("format") != "stereocell-published":
         return None
@@ -155,7 +155,7 @@ def _bundle(path: Path, names: set[str]) -> Contents | None:
 
 
 def _build(path: Path, names: set[str]) -> Contents | None:
-    """Recognise an OUT, from the moment that its plan is written."""
+    """Recognise an OUT as soon as its plan is written."""
     plan = _read(path / _PLAN) if _PLAN in names else {}
     provenance = _read(path / "provenance.json") if "provenance.json" in names else {}
     is_ours = bool(
@@ -201,7 +201,7 @@ def _part(path: Path, _: set[str]) -> Contents | None:
 
 
 def _build_around(path: Path) -> Path | None:
-    """Return the build that a folder is a part of; None: there is none."""
+    """Return the build that contains a folder; None: there is none."""
     place = path.resolve()
     if place.name not in _PARTS:
         return None
@@ -219,7 +219,7 @@ def _named(words: str, name: str) -> str:
 
 
 def _read(file: Path) -> Mapping[str, Any]:
-    """Return the content of a JSON file, its seal not looked at; empty for anything else."""
+    """Return the content of a JSON file without a check of its seal; empty for other files."""
     fetch(file)
     try:
         if file.stat().st_size > _MAX_BYTES:

@@ -1,9 +1,8 @@
-"""The documents of a build: which schema each JSON file has, and the one place that checks them.
+"""The documents of a build: the schema of each JSON file, and the check of its content.
 
-`atomic_write` calls `require_readable` before a document takes its place, and `read_json` parses by
-the same code. So a command that would write a document that no command can read fails in one line,
-and leaves what was there. A reader that knows more rules than a schema, as that of plan.json, is
-also asked by the writer of that file.
+`atomic_write` calls `require_readable` before a document takes its place, and `read_json` parses
+with the same code. So a command that would write an unreadable document fails in one line, and the
+earlier document stays. plan.json has rules beyond its schema, which its writer checks as well.
 """
 
 import hashlib
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from jsonschema import Draft202012Validator
 
 # Schemas by the name of a document: a file of schemas/, with `#Name` for one of its definitions.
-# A document without a schema must be JSON here; its reader checks it by rules of its own.
+# A document without a schema only has to be JSON here; its reader has rules of its own.
 SCHEMAS: dict[str, str | None] = {
     r"plan\.json": "plan.schema.json",
     r"provenance\.json": "units.schema.json#Provenance",
@@ -48,9 +47,9 @@ SCHEMAS: dict[str, str | None] = {
     r"(files|tile|tileset|finer.*|.*_level|stereocell-published)\.json": None,
 }
 SETTINGS = "stereocell.toml"
-NOT_WRITTEN = "not written, as no command could read it"
-# Schemas and hashes of documents that fitted: a unit's record is read with each of its files, and
-# the schema took up to 20 ms of each time, a fifth of a small build
+NOT_WRITTEN = "not written, because no command could read it"
+# Schemas, and hashes of documents that passed them. A unit's record is read with each of its files,
+# and the check took up to 20 ms each time, a fifth of a small build.
 _fitting: set[tuple[str, bytes]] = set()
 _MAX_FITTING = 100_000
 
@@ -58,7 +57,7 @@ _MAX_FITTING = 100_000
 def require_readable(path: Path, written: Path) -> None:
     """Raise OutputError where the content of `written` can't be read once it lies at `path`.
 
-    Only documents of a build are looked at, by the name of `path`.
+    Only documents of a build are checked. They are known by the name of `path`.
     """
     if path.name == SETTINGS:
         try:
@@ -80,9 +79,10 @@ def schema_of(name: str) -> str | None:
 
 
 def parse(path: Path, data: bytes, schema: str | None, remedy: str) -> Any:
-    """Return the content of a JSON document that fits `schema`; None: of any JSON.
+    """Return the content of a JSON document.
 
     path    the document's place, for messages
+    schema  the schema that it must fit; None: any JSON is accepted
     remedy  the user's next step, for messages
 
     Raises OutputError; its text names file, field and remedy.

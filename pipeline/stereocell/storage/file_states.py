@@ -1,13 +1,14 @@
-"""The files that an input consists of, and whether they changed since they were looked at.
+"""Record the states of an input's files, and find the files that changed since then.
 
-Looking is a listing: size and modification time of each file, size and ETag of each object. Small
-inputs are read as well, so that a file that was written again with the same bytes counts as
-unchanged. An address of `http` can't be listed: there a source of one file is complete, if the
-server states an ETag or a date, and no other.
+A state is size and modification time of a file, or size and ETag of an object. The bytes of small
+inputs are compared as well, so a file that was written again with the same bytes counts as
+unchanged. An address of `http` can't be listed: its states are only complete if the source is one
+file and the server states an ETag or a date.
 """
 
 import hashlib
 import os
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -22,7 +23,7 @@ from stereocell.storage.location import Location
 MAX_READ_BYTES = 64_000_000  # largest size of all files together whose bytes are compared
 MAX_READ_FILES = 2_000  # most files whose bytes are compared
 _UNLISTED = ("http", "https")
-# names that file systems of fsspec have for what changes with an object's content
+# names in fsspec's file systems for a value that changes with an object's content
 _MARKS = (
     "ETag",
     "etag",
@@ -39,10 +40,10 @@ State = tuple[int, str]  # size in bytes; modification time or ETag
 
 @dataclass(frozen=True, slots=True)
 class FileStates:
-    """Files as they were at one time.
+    """The states of files at one time.
 
-    paths        files, and folders with all that is below them; addresses where it is remote
-    states       by path; a file that isn't there has none
+    paths        files, and folders with all files below them; addresses of a remote source
+    states       states by path; a missing file has none
     digests      SHA-256 by path; empty where the files are too many or too large
     is_complete  whether all files could be listed
     """
@@ -55,7 +56,7 @@ class FileStates:
 
     @classmethod
     def look(cls, location: Location, paths: Sequence[str]) -> "FileStates":
-        """Return the present states. A public store that permits no listing has none."""
+        """Return the present states; without any where a store permits no listing."""
         try:
             states = dict(_listed(location, paths))
         except SourceError:
@@ -78,13 +79,13 @@ class FileStates:
         return {path.removeprefix(root) for path in paths}
 
     def lines(self) -> list[str]:
-        """Return a line for each file: path below the source, and content, or size and date."""
+        """Return a line for each file: its path below the source, and its digest or state."""
         source = self.location.path if self.location.is_local else self.location.source
         known = {path: self.digests.get(path) or f"{state}" for path, state in self.states.items()}
         return sorted(f"{path.removeprefix(source)} {about}\n" for path, about in known.items())
 
     def changed(self) -> list[str]:
-        """Return the paths that differ now: other bytes, gone, or new. Raises SourceError."""
+        """Return the paths of changed, missing and new files. Raises SourceError."""
         if not self.is_complete and not self.states:
             return []
         now = dict(_listed(self.location, self.paths))
@@ -92,13 +93,13 @@ class FileStates:
         return sorted(path for path in differ if not self._is_rewritten(path))
 
     def _is_rewritten(self, path: str) -> bool:
-        """Whether a file was written again with the same bytes."""
+        """Return whether a file was written again with the same bytes."""
         known = self.digests.get(path)
         return known is not None and known == _digest(path)
 
 
 def _digest(path: str) -> str:
-    """Return the SHA-256 of a file's bytes; empty where it is gone."""
+    """Return the SHA-256 of a file's bytes; empty: it can't be read."""
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -120,28 +121,29 @@ def _listed(location: Location, paths: Sequence[str]) -> Iterator[tuple[str, Sta
                 yield name, (int(about.get("size") or 0), mark)
 
 
-def _on_disk(path: str) -> Iterator[tuple[str, State]]:
+def _on_disk(path: str, *, is_inner: bool = False) -> Iterator[tuple[str, State]]:
+    """Yield a file, or the files below a folder. Files that vanish meanwhile are left out.
+
+    is_inner  whether the path lies in a listed folder: links to folders are not followed there
+    """
     try:
-        if not os.path.isdir(path):
-            found = os.stat(path)
+        found = os.stat(path)
+        if stat.S_ISREG(found.st_mode):
             yield path, (found.st_size, str(found.st_mtime_ns))
             return
-        with os.scandir(path) as entries:
-            inner = sorted(entries, key=lambda entry: entry.name)
-    except OSError:  # it is gone
+        if not stat.S_ISDIR(found.st_mode) or (is_inner and os.path.islink(path)):
+            return
+        names = sorted(os.listdir(path))
+    except OSError:
         return
-    for entry in inner:
-        if entry.is_dir(follow_symlinks=False):
-            yield from _on_disk(entry.path)
-        elif entry.is_file():
-            found = entry.stat()
-            yield entry.path, (found.st_size, str(found.st_mtime_ns))
+    for name in names:
+        yield from _on_disk(os.path.join(path, name), is_inner=True)
 
 
 def _stored(
     files: Any, address: str, location: Location
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield each object at or below an address, with what the store says of it."""
+    """Yield each object at or below an address, with the store's details of it."""
     path = files._strip_protocol(address)
     if location.source.startswith(_UNLISTED):
         try:
@@ -156,12 +158,12 @@ def _stored(
 def unchanged_while_read(location: Location, again: str) -> Iterator[None]:
     """Raise SourceError where a file or a folder changed while the block read all of it.
 
-    again  the command that reads it anew, for the message
+    again  the user's next step, for the message
     """
     before = FileStates.look(location, [location.path if location.is_local else location.source])
     yield
     if before.changed():
         raise SourceError(
-            f"{location.shown}: changed while it was read, expected a file that stays as it is: "
+            f"{location.shown}: changed while it was read, expected a file that does not change: "
             f"{again}"
         )

@@ -15,8 +15,7 @@ from typing import Any
 from stereocell.model.errors import OutputError
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.documents import NOT_WRITTEN, parse
-from stereocell.storage.seals import damaged
-from stereocell.storage.workspace import fetch
+from stereocell.storage.seals import read_record, require_seal
 
 _SEAL = "sha256"
 
@@ -29,14 +28,7 @@ def read_json(path: Path, schema: str | None, remedy: str) -> Any:
 
     Raises OutputError; its text names file, field and remedy.
     """
-    fetch(path)
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise OutputError(f"{path} is missing: {remedy}") from None
-    except OSError as error:
-        raise OutputError(f"{path}: can't be read ({error.strerror})") from None
-    return parse(path, data, schema, remedy)
+    return parse(path, read_record(path, remedy), schema, remedy)
 
 
 def find_json(path: Path, schema: str) -> Any:
@@ -73,17 +65,13 @@ def read_sealed(path: Path, schema: str, remedy: str) -> dict[str, Any]:
     """Return the content of sealed JSON, without its hash. Raises OutputError as `read_json` does,
     and where the hash differs or is missing.
     """
-    found = read_json(path, None, remedy)
-    if isinstance(found, dict) and found and _SEAL not in found:
-        raise OutputError(
-            f"{path}: has no hash of its content, expected {_SEAL!r}: it is of an earlier version, "
-            f"or was written by hand: {remedy}"
-        )
-    if isinstance(found, dict) and isinstance(expected := found.get(_SEAL), str):
-        digest = _digest_of({name: value for name, value in found.items() if name != _SEAL})
-        if expected != digest:
-            raise OutputError(damaged(path, digest, expected, remedy))
-    content = dict(read_json(path, schema, remedy))
+    data = read_record(path, remedy)
+    found = parse(path, data, None, remedy)
+    if isinstance(found, dict) and found and isinstance(found.get(_SEAL, ""), str):
+        content = {name: value for name, value in found.items() if name != _SEAL}
+        digest = _digest_of(content)
+        require_seal(path, found.get(_SEAL), digest, place=repr(_SEAL), remedy=remedy)
+    content = dict(parse(path, data, schema, remedy))
     del content[_SEAL]
     return content
 

@@ -1,15 +1,15 @@
 """Errors of the format libraries on damaged, unusual or unreachable sources, as one line.
 
-A damaged file makes a library raise anything: tifffile an AssertionError, a parser a
-RecursionError. So an Exception of any class becomes one line where a library raised it. Our own
-code around such a call parses values of the file, too. An exception that was raised there becomes
-one line if its class is in _FAULTS; all others are bugs, and keep their traceback.
+A library can raise any exception on a damaged file: tifffile an AssertionError, a parser a
+RecursionError. So an exception of any class becomes one line if a library raised it. Our own code
+around such a call parses values of the file, too. An exception that it raises becomes one line if
+its class is in _FAULTS. All other exceptions are bugs, and keep their traceback.
 
-`one_line` stands around the calls of one library, and quotes its text. `library_boundary` stands
-around a whole reader as the last resort. It takes only what was raised inside a library, and quotes
-no text, which could hold a patient's name. A library that can end its process runs in a child
-process (child_process.py), whose death `one_line` turns into a line, too. Both keep the warnings of
-libraries from the terminal (library_noise.py).
+`one_line` surrounds the calls of one library, and quotes its text. `library_boundary` surrounds a
+whole reader as the last resort. It catches only exceptions that were raised inside a library, and
+quotes no text, because that could hold a patient's name. A library that can end its process runs in
+a child process (child_process.py); `one_line` turns the child's death into a line, too. Both keep
+the warnings of libraries from the terminal (library_noise.py).
 """
 
 import logging
@@ -71,11 +71,11 @@ _LATE = (
 
 
 class DamagedError(ValueError):
-    """A decoder can't decode a part of a source. The text names the part and says how it failed."""
+    """A decoder can't decode a part of a source. The text names the part and the reason."""
 
 
-# Errors of decoders, by class and by the module that raised them: they mean damaged bytes. An error
-# with a number is the system's, and no damage.
+# Errors of decoders, by class and by the module that raised them: they mean damaged bytes. An
+# OSError with an errno comes from the system and is no damage.
 _UNDECODED = (DamagedError, zlib.error, lzma.LZMAError, ZstdError, EOFError, struct.error)
 _DECODERS = re.compile(
     r"imagecodecs\b.*|numcodecs\.(?!registry|errors).*|zarr\.codecs\.crc32c_|pyarrow\b.*|gzip|bz2|lzma"
@@ -128,7 +128,7 @@ def library_boundary(where: str, expected: str) -> Iterator[None]:
 
     expected  the expected state of the source, for the text
 
-    Errors that our own code raised pass: they are bugs, or lines already.
+    Errors that our own code raised pass: they are bugs, or already lines for the user.
     """
     try:
         with quiet_libraries():
@@ -146,7 +146,7 @@ def library_boundary(where: str, expected: str) -> Iterator[None]:
 
 
 def is_undecoded(error: BaseException) -> bool:
-    """Return whether a decoder raised an error over bytes that it can't decode."""
+    """Return whether a decoder raised the error because it can't decode the bytes."""
     if isinstance(error, _UNDECODED):
         return True
     if not isinstance(error, ValueError | RuntimeError | OSError) or getattr(error, "errno", None):
@@ -160,14 +160,14 @@ def is_undecoded(error: BaseException) -> bool:
 
 
 def damage_words(error: BaseException) -> str:
-    """Return what is wrong with a source that a decoder failed on, in the decoder's own words."""
+    """Return the fault of a source that a decoder failed on, in the decoder's own words."""
     if isinstance(error, DamagedError):
         return str(error)
     return f"damaged (the library says: {_shortened(str(error) or type(error).__name__)})"
 
 
 def _library_of(error: BaseException) -> str:
-    """Return the library that our code called where an error was raised in one; else empty."""
+    """Return the library that our code called and that raised the error; empty: our code did."""
     frames: list[FrameType] = []
     trace = error.__traceback__
     while trace is not None:

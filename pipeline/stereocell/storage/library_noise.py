@@ -1,9 +1,9 @@
-"""Warnings and log lines of libraries, which are kept from the user's terminal.
+"""Keep warnings and log lines of libraries from the user's terminal.
 
-A library warns of things that a user can't change, as a field of another version, or that a reader
-says in a sentence of its own. So none of its warnings is shown while it reads. Warnings of our own
-code stay: they are bugs. Log lines reach the handlers that a program has set up, but not Python's
-last resort, which prints those of libraries that have no handler.
+A library warns of things that a user can't change, such as a field of another version, or that a
+reader reports in a sentence of its own. So its warnings are not shown while it reads. Warnings of
+our own code are shown: they are bugs. Log lines reach the handlers that a program has set up. Lines
+without a handler would be printed by Python's "last resort" handler, which is replaced meanwhile.
 """
 
 import logging
@@ -13,18 +13,18 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
-_LIBRARIES = r"(?!stereocell(\.|$))"  # modules whose names begin otherwise
+_LIBRARIES = r"(?!stereocell(\.|$))"  # names of all modules outside of this package
 _lock = Lock()
-_depth = 0
-_saved: tuple[Any, logging.Handler | None] | None = None  # filters, and the last resort
+_depth = 0  # blocks that threads are inside of
+_saved: tuple[Any, logging.Handler | None] | None = None  # filters, and the last-resort handler
 
 
 @contextmanager
 def quiet_libraries() -> Iterator[None]:
     """Show no warning and no log line of a library while a thread is inside such a block.
 
-    Python keeps both settings once for all threads, so the first one changes them, and the last one
-    restores them.
+    Both settings of Python are shared by all threads. The first thread that enters changes them,
+    and the last one that leaves restores them.
     """
     global _depth
     with _lock:

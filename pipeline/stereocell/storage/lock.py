@@ -25,8 +25,11 @@ from stereocell.storage.temporary_names import clear_remains
 def alone_in(out: Path, command: str) -> Iterator[None]:
     """Hold OUT for a command that writes into it; a folder that stays empty is removed.
 
-    If the previous holder was killed, its half-written files are removed. Raises OutputError where
-    another process holds OUT (the text names it), or where OUT can't be written.
+    If the block fails or is interrupted, or the previous holder was killed, half-written files are
+    removed: Ctrl+C ends workers at once, in the middle of a file. Finished results stay.
+
+    Raises OutputError where another process holds OUT (the text names it), or where OUT can't be
+    written.
     """
     made = _missing_folders(out)
     try:
@@ -42,6 +45,10 @@ def alone_in(out: Path, command: str) -> Iterator[None]:
                 clear_remains(out)
             with holding(Claim((out / LOCK).absolute(), (out / LOCK).read_bytes())):
                 yield
+        except BaseException:
+            with suppress(OSError):  # the error of the block is the one to show
+                clear_remains(out)
+            raise
         finally:
             if sys.platform == "win32":  # it removes no open file
                 os.close(file)

@@ -1,6 +1,6 @@
 """An open HDF5 file in a child process (read/hdf5_texts.py).
 
-It is apart from `read`, whose imports would double the time in which a child starts.
+It is not in `read`, whose imports would double the time in which a child starts.
 """
 
 from typing import Any

@@ -1,7 +1,7 @@
-"""The guard of all writers: nothing of somebody else is removed or replaced without --force.
+"""The guard of all writers: nothing of somebody else is removed or replaced unless it is forced.
 
-A command may replace what StereoCell wrote of the same specimen. Anything else at the place of a
-result ends it before it writes, with a line that says what is there.
+A command may replace results of StereoCell of the same specimen. Other content at the place of a
+result ends the command before it writes, with a line that names the content.
 """
 
 from collections.abc import Iterator
@@ -13,31 +13,36 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.contents import contents_of
 from stereocell.storage.kinds import Kind
 
+AT_A_PROMPT, IN_PYTHON = "--force", "force=True"
 _forced: ContextVar[bool] = ContextVar("forced", default=False)
-HINT = "choose another place, or --force replaces it"
+_force_words: ContextVar[str] = ContextVar("force_words", default="")  # empty: there is no way
 
 
 @contextmanager
-def forcing(is_forced: bool) -> Iterator[None]:
-    """Within the block, allow that results replace whatever lies at their place (--force)."""
-    before = _forced.set(is_forced)
+def forcing(is_forced: bool, words: str = "") -> Iterator[None]:
+    """Within the block, allow that results replace whatever lies at their place, if it is forced.
+
+    words  the caller's way to force it, for remedies: AT_A_PROMPT or IN_PYTHON; empty: none
+    """
+    before, words_before = _forced.set(is_forced), _force_words.set(words)
     try:
         yield
     finally:
         _forced.reset(before)
+        _force_words.reset(words_before)
 
 
 def is_forced() -> bool:
-    """Return whether the user allows that anything is replaced."""
+    """Return whether --force is given."""
     return _forced.get()
 
 
 def require_free(place: Path, *, expected: str, is_ours: bool = False, found: str = "") -> None:
-    """Raise OutputError where a result would replace what isn't ours to replace.
+    """Raise OutputError where a result would replace content that is not its own earlier result.
 
-    expected  what may lie there beside nothing, for the message
-    is_ours   whether the caller knows what lies there for its own result of the same specimen
-    found     what lies there, in words; empty: as it is recognised
+    expected  the allowed content, for the message
+    is_ours   whether the caller has recognised an earlier result of the same specimen
+    found     the content in words; empty: `contents_of` recognises it
     """
     if is_ours or is_forced():
         return
@@ -48,4 +53,12 @@ def require_free(place: Path, *, expected: str, is_ours: bool = False, found: st
 
 def refused(place: Path | str, found: str, expected: str) -> OutputError:
     """Return the error of a place that holds something else."""
-    return OutputError(f"{place}: holds {found}, expected {expected}: {HINT}")
+    return OutputError(
+        f"{place}: holds {found}, expected {expected}: {or_force('choose another place')}"
+    )
+
+
+def or_force(remedy: str) -> str:
+    """Return a remedy, followed by the caller's way to replace what is there, if it has one."""
+    words = _force_words.get()
+    return f"{remedy}, or {words} replaces it" if words else remedy

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from stereocell.model.errors import OutputError
 from stereocell.storage.atomic_write import write_bytes
-from stereocell.storage.seals import damaged
-from stereocell.storage.workspace import fetch
+from stereocell.storage.seals import read_record, require_seal
 
 # ending of the name -> how a comment begins and ends
 _COMMENTS = {".toml": ("# ", ""), ".html": ("<!-- ", " -->")}
@@ -29,23 +28,15 @@ def write_sealed_text(path: Path, text: str) -> None:
 
 def require_sealed_text(path: Path, remedy: str) -> None:
     """Raise OutputError where a text is missing, changed, or was not written by StereoCell."""
-    fetch(path)
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise OutputError(f"{path} is missing: {remedy}") from None
-    except OSError as error:
-        raise OutputError(f"{path}: can't be read ({error.strerror})") from None
-    lines, last = _split(data)
+    lines, last = _split(read_record(path, remedy))
     found = _SEAL.search(last)
-    if found is None:
-        raise OutputError(
-            f"{path}: has no hash of its content in its last line: it is of an earlier version, or "
-            f"was written or changed by hand: {remedy}"
-        )
-    digest = hashlib.sha256(lines).hexdigest()
-    if found[1] != digest:
-        raise OutputError(damaged(path, digest, found[1], remedy))
+    require_seal(
+        path,
+        found and found[1],
+        hashlib.sha256(lines).hexdigest(),
+        place="it in the last line",
+        remedy=remedy,
+    )
 
 
 def is_sealed_text(path: Path) -> bool:

@@ -26,7 +26,7 @@ def clear_beside(path: Path) -> None:
 
 
 def remove_remains(path: Path) -> None:
-    """Remove a file or a folder of a temporary name, if it exists."""
+    """Remove a temporary file or folder, if it exists."""
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)  # a worker that was cut off may still write there
     else:

@@ -125,7 +125,7 @@ def sizes_below(path: Path) -> dict[Path, int]:
 
 
 def names_in(folder: Path) -> list[str]:
-    """Return the names of the files and folders in a folder, local or stored; none if it isn't one.
+    """Return the names in a folder, local or on object storage; empty if it is no folder.
 
     Raises OutputError where it can't be listed.
     """

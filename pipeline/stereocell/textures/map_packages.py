@@ -1,4 +1,4 @@
-"""The packages of the extra `maps`: xatlas makes UVs, alktx2 writes maps as Basis Universal."""
+"""The packages of the extra `maps`: xatlas unwraps surfaces, alktx2 encodes Basis Universal."""
 
 from typing import Any
 

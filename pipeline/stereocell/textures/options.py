@@ -27,7 +27,7 @@ class UnwrapOptions:
         flag=Flag(
             "--maps",
             "coarser levels get UVs and baked maps of normals, occlusion and paint, for DCC tools; "
-            "takes the extra `maps` (default: normals and values at vertices alone)",
+            "needs the extra `maps` (default: normals and values at vertices alone)",
         ),
     )
     first_lod: int = setting(1, "the finest level that gets UVs and baked maps")

@@ -75,8 +75,8 @@ class Network:
     ) -> "Network":
         """Return the model of a file's content, tried on one empty patch.
 
-        path          of the file, for its name and for messages
-        open_session  returns what runs the network; by default in this process
+        path          path of the file, for its name and for messages
+        open_session  opens a session that runs the network; by default in this process
 
         Raises UsageError if onnxruntime isn't installed, SourceError if the file is no such model.
         """

@@ -1,7 +1,7 @@
-"""A network of an ONNX file in onnxruntime, on one thread of the processor.
+"""Run a network of an ONNX file in onnxruntime, on one thread of the processor.
 
-A network is a program: it may loop without end or ask for any memory, and the runtime has no bound
-for either. So the caller runs this object in a process of its own (building/model_process.py).
+A network is a program: it may loop without end or allocate any amount of memory, and the runtime
+bounds neither. So the caller runs this object in a process of its own (building/model_process.py).
 """
 
 import re
@@ -17,12 +17,12 @@ from stereocell.model.extra_packages import import_extra
 
 
 class OnnxError(StereoCellError):
-    """The runtime refuses a network, or fails; the text says why, without a file's name."""
+    """The runtime refuses a network, or fails. The text is the reason without a file's name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tensor:
-    """An input or output: sizes are numbers, or names where the model leaves them open."""
+    """An input or output. Sizes are numbers, or names where the model leaves them open."""
 
     name: str
     shape: tuple[int | str | None, ...]
@@ -54,7 +54,7 @@ class OnnxSession:
                 content, options, providers=["CPUExecutionProvider"]
             )
         except _errors() as error:
-            raise OnnxError(_why(error)) from None
+            raise OnnxError(_reason(error)) from None
 
     def inputs(self) -> tuple[Tensor, ...]:
         return tuple(Tensor(i.name, tuple(i.shape), i.type) for i in self._session.get_inputs())
@@ -72,7 +72,7 @@ class OnnxSession:
         try:
             (found,) = self._session.run(None, {self._session.get_inputs()[0].name: values})
         except _errors() as error:
-            raise OnnxError(_why(error)) from None
+            raise OnnxError(_reason(error)) from None
         return np.asarray(found)
 
 
@@ -88,7 +88,7 @@ def _errors() -> tuple[type[Exception], ...]:
     return (*found, RuntimeError, ValueError)
 
 
-def _why(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     """Return the runtime's message without its name and codes, in one line."""
     text = " ".join(str(error).split())
     if "protobuf" in text:  # the file couldn't be parsed, or holds no graph

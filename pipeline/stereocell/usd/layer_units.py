@@ -31,5 +31,5 @@ def note_missing(stage: Usd.Stage) -> str:
     lines = ", ".join(LINES[field] for field in lacks)
     return (
         f"{layer.realPath}: states no {', no '.join(lacks)}, so other programs {effect}: write "
-        f"into the parentheses at its top, each on a line: {lines}"
+        f"each on a line of its own between the parentheses at the top of the layer: {lines}"
     )

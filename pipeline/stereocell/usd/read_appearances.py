@@ -133,16 +133,16 @@ def edited_color(material: Usd.Prim) -> Usd.Attribute | None:
     """Return the colour of a material's interface if it was edited since the build."""
     interface = material.GetAttribute("inputs:color")
     surface = material.GetChild("surface")
-    plain = surface.GetAttribute("inputs:diffuseColor") if surface else None
-    built = plain.GetCustomDataByKey(BUILT_COLOR) if plain else None
+    repeated = surface.GetAttribute("inputs:diffuseColor") if surface else None
+    built = repeated.GetCustomDataByKey(BUILT_COLOR) if repeated else None
     return interface if interface and built is not None and interface.Get() != built else None
 
 
 def _color_source(surface: UsdShade.Shader) -> Usd.Attribute | None:
     """Return the attribute with a surface's colour: the interface's, if it was edited.
 
-    The shader has a value of its own beside it, for programs that don't follow connections. An
-    edit of that value counts where the interface was left as it was built.
+    The shader repeats the colour, for programs that don't follow connections. An edit of the
+    shader's value counts only if the interface was not edited.
     """
     source = _source(surface, "diffuseColor")
     is_own = source is not None and source.GetPrim() == surface.GetPrim()
@@ -151,11 +151,14 @@ def _color_source(surface: UsdShade.Shader) -> Usd.Attribute | None:
 
 
 def _channel_color(prim: Usd.Prim) -> Usd.Attribute:
-    """Return the attribute with a channel's colour; without a plain surface, the interface's."""
+    """Return the attribute with a channel's colour.
+
+    It is the interface's where the shader has no colour of its own.
+    """
     surface = UsdShade.Shader(prim.GetChild("surface"))
     diffuse = surface.GetInput("diffuseColor") if surface else None
-    is_plain = diffuse and not diffuse.HasConnectedSource() and diffuse.Get() is not None
-    found = _color_source(surface) if is_plain else None
+    has_value = diffuse and not diffuse.HasConnectedSource() and diffuse.Get() is not None
+    found = _color_source(surface) if has_value else None
     return found or prim.GetAttribute("inputs:color")
 
 

@@ -1,7 +1,7 @@
 """Copy the lights of a composed stage into a specimen.usdz.
 
-A usdz is scaled, so only lights without a place keep their effect: distant lights and domes. Images
-of other formats than those that usdz allows are left out.
+A usdz is scaled, so only lights without a position keep their effect: distant lights and domes.
+Images in formats that usdz does not allow are left out.
 
 References: OpenUSD, Usdz File Format Specification, https://openusd.org/release/spec_usdz.html
 """
@@ -17,16 +17,16 @@ _IMAGES = (".exr", ".png", ".jpg", ".jpeg")
 
 
 def copy_lights(composed: Usd.Stage, small: Usd.Stage) -> dict[str, Path]:
-    """Define the drawn lights of a composed stage in the stage of a usdz.
+    """Define the visible lights of a composed stage in the stage of a usdz.
 
     Returns the images of the lights by their names in the archive.
     """
     group = composed.GetPrimAtPath(LIGHTS)
     images: dict[str, Path] = {}
     for light in group.GetChildren() if group else ():
-        has_place = not (light.IsA(UsdLux.DistantLight) or light.IsA(UsdLux.DomeLight))
+        is_distant = light.IsA(UsdLux.DistantLight) or light.IsA(UsdLux.DomeLight)
         visibility = UsdGeom.Imageable(light).ComputeVisibility()
-        if not has_place and visibility != UsdGeom.Tokens.invisible:
+        if is_distant and visibility != UsdGeom.Tokens.invisible:
             images |= _copy_light(light, small)
     return images
 

@@ -6,8 +6,8 @@ repeats the colour as a plain value, because Blender's importer and small viewer
 connection to the material's interface. Storm draws `surface_live` instead, the same shader with
 such a connection, so that an edited interface shows at once. The reader takes the interface where
 it was edited, see usd/read_appearances.py. The opacity points are the transfer function; the LUT is
-baked from them. A variant with shapes is a 2D function, and its opacity points what stands for it
-where gradients are unknown.
+baked from them. A variant with shapes is a 2D function; its opacity points replace it where
+gradients are unknown.
 
 The material has no volume output: USD ships no volume shader that renderers agree on, only
 UsdPreviewSurface. So the binding of a Volume prim to its appearance hands over the channel's values
@@ -140,9 +140,9 @@ def _author_surface(material: UsdShade.Material, is_fed: bool) -> None:
     # else tiles feed it: an opinion here would be stronger than theirs
     if not is_fed:
         color = material.GetInput("color").Get()
-        plain = surface.CreateInput("diffuseColor", _Types.Color3f)
-        plain.Set(color)
-        plain.GetAttr().SetCustomDataByKey(BUILT_COLOR, color)
+        repeated = surface.CreateInput("diffuseColor", _Types.Color3f)
+        repeated.Set(color)
+        repeated.GetAttr().SetCustomDataByKey(BUILT_COLOR, color)
     surface.CreateInput("metallic", _Types.Float).Set(0.0)
     surface.CreateInput("roughness", _Types.Float).Set(ROUGHNESS)
     output = surface.CreateOutput("surface", _Types.Token)
@@ -152,9 +152,9 @@ def _author_surface(material: UsdShade.Material, is_fed: bool) -> None:
 
 
 def _author_live_surface(material: UsdShade.Material, surface: UsdShade.Shader) -> None:
-    """Write the surface that Storm draws: as `surface`, but its colour is the material's input.
+    """Write the surface that Storm draws: as `surface`, but connected to the material's colour.
 
-    It inherits `surface`, so that maps which a tile feeds to that reach it as well.
+    It inherits from `surface`, so that maps which a tile connects to `surface` reach it as well.
     """
     stage, path = material.GetPrim().GetStage(), material.GetPath().AppendChild("surface_live")
     live = UsdShade.Shader.Define(stage, path)

@@ -31,17 +31,9 @@ from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
 from stereocell.storage.workspace import fetch, remove
 from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
+from stereocell.usd.read_levels import ComposedLod, mesh_at, read_lods
 from stereocell.usd.read_objects import read_columns
-from stereocell.usd.read_stage import (
-    ComposedLod,
-    hinted_box,
-    loaded,
-    mesh_at,
-    open_stage,
-    read_lods,
-    specimen_name,
-    tile_prims,
-)
+from stereocell.usd.read_stage import hinted_box, loaded, open_stage, specimen_name, tile_prims
 from stereocell.usd.read_variants import lod_levels
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
 from stereocell.usd.usdz_lights import copy_lights

@@ -1,7 +1,6 @@
-"""Check the records of a build against their own hashes: the plan and all that lies beside it.
+"""Check the records of a build against their own hashes: the plan and the files beside it.
 
-Nothing that one of these files says is trusted before its hash fits. The files of units, stage and
-bundle are checked against lists of their own: see formats.py.
+The files of units, stage and bundle are checked against lists of their own: see formats.py.
 """
 
 from stereocell.building.made_of import require_current
@@ -11,15 +10,15 @@ from stereocell.model.errors import CheckError, OutputError
 
 
 def check_plan(out_folder: OutFolder) -> str:
-    """Check plan.json: its hash, its schema, and the rules that its reader has beyond these."""
+    """Check plan.json: its hash, its schema, and the other rules of its reader."""
     plan = out_folder.plan()
     return f"{out_folder.plan_file.name}: {len(plan.tiles)} tiles x {len(plan.channels)} channels"
 
 
 def check_records(out_folder: OutFolder) -> str:
-    """Check what a plan writes beside plan.json, and the record of the phases.
+    """Check the files that a plan writes beside plan.json, and the record of the phases.
 
-    That says also whether units, stage, bundle and report were made of each other.
+    Also check that units, stage, bundle and report were made of each other.
     """
     settings, provenance = out_folder.settings_file, out_folder.provenance_file
     faults = find_document_faults(out_folder, "plan", "phases", "exports")

@@ -12,7 +12,8 @@ from stereocell.bundle.windowed_voxels import read_windowed
 from stereocell.bundle.write_tile import find_bounds
 from stereocell.bundle.write_transfer2d import count_tile
 from stereocell.usd.read_appearances import read_appearances
-from stereocell.usd.read_stage import loaded, open_stage, read_volume
+from stereocell.usd.read_stage import loaded, open_stage
+from stereocell.usd.read_volume import read_volume
 from stereocell.verify.bundle_files import find_differences
 from stereocell.verify.bundle_surfaces import compare_surfaces, surfaces_of, without_repeats
 from stereocell.verify.bundle_volumes import compare_volume, find_volume, placement_of

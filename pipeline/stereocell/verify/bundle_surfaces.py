@@ -27,7 +27,7 @@ from stereocell.formats.gltf import AMBIENT_SHARE
 from stereocell.formats.gltf_decode import Drawn, read_glb
 from stereocell.formats.tiles3d_walk import Content, walk
 from stereocell.model.mesh import Mesh
-from stereocell.usd.read_stage import ComposedLod
+from stereocell.usd.read_levels import ComposedLod
 from stereocell.usd.read_textures import read_image
 from stereocell.verify.bundle_files import COLOR_STEP
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
 from stereocell.storage.json_files import read_json
-from stereocell.usd.read_stage import ComposedVolume
+from stereocell.usd.read_volume import ComposedVolume
 from stereocell.verify.bundle_files import REMEDY, read_texels
 
 

@@ -16,10 +16,11 @@ from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_attributes import shortest
-from stereocell.usd.read_stage import dependencies, open_stage, tile_prims
+from stereocell.usd.read_stage import open_stage, tile_prims
+from stereocell.usd.stage_files import dependencies
 from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
 from stereocell.verify.bundle_manifest import compare_histograms, compare_manifest
-from stereocell.verify.formats import CheckLine, raise_on
+from stereocell.verify.check_line import CheckLine, raise_on
 from stereocell.verify.objects_against_source import compare_objects
 from stereocell.verify.stage_against_source import SourceTask, UnitFinding, compare_unit
 

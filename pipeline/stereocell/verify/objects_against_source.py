@@ -31,9 +31,10 @@ from stereocell.model.tiling import Box
 from stereocell.objects.extents import Runs
 from stereocell.objects.intensities import PERCENTILE
 from stereocell.objects.table import MEAN, P95
+from stereocell.usd.read_levels import mesh_at, read_lods
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
-from stereocell.usd.read_stage import loaded, mesh_at, open_stage, read_lods
-from stereocell.verify.formats import raise_on
+from stereocell.usd.read_stage import loaded, open_stage
+from stereocell.verify.check_line import raise_on
 from stereocell.verify.shared_walls import (
     NO_SURFACES,
     Surfaces,

@@ -11,9 +11,9 @@ _AGAIN = "run `stereocell publish OUT TARGET` again"
 
 
 def find_site_faults(found: Mapping[str, Path]) -> list[str]:
-    """Return the faults of a published page's files against the list of what was put there.
+    """Compare a published page's files with the list of published files; return the faults.
 
-    found  all files of the page by their relative paths; those that the list lacks are a host's
+    found  all files of the page by their relative paths; files of the web host are in no list
     """
     try:
         listed = dict(json.loads(found[PUBLISHED].read_bytes())["files"])

@@ -33,14 +33,9 @@ from stereocell.model.rigid_transform import Matrix
 from stereocell.model.tile_content import APRON
 from stereocell.storage.workspace import cached
 from stereocell.transfer.joint_histogram import to_eight_bits
-from stereocell.usd.read_stage import (
-    ComposedLod,
-    ComposedVolume,
-    loaded,
-    open_stage,
-    read_lods,
-    read_volume,
-)
+from stereocell.usd.read_levels import ComposedLod, read_lods
+from stereocell.usd.read_stage import loaded, open_stage
+from stereocell.usd.read_volume import ComposedVolume, read_volume
 
 # slack of a distance, as a share and in um: float32, and another order of the same triangles
 _SHARE, _HAIR_UM = 0.02, 1e-3

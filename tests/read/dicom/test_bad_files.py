@@ -20,6 +20,7 @@ from pydicom.uid import (
     JPEGLSLossless,
     RLELossless,
     RTStructureSetStorage,
+    generate_uid,
 )
 
 from stereocell import read
@@ -227,7 +228,7 @@ def test_files_cut_short_are_left_out_and_their_gap_is_told(tmp_path: Path) -> N
     paths = series(tmp_path / "s")
     paths[2].write_bytes(paths[2].read_bytes()[:-500])
     notes = read.open(tmp_path / "s").notes
-    assert any("1 missing slices" in note for note in notes)
+    assert any(f"1 missing slices of {len(paths)} (" in note for note in notes)
     assert any("1 cut short" in note for note in notes)
 
 
@@ -287,3 +288,35 @@ def _plain(folder: Path, content: bytes) -> Path:
     path = folder / "plain.dcm"
     path.write_bytes(content)
     return path
+
+
+def write_concatenation(folder: Path, parts: int) -> list[Path]:
+    """Write an enhanced image as several files, each with some of its frames."""
+    folder.mkdir()
+    shape = (parts * 3, *SHAPE[1:])
+    ds = pydicom.dcmread(write_enhanced(folder / "all", grid(shape=shape), shape, seed=None))
+    groups, size = list(ds.PerFrameFunctionalGroupsSequence), len(ds.PixelData) // parts
+    pixels, whole_uid = ds.PixelData, ds.SOPInstanceUID
+    (folder / "all").unlink()
+    paths = [folder / f"part{number}" for number in range(1, parts + 1)]
+    for number, path in enumerate(paths):
+        ds.SOPInstanceUID = ds.file_meta.MediaStorageSOPInstanceUID = generate_uid(
+            entropy_srcs=[str(number)]
+        )
+        ds.SOPInstanceUIDOfConcatenationSource = whole_uid
+        ds.ConcatenationUID = "1.2.826.0.3"
+        ds.InConcatenationNumber, ds.InConcatenationTotalNumber = number + 1, parts
+        ds.ConcatenationFrameOffsetNumber = 3 * number
+        ds.NumberOfFrames = 3
+        ds.PerFrameFunctionalGroupsSequence = groups[3 * number : 3 * number + 3]
+        ds.PixelData = pixels[number * size : (number + 1) * size]
+        ds.save_as(path)
+    return paths
+
+
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_a_lost_file_of_an_image_in_several_files_is_refused(tmp_path: Path, lost: int) -> None:
+    paths = write_concatenation(tmp_path / "parts", 3)
+    assert read.open(tmp_path / "parts").levels[0].shape == (30, 9, 26)
+    paths[lost].unlink()
+    assert "found 2 of 3 files of an image that is stored in several" in refusal(tmp_path / "parts")

@@ -302,7 +302,7 @@ def test_a_text_that_stands_in_a_million_rows_is_kept_once(tmp_path: Path) -> No
 
 
 def test_parquet_on_which_its_library_aborts_is_refused_in_a_line(tmp_path: Path) -> None:
-    """The repetition of a column, 0 to 2, is 33: pyarrow 26 ends its process on it."""
+    """The repetition type of a column is 33 instead of 0 to 2. pyarrow 26 aborts on it."""
     place = tmp_path / "a.parquet"
     table = pa.table({"label": [1, 2, 3], "kind": ["T", "B", "T"]})
     pq.write_table(table, place, compression="none")
@@ -323,10 +323,10 @@ def test_an_h5ad_whose_floats_are_described_in_no_standard_way_is_refused(tmp_pa
     assert "expected an IEEE float" in refusal(str(place))
 
 
-def test_a_heap_of_texts_on_which_hdf5_never_ends_is_refused_at_a_bound(
+def test_an_h5ad_whose_heap_makes_hdf5_loop_without_end_is_refused_at_a_time_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An object of a heap, of 0 bytes: HDF5 2.0 looks for the next one at the same place."""
+    """A heap object has 0 bytes, so HDF5 2.0 looks for the next object at the same place."""
     place = tmp_path / "a.h5ad"
     with h5py.File(place, "w") as file:
         write_anndata(file, h5py.string_dtype())

@@ -39,10 +39,16 @@ def open_stage(path):
         raise StageProblem(f"{path}: no prim {lacking[0]}, expected a StereoCell stage")
     unit = stage.GetMetadata("metersPerUnit")
     if abs(unit / METERS_PER_UNIT - 1) > 1e-6:
-        raise StageProblem(f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}")
+        raise StageProblem(
+            f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}: write it into the "
+            "parentheses at the top of the layer"
+        )
     axis = stage.GetMetadata("upAxis")
     if axis != "Y":
-        raise StageProblem(f"{path}: upAxis is {axis}, expected Y")
+        raise StageProblem(
+            f'{path}: upAxis is {axis}, expected Y: write upAxis = "Y" into the parentheses at the '
+            "top of the layer"
+        )
     return stage
 
 
@@ -53,7 +59,7 @@ def write_choice(stage, choice, file):
 
     Raises StageProblem if no tile fits, or a channel lacks the transfer function.
     """
-    # a tile that the stage deactivates can't be loaded, and stays as it is
+    # A tile that the stage deactivates can't be loaded, and stays deactivated.
     tiles = stage.GetPrimAtPath(TILES).GetFilteredChildren(Usd.PrimIsActive & Usd.PrimIsDefined)
     chosen = [tile for tile in tiles if _fits(tile.GetName(), choice.tiles)]
     if not chosen:

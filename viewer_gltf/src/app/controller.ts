@@ -63,7 +63,7 @@ const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-
 const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
 
 const LENS_KEY = "stereocell-lens";
-/** Whether the cards are laid out anew by a change: those of the channels that are shown by then. */
+/** Whether a change gives the cards to the channels that are shown by then. */
 const laysOutCards = (change: PanelChange) =>
   change.panel === "find" || (change.panel === "unfold" && change.section === "channels");
 const EYE_ROWS = [EYE_DISTANCE, STEREO_STRENGTH] as const;
@@ -221,7 +221,7 @@ export class Controller {
     else if ("panel" in wish) {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
-      if (laysOutCards(wish)) this.view = { ...this.view, carded: null };
+      if (laysOutCards(wish)) this.view = { ...this.view, channelsWithCard: null };
       this.refresh();
     } else this.viewer.dispatch(wish);
   }
@@ -237,7 +237,7 @@ export class Controller {
     const stand = standOf(search); // what `reset` returns to, wherever a link looks from
     if (camera === null || stand !== null) viewer.openWith(stand, saysDistance);
     if (camera !== null) viewer.lookFrom(camera);
-    this.view = { ...this.view, carded: null };
+    this.view = { ...this.view, channelsWithCard: null };
     viewer.forgetSteps();
   }
 

@@ -1,8 +1,8 @@
 import { describe, expect, it } from "vitest";
-import { DOUBLE_MS, isSecondPress, type Press } from "./double_press";
-import type { Sight } from "./dwell";
+import { DOUBLE_MS, isSecondPress, type TimedPress } from "./double_press";
+import type { RaySample } from "./dwell";
 
-const SIGHT: Sight = {
+const SAMPLE: RaySample = {
   target: "a",
   place: "upper",
   layout: "before",
@@ -10,10 +10,15 @@ const SIGHT: Sight = {
   isGradual: false,
 };
 /** @param right_deg where the ray points */
-function pressed(time_ms: number, more: Partial<Sight> = {}, isStep = false, right_deg = 0): Press {
+function pressed(
+  time_ms: number,
+  more: Partial<RaySample> = {},
+  isStep = false,
+  right_deg = 0,
+): TimedPress {
   const angle = (right_deg * Math.PI) / 180;
   const direction = [Math.sin(angle), 0, -Math.cos(angle)] as const;
-  return { time_ms, sight: { ...SIGHT, direction, ...more }, isStep };
+  return { time_ms, sample: { ...SAMPLE, direction, ...more }, isStep };
 }
 
 describe("the second of two quick presses", () => {
@@ -24,16 +29,16 @@ describe("the second of two quick presses", () => {
     expect(isSecondPress(first, pressed(1150, {}, false, 3))).toBe(true); // a trigger shakes the hand
   });
 
-  it("counts where the first one was long ago, or where there was none", () => {
+  it("counts if the first one was long ago, or if there was none", () => {
     expect(isSecondPress(first, pressed(1001 + DOUBLE_MS))).toBe(false);
     expect(isSecondPress(null, pressed(1000))).toBe(false);
   });
 
-  it("counts on a control that goes on by steps", () => {
+  it("counts on a control that moves on by steps", () => {
     expect(isSecondPress(pressed(1000, {}, true), pressed(1150, {}, true))).toBe(false);
   });
 
-  it("does nothing on what has come under the ray meanwhile, steps or not", () => {
+  it("does nothing on a control that has come under the ray meanwhile, steps or not", () => {
     const other = { target: "b", layout: "after" };
     expect(isSecondPress(first, pressed(1150, other))).toBe(true);
     expect(isSecondPress(first, pressed(1150, other, true))).toBe(true);

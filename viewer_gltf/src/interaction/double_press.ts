@@ -1,27 +1,27 @@
 /**
  * Two presses in quick succession are one intention: people double-click, and a thumb bounces. The
- * second one does nothing, unless the control goes on by a step with each press. Pure.
+ * second press does nothing, unless the control moves on by a step with each press. Pure.
  */
-import { angleBetween, type Sight, TREMBLE_RAD } from "./dwell";
+import { angleBetween, type RaySample, TREMBLE_RAD } from "./dwell";
 
 /** A press of a button, or a dwell that has fired. */
-export type Press = Readonly<{
+export type TimedPress = Readonly<{
   /** On the clock of the page's events. */
   time_ms: number;
-  sight: Sight;
-  /** Each press goes on by a step: pressing quickly is meant. */
+  sample: RaySample;
+  /** Each press moves on by a step, so quick presses all count. */
   isStep: boolean;
 }>;
 
 /** Longest time between the two presses of a double press, ms. */
 export const DOUBLE_MS = 400;
 
-/** Whether a press belongs to the one before it, and so is to do nothing. */
-export function isSecondPress(before: Press | null, press: Press): boolean {
+/** Whether a press is the second one of a double press, and so does nothing. */
+export function isSecondPress(before: TimedPress | null, press: TimedPress): boolean {
   if (before === null || press.time_ms - before.time_ms > DOUBLE_MS) return false;
-  const [then, now] = [before.sight, press.sight];
+  const [then, now] = [before.sample, press.sample];
   if (then.target === now.target && then.place === now.place) return !press.isStep;
-  // the ray has stayed, and something else has come under it
+  // the ray has not moved, and another target has come under it
   const isStill = angleBetween(then.direction, now.direction) <= TREMBLE_RAD;
   return isStill && then.layout !== now.layout;
 }

@@ -5,7 +5,7 @@ import {
   type Dwell,
   dwellProgress,
   NO_DWELL,
-  type Sight,
+  type RaySample,
   spend,
 } from "./dwell";
 
@@ -14,15 +14,15 @@ const FRAME_S = 1 / 64; // exact in binary: 1.5 s is 96 frames
 const MIDDLES: Readonly<Record<string, number>> = { a: 0, b: 2, far: 20 };
 
 /** @param at_deg to the right */
-function seen(target: string | null, more: Partial<Sight> = {}, at_deg?: number): Sight {
+function seen(target: string | null, more: Partial<RaySample> = {}, at_deg?: number): RaySample {
   const angle = ((at_deg ?? (target === null ? 10 : MIDDLES[target])) * Math.PI) / 180;
   const direction = [Math.sin(angle), 0, -Math.cos(angle)] as const;
   return { target, place: null, layout: "", direction, isGradual: false, ...more };
 }
 
-/** Look at each sight for so many seconds; the targets that fired, in order. */
+/** Look at each sample for so many seconds; the targets that fired, in order. */
 function watch(
-  gazes: readonly (readonly [Sight | string | null, number])[],
+  gazes: readonly (readonly [RaySample | string | null, number])[],
   isOn = true,
   start = NO_DWELL,
 ) {
@@ -30,12 +30,12 @@ function watch(
   const fired: (string | null)[] = [];
   const progress: number[] = [];
   for (const [at, seconds] of gazes) {
-    const sight = at === null || typeof at === "string" ? seen(at) : at;
+    const sample = at === null || typeof at === "string" ? seen(at) : at;
     // The frame on which a target is first seen starts its clock and adds nothing to it.
     for (let i = 0; i <= Math.round(seconds / FRAME_S); i++) {
-      const [next, fires] = advanceDwell(dwell, sight, FRAME_S, isOn);
+      const [next, fires] = advanceDwell(dwell, sample, FRAME_S, isOn);
       dwell = next;
-      if (fires) fired.push(sight.target);
+      if (fires) fired.push(sample.target);
       progress.push(dwellProgress(dwell));
     }
   }
@@ -111,7 +111,7 @@ describe("a gaze that rests where it has chosen", () => {
 
   it("chooses again by a slider, a little further along it, and not by a switch", () => {
     const slider = { isGradual: true };
-    const along = (more: Partial<Sight>, by_deg: number) =>
+    const along = (more: Partial<RaySample>, by_deg: number) =>
       watch([
         [seen("a", more, 0), 2],
         [seen("a", more, by_deg), 2],
@@ -144,7 +144,7 @@ describe("a layout that changes under the gaze", () => {
     expect(watch([[moved, 6]], true, rested.dwell).fired).toEqual([next.target]);
   });
 
-  it("goes on where nothing changes under the gaze itself", () => {
+  it("lets the time count on if nothing changes under the gaze itself", () => {
     const { dwell } = watch([
       [seen("far", { ...before, place: "aside" }), 0],
       [seen("a", before), 1],
@@ -152,17 +152,17 @@ describe("a layout that changes under the gaze", () => {
     expect(watch([[seen("a", after), 1]], true, dwell).fired).toEqual(["a"]);
   });
 
-  it("is not what a gaze meets that moves to another control", () => {
+  it("does not stop a gaze that moves to another control by itself", () => {
     const { dwell } = watch([[seen("far", { ...before, place: "aside" }), 0]]);
     expect(watch([[seen("b", before), 2]], true, dwell).fired).toEqual(["b"]);
   });
 
-  it("is the first sight of a control as well, but not of a tile", () => {
+  it("is assumed at the first frame for a control, and not for a tile", () => {
     expect(watch([[seen("a", before), 6]]).fired).toEqual([]);
     expect(watch([[seen("a", { ...before, place: null }), 6]]).fired).toEqual(["a"]);
   });
 
-  it("leaves a control that has fired as it is, though it comes back under the gaze", () => {
+  it("does not let a control fire again that has fired and comes back under the gaze", () => {
     const { dwell } = watch([[seen("far", { ...before, place: "aside" }), 0]]);
     const slid = seen("b", { layout: "then", place: "upper" }, 0);
     const gazes = [

@@ -3,22 +3,22 @@
  * headset.
  *
  * A dwell fires once and is spent. It is spent as well when the layout under a resting gaze changes:
- * a control that slides or opens under the gaze was not looked for. A spent dwell fires nothing until
- * the gaze moves on, and the tremble of a resting head is no such move.
+ * the user did not look for a control that slides or opens under the gaze. A spent dwell fires nothing
+ * until the gaze moves on. The tremble of a resting head is no such move.
  */
 import { dot, type Vec3 } from "../math/vec3";
 
-/** The target that the gaze meets in one frame, and its place. */
-export type Sight = Readonly<{
+/** The target that a ray meets in one frame, and its place. */
+export type RaySample = Readonly<{
   /** The key of the target; null: nothing that can be chosen. */
   target: string | null;
   /** Where the target lies in its layout; null: it belongs to no layout, as a tile does. */
   place: string | null;
   /** Changes whenever any target comes, goes or moves in its layout. */
   layout: string;
-  /** Direction of the gaze, of unit length. */
+  /** Direction of the ray, of unit length. */
   direction: Vec3;
-  /** Each place on the target is a choice of its own, as on a slider. */
+  /** Each point of the target chooses another value, as on a slider. */
   isGradual: boolean;
 }>;
 
@@ -31,8 +31,8 @@ type Spent = Readonly<{
 }>;
 
 export type Dwell = Readonly<{
-  /** The sight of the frame before; null: there was none. */
-  sight: Sight | null;
+  /** The sample of the previous frame; null: there was none. */
+  sample: RaySample | null;
   elapsed_s: number;
   /** null: the time counts. */
   spent: Spent | null;
@@ -46,39 +46,39 @@ export const TREMBLE_RAD = (1 * Math.PI) / 180;
 /** Turn that is a move of its own, also within one control, radians. */
 const MOVE_RAD = (1.5 * Math.PI) / 180;
 
-export const NO_DWELL: Dwell = { sight: null, elapsed_s: 0, spent: null };
+export const NO_DWELL: Dwell = { sample: null, elapsed_s: 0, spent: null };
 
 /** The next state, and whether this frame is the one on which the dwell fires. */
 export function advanceDwell(
   dwell: Dwell,
-  sight: Sight,
+  sample: RaySample,
   dt_s: number,
   isOn = true,
 ): readonly [Dwell, boolean] {
   const { spent } = dwell;
-  if (hasLayoutChanged(dwell.sight, sight)) {
-    const hasFired = spent?.hasFired === true && spent.target === sight.target;
-    const direction = spent?.direction ?? sight.direction;
-    const { target } = sight;
-    return [{ sight, elapsed_s: 0, spent: { direction, target, hasFired } }, false];
+  if (hasLayoutChanged(dwell.sample, sample)) {
+    const hasFired = spent?.hasFired === true && spent.target === sample.target;
+    const direction = spent?.direction ?? sample.direction;
+    const { target } = sample;
+    return [{ sample, elapsed_s: 0, spent: { direction, target, hasFired } }, false];
   }
-  if (spent !== null && !hasLeft(spent, sight)) return [{ sight, elapsed_s: 0, spent }, false];
-  const isCounting = spent === null && isOn && sight.target === dwell.sight?.target;
-  if (!isCounting || sight.target === null) return [{ sight, elapsed_s: 0, spent: null }, false];
+  if (spent !== null && !hasLeft(spent, sample)) return [{ sample, elapsed_s: 0, spent }, false];
+  const isCounting = spent === null && isOn && sample.target === dwell.sample?.target;
+  if (!isCounting || sample.target === null) return [{ sample, elapsed_s: 0, spent: null }, false];
   const elapsed_s = dwell.elapsed_s + Math.min(Math.max(dt_s, 0), LONGEST_FRAME_S);
-  const next = { sight, elapsed_s, spent: null };
+  const next = { sample, elapsed_s, spent: null };
   return elapsed_s < DWELL_S ? [next, false] : [spend(next), true];
 }
 
-/** The dwell after something was chosen, by the gaze or by a button: the same gaze chooses no more. */
+/** The dwell after the gaze or a button has chosen: the gaze chooses nothing more until it moves on. */
 export function spend(dwell: Dwell): Dwell {
-  const { sight } = dwell;
-  if (sight === null) return dwell;
-  const { direction, target } = sight;
-  return { sight, elapsed_s: 0, spent: { direction, target, hasFired: true } };
+  const { sample } = dwell;
+  if (sample === null) return dwell;
+  const { direction, target } = sample;
+  return { sample, elapsed_s: 0, spent: { direction, target, hasFired: true } };
 }
 
-/** Share of the ring that is filled, 0..1; 0 while the dwell is spent: the ring is gone. */
+/** Share of the ring that is filled, 0..1; 0 while the dwell is spent, so the ring is hidden. */
 export function dwellProgress(dwell: Dwell): number {
   return Math.min(1, dwell.elapsed_s / DWELL_S);
 }
@@ -90,18 +90,18 @@ export function angleBetween(a: Vec3, b: Vec3): number {
 
 /**
  * Whether another control is under the gaze because the layout has changed, and not because the gaze has
- * moved. At the first sight this is so for each control, and not for what belongs to no layout.
+ * moved. At the first sample this is so for each control, and not for what belongs to no layout.
  */
-function hasLayoutChanged(before: Sight | null, now: Sight): boolean {
+function hasLayoutChanged(before: RaySample | null, now: RaySample): boolean {
   if (before === null) return now.place !== null;
   if (before.layout === now.layout) return false;
   return before.target !== now.target || before.place !== now.place;
 }
 
 /** Whether the gaze has moved on since its dwell was spent. */
-function hasLeft({ direction, target, hasFired }: Spent, sight: Sight): boolean {
-  const turn = angleBetween(direction, sight.direction);
-  const isElsewhere = sight.target !== target;
-  if (turn > MOVE_RAD) return isElsewhere || sight.isGradual || !hasFired;
+function hasLeft({ direction, target, hasFired }: Spent, sample: RaySample): boolean {
+  const turn = angleBetween(direction, sample.direction);
+  const isElsewhere = sample.target !== target;
+  if (turn > MOVE_RAD) return isElsewhere || sample.isGradual || !hasFired;
   return turn > TREMBLE_RAD && isElsewhere;
 }

@@ -4,8 +4,8 @@
  */
 import { type Matrix4, Vector3 } from "three";
 import type { Command } from "../state/commands";
-import { isSecondPress, type Press } from "./double_press";
-import { advanceDwell, type Dwell, dwellProgress, NO_DWELL, type Sight, spend } from "./dwell";
+import { isSecondPress, type TimedPress } from "./double_press";
+import { advanceDwell, type Dwell, dwellProgress, NO_DWELL, type RaySample, spend } from "./dwell";
 
 /** `direction` has unit length. */
 export type RoomRay = Readonly<{ origin: Vector3; direction: Vector3 }>;
@@ -21,9 +21,9 @@ export type Hit = Readonly<{
   hold?: "slide" | "carry";
   /** Goes on, little by little, while the button is held or the gaze stays. */
   repeats?: Command;
-  /** Where it lies in its target's layout; absent: it belongs to no layout. */
+  /** The hit's place in its target's layout; absent: it belongs to no layout. */
   place?: string;
-  /** Each press goes on by a step: pressing quickly is meant. */
+  /** Each press moves on by a step, so quick presses all count. */
   isStep?: boolean;
 }>;
 
@@ -31,7 +31,7 @@ export type Hit = Readonly<{
 export interface Target {
   /** Drawn over what is nearer, so that it is met before it. */
   readonly isOnTop: boolean;
-  /** Changes whenever something that can be chosen comes, goes or moves in it; absent: nothing does. */
+  /** Changes whenever a control of the target appears, disappears or moves; absent: it has none. */
   readonly layout?: string;
   meet(ray: RoomRay): Hit | null;
   /** Chosen by dwell (`isByGaze`) or button; what holds on to the ray is chosen before it is dragged. */
@@ -69,7 +69,7 @@ function layoutOf(targets: readonly Target[]): string {
 }
 
 /** @param met null: nothing can be chosen */
-function sightOf({ direction }: RoomRay, met: Met | null, targets: readonly Target[]): Sight {
+function sampleOf({ direction }: RoomRay, met: Met | null, targets: readonly Target[]): RaySample {
   return {
     target: met?.key ?? null,
     place: met?.place ?? null,
@@ -85,7 +85,7 @@ export class Pointer {
   /** The hit of each hand's ray, in the order given. */
   hands: readonly (Met | null)[] = [];
   private dwell: Dwell = NO_DWELL;
-  private lastPress: Press | null = null;
+  private lastPress: TimedPress | null = null;
 
   /** Of the dwell, 0..1. */
   get progress(): number {
@@ -108,23 +108,23 @@ export class Pointer {
     this.gaze = meetFirst(gaze, targets);
     this.hands = hands.map((ray) => ray && meetFirst(ray, targets));
     const isGazing = this.hands.every((met) => met === null);
-    const sight = sightOf(gaze, isGazing ? this.gaze : null, targets);
-    const [dwell, fires] = advanceDwell(this.dwell, sight, dt_s, isDwellOn);
+    const sample = sampleOf(gaze, isGazing ? this.gaze : null, targets);
+    const [dwell, fires] = advanceDwell(this.dwell, sample, dt_s, isDwellOn);
     this.dwell = dwell;
     return fires ? this.gaze : null;
   }
 
   /**
-   * Something is chosen, by a button or by the dwell: a gaze that stays chooses no more.
+   * Choose a hit, by a button or by the dwell. A gaze that stays chooses nothing more.
    *
-   * @returns whether it counts; the second press of a double press does not
+   * @returns whether the press counts; the second press of a double press does not
    */
   press(met: Met, targets: readonly Target[], time_ms: number): boolean {
     this.dwell = spend(this.dwell);
-    const sight = sightOf(met.ray, met, targets);
-    // a tile that one press selects is isolated by the next, however soon; a slider may be taken again
+    const sample = sampleOf(met.ray, met, targets);
+    // The second press on a tile isolates it, and a slider may be taken again, however soon.
     const isStep = met.isStep === true || met.place === undefined || met.hold !== undefined;
-    const press = { time_ms, sight, isStep };
+    const press = { time_ms, sample, isStep };
     const isSecond = isSecondPress(this.lastPress, press);
     this.lastPress = press;
     return !isSecond;

@@ -15,7 +15,7 @@ const OF = "/";
 
 export class TileTarget implements Target {
   readonly isOnTop = false;
-  /** Which tiles are shown. */
+  /** The names of the tiles that are shown. */
   layout = "";
   private shown: readonly BoxedTile[] = [];
   clip: Clip = WHOLE;

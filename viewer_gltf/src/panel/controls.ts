@@ -47,10 +47,10 @@ export type PanelView = Readonly<{
   /** The page of the list of channels that is shown, from 0. */
   page: number;
   /**
-   * The channels that have a card above the list, if there are many: those that were shown when the section
-   * was last laid out. null: those that are shown now.
+   * The channels with a card above the list, if there are many channels. They were shown when the section was
+   * last opened. null: the channels that are shown now get the cards.
    */
-  carded: readonly string[] | null;
+  channelsWithCard: readonly string[] | null;
   picked: string | null;
   clipPart: ClipPart | null;
   parameter: string | null;
@@ -71,7 +71,7 @@ export type PanelView = Readonly<{
 export const START_VIEW: PanelView = {
   search: "",
   page: 0,
-  carded: null,
+  channelsWithCard: null,
   picked: null,
   clipPart: null,
   parameter: null,
@@ -149,7 +149,7 @@ export type Button = Base &
   Readonly<{
     kind: "button";
     isPrimary?: boolean;
-    /** Each press goes on by a step, as undoing does: pressing quickly is meant. */
+    /** Each press moves on by a step, as undoing does, so quick presses all count. */
     isStep?: boolean;
     /** Goes on with it, little by little, while it is held or gazed at. */
     repeats?: Command;
@@ -240,9 +240,9 @@ export type Group = Readonly<{
   tags: readonly string[];
   /** What the tags mean, in a sentence; empty: nothing more. */
   about: string;
-  /** It is not shown in the picture. */
+  /** Its channel is hidden, so its name is drawn dim. */
   isDimmed: boolean;
-  /** A row of a long list. */
+  /** Drawn as a row of a long list, not as a card. */
   isCompact?: boolean;
   controls: readonly Control[];
   more: readonly Control[];

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
+import { FLAT_FACTS } from "../../test/support/fixture/facts";
+import { sampleManifest } from "../../test/support/fixture/manifest";
 import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
 import { DISC_RADIUS, SWITCH_DISTANCE } from "../state/parameters/volumes";
@@ -18,30 +19,7 @@ import { type Facts, layOut } from "./layout";
 import { PALETTES } from "./palettes";
 import { PAGE } from "./sections/channels";
 
-const FACTS: Facts = {
-  title: "sample",
-  subtitle: "",
-  shown: SPECIMEN_BOX,
-  ranges: new Map([["c0", [100, 1120]]]),
-  focusTile: "r1_c2",
-  isStereo: false,
-  stereo: { isAvailable: false, reason: "No headset was found." },
-  split: null,
-  hasRoom: false,
-  canScan: false,
-  faultOfCode: () => "",
-  frame_ms: 12.3,
-  settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
-  triangles: 12_345,
-  volumeLevel: 1,
-  samples: null,
-  isLoading: false,
-  values: [],
-  sliceValues: [],
-  isFilming: false,
-  undo: null,
-  redo: null,
-};
+const FACTS: Facts = { ...FLAT_FACTS, ranges: new Map([["c0", [100, 1120]]]) };
 const start = (channels = 3) => initialState(sampleManifest(channels));
 
 function controlsOf(layout: Layout): readonly Control[] {

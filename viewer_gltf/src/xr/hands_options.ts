@@ -1,4 +1,4 @@
-/** The options that the hands in stereo are made with. */
+/** Options of the hands in stereo. */
 import type { Scene, WebXRManager } from "three";
 import type { Target } from "../interaction/ray_pointer";
 import type { BoxedTile } from "../math/pick";
@@ -13,16 +13,16 @@ export type HandsOptions = Readonly<{
   scene: Scene;
   specimen: Specimen;
   tiles: readonly BoxedTile[];
-  /** Between the panel and the tiles: what is dragged, such as a cut's handles. */
+  /** Targets between the panel and the tiles that can be dragged, such as a cut's handles. */
   handles?: readonly Target[];
   layOut: (view: PanelView) => Layout;
   onAction: (action: Action) => void;
   onCommand: (command: Command) => void;
   /** A tile was chosen by dwell (`isByGaze`) or button; the ray is in um of the specimen. */
   onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void;
-  /** Stereo is to end. */
+  /** The user asks to leave stereo. */
   onLeave: () => void;
-  /** The phone is in a viewer of other lenses. */
+  /** The user has chosen another lens profile. */
   onLenses?: (lenses: Lenses) => void;
   /** Absent: true. False: panel and notices are not painted, as in a program without a screen. */
   isPainted?: boolean;

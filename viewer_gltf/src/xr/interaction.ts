@@ -75,7 +75,7 @@ export class Hands {
   /** The hands that hold the specimen, and their places in the frame before. */
   private held = new Map<XRInputSource, HandPose | null>();
   private gaze: RoomRay = gazeOf(new Matrix4());
-  /** When the button was pressed since the frame before, ms. */
+  /** Times at which the button was pressed since the previous frame, ms. */
   private taps: number[] = [];
   private isRunning = false;
   private shown = "";
@@ -151,7 +151,7 @@ export class Hands {
     this.ring.hide();
   }
 
-  /** The only button of the split screen, or a key in its place. @param time_ms on the clock of events */
+  /** Press the only button of the split screen, or a key in its place. @param time_ms on the clock of events */
   tap(time_ms = this.now_ms()): void {
     this.taps.push(time_ms);
   }

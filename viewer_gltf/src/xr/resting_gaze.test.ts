@@ -30,7 +30,7 @@ type TestedPage = readonly [
   ids: readonly string[],
   variant: Variant,
 ];
-/** The name is for what is reported of a test that fails. */
+/** The name of a page appears in the report of a failed test. */
 const PAGES: readonly TestedPage[] = [
   ...pagesOf(VIEW, busy).map(
     ([tab, page, ids]) => [`${tab} ${page}`, tab, page, ids, busy] as const,
@@ -47,14 +47,14 @@ function at([, tab, page, , variant]: TestedPage): LookingPerson {
 }
 const CHANNELS = PAGES[1];
 
-/** Most wishes and changes that a control led to, and the control. */
-type Led = Readonly<{ id: string; wishes: number; changes: number }>;
+/** The numbers of requests and changes that one control has caused. */
+type Effect = Readonly<{ id: string; wishes: number; changes: number }>;
 
-function ledTo(
+function effectsOf(
   page: TestedPage,
   act: (person: LookingPerson, id: string) => void,
   ids = page[3],
-): readonly Led[] {
+): readonly Effect[] {
   return ids.map((id) => {
     const person = at(page);
     act(person, id);
@@ -63,7 +63,8 @@ function ledTo(
     return { id, wishes: wishes.length, changes };
   });
 }
-const moreThanOne = (all: readonly Led[]) => all.filter((led) => led.wishes > 1 || led.changes > 1);
+const moreThanOne = (all: readonly Effect[]) =>
+  all.filter(({ wishes, changes }) => wishes > 1 || changes > 1);
 
 describe("every control of every page", () => {
   it("is part of these tests", () => {
@@ -73,7 +74,7 @@ describe("every control of every page", () => {
   });
 
   it.each(PAGES)("changes one thing under a gaze that rests on it for 6 s more: %s", (...page) => {
-    const all = ledTo(page, (person, id) => {
+    const all = effectsOf(page, (person, id) => {
       person.lookAt(id, 0.5);
       person.rest(7.5);
     });
@@ -84,7 +85,7 @@ describe("every control of every page", () => {
   it.each(sweep(PAGES, ([, tab, page]) => tab === "channels" && page < 2))(
     "changes one thing under a gaze at its lower edge: %s",
     (...page) => {
-      const all = ledTo(page, (person, id) => {
+      const all = effectsOf(page, (person, id) => {
         person.lookAt(id, 0.5, 0.9);
         person.rest(7.5);
       });
@@ -95,7 +96,7 @@ describe("every control of every page", () => {
   it.each(sweep(PAGES, ([, tab]) => ["notices", "light", "measure"].includes(tab)))(
     "changes one thing by the button, and the gaze adds nothing: %s",
     (...page) => {
-      const all = ledTo(page, (person, id) => {
+      const all = effectsOf(page, (person, id) => {
         person.lookAt(id, 0.5);
         person.rest(1.4);
         person.press();
@@ -119,7 +120,7 @@ describe("every control of every page", () => {
       person.press(180);
       person.rest(2);
     };
-    const all = ledTo(page, act, switches);
+    const all = effectsOf(page, act, switches);
     expect(moreThanOne(all)).toEqual([]);
   });
 });
@@ -171,7 +172,7 @@ describe("the rows of the panel", () => {
 });
 
 describe("a gaze that opens or closes the panel", () => {
-  it("does no more, though a control lies where the button was", () => {
+  it("does nothing more, though a control lies where the button was", () => {
     const person = new LookingPerson(9, busy);
     person.lookAt("opener");
     person.changes = 0;
@@ -183,7 +184,7 @@ describe("a gaze that opens or closes the panel", () => {
     expect([person.changes, person.wishes]).toEqual([1, []]);
   });
 
-  it("was not looked for when stereo begins with the gaze on the button", () => {
+  it("does not fire when stereo begins with the gaze on the button", () => {
     const person = new LookingPerson(9, busy);
     person.lookAt("opener");
     person.hands.stop();
@@ -205,7 +206,7 @@ describe("a gaze that opens or closes the panel", () => {
     expect([person.changes, person.wishes]).toEqual([1, []]);
   });
 
-  it("is not taken for one by a double press: the panel stays open", () => {
+  it("leaves the panel open after a double press on its button", () => {
     const person = new LookingPerson(12, busy);
     person.lookAt("opener");
     person.press();
@@ -216,7 +217,7 @@ describe("a gaze that opens or closes the panel", () => {
 });
 
 describe("a press that comes just after the dwell", () => {
-  it("is the same intention", () => {
+  it("changes nothing more", () => {
     const person = at(CHANNELS);
     person.lookAt("c0/shown");
     person.rest(1.6);

@@ -1,4 +1,4 @@
-/** Double clicks on the flat panel: each counts once. STEREOCELL_SHOTS names a folder to leave a picture in. */
+/** Each double click on the flat panel counts once. STEREOCELL_SHOTS names a folder for a picture. */
 import { join } from "node:path";
 import { beforeAll, expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
@@ -65,7 +65,7 @@ describeInChromium("a double click on the panel", () => {
     expect([selected, isolated]).toEqual(["r0_c1", null]);
   });
 
-  it("undoes twice, since each click there is a step", async () => {
+  it("undoes twice, because each click on Undo is a step", async () => {
     const quality = page().locator('[data-control="quality"][value="high"]');
     const isChosen = () => quality.isChecked();
     await quality.setChecked(true, { force: true });

@@ -99,8 +99,8 @@ describeInChromium("the path-traced page", () => {
     for (const key of keys) await page().keyboard.press(key);
   }
   /**
-   * Takes a picture of `wanted` samples at least, also where they began anew in between. One that has
-   * ENOUGH_SAMPLES rests: a busy machine may come to it before the test has looked.
+   * Takes a picture of at least `wanted` samples, also if tracing began again in between. Tracing stops at
+   * ENOUGH_SAMPLES, which a busy machine may reach before the test looks.
    */
   async function shoot(wanted = 5): Promise<Picture> {
     const least = Math.min(wanted, ENOUGH_SAMPLES);

@@ -1,4 +1,4 @@
-/** A gaze that rests on the whole page, on the split screen: it does one thing and no more. */
+/** A gaze that rests on a control of the split screen does one thing, on the whole page. */
 import { join } from "node:path";
 import { expect, it } from "vitest";
 import { addClock, holdFrames } from "../support/browser/clock";
@@ -14,7 +14,7 @@ describeInChromium("a gaze that rests on the page's panel", () => {
   const menu = async () => (await stand.viewer.snapshot()).menu.map(({ id }) => id);
   const channels = async () => (await stand.viewer.snapshot()).state.channels;
 
-  /** Nine channels fill the panel: one of them lies where the button was that opens it. */
+  /** Nine channels fill the panel, and one of them lies where the opening button was. */
   async function enter(): Promise<Gazer> {
     const { page } = stand.viewer;
     const { channels: few, ...rest } = stand.manifest;
@@ -43,7 +43,7 @@ describeInChromium("a gaze that rests on the page's panel", () => {
     if (SHOTS) await stand.viewer.page.screenshot({ path: join(SHOTS, `${name}.png`) });
   };
 
-  it("opens the menu and does no more, however long it stays", async () => {
+  it("opens the menu and does nothing more, however long it stays", async () => {
     const gazer = await enter();
     const before = (await stand.viewer.snapshot()).state;
     await gazer.lookAt("opener");

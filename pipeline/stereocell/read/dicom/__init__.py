@@ -78,6 +78,7 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         raise SourceError(
             f"{location.shown}: {stack.problem}; expected parallel slices of one volume"
         )
+    _require_parts(stack, location.shown)
     layout, dtype = stack.layout, dtype_of([f for frames in stack.times for f in frames])
     canonical = canonical_of(layout.affine, layout.shape)
     z, y, x = (layout.shape[axis] for axis in canonical.order)
@@ -100,6 +101,19 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
         files=tuple(str(found.paths[index]) for index in sorted(read)),
     )
+
+
+def _require_parts(stack: Stack, shown: str) -> None:
+    """Raise SourceError where files are missing of an image that is stored in several."""
+    held: dict[tuple[bytes, int], set[int]] = {}
+    for frame in (frame for frames in stack.times for frame in frames):
+        held.setdefault(frame.parts, set()).add(frame.file)
+    for (_, parts), files in held.items():
+        if len(files) < parts:
+            raise SourceError(
+                f"{shown}: found {len(files)} of {parts} files of an image that is stored in "
+                f"several (a concatenation), expected all of them: copy the folder again"
+            )
 
 
 def _label_map(found: Found, stack: Stack, series: int, shown: str) -> Image:

@@ -51,6 +51,8 @@ class Frame:
     segment            the number of the one that it shows, in a segmentation; 0: of none or all
     segmentation       the file's; None: it is an image
     is_quadruped       the axes of the place are those of an animal on four legs
+    parts              of an image that is stored in several files: a digest of its UID, and the
+                       number of files; 0: it is stored in one file, or the number isn't stated
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
@@ -75,3 +77,4 @@ class Frame:
     segment: int = 0
     segmentation: Segmentation | None = None
     is_quadruped: bool = False
+    parts: tuple[bytes, int] = (b"", 0)

@@ -45,6 +45,8 @@ _TAGS: list[Any] = [
     "FrameOfReferenceUID",
     "InstanceNumber",
     "NumberOfFrames",
+    "ConcatenationUID",
+    "InConcatenationTotalNumber",
     "Rows",
     "Columns",
     "SamplesPerPixel",
@@ -163,10 +165,11 @@ def _frames(
     is_mask = segmentation is not None
     is_float = _check_pixels(header, opened, size, rows * columns * count, is_mask=is_mask)
     place_first(header)
-    series, instance, reference = (
-        hashlib.sha256(str(header.get(key, "")).encode()).digest()
-        for key in ("SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID")
+    uids = "SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID", "ConcatenationUID"
+    series, instance, reference, whole = (
+        hashlib.sha256(str(header.get(key, "")).encode()).digest() for key in uids
     )
+    parts = int(header.get("InConcatenationTotalNumber") or 0)
     if "SOPInstanceUID" not in header:  # then nothing identifies copies
         instance = f"{file}".encode()
     modality = str(header.get("Modality", "")).strip()
@@ -211,6 +214,7 @@ def _frames(
                 int(segment or 0) if is_mask else 0,
                 segmentation,
                 is_quadruped,
+                (whole, parts),
             )
             for number, tile in enumerate(mosaic.tiles)
         ]

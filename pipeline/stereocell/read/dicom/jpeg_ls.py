@@ -1,6 +1,6 @@
-"""JPEG-LS in DICOM, decoded by CharLS as imagecodecs has it.
+"""Decode JPEG-LS in DICOM by the CharLS library, which imagecodecs contains.
 
-pydicom's own plugin takes pyjpegls, which has no wheels for Python 3.14. GDCM refuses precisions of
+pydicom's own plugin needs pyjpegls, which has no wheels for Python 3.14. GDCM refuses precisions of
 6 and 7 bits.
 """
 
@@ -16,7 +16,7 @@ PLUGIN = "imagecodecs"
 
 
 def is_available(uid: str) -> bool:
-    """Return whether the syntax is JPEG-LS. pydicom asks each plugin."""
+    """Return whether the syntax is JPEG-LS. pydicom calls this for each plugin."""
     return uid in JPEGLSTransferSyntaxes
 
 

@@ -6,9 +6,11 @@ their own, of which one is built. Every file's head is read, its pixels when a w
 """
 
 import re
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -34,6 +36,7 @@ from stereocell.storage.location import Location
 
 _AXES = ("t", "c", "z", "y", "x")
 _SHOWN = 4  # names in a message
+_NUMBER = re.compile(r"[0-9]{1,9}$")  # at the end of a channel's name
 _EVEN = 0.01  # share of a step along z by which planes may deviate
 
 
@@ -283,11 +286,27 @@ def _read_as(volume: Volume) -> str:
     if len(volume.channels) > 1:
         shown = ", ".join(volume.channels[:_SHOWN])
         more = ", ..." if len(volume.channels) > _SHOWN else ""
-        parts.append(f"{len(volume.channels)} channels ({shown}{more})")
+        numbers = [int(found[0]) for name in volume.channels if (found := _NUMBER.search(name))]
+        skipped = _skipped(numbers) if len(numbers) == len(volume.channels) else ""
+        parts.append(f"{len(volume.channels)} channels ({shown}{more}{skipped})")
     if len(volume.times) > 1:
-        parts.append(f"{len(volume.times)} points in time")
+        skipped = _skipped(volume.times)
+        parts.append(f"{len(volume.times)} points in time{f' ({skipped[2:]})' * bool(skipped)}")
     if place.plane is not None:
-        parts.append(f"{len(volume.planes)} planes ({volume.planes[0]} to {volume.planes[-1]})")
+        first, last, skipped = volume.planes[0], volume.planes[-1], _skipped(volume.planes)
+        parts.append(f"{len(volume.planes)} planes ({first} to {last}{skipped})")
     description = " of ".join(parts) or "one stack"
     count = len(volume.files)
     return f"{count} file{'s' * (count != 1)}, named as {template_of(place)}, read as {description}"
+
+
+def _skipped(numbers: Sequence[int]) -> str:
+    """Return the words for the numbers between the least and the largest that no name has."""
+    least, largest = min(numbers), max(numbers)
+    count = largest - least + 1 - len(set(numbers))
+    if not count:
+        return ""
+    present = set(numbers)
+    absent = (number for number in range(least, largest) if number not in present)
+    shown = ", ".join(map(str, islice(absent, _SHOWN)))
+    return f"; no file is numbered {shown}{', ...' if count > _SHOWN else ''}"

@@ -3,7 +3,7 @@
 The sizes that a file states are checked before it is read. It is read a batch of rows at a time,
 and only the columns that are taken.
 
-libarrow ends its process on some damaged files, so all of it runs in a child process
+libarrow aborts its process on some damaged files, so the reader runs in a child process
 (storage/child_process.py).
 """
 
@@ -34,14 +34,14 @@ from stereocell.storage.location import Location
 
 _EXPECTED = "a Parquet file that is whole"
 _BATCH = 1 << 16  # rows
-_MOST_S = 600.0  # seconds for a table; one of 10 million rows takes less than a tenth of it
+_MOST_S = 600.0  # s, longest time for a table; 10 million rows take less than a tenth of it
 _MAX_BYTES = 1 << 28  # most bytes of a column in a group of rows
 _INDEX = "__index_level_"  # how pandas calls an index without a name
 
 
 @dataclass(frozen=True, slots=True)
 class _Request:
-    """The file's name for messages, the columns that are wanted, and the most bytes of one."""
+    """The file's name for messages, the wanted columns, and the largest size of a column."""
 
     where: str
     key: str

@@ -1,7 +1,7 @@
-"""Tables of AnnData where they are: in a Zarr store, or in an HDF5 file (.h5ad).
+"""Open tables of AnnData in a Zarr store or in an HDF5 file (.h5ad).
 
-libhdf5 loops without end over some damaged heaps of texts, in C and with Python's lock, so that no
-signal is heard. A .h5ad holds such heaps, so it is read in a child process
+libhdf5 loops without end over some damaged heaps of texts. It does so in C and holds Python's lock,
+so no signal can end it. A .h5ad holds such heaps, so it is read in a child process
 (storage/child_process.py).
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
-from stereocell.read.hdf5_chunks import require_sound_index
+from stereocell.read.hdf5_chunks import ChunkIndex
 from stereocell.read.hdf5_tree import Hdf5Tree, require_readable
 from stereocell.read.tables.anndata import read_anndata
 from stereocell.read.tables.table import Table
@@ -25,7 +25,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _EXPECTED = "a table of AnnData (obs, var, X)"
-_MOST_S = 300.0  # seconds for a table of HDF5; one of a million rows takes less than a tenth of it
+_MOST_S = 300.0  # s, longest time for a table of HDF5; a million rows take less than a tenth of it
 _TEXT_BYTES = 1024  # bytes of a text, on average in its chunk
 _LARGEST_CHUNK = 1 << 28  # bytes
 _LONGEST_TEXT = 4096  # bytes, of texts of one length
@@ -110,7 +110,7 @@ class _Hdf5Node:
         if item * math.prod(self._node.chunks or ()) > _LARGEST_CHUNK:
             raise SourceError(f"{where}: found a chunk over {_LARGEST_CHUNK} bytes, expected less")
         if not self._is_sound:
-            require_sound_index(self._node, where)
+            ChunkIndex(self._node, where).require_found()
             self._is_sound = True
         is_text = h5py.check_string_dtype(self._node.dtype) is not None
         stored = self._node.asstr(errors="replace") if is_text else self._node

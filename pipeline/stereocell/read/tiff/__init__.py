@@ -1,32 +1,38 @@
 """TIFF: OME-TIFF, and what ImageJ, Zeiss LSM, MetaMorph, Micro-Manager, tifffile and others write.
 
-read/tiff/ome.py reads what OME-XML describes, read/tiff/plain.py all else; both by tifffile.
+read/tiff/ome.py reads files with OME-XML, read/tiff/plain.py all others; both use tifffile.
 """
 
 import logging
-import os
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from xml.etree import ElementTree
 
 from tifffile import TiffFile
 
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
 from stereocell.read.image import Image
+from stereocell.read.tiff.companion import (
+    Described,
+    companion_at,
+    companion_of,
+    first_of_set,
+    is_companion,
+)
 from stereocell.read.tiff.ome import read_ome
+from stereocell.read.tiff.ome_set import settle_files
 from stereocell.read.tiff.open_file import open_tiff, refuse_short
 from stereocell.read.tiff.plain import kind_of, read_plain
 from stereocell.storage.library_errors import collected_log, one_line
-from stereocell.storage.location import Location, require_own
+from stereocell.storage.location import Location
 
 logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are raised here
 _OME_NAMES = (".ome.tif", ".ome.tiff", ".ome.tf2", ".ome.tf8", ".ome.btf")
-_COMPANION = ".companion.ome"
 _BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's words
 _HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
-_MAX_COMPANION = 64 << 20  # bytes of an OME-XML beside the TIFF files
 
 
 def read_image(location: Location, axes: str = "") -> Image:
@@ -37,8 +43,9 @@ def read_image(location: Location, axes: str = "") -> Image:
     Raises SourceError where the file can't be read as an image, UsageError where it has another
     number of axes.
     """
-    if location.parts[-1].lower().endswith(_COMPANION):
-        location = _first_of_set(location)
+    given = location.source if is_companion(location) else ""
+    if given:
+        location = first_of_set(location)
     where = location.shown
     stack = ExitStack()
     try:
@@ -46,25 +53,38 @@ def read_image(location: Location, axes: str = "") -> Image:
             tiff = open_tiff(location, stack)
             with one_line(where, "a TIFF file, whole"):
                 text = tiff.pages.first.description
-            if not _is_ome(text):
+            if not given and not _is_ome(text):
                 image = read_plain(location, tiff, stack, axes)
                 _require_pages_read(location, tiff, log)
                 return _with_note(location, image)
-            try:
-                root = ome_xml.parse(text, where)
-            except SourceError as error:
-                raise SourceError(f"{error}{_otherwise(tiff)}") from error
-            companion = ome_xml.companion_of(root)
-            if companion:
-                text = _companion(location, companion)
-                root = ome_xml.parse(text, f"{where}: {companion!r:.100}")
+            described = _described(location, tiff, text, given)
+            root, text, beside = described.root, described.text, described.path
+            is_changed, notes = settle_files(location, root, is_companion=bool(beside))
+            if is_changed:
+                text = ElementTree.tostring(root, encoding="unicode")
+            if beside or is_changed:
                 tiff = open_tiff(location, stack, omexml=text)
             image = read_ome(location, tiff, stack, root=root, text=text, log=log, axes=axes)
-            beside = [os.path.join(location.folder, companion)] if companion else []
-            return replace(image, files=(*image.files, *beside))
+            files = (*image.files, *([beside] if beside else []))
+            return replace(image, files=files, notes=(*notes, *image.notes))
     except BaseException:
         stack.close()
         raise
+
+
+def _described(location: Location, tiff: TiffFile, text: str, given: str) -> Described:
+    """Return the OME-XML of a file or of its set. Raises SourceError.
+
+    text   of the file's first page
+    given  path of the file of OME-XML that the user named; empty: none
+    """
+    if given:
+        return companion_at(given, given)
+    try:
+        root = ome_xml.parse(text, location.shown)
+    except SourceError as error:
+        raise SourceError(f"{error}{_otherwise(tiff)}") from error
+    return companion_of(location, root) or Described(root, text)
 
 
 def _require_pages_read(location: Location, tiff: TiffFile, log: Sequence[str]) -> None:
@@ -73,19 +93,6 @@ def _require_pages_read(location: Location, tiff: TiffFile, log: Sequence[str]) 
         found = _BEYOND.search(message)
         if found:
             refuse_short(location.shown, tiff.filehandle.size, int(found[1]))
-
-
-def _first_of_set(location: Location) -> Location:
-    """Return the first TIFF file of a set that is named by its OME-XML. Raises SourceError."""
-    where = location.shown
-    if not location.is_local:
-        raise SourceError(f"{where}: found OME-XML at an address, expected the set on this machine")
-    root = ome_xml.parse(_text_of(location.source, where), where)
-    name = next(ome_xml.files_of(root), "")
-    path = os.path.join(location.folder, name)
-    if not name or require_own(path, [location.folder], named=f"{where}: {name!r:.200}") is None:
-        raise SourceError(f"{where}: FileName: found {name!r:.200}, expected a TIFF file beside it")
-    return Location(path, True)
 
 
 def _is_ome(description: str) -> bool:
@@ -113,25 +120,3 @@ def _otherwise(tiff: TiffFile) -> str:
         f" (without it the file is {found}: saved anew as TIFF by ImageJ, say, it is read "
         "without OME-XML)"
     )
-
-
-def _companion(location: Location, name: str) -> str:
-    """Return the OME-XML of a set whose files refer to one beside them. Raises SourceError."""
-    named = f"{location.shown}: OME-XML: BinaryOnly MetadataFile {name!r:.100}"
-    if not location.is_local:
-        raise SourceError(f"{named}: beside an address, expected the set on this machine")
-    path = os.path.join(location.folder, name)
-    status = require_own(path, [location.folder], named=named)
-    if status is None:
-        raise SourceError(f"{named}: not found, expected it beside the TIFF file")
-    return _text_of(path, named)
-
-
-def _text_of(path: str, named: str) -> str:
-    """Return the OME-XML of a file. Raises SourceError."""
-    with one_line(named, "OME-XML"):
-        size = os.path.getsize(path)
-        if size > _MAX_COMPANION:
-            raise SourceError(f"{named}: found {size} bytes, expected OME-XML")
-        with open(path, encoding="utf-8") as file:
-            return file.read().strip()

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tifffile import TiffPage, TiffPageSeries
 
 from stereocell.model.errors import SourceError
-from stereocell.read import zarr_ending  # noqa: F401  (it acts as Python ends)
+from stereocell.read import zarr_ending  # noqa: F401  (it registers a function for Python's end)
 from stereocell.read.array_axes import given_axes
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Color

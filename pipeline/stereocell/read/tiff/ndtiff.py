@@ -1,8 +1,8 @@
 """Micro-Manager's NDTiff: a set of TIFF files, and an index that names axes and places of images.
 
-An index that was cut short lists fewer images, and tifffile takes these for all. So the images in
-each file are counted and compared with the index, and files of the set that it doesn't name are
-looked for.
+An index that was cut short lists fewer images, and tifffile returns only those. So the images in
+each file are counted and compared with the index. Files of the set that the index doesn't name are
+searched, too.
 
 References: https://github.com/micro-manager/NDTiffStorage
 """
@@ -53,7 +53,7 @@ def with_index(
 
 
 def index_of(location: Location) -> str:
-    """Return the path that the index beside a file has."""
+    """Return the path of the index beside a file; the index may be missing."""
     return os.path.join(os.path.dirname(os.path.realpath(location.path)), INDEX)
 
 
@@ -83,7 +83,7 @@ def _images_in(location: Location, path: str) -> int:
 
 
 def _is_marked(path: str) -> bool:
-    """Whether a file begins as those of NDTiff do."""
+    """Return whether a file has the mark of NDTiff in its first bytes."""
     if not os.path.isfile(path):
         return False
     with open(path, "rb") as file:

@@ -8,12 +8,12 @@ References: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specificat
 """
 
 import math
-import os
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from itertools import chain
+from typing import Any
 from xml.etree import ElementTree
 
 from tifffile import TiffFile, TiffPage
@@ -30,9 +30,10 @@ from stereocell.read.tiff.arrays import (
     samples_as_channels,
     with_given_axes,
 )
+from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_own
+from stereocell.storage.location import Location
 
 # Limits of the numbers in OME-XML and tags: the libraries allocate lists of such a length at once.
 _MAX_SIDE = 10_000_000  # voxels along an axis
@@ -62,7 +63,6 @@ def read_ome(
     where = location.shown
     with one_line(where, "an OME-TIFF file, whole, with its OME-XML"):
         _check_claims(where, tiff, text)
-        _check_files(location, tiff, root)
         tiff.is_ome = True
         images = ome_xml.images_of(root, where)
         series = tiff.series[0]
@@ -73,8 +73,7 @@ def read_ome(
         raise SourceError(
             f"{where}: planes don't match the OME-XML{reason}, expected a page for each plane"
         )
-    for index, level in enumerate(pages):
-        require_pages(f"{where}: level {index}", tiff, level, len(level))
+    _require_planes(location, tiff, root, pages)
     if axes:
         arrays = with_given_axes(where, arrays, axes)
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
@@ -82,8 +81,20 @@ def read_ome(
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
 
 
+def _require_planes(
+    location: Location, tiff: TiffFile, root: ElementTree.Element, levels: list[list[Any]]
+) -> None:
+    """Raise SourceError where planes are missing, or are not those that the OME-XML names."""
+    require_files(location, root, levels[0])
+    for index, level in enumerate(levels):
+        require_pages(f"{location.shown}: level {index}", tiff, level, len(level))
+    with one_line(location.shown, "an OME-XML with whole numbers in TiffData"):
+        require_described(location, root, levels[0])
+    require_alike(location, levels[0])
+
+
 def _undescribed(tiff: TiffFile) -> tuple[str, ...]:
-    """Return a note on pages of the files that no image of the OME-XML has."""
+    """Return a note on pages of the files that belong to no image of the OME-XML."""
     pages = [page for one in tiff.series for page in one.pages if page is not None]
     described, total = len(pages), sum(len(file.pages) for file in {page.parent for page in pages})
     if total <= described:
@@ -113,25 +124,6 @@ def _check_claims(where: str, tiff: TiffFile, text: str) -> None:
     tag = tiff.pages.first.tags.get(_SUB_IFDS)
     if tag is not None and tag.count > _MAX_LEVELS:
         raise SourceError(f"{where}: SubIFDs: found {tag.count}, expected at most {_MAX_LEVELS}")
-
-
-def _check_files(location: Location, tiff: TiffFile, root: ElementTree.Element) -> None:
-    """Raise SourceError where the OME-XML refers to a file outside the source's folder.
-
-    This runs before tifffile opens these files. For a remote source tifffile opens none.
-    """
-    if not location.is_local:
-        return
-    names = {  # each once: every plane may name its file
-        element.get("FileName"): None
-        for element in root.iter()
-        if element.tag.endswith("UUID") and element.text != root.get("UUID", "")
-    }
-    folder = location.folder
-    for name in names:
-        if name is not None:
-            named = f"{location.shown}: OME-XML: UUID FileName {name!r:.200}"
-            require_own(os.path.join(tiff.filehandle.dirname, name), [folder], named=named)
 
 
 def _image(

@@ -23,6 +23,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 MAX_PLANES = 1_000_000
+SUFFIXES = (".tif", ".tiff", ".tf2", ".tf8", ".btf")
 _REMOTE_BLOCK = 1 << 18  # bytes of a remote read; fsspec's default reads 5 MB ahead for every tile
 _DESCRIPTION = 270  # tag ImageDescription, one byte a character
 _MAX_TAGS = 4096  # of a directory; tifffile refuses more
@@ -76,7 +77,7 @@ def require_directories(where: str, file: IO[bytes], size: int) -> int:
     order = "<" if head[:2] == b"II" else ">"
     is_big = head[2:4] in (b"+\0", b"\0+")
     if not is_big and size >= 1 << 32:
-        return 0  # offsets of 32 bits that wrapped around: tifffile mends them
+        return 0  # offsets of 32 bits have wrapped around: tifffile mends them
     number, offset_bytes = ("Q", 8) if is_big else ("H", 4)
     link, entry = ("Q", 20) if is_big else ("I", 12)
     (offset,) = struct.unpack_from(order + link, head, 8 if is_big else 4)
@@ -89,7 +90,7 @@ def require_directories(where: str, file: IO[bytes], size: int) -> int:
         file.seek(offset)
         (count,) = struct.unpack(order + number, file.read(width))
         if count > _MAX_TAGS:
-            return 0  # tifffile says so
+            return 0  # tifffile refuses the directory
         end = offset + width + entry * count
         if len(seen) == 1:
             _require_description(where, size, file.read(entry * count), order, is_big=is_big)
@@ -105,7 +106,7 @@ def _require_description(
 ) -> None:
     """Raise SourceError where the text of the first directory ends beyond the file.
 
-    tifffile leaves such a text out, and a file without its OME-XML would be read as plain TIFF.
+    tifffile ignores such a text, and a file without its OME-XML would be read as plain TIFF.
     """
     form, inline = struct.Struct(order + ("HHQQ" if is_big else "HHII")), 8 if is_big else 4
     whole = entries[: len(entries) // form.size * form.size]
@@ -146,7 +147,7 @@ def require_pages(
 
 
 def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
-    """Return the paths of the files that hold some pages; of an address the address alone."""
+    """Return the paths of the files that hold some pages; empty: the source is an address."""
     if not location.is_local:
         return ()
     paths = {page.parent.filehandle.path for page in pages if page is not None}
@@ -154,11 +155,11 @@ def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
 
 
 def note_absent(levels: Iterable[Iterable[Any]]) -> tuple[str, ...]:
-    """Return a note on each level's strips and tiles without any bytes, which are read as 0.
+    """Return a note for each level that has strips or tiles without bytes, which are read as 0.
 
     levels  the pages of each level, the finest one first
 
-    Writers leave out empty ones (GDAL calls such a file sparse), and a lost one looks alike.
+    Writers leave out empty tiles (GDAL calls such a file sparse), and a lost tile looks the same.
     """
     found = []
     for index, pages in enumerate(levels):

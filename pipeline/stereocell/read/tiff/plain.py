@@ -7,6 +7,7 @@ two unknown axes, of which a short one is taken for channels.
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from math import prod
 
 from tifffile import TiffFile, TiffPageSeries
 
@@ -38,6 +39,7 @@ from stereocell.storage.location import Location
 _UNKNOWN = "qio"  # tifffile's axes of pages that are sequence, image, other
 _PLACES = {"r": "positions", "p": "positions", "m": "mosaic tiles", "v": "views"}
 _MAX_CHANNELS = 10  # of two unknown axes the one this short may be channels
+_IMAGEJ_AXES = ("channels", "slices", "frames")
 _EXPECTED = "a TIFF of planes of one size"
 
 
@@ -67,7 +69,8 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         absent = note_absent(level.pages for level in series.levels)
         if series.kind == "ndtiff":
             files += (index_of(location),)
-    notes = [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
+        notes = _undescribed(tiff, found)
+    notes += [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
     arrays, more = _at_first_place(arrays)
     notes += more
     if axes:
@@ -121,12 +124,33 @@ def _left_out(others: int) -> list[str]:
     return [f"{others} other image{'s' * (others > 1)} in the file left out: the largest is built"]
 
 
+def _undescribed(tiff: TiffFile, found: Sequence[TiffPageSeries]) -> list[str]:
+    """Return a note on pages that no image has: the file's description counts fewer planes."""
+    largest = max(found, key=lambda one: one.size)
+    if largest.kind == "ndtiff":  # compared with its index already
+        return []
+    levels, total = [level for one in found for level in one.levels], len(tiff.pages)
+    if largest.kind == "lsm":  # every second page is a thumbnail
+        levels, total = [largest], len(largest)
+    described = sum(level.size // max(level.keyframe.size, 1) for level in levels)
+    if described >= total:
+        return []
+    share = (total - described) / total
+    return [
+        f"the file's description counts {described} of {total} pages: the others are left out "
+        f"({share:.0%})"
+    ]
+
+
 def _require_imagej_whole(where: str, tiff: TiffFile) -> None:
-    """Raise SourceError where planes are missing that ImageJ's description counts."""
+    """Raise SourceError where planes are missing that ImageJ's description counts.
+
+    The description states the number of planes, and most often the axes too: they have to agree.
+    """
     meta = tiff.imagej_metadata if tiff.is_imagej else None
     if not meta:
         return
-    sizes = [meta.get(key, 1) for key in ("channels", "slices", "frames")]
+    sizes = [meta.get(key, 1) for key in _IMAGEJ_AXES]
     if not all(isinstance(size, int) and 0 < size <= MAX_PLANES for size in sizes):
         raise SourceError(
             f"{where}: ImageJ's description: found {sizes!r:.80} channels, slices and frames, "
@@ -134,6 +158,13 @@ def _require_imagej_whole(where: str, tiff: TiffFile) -> None:
         )
     page = tiff.pages.first
     planes = max(sizes[0] // page.samplesperpixel, 1) * sizes[1] * sizes[2]
+    images = meta.get("images", planes)
+    if any(key in meta for key in _IMAGEJ_AXES) and images not in (planes, prod(sizes)):
+        stated = " x ".join(f"{meta[key]} {key}" for key in _IMAGEJ_AXES if key in meta)
+        raise SourceError(
+            f"{where}: ImageJ's description: found images={images!s:.20} and {stated}, expected "
+            "the same number of planes (copy or download the file again, or save it anew in ImageJ)"
+        )
     if planes > len(tiff.pages) and page.is_final and page.dataoffsets:
         end = page.dataoffsets[0] + planes * page.nbytes
         if end > tiff.filehandle.size:

@@ -73,7 +73,7 @@ export type Region = Readonly<{
   press?: (across: number, down: number) => CanvasWish;
   /** Goes on, little by little, while it is held or gazed at. */
   repeats?: Command;
-  /** Each press goes on by a step, as to the next option: pressing quickly is meant. */
+  /** Each press moves on by a step, for example to the next option, so quick presses all count. */
   isStep?: boolean;
 }>;
 

@@ -1,38 +1,15 @@
 import { describe, expect, it } from "vitest";
-import { SPECIMEN_BOX, sampleManifest } from "../../../test/support/fixture/manifest";
+import { STEREO_FACTS } from "../../../test/support/fixture/facts";
+import { sampleManifest } from "../../../test/support/fixture/manifest";
 import { initialState } from "../../state/initial_state";
 import { reduce } from "../../state/reduce";
 import type { ViewerState } from "../../state/viewer_state";
 import { type PanelView, START_VIEW } from "../controls";
-import { type Facts, layOut } from "../layout";
+import { layOut } from "../layout";
 import { blocksOf } from "./controls";
 import { type Rect, type Region, ROW } from "./draw_list";
 import { HEIGHT, type Page, PX_PER_M, pageOf, paginate, WIDTH } from "./page";
 
-const FACTS: Facts = {
-  title: "sample",
-  subtitle: "",
-  shown: SPECIMEN_BOX,
-  ranges: new Map(),
-  focusTile: "r1_c2",
-  isStereo: true,
-  stereo: { isAvailable: true, reason: "" },
-  split: null,
-  hasRoom: false,
-  canScan: false,
-  faultOfCode: () => "",
-  frame_ms: 12.3,
-  settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
-  triangles: 12_345,
-  volumeLevel: 1,
-  samples: null,
-  isLoading: false,
-  values: [],
-  sliceValues: [],
-  isFilming: false,
-  undo: null,
-  redo: null,
-};
 /** By the camera of the flat screen, into files. */
 const OF_THE_SCREEN = [
   "picture-size",
@@ -45,7 +22,7 @@ const OF_THE_SCREEN = [
 const start = (channels = 12) => initialState(sampleManifest(channels));
 const SPLIT = { isAvailable: true, reason: "" };
 const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
-  layOut(state, { ...FACTS, split: SPLIT }, { ...START_VIEW, ...view });
+  layOut(state, { ...STEREO_FACTS, split: SPLIT }, { ...START_VIEW, ...view });
 
 const TABS = [
   ...[
@@ -155,7 +132,7 @@ describe("the panel on a plane", () => {
     const offered = new Set<string>();
     const inStereo = new Set<string>();
     for (const state of [start(), traced]) {
-      const onPage = { ...FACTS, isStereo: false, split: SPLIT, canScan: true };
+      const onPage = { ...STEREO_FACTS, isStereo: false, split: SPLIT, canScan: true };
       const flat = layOut(state, onPage, view);
       for (const item of flat.sections.flatMap(({ items }) => items)) {
         const all = item.kind === "group" ? [...item.controls, ...item.more] : [item];

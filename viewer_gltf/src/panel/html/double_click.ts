@@ -1,9 +1,10 @@
 /**
- * The second click of a double click is no second wish: it would switch a control back, or choose what has
- * come under the pointer by the first. Controls that go on by a step, `data-step`, take each click.
+ * The second click of a double click is not a second request: it would switch a control back, or choose a
+ * control that the first click has moved under the pointer. Controls that move on by a step, `data-step`,
+ * take each click.
  */
 
-/** Keep the second click of a double click, as the browser counts them, from what lies in an element. */
+/** Stop the second click of a double click, as the browser counts clicks, on all children of an element. */
 export function ignoreSecondClicks(root: HTMLElement): void {
   let stepped: Element | null = null;
   const onClick = (event: MouseEvent) => {

@@ -43,7 +43,7 @@ class Items {
   }
 }
 
-/** A channel: its card, or a row of a long list. */
+/** A channel, as a card or as a row of a long list. */
 function makeGroup(first: Group, send: Send): Widget<Group> {
   let now = first;
   const canOpen = first.more.length > 0;

@@ -14,7 +14,7 @@ import { colourOf, controlOf, paletteOf } from "../control_templates";
 import type { Control, Group, PanelView, Section } from "../controls";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
-/** Most channels that all have a card: so many rows fit a page of the panel in stereo. */
+/** Largest number of channels that all have a card: so many rows fit a page of the panel in stereo. */
 export const FEW = 9;
 /** Channels of a page of the list; fewer need no search. */
 export const PAGE = 6;
@@ -133,20 +133,23 @@ function cardOf(
   };
 }
 
-/** The channels that have a card above the list. */
-function carded({ channels }: ViewerState, { carded: ids }: PanelView): readonly ChannelState[] {
+/** The channels with a card above the list. */
+function withCards(
+  { channels }: ViewerState,
+  { channelsWithCard: ids }: PanelView,
+): readonly ChannelState[] {
   if (channels.length <= FEW) return channels;
   return channels.filter(({ id, shown }) => ids?.includes(id) ?? shown);
 }
 
-/** The listed channels with the sought text in their name or id. */
+/** The channels of the list whose name or id contains the text that is searched for. */
 export function foundChannels(
   state: ViewerState,
   view: PanelView,
   search = view.search,
 ): readonly ChannelState[] {
   const sought = search.trim().toLowerCase();
-  const cards = carded(state, view);
+  const cards = withCards(state, view);
   return state.channels.filter(
     (channel) =>
       !cards.includes(channel) &&
@@ -154,7 +157,7 @@ export function foundChannels(
   );
 }
 
-/** How many pages those that are found take. */
+/** How many pages the found channels take. */
 export function pagesOf(state: ViewerState, view: PanelView): number {
   return Math.max(1, Math.ceil(foundChannels(state, view).length / PAGE));
 }
@@ -206,7 +209,7 @@ function addingOf(
   return items;
 }
 
-/** A card as a row of the list: all but the switch waits until the channel is shown, and opened. */
+/** A card as a row of the list. Only the switch is there until the channel is shown and opened. */
 function rowOf(card: Group): Group {
   const isSwitch = ({ id }: Control) => id === `${card.id}/shown`;
   const canOpen = !card.isDimmed || card.isOpen;
@@ -224,12 +227,12 @@ export function channelItems(
   facts: ChannelFacts,
   view: PanelView,
 ): Section["items"] {
-  const cards = carded(state, view).map((channel) => cardOf(channel, facts, view));
+  const cards = withCards(state, view).map((channel) => cardOf(channel, facts, view));
   return [...cards, ...addingOf(state, facts, view)];
 }
 
-/** The view with the cards of the channels that are shown now; they keep their places until it is laid out anew. */
+/** Give the channels that are shown now their cards, which keep their places until the section is opened again. */
 export function keepPlaces(view: PanelView, { channels }: ViewerState): PanelView {
-  if (view.carded !== null) return view;
-  return { ...view, carded: channels.filter(({ shown }) => shown).map(({ id }) => id) };
+  if (view.channelsWithCard !== null) return view;
+  return { ...view, channelsWithCard: channels.filter(({ shown }) => shown).map(({ id }) => id) };
 }

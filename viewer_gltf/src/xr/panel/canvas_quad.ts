@@ -35,7 +35,7 @@ export class CanvasQuad {
   private painted = "";
   private readonly toQuad = new Matrix4();
 
-  /** @param context what the picture is painted with; null: nobody sees it, as in a program without a screen */
+  /** @param context of the canvas that is painted; null: nothing is painted, as in a test without a browser */
   constructor(
     readonly width: number,
     readonly height: number,

@@ -26,7 +26,7 @@ export class RoomNotice {
   /** It comes with the next frame, which knows where the head looks. */
   private wantsPlace = false;
 
-  /** @param isPainted false: nobody sees it */
+  /** @param isPainted false: nothing is painted, as in a test without a browser */
   constructor(isPainted = true) {
     this.quad = new CanvasQuad(NOTICE_WIDTH, NOTICE_HEIGHT, isPainted ? undefined : null);
     this.quad.drawOver(RENDER_ORDER);

@@ -54,7 +54,7 @@ export type RoomPanelOptions = Readonly<{
   onLenses: (lenses: Lenses) => void;
   /** Reports why a request can't be granted. */
   onAnnounce: (text: string) => void;
-  /** Absent: true. False: nobody sees it, as in a program without a screen. */
+  /** Absent: true. False: nothing is painted, as in a test without a browser. */
   isPainted?: boolean;
 }>;
 
@@ -69,7 +69,7 @@ export class RoomPanel {
   /** In the order in which rays meet them. */
   readonly targets: readonly Target[];
   private page: Page = { marks: [], regions: [] };
-  /** Where the controls of the page are, and how often that has changed. */
+  /** The places of the page's controls, and the number of times that they have changed. */
   private arrangement = "";
   private changes = 0;
   private view: PanelView = START_VIEW;
@@ -123,7 +123,7 @@ export class RoomPanel {
     return this.quad.mesh.visible;
   }
 
-  /** Changes whenever a control comes, goes or moves. */
+  /** Changes whenever a control appears, disappears or moves. */
   private get layout(): string {
     return `panel ${this.isOpen} ${this.changes}`;
   }
@@ -232,13 +232,13 @@ export class RoomPanel {
   private open(eye: Vector3, bearing: Bearing): void {
     this.quad.place(pointAt(bearing, eye, DISTANCE_M), eye);
     this.quad.mesh.visible = true;
-    this.layOutAnew();
+    this.layOutAgain();
     this.paintOpener();
   }
 
-  /** The cards are those of the channels that are shown by now. */
-  private layOutAnew(): void {
-    this.view = { ...this.view, carded: null };
+  /** Lay the page out again, with cards for the channels that are shown now. */
+  private layOutAgain(): void {
+    this.view = { ...this.view, channelsWithCard: null };
     this.isStale = true;
   }
 
@@ -322,7 +322,7 @@ export class RoomPanel {
     } else if ("type" in wish) this.options.onWish(wish);
     else if (wish.canvas === "tab") {
       this.section = { tab: wish.section, page: 0 };
-      this.layOutAnew();
+      this.layOutAgain();
     } else if (wish.canvas === "page") this.section = { ...this.section, page: wish.page };
     else if (wish.canvas === "announce") this.options.onAnnounce(wish.text);
     else if (wish.canvas === "close") this.close();

@@ -276,7 +276,7 @@ class Bench {
     return this.state.measured;
   }
 
-  /** Returns the handle that the gaze meets straight ahead; null: it meets none. */
+  /** The handle that the gaze meets straight ahead; null: it meets none. */
   meet(): Hit | null {
     return this.marks.target.meet(gazeOf(this.camera.matrixWorld));
   }

@@ -98,8 +98,8 @@ async function draws(browser: Process): Promise<boolean> {
 }
 
 /**
- * How long an action waits for what it needs, ms. Playwright's own 30 s are short where other
- * programs have the cores; a test's own limit, which is longer, ends an action that waits in vain.
+ * Longest time that an action waits for its element, ms. Playwright's own 30 s are too short while other
+ * programs use the cores. The time limit of the test is longer, and ends an action that waits in vain.
  */
 const PATIENCE_MS = 150_000;
 

@@ -1,4 +1,4 @@
-/** A head in a phone's viewer, on the whole page: it looks at controls of the panel, and rests as heads do. */
+/** A head in a Cardboard viewer, on the whole page: it looks at controls of the panel, and trembles. */
 import type { Page } from "playwright-core";
 import { tick } from "../browser/clock";
 import type { ViewerPage } from "../browser/page";
@@ -11,7 +11,7 @@ const CORRECTIONS = 4;
 /** Age of a report, ms, from which nothing is predicted: the head's turn is then the same in every run. */
 const OLD_MS = 1000;
 
-/** The page has to have a held clock: see `addClock`. */
+/** The page's clock must be held: see `addClock`. */
 export class Gazer {
   private yaw_deg = 0;
   private pitch_deg = 0;
@@ -40,7 +40,7 @@ export class Gazer {
     await tick(this.page, 10);
   }
 
-  /** Look on at the same place, trembling as heads do. */
+  /** Keep looking at the same place, with the tremble of a head. */
   async rest(seconds: number): Promise<void> {
     for (let k = 0; k < Math.round((1000 * seconds) / FRAME_MS); k++) {
       await this.report(...(this.offsets.next().value as readonly [number, number]));

@@ -30,34 +30,19 @@ import { depthMaterial } from "../../../src/surfaces/blend_material";
 import { betweenEyes } from "../../../src/xr/head_pose";
 import { Hands } from "../../../src/xr/interaction";
 import { XrSession } from "../../../src/xr/session";
-import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
+import { STEREO_FACTS } from "../fixture/facts";
+import { sampleManifest } from "../fixture/manifest";
 
 type At = readonly [number, number, number];
 type Side = "left" | "right";
 
 const FACTS: Facts = {
+  ...STEREO_FACTS,
   title: "Sample",
-  subtitle: "",
-  shown: SPECIMEN_BOX,
   ranges: new Map([["c0", [100, 1120]]]),
   focusTile: null,
-  isStereo: true,
-  stereo: { isAvailable: true, reason: "" },
-  split: null,
-  hasRoom: false,
-  canScan: false,
-  faultOfCode: () => "",
   frame_ms: null,
-  settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
   triangles: 123_456,
-  volumeLevel: 1,
-  samples: null,
-  isLoading: false,
-  values: [],
-  sliceValues: [],
-  isFilming: false,
-  undo: null,
-  redo: null,
 };
 /** Before the specimen's upper edge. */
 export const HANDLE_m: At = [0, 0.45, -1.2];

@@ -9,7 +9,8 @@ import { initialState } from "../../../src/state/initial_state";
 import { reduce } from "../../../src/state/reduce";
 import type { ViewerState } from "../../../src/state/viewer_state";
 import { Hands } from "../../../src/xr/interaction";
-import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
+import { STEREO_FACTS } from "../fixture/facts";
+import { sampleManifest } from "../fixture/manifest";
 import { tremble } from "./tremble";
 
 /** Longest time that a frame counts, s. */
@@ -19,27 +20,10 @@ const TURN_MS = 500;
 const EYE = new Vector3();
 const RAD = Math.PI / 180;
 
-export const STEREO_FACTS: Facts = {
-  title: "sample",
-  subtitle: "",
-  shown: SPECIMEN_BOX,
-  ranges: new Map(),
-  focusTile: "r1_c2",
-  isStereo: true,
-  stereo: { isAvailable: true, reason: "" },
+/** Stereo is offered in both ways, and a step can be undone and redone, so that every control can be operated. */
+const FACTS: Facts = {
+  ...STEREO_FACTS,
   split: { isAvailable: true, reason: "" },
-  hasRoom: false,
-  canScan: false,
-  faultOfCode: () => "",
-  frame_ms: 12.3,
-  settings: { steps: 64, resolution: 0.5, discShare: 1, errorFactor: 1 },
-  triangles: 12_345,
-  volumeLevel: 1,
-  samples: null,
-  isLoading: false,
-  values: [],
-  sliceValues: [],
-  isFilming: false,
   undo: "Colour",
   redo: "Colour",
 };
@@ -86,7 +70,7 @@ export class LookingPerson {
       tiles: manifest.tiles,
       isPainted: false,
       now_ms: () => this.now_ms,
-      layOut: (view) => layOut(this.state, STEREO_FACTS, view),
+      layOut: (view) => layOut(this.state, FACTS, view),
       onAction: (action) => {
         this.wishes.push(action);
         this.state = reduce(this.state, action);
@@ -109,7 +93,7 @@ export class LookingPerson {
 
   /** The names of all controls of the panel that are on or off. */
   get switches(): readonly string[] {
-    return layOut(this.state, STEREO_FACTS, { ...START_VIEW, ...this.view })
+    return layOut(this.state, FACTS, { ...START_VIEW, ...this.view })
       .sections.flatMap(({ items }) => items)
       .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item]))
       .flatMap(({ kind, id }) => (kind === "toggle" ? [id] : []));

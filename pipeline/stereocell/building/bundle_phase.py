@@ -1,0 +1,103 @@
+"""The bundle as a phase of a build: it is exported anew where the composed stage has changed."""
+
+from functools import partial
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import no_layer, require_own_bundle
+from stereocell.building.phase import Phase, digest_of_bundle, phase_of, states_of
+from stereocell.bundle import write as bundle_writer
+from stereocell.bundle.manifest import require_bundle
+from stereocell.engine.run import Engine, console
+from stereocell.read.image import printable
+from stereocell.storage.assets import viewer_dist
+from stereocell.storage.cache_key import key_of
+from stereocell.storage.overwriting import is_forced
+from stereocell.storage.workspace import is_file, objects_below, remove
+from stereocell.textures.map_packages import encoder_version, require_map_packages
+from stereocell.usd import written_files
+from stereocell.usd.stage_files import dependencies, may_be_image
+
+
+def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
+    """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it (`stage`).
+
+    Raises OutputError where the stage is missing, StageError where it can't be read.
+    """
+    out_folder = OutFolder(out)
+    with phase_of(out_folder, "bundle") as phase:
+        path = _require_stage(out_folder, stage)
+        viewer = viewer_dist()
+        key = _key_of(out_folder, path, viewer)
+        if objects_below(path.parent) is not None and out_folder.is_begun("bundle"):
+            bundle_writer.remove_half(out_folder.bundle_dir)
+        if not is_forced():
+            require_bundle(out_folder.bundle_dir)  # before the phase is begun
+        done = partial(digest_of_bundle, out_folder)
+        if not phase.is_done(key, done, require_own=require_own_bundle):
+            _write(out_folder, path, viewer, key, engine)
+            phase.about = "" if stage is None else f"of {printable(path.name)}"
+    remove(out_folder.parts_dir)
+    _tell_of_page(phase, viewer)
+
+
+def _require_stage(out_folder: OutFolder, layer: Path | None) -> Path:
+    """Return the path of the stage to export. Raises OutputError where that can't be begun.
+
+    Raises StageError where a file that the stage's phase wrote is lost or damaged; a layer that may
+    have been edited in place passes, and the bundle's writer names it.
+    """
+    out_folder.require_finished("stage")
+    if out_folder.has_begun("stage"):  # else it is none that this build wrote
+        listed = written_files.read_stage_list(out_folder.stage_dir)
+        written_files.require_kept(out_folder.stage_dir, listed, out_folder.stage_list)
+    if is_file(out_folder.plan_file):
+        plan = out_folder.plan()  # no phase goes on beside a plan that was changed by hand
+        if plan.settings.unwrap.maps:
+            require_map_packages()
+    path = layer if layer is not None else out_folder.stage_file
+    if not is_file(path):
+        raise no_layer(path, is_given=layer is not None)
+    return path
+
+
+def _key_of(out_folder: OutFolder, path: Path, viewer: Path | None) -> str:
+    """Return a key of everything that the bundle is made of. Raises StageError for foreign files.
+
+    path    the stage
+    viewer  the folder of the page; None: it is not built
+    """
+    kept = objects_below(path.parent)
+    files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
+    made_of = [str(path.absolute()), states_of(files)] if kept is None else kept
+    # an image may feed a surface, and is encoded then: by this version, or not at all
+    encoder = encoder_version() if any(map(may_be_image, files)) else None
+    page = [] if viewer is None else states_of(sorted(viewer.rglob("*")))
+    return key_of([made_of, page, encoder], bundle_writer)
+
+
+def _write(
+    out_folder: OutFolder, path: Path, viewer: Path | None, key: str, engine: Engine
+) -> None:
+    """Write the bundle; its finished tiles are kept until it is whole."""
+    out_folder.remove_other_folders(out_folder.parts_dir, {key})
+    bundle_writer.write_bundle(
+        path,
+        out_folder.bundle_dir,
+        viewer,
+        run=engine.run,
+        parts=out_folder.parts_dir / key,
+        report_line=_print_line,
+    )
+
+
+def _tell_of_page(phase: Phase, viewer: Path | None) -> None:
+    """Say that the bundle has no page, where it was written without one."""
+    if viewer is None and not phase.is_up_to_date:
+        console.print(
+            "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
+        )
+
+
+def _print_line(line: str) -> None:
+    console.print(f"bundle: {line}", markup=False, soft_wrap=True)

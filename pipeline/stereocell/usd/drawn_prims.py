@@ -1,0 +1,52 @@
+"""Which prims of a composed stage are drawn, and where they stand in the world."""
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Tf, Usd, UsdGeom, UsdUtils
+
+from stereocell.model.errors import StageError
+from stereocell.usd.read_attributes import one_line, require_still
+
+FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
+
+
+def require_composed(stage: Usd.Stage) -> None:
+    """Raise StageError for the first layer, payload or reference that USD failed to compose."""
+    errors = stage.GetCompositionErrors()
+    if errors:
+        raise StageError(f"{stage.GetRootLayer().realPath}: {one_line(errors[0])}")
+
+
+def drawn(tile: Usd.Prim, path: object) -> Usd.Prim | None:
+    """Return the prim at a path of a tile's stage; None where it is not drawn."""
+    prim = tile.GetStage().GetPrimAtPath(path)
+    return prim if prim and prim.IsActive() and is_visible(prim) else None
+
+
+def is_visible(prim: Usd.Prim) -> bool:
+    """Return whether neither a prim nor one above it is hidden."""
+    return bool(UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible)
+
+
+def to_world(prim: Usd.Prim) -> NDArray[np.float64]:
+    """Return the matrix (4, 4) from a prim's space to the world, for row vectors.
+
+    Raises StageError where it is flat, infinite or leads too far away.
+    """
+    for path in prim.GetPath().GetAncestorsRange():
+        for op in UsdGeom.Xformable(prim.GetStage().GetPrimAtPath(path)).GetOrderedXformOps():
+            require_still(op.GetAttr())
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
+    try:
+        matrix = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))
+    except Tf.ErrorException as error:
+        raise StageError(f"{prim.GetPath()}: {one_line(error)}") from error
+    finally:
+        del quiet
+    is_near = np.abs(matrix).max() <= FARTHEST_UM
+    if not is_near or not np.abs(np.linalg.det(matrix[:3, :3])) > 0:
+        raise StageError(
+            f"{prim.GetPath()}: its transform is flat, infinite or leads farther than "
+            f"{FARTHEST_UM:g} um, expected one that a surface survives"
+        )
+    return matrix

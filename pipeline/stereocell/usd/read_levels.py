@@ -1,0 +1,173 @@
+"""Read the surfaces of a loaded tile, level by level of detail, edited or not.
+
+The levels are variants; the reader selects one after the other in the session layer.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from stereocell.formats.gltf import Material
+from stereocell.model.errors import StageError
+from stereocell.model.mesh import Mesh
+from stereocell.usd.drawn_prims import drawn, to_world
+from stereocell.usd.layer import (
+    DISTANCE,
+    LARGEST_DISTANCE,
+    SHAPE_HASH,
+    hash_shape,
+)
+from stereocell.usd.read_appearances import material_of, surface_of
+from stereocell.usd.read_attributes import (
+    numbers_of,
+    select_variant,
+    shortest,
+)
+from stereocell.usd.read_mesh import LargeFaceError, read_mesh
+from stereocell.usd.read_objects import without_hidden
+from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
+from stereocell.usd.read_variants import lod_levels
+
+
+@dataclass(frozen=True, slots=True)
+class MadeMaps:
+    """Maps of a recomputed level, uint8: normals (h, w, 3), openness (h, w), sRGB (h, w, 3)."""
+
+    normal: NDArray[np.uint8] | None
+    occlusion: NDArray[np.uint8] | None
+    color: NDArray[np.uint8] | None
+
+
+@dataclass(frozen=True, slots=True)
+class ComposedLod:
+    """One level of detail, in world um. `level` counts from the finest, 0.
+
+    matrix  (4, 4) for row vectors, from the mesh's own space to world um
+    distance_um  99th percentile of the distances from the iso-surface, and back
+    largest_um   the largest of them; the former, where a stage of an earlier version has none
+    shape   hash of the composed points and faces
+    built   the same hash as the pipeline wrote it; empty: the stage has none
+    own     the mesh prim's own transform
+    lost    values that an edit invalidated: they belong to other vertices
+    images  maps in memory, where the level was recomputed: see bundle/edited_meshes.py
+    """
+
+    level: int
+    mesh: Mesh
+    distance_um: float
+    largest_um: float
+    material: Material
+    maps: ComposedMaps
+    matrix: NDArray[np.float64]
+    shape: str
+    built: str
+    own: tuple[float, ...]
+    lost: tuple[str, ...] = ()
+    images: MadeMaps | None = None
+
+
+def read_lods(tile: Usd.Prim, channel_id: str, *, finest: int = 0) -> Iterator[ComposedLod]:
+    """Yield a loaded tile's levels of detail of one channel from `finest` on; none: no surface.
+
+    Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
+    """
+    levels = [level for level in lod_levels(tile) if level >= finest]
+    for level in levels or [0]:  # a flattened stage has one level, and no variants
+        prim = mesh_at(tile, channel_id, level)
+        if prim is None:
+            continue
+        matrix = to_world(prim)
+        built = str(prim.GetAttribute(SHAPE_HASH).Get() or "")
+        shape = hash_shape(UsdGeom.Mesh(prim)) if built else ""
+        try:
+            surface = surface_of(prim)
+            fed = vertex_values_of(surface)
+            mesh = read_mesh(UsdGeom.Mesh(prim), matrix, shown=fed, is_edited=shape != built)
+        except LargeFaceError as error:
+            inside = f", inside the variant lod=lod{level}" if levels else ""
+            raise StageError(f"{error}{inside}") from error
+        except StageError as error:
+            raise StageError(f"{error}{_edit_advice(level) if levels else ''}") from error
+        mesh = mesh and without_hidden(mesh, prim)
+        if mesh is None:
+            continue
+        stretch = float(np.linalg.norm(matrix[:3, :3], 2))
+        distance = largest = shortest(*numbers_of(prim, DISTANCE, 1)) * stretch
+        if prim.HasAttribute(LARGEST_DISTANCE):
+            largest = shortest(*numbers_of(prim, LARGEST_DISTANCE, 1)) * stretch
+        own = UsdGeom.Xformable(prim).GetLocalTransformation()
+        lod = ComposedLod(
+            level,
+            mesh,
+            distance,
+            largest,
+            material_of(surface),
+            maps_of(surface),
+            matrix,
+            shape,
+            built,
+            tuple(np.array(own).ravel().tolist()),
+        )
+        yield lod if shape == built else _without_misfits(lod, prim, fed)
+
+
+def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> ComposedLod:
+    """Return an edited level without maps and vertex values that belong to other faces."""
+    mesh, lost, has_color = lod.mesh, [], True
+    if lod.maps.any and mesh.uvs is None:
+        has_color = lod.maps.color is None
+        lod = replace(lod, maps=ComposedMaps())
+        lost.append("maps")
+    if "occlusion" in fed and mesh.openness is None:
+        lost.append("occlusion")
+    if "displayColor" in fed and mesh.colors is None:
+        lost.append("colours")
+        has_color = False
+    colors = np.array(UsdGeom.Gprim(prim).GetDisplayColorAttr().Get() or [], np.float64)
+    if not has_color and colors.size:  # one average colour replaces them
+        r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
+        lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
+    return replace(lod, lost=tuple(lost))
+
+
+def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
+    """Return an edited level's mesh in its own space. Raises StageError where it is gone."""
+    prim = mesh_at(tile, channel_id, level)
+    found = None
+    if prim is not None:
+        fed = vertex_values_of(surface_of(prim))
+        found = read_mesh(UsdGeom.Mesh(prim), np.eye(4), shown=fed, is_edited=True)
+    if found is None:
+        raise StageError(f"{tile.GetPath()}/{channel_id}: lod{level} has no mesh any more")
+    return found
+
+
+def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
+    """Return the levels whose faces an edit removed, all of them."""
+    found = []
+    for level in lod_levels(tile) or [0]:
+        prim = mesh_at(tile, channel_id, level)
+        if prim is None or not prim.GetAttribute(SHAPE_HASH).Get():
+            continue
+        if not UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get():
+            found.append(level)
+    return found
+
+
+def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
+    """Select a level and return the mesh that it draws; None: it draws none."""
+    if lod_levels(tile):
+        select_variant(tile, "lod", f"lod{level}")
+    prim = drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}"))
+    return prim if prim is not None and prim.IsA(UsdGeom.Mesh) else None
+
+
+def _edit_advice(level: int) -> str:
+    """Explain that an edit outside the variants overrides all levels, and fits one at most."""
+    return (
+        f" at lod{level}: edit inside the variant lod=lod{level}, or override points, "
+        "faceVertexCounts, faceVertexIndices and normals together"
+    )

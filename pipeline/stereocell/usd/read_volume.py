@@ -1,0 +1,76 @@
+"""Read where the voxels of a loaded tile are, and their place in the world."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdVol
+
+from stereocell.formats.vdb import GRID_NAME, MEASURED_NAME
+from stereocell.model.errors import StageError
+from stereocell.usd.drawn_prims import drawn, to_world
+from stereocell.usd.read_attributes import (
+    Point,
+    file_of,
+    point_of,
+    sizes_of,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ComposedVolume:
+    """One volume: the file with its voxels, and its place.
+
+    field       the .vdb that other programs draw; None: the stage names none
+    measured    the .vdb with the voxels as they were measured; None: they are not kept
+    size        voxels (x, y, z) with the apron
+    apron       voxels on each side
+    low, high   corners (x, y, z) in um of the box inside the apron, before `matrix`
+    matrix      (4, 4) for row vectors, to world um
+    """
+
+    atlas: Path
+    field: Path | None
+    measured: Path | None
+    size: tuple[int, int, int]
+    apron: int
+    low: Point
+    high: Point
+    matrix: NDArray[np.float64]
+
+
+def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
+    """Return a loaded tile's volume of one channel; None if it is not drawn.
+
+    Raises StageError where its attributes are missing or contradict each other.
+    """
+    name = f"{channel_id}_{tile.GetName()}_volume"
+    prim = drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{name}"))
+    if prim is None:
+        return None
+    width, height, depth = sizes_of(prim, "stereocell:atlasSize", 3)
+    (apron,) = sizes_of(prim, "stereocell:apron", 1)
+    if min(width, height, depth) <= 2 * apron:
+        raise StageError(
+            f"{prim.GetPath()}: found {width} x {height} x {depth} voxels, apron {apron}, "
+            "expected voxels inside it"
+        )
+    return ComposedVolume(
+        file_of(prim.GetAttribute("stereocell:atlas")),
+        _field_of(prim, GRID_NAME),
+        _field_of(prim, MEASURED_NAME),
+        (width, height, depth),
+        apron,
+        point_of(prim, "stereocell:boundsMin"),
+        point_of(prim, "stereocell:boundsMax"),
+        to_world(prim),
+    )
+
+
+def _field_of(volume: Usd.Prim, name: str) -> Path | None:
+    """Return the file of a field of a volume; None where there is none."""
+    path = UsdVol.Volume(volume).GetFieldPath(name)
+    prim = volume.GetStage().GetPrimAtPath(path) if path else None
+    asset = UsdVol.FieldAsset(prim).GetFilePathAttr().Get() if prim else None
+    return Path(asset.resolvedPath) if asset and asset.resolvedPath else None

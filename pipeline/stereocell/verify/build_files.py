@@ -1,0 +1,149 @@
+"""Check the files of a build's units, tissue classes and stage, and its .usdz."""
+
+from pathlib import Path
+
+from stereocell.building import unit_files
+from stereocell.building.input_unchanged import require_added
+from stereocell.building.out_folder import INDEX, SURVEY, OutFolder
+from stereocell.building.sealed_documents import (
+    UNITS_AGAIN,
+    checks_of,
+    find_document_faults,
+)
+from stereocell.building.survey_file import COMPONENTS, EVIDENCE, WINDOW
+from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
+from stereocell.formats.exr import check_exr
+from stereocell.formats.stl import check_stl
+from stereocell.formats.vdb import check_vdb
+from stereocell.model.errors import CheckError, StereoCellError
+from stereocell.storage.file_list import DAMAGED, MISSING
+from stereocell.storage.json_files import find_sealed, read_json
+from stereocell.storage.location import Location, require_own
+from stereocell.storage.workspace import is_file, sizes_below
+from stereocell.usd import written_files
+from stereocell.usd.stage_files import dependencies
+from stereocell.usd.validate import validate_stage, validate_usdz
+from stereocell.usd.write_tile import closed_file, has_mesh
+from stereocell.verify.check_line import raise_on, raise_on_all
+
+_WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
+
+
+def check_tissue(out: Path) -> str:
+    """Check the files of `stereocell tissue`; the bundle needs none of them."""
+    files = read_whole(out / FOLDER)["files"]
+    require_added(OutFolder(out).plan())
+    return f"{RECORD} and {len(files)} files that it lists"
+
+
+def check_units(out_folder: OutFolder) -> str:
+    """Check the units' files against the hashes in unit.json, and the survey behind them."""
+    told = find_document_faults(out_folder, "units")
+    lists = [fault.removesuffix(f": {UNITS_AGAIN}") for fault in told]
+    problems, files = _spoilt_survey(out_folder), 0
+    index = find_sealed(out_folder.index_file, INDEX) or {}
+    for name, key in index.items():
+        tile_id, channel_id = name.split("/")
+        folder = out_folder.unit_dir(tile_id, channel_id, key)
+        files += len(sizes_below(folder))
+        problems += [
+            f"{(folder / file).relative_to(out_folder.out).as_posix()}: {fault}"
+            for file, fault in unit_files.find_damage(folder).items()
+        ]
+    removal = "remove what is damaged and " if problems else ""
+    raise_on_all([*lists, *problems], f"{removal}{UNITS_AGAIN}")
+    return f"{files} files of {len(index)} units"
+
+
+def _spoilt_survey(out_folder: OutFolder) -> list[str]:
+    """Return the faults of the files of windows and levels that the survey names."""
+    survey = find_sealed(out_folder.survey_file, SURVEY) or {"channels": {}}
+    channels = survey["channels"].values()
+    files = {channel["statistics_file"]: WINDOW for channel in channels}
+    schemas = {"evidence": EVIDENCE, "components": COMPONENTS}
+    for channel in channels:
+        for tile in channel["iso"].values():
+            files |= {file: schemas[what] for what, file in tile["files"].items()}
+    spoilt = [name for name in files if find_sealed(out_folder.out / name, files[name]) is None]
+    return [_fault_of(out_folder, out_folder.out / name) for name in spoilt]
+
+
+def _fault_of(out_folder: OutFolder, file: Path) -> str:
+    name = file.relative_to(out_folder.out).as_posix()
+    return f"{name}: {DAMAGED if is_file(file) else MISSING}"
+
+
+def check_stage_hashes(out_folder: OutFolder) -> str:
+    """Check every file that the build wrote against the stage's list; others are an artist's."""
+    for require in checks_of(out_folder, "stage"):
+        require()
+    listed = read_json(out_folder.stage_list, "units.schema.json#FileList", written_files.REMEDY)
+    if written_files.STAGE_NAME not in listed:
+        path = out_folder.stage_list
+        raise CheckError(f"{path}: damaged, not the list that was written: {written_files.REMEDY}")
+    problems = written_files.find_damage(out_folder.stage_dir, listed)
+    told = [f"stage/{path}: {fault}" for path, fault in problems.items()]
+    remedy = f"remove what is damaged and {written_files.REMEDY}"
+    if {written_files.CHANGED, written_files.DOUBTFUL} & set(problems.values()):
+        remedy += f"; {written_files.ADVICE}"
+    raise_on_all(told, remedy)
+    return f"{len(listed)} files"
+
+
+def check_stage(out: Path) -> str:
+    """Check the composed stage by USD's own validators and by our rules."""
+    out_folder = OutFolder(out)
+    out_folder.require_finished("stage")
+    path = out_folder.stage_file
+    dependencies(path, path.parent)  # refuses files outside the stage
+    findings = validate_stage(path)
+    raise_on([str(finding) for finding in findings])
+    return f"{path.name}: nothing found by UsdValidation and by our own rules"
+
+
+def check_usdz(path: Path) -> str:
+    """Check a .usdz by the validators of its format; a specimen without surfaces has none."""
+    if not path.parent.is_dir():
+        raise CheckError(f"{path.parent}: missing, run `stereocell stage OUT`")
+    if not path.is_file():
+        return f"no {path.name}: a specimen without surfaces has none"
+    dependencies(path, path.parent)
+    raise_on([str(finding) for finding in validate_usdz(path)])
+    return f"{path.name}: nothing found by the validators of usdz and by our own rules"
+
+
+def check_stage_files(out: Path) -> str:
+    """Check that volumes, lookup tables and closed copies are whole: USD checks only that the
+    first two exist."""
+    folder = out / "stage"
+    paths = sorted(path for path in folder.rglob("*") if path.suffix in _WHOLE)
+    if not paths:
+        raise CheckError(f"{folder}: no .exr and no .vdb file, expected those of its volumes")
+    problems = _lost_copies(out)
+    for path in paths:
+        try:
+            require_own(path, [Location.of(folder).folder], named=str(path), raised=CheckError)
+            _WHOLE[path.suffix](path)
+        except StereoCellError as error:
+            problems.append(str(error))
+    raise_on(problems)
+    copies = sum(path.suffix == ".stl" for path in paths)
+    closed = f" and {copies} closed .stl" if copies else ""
+    return f"{len(paths) - copies} volumes and lookup tables{closed} are whole"
+
+
+def _lost_copies(out: Path) -> list[str]:
+    """Return the problems where the plan requests closed copies, and a surface has none."""
+    out_folder = OutFolder(out)
+    if not out_folder.plan_file.is_file():  # the line `plan` reports it
+        return []
+    plan = out_folder.plan()
+    if not plan.settings.surface.closed_tiles:
+        return []
+    return [
+        f"{path}: missing, expected as surface.closed_tiles is on: run `stereocell stage OUT`"
+        for tile in plan.tiles
+        for channel in plan.channels
+        for path in [closed_file(out_folder.stage_dir, tile.id, channel.id)]
+        if has_mesh(out_folder.stage_dir, tile.id, channel.id) and not path.is_file()
+    ]

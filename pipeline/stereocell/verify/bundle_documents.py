@@ -1,0 +1,171 @@
+"""Check the JSON documents of a bundle: their schemas, and the rules that no schema states."""
+
+import hashlib
+import struct
+from pathlib import Path
+from typing import Any
+
+from stereocell.bundle.manifest import MANIFEST, read_manifest
+from stereocell.bundle.manifest import REMEDY as RUN_BUNDLE
+from stereocell.bundle.manifest import SCHEMA as BUNDLE
+from stereocell.bundle.write_objects import hash_parts
+from stereocell.model.errors import CheckError
+from stereocell.storage.json_files import read_json
+from stereocell.transfer.shapes2d import find_fault, shapes_from
+from stereocell.usd.write_usdz import USDZ_NAME
+from stereocell.verify.build_files import check_usdz
+from stereocell.verify.check_line import raise_on
+
+
+def check_manifest(bundle: Path) -> str:
+    """Check the manifest against its schema and its own hash."""
+    read_manifest(bundle)
+    return f"{MANIFEST} fits {BUNDLE}, as written"
+
+
+def check_json(path: Path, schema: str, remedy: str) -> str:
+    """Check one document against its schema."""
+    read_json(path, schema, remedy)
+    return f"{path.name} fits {schema}"
+
+
+def check_usdz_of_bundle(bundle: Path) -> str:
+    """Check specimen.usdz where the manifest names one; its hash is checked with all others."""
+    manifest = read_manifest(bundle)
+    if manifest.get("usdz") is None:
+        return f"no {USDZ_NAME}: {manifest.get('usdz_reason') or 'the manifest names none'}"
+    if not (bundle / USDZ_NAME).is_file():
+        raise CheckError(f"{USDZ_NAME}: missing, {RUN_BUNDLE}")
+    return check_usdz(bundle / USDZ_NAME)
+
+
+def check_volume_lists(bundle: Path) -> str:
+    """Check each volumes.json, and its hashes of the levels in the textures."""
+    problems = []
+    volumes = 0
+    for channel in channels_of(bundle):
+        path = bundle / channel["volumes"]["path"]
+        content = read_json(path, "volumes.schema.json", RUN_BUNDLE)
+        for volume in content["volumes"]:
+            volumes += 1
+            texture = bundle / volume["file"]["path"]
+            listed = [(level["offset"], level["length"]) for level in volume["levels"]]
+            if _levels_of(texture, len(listed)) != listed:
+                problems.append(f"{path}: the levels of {volume['file']['path']} lie elsewhere")
+                continue
+            problems += _spoilt_levels(texture, volume)
+    raise_on(problems)
+    return f"{volumes} volumes"
+
+
+def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
+    """Return offset and length in bytes of a KTX2 file's levels; empty for another number."""
+    try:
+        with texture.open("rb") as file:
+            head = file.read(80 + 24 * count)
+    except OSError as error:
+        raise CheckError(f"{texture}: {error.strerror or error}") from error
+    if len(head) < 80 + 24 * count or struct.unpack_from("<I", head, 40) != (count,):
+        return []
+    return [struct.unpack_from("<2Q", head, 80 + 24 * k) for k in range(count)]
+
+
+def _spoilt_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
+    """Return the levels that lie at the right place but don't match their hash."""
+    problems = []
+    try:
+        with texture.open("rb") as file:
+            for k, level in enumerate(volume["levels"]):
+                file.seek(level["offset"])
+                found = hashlib.sha256(file.read(level["length"])).hexdigest()
+                if found != level["sha256"]:
+                    problems.append(
+                        f"{volume['file']['path']}: level {k}: "
+                        f"expected SHA-256 {level['sha256']}, found {found}"
+                    )
+    except OSError as error:
+        raise CheckError(f"{texture}: {error.strerror or error}") from error
+    return problems
+
+
+def channels_of(bundle: Path) -> list[dict[str, Any]]:
+    """Return the channels of a bundle's manifest. Raises OutputError where it is invalid."""
+    manifest = read_manifest(bundle)
+    channels: list[dict[str, Any]] = manifest["channels"]
+    return channels
+
+
+def transfer2d_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
+    """Return a channel's 2D transfer functions. Raises OutputError where they are invalid."""
+    path = bundle / channel["transfer_functions_2d"]["file"]["path"]
+    content: dict[str, Any] = read_json(path, "transfer2d.schema.json", RUN_BUNDLE)
+    return content
+
+
+def check_transfer2d(bundle: Path) -> str:
+    """Check each transfer2d.json: its names, and rules of its shapes beyond the schema."""
+    problems = []
+    count = 0
+    for channel in channels_of(bundle):
+        listed, known = channel["transfer_functions_2d"], channel["transfer_functions"]
+        functions = transfer2d_of(bundle, channel)["functions"]
+        if list(functions) != listed["names"] or not set(functions) <= set(known):
+            problems.append(
+                f"{listed['file']['path']}: functions are {', '.join(functions) or 'none'}, the "
+                f"manifest says {', '.join(listed['names']) or 'none'} of {', '.join(known)}"
+            )
+        for name, content in functions.items():
+            count += len(content)
+            problems += [
+                f"{listed['file']['path']}: {name}: shape {i}: {fault}"
+                for i, shape in enumerate(shapes_from(content))
+                if (fault := find_fault(shape))
+            ]
+    raise_on(problems)
+    return f"{count} shapes"
+
+
+def objects_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the table of a channel that is a label map; None: it is an image's."""
+    if "objects" not in channel:
+        return None
+    path = bundle / channel["objects"]["path"]
+    content: dict[str, Any] = read_json(path, "objects.schema.json", RUN_BUNDLE)
+    return content
+
+
+def check_objects(bundle: Path) -> str:
+    """Check each objects.json: that its files have a value a row, and its tiles rows there are."""
+    problems = []
+    objects = 0
+    for channel in channels_of(bundle):
+        content = objects_of(bundle, channel)
+        if content is None:
+            continue
+        count, name = content["count"], channel["objects"]["path"]
+        objects += count
+        sizes = [(content["labels"], content["label_bytes"]), (content["boxes"], 24)]
+        sizes += [(column["bytes"], 1) for column in content["columns"]]
+        sizes += [(column["exact"], 4) for column in content["columns"]]
+        problems += [
+            f"{name}: {ref['path']} has {ref['bytes']} bytes, expected {count * width}"
+            for ref, width in sizes
+            if ref["bytes"] != count * width
+        ]
+        problems += [
+            f"{name}: {column['exact']['path']}: parts have other SHA-256 than stated"
+            for column in content["columns"]
+            if "parts" in column and not _has_parts(bundle / column["exact"]["path"], column)
+        ]
+        for tile, rows in content["tiles"].items():
+            if max([rows["first"] + rows["count"] - 1, *rows.get("more", [])]) >= max(count, 1):
+                problems.append(f"{name}: {tile}: names rows beyond the {count} that there are")
+    raise_on(problems)
+    return f"{objects} objects"
+
+
+def _has_parts(file: Path, column: dict[str, Any]) -> bool:
+    try:
+        return bool(column["parts"] == hash_parts(file.read_bytes()))
+    except OSError as error:
+        raise CheckError(f"{file}: {error.strerror or error}") from error
