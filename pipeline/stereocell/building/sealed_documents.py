@@ -6,6 +6,7 @@ the first command that would go on from it, with the remedy that `check` names.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 from stereocell.building.out_folder import (
     EXPORTS,
@@ -106,10 +107,7 @@ def _units(out_folder: OutFolder) -> list[_Check]:
     }
     if not has_units(out_folder):
         return []
-    return [
-        lambda file=file, schema=schema: read_sealed(file, schema, UNITS_AGAIN)
-        for file, schema in schemas.items()
-    ]
+    return [partial(read_sealed, file, schema, UNITS_AGAIN) for file, schema in schemas.items()]
 
 
 def _stage(out_folder: OutFolder) -> list[_Check]:

@@ -24,8 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.bundle.manifest import MANIFEST, read_manifest
-from stereocell.bundle.manifest import REMEDY as _REMEDY
+from stereocell.bundle.manifest import MANIFEST, REMEDY, read_manifest
 from stereocell.formats.brick_stream import (
     HASH_BYTES,
     BrickFormatError,
@@ -143,7 +142,7 @@ class BrickLibrary:
             try:
                 status = path.stat()
             except OSError as error:
-                raise OutputError(f"{path.name}: {error.strerror}: {_REMEDY}") from None
+                raise OutputError(f"{path.name}: {error.strerror}: {REMEDY}") from None
             stamp = (status.st_mtime_ns, status.st_ino)
             if stamp != self._stamp:
                 self._volumes = _read_volumes(self._bundle)
@@ -221,9 +220,9 @@ class BrickLibrary:
         try:
             texture = decode_finest(data)
         except SourceError as error:
-            raise SourceError(f"{name}: {error}: {_REMEDY}") from None
+            raise SourceError(f"{name}: {error}: {REMEDY}") from None
         if list(texture.shape[2::-1]) != volume.entry["size"] or texture.shape[3] != 1:
-            raise SourceError(f"{name}: {texture.shape[2::-1]} texels: {_REMEDY}")
+            raise SourceError(f"{name}: {texture.shape[2::-1]} texels: {REMEDY}")
         source = bytes.fromhex(volume.source)[:HASH_BYTES]
         return encode_tree(build(texture[..., 0], volume.threshold), source)
 
@@ -244,22 +243,22 @@ def invisible_below(row: NDArray[np.uint8]) -> int:
 
 
 def _read_volumes(bundle: Path) -> dict[tuple[str, str], Volume]:
-    manifest = read_manifest(bundle, _REMEDY)
+    manifest = read_manifest(bundle)
     found = {}
     for channel in manifest["channels"]:
-        listed = read_json(bundle / channel["volumes"]["path"], "volumes.schema.json", _REMEDY)
+        listed = read_json(bundle / channel["volumes"]["path"], "volumes.schema.json", REMEDY)
         name = channel["lut"]["path"]
         try:
             lut = decode_finest(_read(bundle, channel["lut"]))[0]
         except SourceError as error:
-            raise SourceError(f"{name}: {error}: {_REMEDY}") from None
+            raise SourceError(f"{name}: {error}: {REMEDY}") from None
         names = channel["transfer_functions"]
         if lut.shape != (len(names), 256, 4):
             wanted = f"{len(names)} rows of 256 RGBA"
-            raise SourceError(f"{name}: {lut.shape} texels, expected {wanted}: {_REMEDY}")
+            raise SourceError(f"{name}: {lut.shape} texels, expected {wanted}: {REMEDY}")
         if channel["transfer_function"] not in names:
             chosen = channel["transfer_function"]
-            raise SourceError(f"{MANIFEST}: {chosen} is none of {', '.join(names)}: {_REMEDY}")
+            raise SourceError(f"{MANIFEST}: {chosen} is none of {', '.join(names)}: {REMEDY}")
         threshold = invisible_below(lut[names.index(channel["transfer_function"])])
         for entry in listed["volumes"]:
             found[entry["tile"], channel["id"]] = Volume(
@@ -273,7 +272,7 @@ def _read(bundle: Path, ref: dict[str, Any]) -> bytes:
     try:
         data = (bundle / ref["path"]).read_bytes()
     except OSError as error:
-        raise SourceError(f"{ref['path']}: {error.strerror}: {_REMEDY}") from None
+        raise SourceError(f"{ref['path']}: {error.strerror}: {REMEDY}") from None
     if hashlib.sha256(data).hexdigest() != ref["sha256"]:
-        raise SourceError(f"{ref['path']}: its SHA-256 is not the manifest's: {_REMEDY}")
+        raise SourceError(f"{ref['path']}: its SHA-256 is not the manifest's: {REMEDY}")
     return data

@@ -5,9 +5,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
-from stereocell.bundle.manifest import MANIFEST, read_manifest
-from stereocell.bundle.manifest import REMEDY as RUN_BUNDLE
-from stereocell.bundle.manifest import SCHEMA as BUNDLE
+from stereocell.bundle.manifest import MANIFEST, REMEDY, SCHEMA, read_manifest
 from stereocell.bundle.write_objects import hash_parts
 from stereocell.model.errors import CheckError
 from stereocell.storage.json_files import read_json
@@ -20,7 +18,7 @@ from stereocell.verify.check_line import raise_on
 def check_manifest(bundle: Path) -> str:
     """Check the manifest against its schema and its own hash."""
     read_manifest(bundle)
-    return f"{MANIFEST} fits {BUNDLE}, as written"
+    return f"{MANIFEST} fits {SCHEMA}, as written"
 
 
 def check_json(path: Path, schema: str, remedy: str) -> str:
@@ -35,7 +33,7 @@ def check_usdz_of_bundle(bundle: Path) -> str:
     if manifest.get("usdz") is None:
         return f"no {USDZ_NAME}: {manifest.get('usdz_reason') or 'the manifest names none'}"
     if not (bundle / USDZ_NAME).is_file():
-        raise CheckError(f"{USDZ_NAME}: missing, {RUN_BUNDLE}")
+        raise CheckError(f"{USDZ_NAME}: missing, {REMEDY}")
     return check_usdz(bundle / USDZ_NAME)
 
 
@@ -45,7 +43,7 @@ def check_volume_lists(bundle: Path) -> str:
     volumes = 0
     for channel in channels_of(bundle):
         path = bundle / channel["volumes"]["path"]
-        content = read_json(path, "volumes.schema.json", RUN_BUNDLE)
+        content = read_json(path, "volumes.schema.json", REMEDY)
         for volume in content["volumes"]:
             volumes += 1
             texture = bundle / volume["file"]["path"]
@@ -98,7 +96,7 @@ def channels_of(bundle: Path) -> list[dict[str, Any]]:
 def transfer2d_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
     """Return a channel's 2D transfer functions. Raises OutputError where they are invalid."""
     path = bundle / channel["transfer_functions_2d"]["file"]["path"]
-    content: dict[str, Any] = read_json(path, "transfer2d.schema.json", RUN_BUNDLE)
+    content: dict[str, Any] = read_json(path, "transfer2d.schema.json", REMEDY)
     return content
 
 
@@ -130,7 +128,7 @@ def objects_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any] | None:
     if "objects" not in channel:
         return None
     path = bundle / channel["objects"]["path"]
-    content: dict[str, Any] = read_json(path, "objects.schema.json", RUN_BUNDLE)
+    content: dict[str, Any] = read_json(path, "objects.schema.json", REMEDY)
     return content
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.phase import digest_of_manifest
-from stereocell.bundle.manifest import FILES, MANIFEST, read_manifest
+from stereocell.bundle.manifest import FILES, MANIFEST, REMEDY, SCHEMA, read_manifest
 from stereocell.formats.tiles3d import CONTENT_HASH, content_hash
 from stereocell.formats.tiles3d_walk import Content, walk
 from stereocell.model.errors import StereoCellError
@@ -14,8 +14,6 @@ from stereocell.storage.contents import PUBLISHED
 from stereocell.storage.file_list import measure
 from stereocell.storage.json_files import read_json
 from stereocell.verify.bundle_documents import (
-    BUNDLE,
-    RUN_BUNDLE,
     channels_of,
     objects_of,
     transfer2d_of,
@@ -68,7 +66,7 @@ def check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
     out_folder  the OUT of the bundle, which has a hash of the manifest; None: a bundle by itself
     """
     manifest = read_manifest(bundle)
-    listed = read_json(bundle / FILES, f"{BUNDLE}#FileIndex", RUN_BUNDLE)
+    listed = read_json(bundle / FILES, f"{SCHEMA}#FileIndex", REMEDY)
     problems = []
     found = {p.relative_to(bundle).as_posix(): p for p in bundle.rglob("*") if p.is_file()}
     for path, entry in listed.items():
@@ -84,7 +82,7 @@ def check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
     references = list(_references(manifest))
     for channel in channels_of(bundle):
         path = bundle / channel["volumes"]["path"]
-        references += _references(read_json(path, "volumes.schema.json", RUN_BUNDLE))
+        references += _references(read_json(path, "volumes.schema.json", REMEDY))
         references += _references(transfer2d_of(bundle, channel))
         references += _references(objects_of(bundle, channel))
     for reference in references:
@@ -96,7 +94,7 @@ def check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
             problems.append(f"{reference['path']}: a reference to it has another hash")
     if out_folder is not None and not _is_own_manifest(out_folder):
         problems.append(f"{MANIFEST}: not the bytes that were written")
-    raise_on_all(sorted(problems), f"remove what is damaged and {RUN_BUNDLE}")
+    raise_on_all(sorted(problems), f"remove what is damaged and {REMEDY}")
     return f"{len(listed)} files, {len(references)} references"
 
 

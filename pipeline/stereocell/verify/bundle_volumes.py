@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.bundle.manifest import REMEDY
 from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
 from stereocell.storage.json_files import read_json
 from stereocell.usd.read_volume import ComposedVolume
-from stereocell.verify.bundle_files import REMEDY, read_texels
+from stereocell.verify.bundle_files import read_texels
 
 
 def placement_of(volume: ComposedVolume) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.sealed_documents import has_report, has_units
 from stereocell.building.tissue_files import FOLDER
-from stereocell.bundle.manifest import FILES, MANIFEST
+from stereocell.bundle.manifest import FILES, MANIFEST, REMEDY, SCHEMA
 from stereocell.model.errors import OutputError, StereoCellError
 from stereocell.storage.contents import require_kind
 from stereocell.storage.kinds import Kind
@@ -26,8 +26,6 @@ from stereocell.verify.build_files import (
 )
 from stereocell.verify.build_records import check_plan, check_records, check_report
 from stereocell.verify.bundle_documents import (
-    BUNDLE,
-    RUN_BUNDLE,
     check_json,
     check_manifest,
     check_objects,
@@ -84,7 +82,7 @@ def _checks_of_build(out: Path) -> list[_Check]:
 def _checks_of_bundle(bundle: Path, out_folder: OutFolder | None) -> list[_Check]:
     return [
         ("manifest", lambda: check_manifest(bundle)),
-        ("file list", lambda: check_json(bundle / FILES, f"{BUNDLE}#FileIndex", RUN_BUNDLE)),
+        ("file list", lambda: check_json(bundle / FILES, f"{SCHEMA}#FileIndex", REMEDY)),
         ("volume lists", lambda: check_volume_lists(bundle)),
         ("2D transfer functions", lambda: check_transfer2d(bundle)),
         ("object tables", lambda: check_objects(bundle)),
