@@ -24,23 +24,20 @@ from stereocell.usd.layer import (
     CHANNELS,
     DISTANCE,
     LARGEST_DISTANCE,
-    METERS_PER_UNIT,
     PATIENT_API,
     ROOT,
     SHAPE_HASH,
     SIDES,
     TILES,
-    UP_AXIS,
     hash_shape,
     move_box,
 )
-from stereocell.usd.layer_units import STATED_AXIS, STATED_UNIT
+from stereocell.usd.layer_units import require_units
 from stereocell.usd.read_appearances import material_of, surface_of
 from stereocell.usd.read_attributes import (
     Point,
     file_of,
     numbers_of,
-    one_line,
     point_of,
     require_still,
     select_variant,
@@ -51,9 +48,12 @@ from stereocell.usd.read_mesh import LargeFaceError, read_mesh
 from stereocell.usd.read_objects import without_hidden
 from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import TileChoice, lod_levels, read_choice
+from stereocell.usd.typed_values import one_line, read_as, text_of
 from stereocell.usd.written_files import AsWritten
 
+_PERSPECTIVE = 1e-9  # largest deviation of an affine matrix's last column
 _SIDE_DIGITS = 9  # decimals of the unit vectors to a patient's sides: scanners state fewer
+_Types = Sdf.ValueTypeNames
 _FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 
@@ -117,8 +117,10 @@ class ComposedVolume:
 
 
 def open_stage(path: Path) -> Usd.Stage:
-    """Open a stage without its payloads. Raises StageError where it can't, or for other
-    units or another up axis."""
+    """Open a stage without its payloads.
+
+    Raises StageError where it can't, or for a layer of other units, up axis or default prim.
+    """
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
     try:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
@@ -130,19 +132,7 @@ def open_stage(path: Path) -> Usd.Stage:
     finally:
         del quiet
     _check_composition(stage)
-    if UsdGeom.StageHasAuthoredMetersPerUnit(stage):
-        unit = UsdGeom.GetStageMetersPerUnit(stage)
-        if not UsdGeom.LinearUnitsAre(unit, METERS_PER_UNIT):
-            raise StageError(
-                f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}: "
-                f"write {STATED_UNIT} there; this scales nothing, a stage's numbers are um"
-            )
-    axis = UsdGeom.GetStageUpAxis(stage)
-    if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis) and axis != UP_AXIS:
-        raise StageError(
-            f"{path}: upAxis is {axis}, expected {UP_AXIS}: write {STATED_AXIS} there; this turns "
-            "nothing"
-        )
+    require_units(stage)
     for needed in (ROOT, CHANNELS, TILES):
         if not stage.GetPrimAtPath(needed):
             raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")
@@ -208,8 +198,7 @@ def specimen_name(stage: Usd.Stage) -> str:
 
 def modality_of(stage: Usd.Stage) -> str:
     """Return DICOM's code of the modality, `MR` or the like; empty: the stage states none."""
-    attribute = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality")
-    return str((attribute.Get() if attribute else None) or "")
+    return text_of(stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality"))
 
 
 def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
@@ -245,7 +234,8 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
     The tile need not be loaded. Raises StageError where it has no hint or an invalid one.
     """
-    hint = UsdGeom.ModelAPI(tile).GetExtentsHintAttr().Get()
+    attribute = UsdGeom.ModelAPI(tile).GetExtentsHintAttr()
+    hint = read_as(attribute, _Types.Float3Array, may_be_nan=True)
     if not hint:
         raise StageError(f"{tile.GetPath()}.extentsHint: no value")
     corners = np.array(hint, np.float64)
@@ -305,7 +295,7 @@ def read_lods(tile: Usd.Prim, channel_id: str, *, finest: int = 0) -> Iterator[C
         if prim is None:
             continue
         matrix = _to_world(prim)
-        built = str(prim.GetAttribute(SHAPE_HASH).Get() or "")
+        built = text_of(prim.GetAttribute(SHAPE_HASH))
         shape = hash_shape(UsdGeom.Mesh(prim)) if built else ""
         try:
             surface = surface_of(prim)
@@ -351,7 +341,8 @@ def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> Compose
     if "displayColor" in fed and mesh.colors is None:
         lost.append("colours")
         has_color = False
-    colors = np.array(UsdGeom.Gprim(prim).GetDisplayColorAttr().Get() or [], np.float64)
+    given = read_as(UsdGeom.Gprim(prim).GetDisplayColorAttr(), _Types.Color3fArray)
+    colors = np.array(given or [], np.float64)
     if not has_color and colors.size:  # one average colour replaces them
         r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
         lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
@@ -375,11 +366,17 @@ def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
     found = []
     for level in lod_levels(tile) or [0]:
         prim = mesh_at(tile, channel_id, level)
-        if prim is None or not prim.GetAttribute(SHAPE_HASH).Get():
+        if prim is None or not text_of(prim.GetAttribute(SHAPE_HASH)):
             continue
-        if not UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get():
+        if not count_faces(prim):
             found.append(level)
     return found
+
+
+def count_faces(mesh: Usd.Prim) -> int:
+    """Return the number of faces of a mesh. Raises StageError where they aren't whole numbers."""
+    counts = UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr()
+    return len(read_as(counts, _Types.IntArray) or ())
 
 
 def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
@@ -430,7 +427,7 @@ def _field_of(volume: Usd.Prim, name: str) -> Path | None:
     """Return the file of a field of a volume; None where there is none."""
     path = UsdVol.Volume(volume).GetFieldPath(name)
     prim = volume.GetStage().GetPrimAtPath(path) if path else None
-    asset = UsdVol.FieldAsset(prim).GetFilePathAttr().Get() if prim else None
+    asset = read_as(UsdVol.FieldAsset(prim).GetFilePathAttr(), _Types.Asset) if prim else None
     return Path(asset.resolvedPath) if asset and asset.resolvedPath else None
 
 
@@ -470,5 +467,10 @@ def _to_world(prim: Usd.Prim) -> NDArray[np.float64]:
         raise StageError(
             f"{prim.GetPath()}: its transform is flat, infinite or leads farther than "
             f"{_FARTHEST_UM:g} um, expected one that a surface survives"
+        )
+    if not np.allclose(matrix[:, 3], (0, 0, 0, 1), rtol=0, atol=_PERSPECTIVE):
+        raise StageError(
+            f"{prim.GetPath()}: its transform has a perspective, expected the last column of its "
+            f"matrix to be 0, 0, 0, 1, found {', '.join(f'{part:g}' for part in matrix[:, 3])}"
         )
     return matrix

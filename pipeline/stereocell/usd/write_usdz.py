@@ -34,6 +34,7 @@ from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
 from stereocell.usd.read_objects import read_columns
 from stereocell.usd.read_stage import (
     ComposedLod,
+    count_faces,
     hinted_box,
     loaded,
     mesh_at,
@@ -135,8 +136,7 @@ def _choose_level(stage: Usd.Stage, channels: Collection[str], as_written: AsWri
 
 def _count_triangles(tile: Usd.Prim, channels: Collection[str], level: int) -> int:
     found = (mesh_at(tile, channel, level) for channel in channels)
-    meshes = (UsdGeom.Mesh(prim) for prim in found if prim is not None)
-    return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
+    return sum(count_faces(prim) for prim in found if prim is not None)
 
 
 def _read_parts(
