@@ -304,11 +304,10 @@ def preset_path(preset: str) -> Path:
     """Return the file of a preset: one of ours by name, or the user's own TOML file."""
     if preset.endswith(".toml"):
         return Path(preset)
-    path = PRESETS / f"{preset}.toml"
-    if not path.is_file():
+    if preset not in preset_names():
         known = ", ".join(preset_names())
         raise UsageError(f"preset {preset!r} is unknown, expected one of {known} or a .toml file")
-    return path
+    return PRESETS / f"{preset}.toml"
 
 
 def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings:
@@ -439,6 +438,12 @@ def _read(path: Path) -> dict[str, Any]:
         return tomllib.loads(content.decode())
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}, expected a TOML file of settings") from None
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise UsageError(
+            f"{path}: line {line}: found byte 0x{content[error.start]:02x}, expected UTF-8: save "
+            "the file in this encoding"
+        ) from None
     except (ValueError, RecursionError) as error:  # tomllib's own, no UTF-8, endless numbers
         raise UsageError(f"{path}: not TOML: {error!s:.200}") from None
 
