@@ -174,3 +174,17 @@ def test_every_number_has_bounds(section: str, key: str, value: int) -> None:
 
 def test_voxel_values_of_settings_and_of_inputs_have_one_bound() -> None:
     assert MAX_VOXEL_VALUE == MAX_VALUE
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"plan": {"grid": "\udcff"}}, "here: plan.grid is '\\xff', expected text in UTF-8"),
+        ({"plan": {"channels": ["a", "\udce9"]}}, "here: plan.channels is '\\xe9', expected text"),
+        ({"iso_values": {"\ud800": 1.0}}, "here: iso_values.\\ud800 is '\\ud800', expected text"),
+    ],
+)
+def test_texts_that_are_not_utf8_are_named(values: dict[str, object], told: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        settings_module.apply(Settings(), values, "here")
+    assert str(raised.value).startswith(told)

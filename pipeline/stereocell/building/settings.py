@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
 from functools import cache
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stereocell.building.setting_values import finite, require_utf8
 from stereocell.isosurface.options import IsoValueOptions, SurfaceOptions, parse_level
 from stereocell.meshes.options import LodOptions
 from stereocell.model.axes import axes_of, is_axes
@@ -335,8 +335,9 @@ def _validate(content: Mapping[str, Any], where: str) -> Settings:
     """
     from pydantic import ValidationError  # slow to import
 
+    require_utf8(content, where)
     try:
-        return _adapter().validate_json(json.dumps(_finite(content), default=str), strict=True)
+        return _adapter().validate_json(json.dumps(finite(content), default=str), strict=True)
     except ValidationError as error:
         faults = error.errors(include_url=False)
     place = faults[0]["loc"][:2]
@@ -360,18 +361,6 @@ def _adapter() -> "TypeAdapter[Settings]":
     from pydantic import TypeAdapter
 
     return TypeAdapter(Settings)
-
-
-def _finite(value: Any) -> Any:
-    """Return plain values with nothing in the place of numbers that are not finite."""
-    if isinstance(value, Mapping):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, int | float):
-        try:
-            return value if isfinite(value) else None
-        except OverflowError:  # TOML's whole numbers have no end
-            return None
-    return [_finite(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def to_dict(settings: Settings) -> dict[str, Any]:

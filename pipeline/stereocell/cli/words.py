@@ -1,10 +1,10 @@
 """Check and prepare the words of a command line before they are parsed."""
 
-import os
 import re
 from collections.abc import Sequence
 
 from stereocell.model.errors import UsageError
+from stereocell.model.utf8 import escaped_bytes
 
 _BELOW_ZERO = re.compile(r"-\.?\d")  # no flag of ours has a digit there
 # argparse of Python 3.11 removes `--` from the values of flags, so that no value is left
@@ -37,13 +37,7 @@ def prepared(words: Sequence[str]) -> list[str]:
 
 def _require_utf8(where: str, word: str) -> None:
     """Raise UsageError for bytes that are not UTF-8, which Python keeps as lone surrogates."""
-    try:
-        word.encode()
-    except UnicodeEncodeError:
-        try:
-            shown = os.fsencode(word).decode("utf-8", "backslashreplace")
-        except UnicodeEncodeError:  # no bytes of a command line make such a word
-            shown = word.encode("utf-8", "backslashreplace").decode()
+    if shown := escaped_bytes(word):
         raise UsageError(
             f"{where} is '{shown}', expected UTF-8: give a file with such a name another one"
-        ) from None
+        )
