@@ -44,13 +44,37 @@ def test_a_network_of_more_memory_than_its_bound_is_refused(tmp_path: Path) -> N
     assert "--model-memory-gb" in line
 
 
+def test_a_tensor_beyond_this_machine_names_the_bound_to_raise(tmp_path: Path) -> None:
+    line = refusal(write_huge_model(tmp_path / "m.onnx", planes=1 << 44), ModelBounds())
+    assert "it asks for more memory than it gets" in line
+    assert "--model-memory-gb" in line
+    assert "bfc_arena" not in line
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (["x" * 101, "b"], "found 'xxxxxxxx"),
+        (["x" * 5000, "b"], "found 'xxxxxxxx"),
+        (["a\nb", "c"], "found 'a\\nb', expected printable characters"),
+        ("[" * 100_000, "metadata 'stereocell_classes' is '[[["),
+    ],
+)
+def test_names_that_no_channel_can_have_are_refused(
+    tmp_path: Path, names: object, told: str
+) -> None:
+    line = refusal(write_model(tmp_path / "m.onnx", names=names), ModelBounds())
+    assert told in line
+    assert len(line) < 500
+
+
 def test_a_file_that_is_no_network_is_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "m.onnx").write_bytes(b"GIF89a")
     line = refusal(tmp_path / "m.onnx", ModelBounds())
     assert line.endswith("found another kind of file, expected an ONNX model")
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("value", [0.0, -1.0, 1e300, float("nan"), float("inf")])
 def test_a_bound_that_is_not_a_positive_number_is_refused(value: float) -> None:
     with pytest.raises(UsageError, match="--model-seconds"):
         ModelBounds(seconds=value)

@@ -1,12 +1,18 @@
 """Settings: presets, files, flags; and what is wrong with them."""
 
+import re
 import tomllib
+from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from stereocell.building import settings as settings_module
+from stereocell.building.settings import Settings
 from stereocell.model.errors import UsageError
+from stereocell.model.settings import MAX_VOXEL_VALUE
+from stereocell.read.dataset import MAX_VALUE
 
 
 def test_printed_settings_are_the_defaults_again() -> None:
@@ -80,9 +86,9 @@ def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
         ("[plan]\nlevel = 1.5\n", "plan.level is 1.5, expected a whole number or 'auto'"),
         ("[window]\nlow_percentile = true\n", "low_percentile is True, expected a number"),
         ("[window]\nlow_percentile = 100\n", "expected 0 <= low < high <= 100"),
-        ("[isovalue]\nbins = 3\n", "bins is 3, expected at least 16"),
+        ("[isovalue]\nbins = 3\n", "bins is 3, expected 16 to 65536"),
         ("[plan]\nchannels = 3\n", "channels is 3, expected a list"),
-        ("[plan]\nmax_voxels = 0\n", "plan.max_voxels is 0, expected at least 1"),
+        ("[plan]\nmax_voxels = 0\n", "plan.max_voxels is 0, expected 1 or more"),
         ("[plan]\ntime = -1\n", "plan.time is -1, expected 0 or more"),
         ("[plan]\nspacing_um = [1, 0, 1]\n", "spacing_um: found 1,0,1, expected z,y,x in um"),
         ("[plan]\nspacing_um = [1, 2]\n", "spacing_um: found 1,2, expected z,y,x in um"),
@@ -94,6 +100,15 @@ def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
         ("[unwrap]\npadding = 1.5\n", "unwrap.padding is 1.5, expected a whole number"),
         ("[unwrap]\npadding = 200\n", "unwrap.padding is 200, expected 3 to 24"),
         ("plan = 3\n", "plan is 3, expected a table"),
+        ("[surface]\ngrid_um = 1e308\n", "grid_um is 1e+308, expected a length in um, 0"),
+        ("[surface]\nalpha_um = 1e13\n", "alpha_um is 10000000000000.0, expected a length in"),
+        (
+            "[lod]\nsamples = 99999999999999999999\n",
+            "lod.samples is 99999999999999999999, expected",
+        ),
+        ("[lod]\nerrors = [1.0, 1e300]\n", "lod.errors is 1e+300, expected 0 to 1e+06"),
+        ("[iso_values]\nCD31 = 1e300\n", "iso_values.CD31 is 1e+300, expected a voxel value"),
+        ('[windows]\nCD31 = "-3e38:3e38"\n', "windows.CD31 is '-3e38:3e38', expected LOW:HIGH"),
         ("[plan\n", "not TOML"),
     ],
 )
@@ -132,3 +147,44 @@ def test_whole_number_without_end_is_wrong_usage(tmp_path: Path) -> None:
     file.write_text("[isovalue]\nmin_area_share = " + "9" * 400)
     with pytest.raises(UsageError, match=r"isovalue\.min_area_share is 9"):
         settings_module.load(None, file, flags={})
+
+
+NUMBERS = [
+    (section.name, field.name)
+    for section in fields(Settings())
+    if is_dataclass(getattr(Settings(), section.name))
+    for field in fields(getattr(Settings(), section.name))
+    if {int, float} & {field.type, *get_args(field.type)}
+]
+
+
+def test_every_section_has_numbers() -> None:
+    assert {section for section, _ in NUMBERS} >= {"plan", "surface", "lod", "objects", "unwrap"}
+
+
+@pytest.mark.parametrize(("section", "key"), NUMBERS)
+@pytest.mark.parametrize("value", [10**20, -(10**20)])
+def test_every_number_has_bounds(section: str, key: str, value: int) -> None:
+    default = getattr(getattr(Settings(), section), key)
+    given = [value, value, value] if isinstance(default, tuple) else value
+    with pytest.raises(UsageError) as raised:
+        settings_module.apply(Settings(), {section: {key: given}}, "here")
+    assert re.match(rf"{section}[. ]({key}|percentiles)", str(raised.value))
+
+
+def test_voxel_values_of_settings_and_of_inputs_have_one_bound() -> None:
+    assert MAX_VOXEL_VALUE == MAX_VALUE
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"plan": {"grid": "\udcff"}}, "here: plan.grid is '\\xff', expected text in UTF-8"),
+        ({"plan": {"channels": ["a", "\udce9"]}}, "here: plan.channels is '\\xe9', expected text"),
+        ({"iso_values": {"\ud800": 1.0}}, "here: iso_values.\\ud800 is '\\ud800', expected text"),
+    ],
+)
+def test_texts_that_are_not_utf8_are_named(values: dict[str, object], told: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        settings_module.apply(Settings(), values, "here")
+    assert str(raised.value).startswith(told)

@@ -21,7 +21,7 @@ from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support import spheres
 from support.bundles import CD31, channel, factor, files, load, volumes, write_tiles
 from support.glbs import decoded_positions_m, read
-from support.stages import layer_over
+from support.stages import HEAD, layer_over
 
 
 @pytest.fixture(scope="module")
@@ -711,7 +711,11 @@ def test_points_in_other_units_are_told(stage, tmp_path):
     in_level(over, "lod0", swell(1.25))
     layer.pseudoRoot.SetInfo("metersPerUnit", 0.01)
     layer.Save()
-    root = layer_over(tmp_path / "root.usda", "./an artist's.usda")
+    root = Sdf.Layer.CreateNew(str(tmp_path / "root.usda"))
+    root.ImportFromString(f"{HEAD})\n")
+    specimen = Sdf.CreatePrimInLayer(root, "/Specimen")
+    specimen.specifier = Sdf.SpecifierDef
+    specimen.referenceList.prependedItems = [Sdf.Reference("./an artist's.usda", "/Specimen")]
     root.Save()
     told: list[str] = []
     write_bundle(
@@ -729,7 +733,7 @@ def test_points_that_are_no_numbers_are_refused(edit):
     def spoil(mesh):
         set_points(mesh, lambda points: np.where(points > 9.9, np.nan, points))
 
-    with pytest.raises(StereoCellError, match=r"CD31_r0_c0.points: a number that is not finite"):
+    with pytest.raises(StereoCellError, match=r"CD31_r0_c0.points: found nan, expected point3f"):
         edit(lambda s: in_level(s, "lod0", spoil))
 
 

@@ -135,5 +135,5 @@ def test_errors_must_rise() -> None:
 
 
 def test_no_samples_is_wrong_usage() -> None:
-    with pytest.raises(UsageError, match=r"lod\.samples is 0, expected 1 or more"):
+    with pytest.raises(UsageError, match=r"lod\.samples is 0, expected 1 to 1e"):
         LodOptions(samples=0)

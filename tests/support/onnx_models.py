@@ -65,9 +65,9 @@ def write_endless_model(path: Path) -> Path:
     return _save(path, [loop, both], [numpy_helper.from_array(np.array(2**62), "steps")])
 
 
-def write_huge_model(path: Path) -> Path:
-    """Write a network, of some hundred bytes, with a constant of 4.3 GB."""
-    size = numpy_helper.from_array(np.array([1, 2, 1 << 29, 1, 1]), "size")
+def write_huge_model(path: Path, *, planes: int = 1 << 29) -> Path:
+    """Write a network, of some hundred bytes, with a constant of 8 bytes a plane: 4.3 GB."""
+    size = numpy_helper.from_array(np.array([1, 2, planes, 1, 1]), "size")
     nodes = [
         helper.make_node("ConstantOfShape", ["size"], ["many"]),
         helper.make_node("ReduceMax", ["many"], ["one"], axes=[2, 3, 4]),

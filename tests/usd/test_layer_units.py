@@ -13,7 +13,7 @@ from stereocell.model.errors import StageError
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_levels import read_lods
 from stereocell.usd.read_stage import loaded, open_stage
-from support.stages import F_ID, leaf, write_whole
+from support.stages import F_ID, HEAD, leaf, write_whole
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +63,10 @@ def test_bundle_and_export_report_a_layer_without_units(stage_path: Path, tmp_pa
     [
         ("metersPerUnit = 1", "expected 1e-06: write metersPerUnit = 1e-6 there"),
         ('upAxis = "Z"', 'expected Y: write upAxis = "Y" there'),
+        ('defaultPrim = "Other"', 'expected Specimen: write defaultPrim = "Specimen" there'),
     ],
 )
-def test_another_unit_or_axis_is_refused_with_the_line_to_write(
+def test_another_unit_axis_or_prim_is_refused_with_the_line_to_write(
     stage_path: Path, tmp_path: Path, fields: str, remedy: str
 ) -> None:
     layer = write_over(stage_path, tmp_path / "edit.usda", fields)
@@ -73,6 +74,34 @@ def test_another_unit_or_axis_is_refused_with_the_line_to_write(
         open_stage(layer)
     assert str(caught.value).startswith(f"{layer}: ")
     assert remedy in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("fields", "remedy"),
+    [
+        ("metersPerUnit = 0.01", "metersPerUnit is 0.01, expected 1e-06"),
+        ('upAxis = "Z"', "upAxis is Z, expected Y"),
+    ],
+)
+def test_units_of_a_sublayer_of_the_layer_are_refused_too(
+    stage_path: Path, tmp_path: Path, fields: str, remedy: str
+) -> None:
+    inner = tmp_path / "inner.usda"
+    inner.write_text(f"#usda 1.0\n({fields})\n")
+    between = tmp_path / "between.usda"
+    between.write_text("#usda 1.0\n(subLayers = [@./inner.usda@])\n")
+    layer = tmp_path / "edit.usda"
+    layer.write_text(f"{HEAD}subLayers = [@./between.usda@, @{stage_path}@])\n")
+    with pytest.raises(StageError) as caught:
+        open_stage(layer)
+    assert str(caught.value).startswith(f"{inner}: {remedy}: write ")
+
+
+def test_the_default_prim_of_a_sublayer_is_its_own(stage_path: Path, tmp_path: Path) -> None:
+    (tmp_path / "inner.usda").write_text('#usda 1.0\n(defaultPrim = "Rig")\ndef "Rig" {}\n')
+    layer = tmp_path / "edit.usda"
+    layer.write_text(f"{HEAD}subLayers = [@./inner.usda@, @{stage_path}@])\n")
+    assert note_missing(open_stage(layer)) == ""
 
 
 def test_a_face_of_too_many_corners_has_one_remedy(stage_path: Path, tmp_path: Path) -> None:

@@ -20,6 +20,9 @@ from stereocell.storage.location import Location
 from stereocell.tissue.onnx_classifier import Network
 from stereocell.tissue.onnx_session import OnnxSession, Tensor
 
+_MOST = 1e6  # seconds, a week and a half, or GB
+_LONGEST_NAME = 100  # characters of a class, which names a channel and its files
+
 
 @dataclass(frozen=True, slots=True)
 class ModelBounds:
@@ -37,8 +40,10 @@ class ModelBounds:
             ("--model-seconds", self.seconds),
             ("--model-memory-gb", self.memory_gb),
         ):
-            if not 0 < value < float("inf"):
-                raise UsageError(f"{flag} is {value:g}, expected a number above 0")
+            if not 0 < value <= _MOST:
+                raise UsageError(
+                    f"{flag} is {value:g}, expected a number above 0, at most {_MOST:g}"
+                )
 
 
 @contextmanager
@@ -64,10 +69,10 @@ def opened_network(path: Path, bounds: ModelBounds) -> Iterator[Network]:
 def _require_printable(path: Path, network: Network) -> None:
     """Raise SourceError where the name of a class has a character that can't be printed."""
     for name in network.classes:
-        if not name.isprintable():
+        if not name.isprintable() or len(name) > _LONGEST_NAME:
             raise SourceError(
-                f"{path}: name of a class: found {name!r:.80}, expected printable characters: "
-                "rename it in the model's metadata"
+                f"{path}: name of a class: found {name!r:.80}, expected printable characters, at "
+                f"most {_LONGEST_NAME}: rename it in the model's metadata"
             )
 
 

@@ -9,16 +9,25 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
 from functools import cache
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stereocell.building.setting_values import finite, require_utf8
 from stereocell.isosurface.options import IsoValueOptions, SurfaceOptions, parse_level
 from stereocell.meshes.options import LodOptions
 from stereocell.model.axes import axes_of, is_axes
 from stereocell.model.errors import UsageError
 from stereocell.model.modality import MODALITIES
-from stereocell.model.settings import AUTO, Flag, setting
+from stereocell.model.settings import (
+    AUTO,
+    COUNT,
+    COUNT_OR_NONE,
+    LENGTH_UM,
+    Bounds,
+    Flag,
+    require_bounds,
+    setting,
+)
 from stereocell.objects.options import ObjectOptions
 from stereocell.storage.documents import SETTINGS
 from stereocell.textures.options import UnwrapOptions
@@ -29,6 +38,7 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 EIGHT_BITS = 8
+MAX_INDEX = 2**31  # of levels, and of voxels along an axis
 INTENSITY = "intensity"  # value of taken_as: voxels are intensities, even if they look like labels
 NO_PRESET = "none"  # names the defaults
 PRESETS = Path(__file__).parent / "presets"
@@ -52,9 +62,12 @@ class PlanOptions:
         flag=Flag(
             "--level", "resolution level, 0 is the finest (default auto: see plan.max_voxels)"
         ),
+        bounds=Bounds(-MAX_INDEX, MAX_INDEX),
     )
     max_voxels: int = setting(
-        2_000_000_000, "auto takes the finest level within this: the region, all channels"
+        2_000_000_000,
+        "auto takes the finest level within this: the region, all channels",
+        bounds=COUNT,
     )
     channels: tuple[str, ...] = setting(
         (),
@@ -76,13 +89,14 @@ class PlanOptions:
         (194, 512, 512),
         "voxels z, y, x, clipped to the data",
         flag=Flag("--tile-size", "z,y,x in voxels", "three numbers z,y,x"),
+        bounds=Bounds(-MAX_INDEX, MAX_INDEX),
     )
     grid: str = setting(
         "",
         "columns x rows of equal tiles, as 5x2; instead of tile_size",
         flag=Flag("--grid", "columns x rows of equal tiles, as 5x2; not with --tile-size"),
     )
-    time: int = setting(0, "index into a time series", flag=Flag("--time"))
+    time: int = setting(0, "index into a time series", flag=Flag("--time"), bounds=COUNT_OR_NONE)
     series: int = setting(
         0,
         "which of several images of a source, from 1 as --series list counts; 0: the largest",
@@ -92,6 +106,7 @@ class PlanOptions:
             "CZI, LIF, ND2 (default: the largest); `list` shows them and does nothing else",
             "N|list",
         ),
+        bounds=COUNT_OR_NONE,
     )
     pattern: str = setting(
         "",
@@ -120,6 +135,7 @@ class PlanOptions:
             "z,y,x voxel spacing in um, instead of the file's",
             "three numbers z,y,x",
         ),
+        bounds=LENGTH_UM,
     )
     taken_as: str = setting(
         "",
@@ -136,12 +152,6 @@ class PlanOptions:
     )
 
     def __post_init__(self) -> None:
-        if self.max_voxels < 1:
-            raise UsageError(f"plan.max_voxels is {self.max_voxels}, expected at least 1")
-        if self.time < 0:
-            raise UsageError(f"plan.time is {self.time}, expected 0 or more")
-        if self.series < 0:
-            raise UsageError(f"plan.series is {self.series}, expected 0 or more")
         if self.axes and not is_axes(axes_of(self.axes)):
             raise UsageError(
                 f"plan.axes is {self.axes!r:.40}, expected z, y and x, and t and c where there are "
@@ -150,6 +160,7 @@ class PlanOptions:
         if self.spacing_um and not (len(self.spacing_um) == 3 and min(self.spacing_um) > 0):
             found = ",".join(f"{value:g}" for value in self.spacing_um)
             raise UsageError(f"plan.spacing_um: found {found}, expected z,y,x in um, each above 0")
+        require_bounds("plan", self)
         if self.taken_as not in ("", INTENSITY):
             raise UsageError(
                 f"plan.taken_as is {self.taken_as!r:.40}, expected {INTENSITY}, or nothing"
@@ -173,6 +184,7 @@ class VolumeOptions:
             "16 (default): the stage keeps the voxels as measured, so that another window loses "
             "nothing; 8: those of 8 bits alone, about half the size",
         ),
+        bounds=COUNT_OR_NONE,
     )
 
     def __post_init__(self) -> None:
@@ -292,11 +304,10 @@ def preset_path(preset: str) -> Path:
     """Return the file of a preset: one of ours by name, or the user's own TOML file."""
     if preset.endswith(".toml"):
         return Path(preset)
-    path = PRESETS / f"{preset}.toml"
-    if not path.is_file():
+    if preset not in preset_names():
         known = ", ".join(preset_names())
         raise UsageError(f"preset {preset!r} is unknown, expected one of {known} or a .toml file")
-    return path
+    return PRESETS / f"{preset}.toml"
 
 
 def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings:
@@ -324,8 +335,9 @@ def _validate(content: Mapping[str, Any], where: str) -> Settings:
     """
     from pydantic import ValidationError  # slow to import
 
+    require_utf8(content, where)
     try:
-        return _adapter().validate_json(json.dumps(_finite(content), default=str), strict=True)
+        return _adapter().validate_json(json.dumps(finite(content), default=str), strict=True)
     except ValidationError as error:
         faults = error.errors(include_url=False)
     place = faults[0]["loc"][:2]
@@ -349,18 +361,6 @@ def _adapter() -> "TypeAdapter[Settings]":
     from pydantic import TypeAdapter
 
     return TypeAdapter(Settings)
-
-
-def _finite(value: Any) -> Any:
-    """Return plain values with nothing in the place of numbers that are not finite."""
-    if isinstance(value, Mapping):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, int | float):
-        try:
-            return value if isfinite(value) else None
-        except OverflowError:  # TOML's whole numbers have no end
-            return None
-    return [_finite(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def to_dict(settings: Settings) -> dict[str, Any]:
@@ -426,6 +426,12 @@ def _read(path: Path) -> dict[str, Any]:
         return tomllib.loads(content.decode())
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}, expected a TOML file of settings") from None
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise UsageError(
+            f"{path}: line {line}: found byte 0x{content[error.start]:02x}, expected UTF-8: save "
+            "the file in this encoding"
+        ) from None
     except (ValueError, RecursionError) as error:  # tomllib's own, no UTF-8, endless numbers
         raise UsageError(f"{path}: not TOML: {error!s:.200}") from None
 

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 from pydantic import TypeAdapter, ValidationError
 
 from stereocell.meshes.distance import Nearest, measure_spread
@@ -49,8 +49,10 @@ from stereocell.usd.read_levels import (
 )
 from stereocell.usd.read_mesh import move_mesh
 from stereocell.usd.read_textures import ComposedMaps, read_image
+from stereocell.usd.typed_values import read_as
 
 T = TypeVar("T")
+_Types = Sdf.ValueTypeNames
 
 
 class _Options(NamedTuple):
@@ -351,7 +353,7 @@ def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[
     """Return the corners (x, y, z) of a tile's box in its own space, um; None: no volume."""
     prim = _volume(tile, channel_id)
     low, high = (
-        prim.GetAttribute(f"stereocell:bounds{end}").Get() if prim else None
+        read_as(prim.GetAttribute(f"stereocell:bounds{end}"), _Types.Double3) if prim else None
         for end in ("Min", "Max")
     )
     if low is None or high is None:
@@ -362,9 +364,11 @@ def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[
 def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> Spacing:
     """Return the voxel spacing (z, y, x), um; without a volume, the median length of an edge."""
     box, prim = _box(tile, channel_id), _volume(tile, channel_id)
-    size = prim.GetAttribute("stereocell:atlasSize").Get() if box is not None else None
+    size = None
+    if box is not None:
+        size = read_as(prim.GetAttribute("stereocell:atlasSize"), _Types.Int3)
     if box is not None and size:
-        apron = int(prim.GetAttribute("stereocell:apron").Get() or 0)
+        apron = int(read_as(prim.GetAttribute("stereocell:apron"), _Types.Int) or 0)
         steps = np.array(size, np.float64) - 2 * apron - 1
         x, y, z = ((box[1] - box[0]) / np.maximum(steps, 1)).tolist()
         if min(x, y, z) > 0:

@@ -44,6 +44,7 @@ from stereocell.storage.file_list import encode, to_json
 from stereocell.storage.json_files import compact_json, sealed
 from stereocell.storage.workspace import is_file, move, remove, sizes_below
 from stereocell.transfer.opacity import evaluate
+from stereocell.usd.layer import CHANNELS
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_objects import painter_of, read_columns
@@ -56,6 +57,7 @@ from stereocell.usd.read_stage import (
     specimen_name,
     tile_prims,
 )
+from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.written_files import CHANGED, REMEDY, AsWritten
 
 T = TypeVar("T")
@@ -96,7 +98,7 @@ def write_bundle(
     require_bundle(bundle_dir)
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
         raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
-    with replacing_folder(bundle_dir) as folder:
+    with usd_boundary(stage_path), replacing_folder(bundle_dir) as folder:
         _fill(stage_path, folder, viewer_dist, run, parts or folder / ".parts", report_line)
         shutil.rmtree(folder / ".parts", ignore_errors=True)
 
@@ -124,6 +126,8 @@ def _fill(
     if note := note_missing(stage):
         report_line(note)
     appearances = read_appearances(stage)
+    if not appearances:
+        raise StageError(f"{stage_path}: no channel is active below {CHANNELS}, expected one")
     prims = tile_prims(stage)
     if not prims:
         raise StageError(f"{stage_path}: no tile is visible")

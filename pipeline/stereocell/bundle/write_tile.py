@@ -44,6 +44,7 @@ from stereocell.usd.read_stage import hinted_box, loaded, open_stage
 from stereocell.usd.read_textures import read_image
 from stereocell.usd.read_variants import Representation
 from stereocell.usd.read_volume import ComposedVolume, read_volume
+from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.written_files import AsWritten
 
 _RECORD = "tile.json"
@@ -163,6 +164,7 @@ def export_tile(
     as_written = AsWritten()
     stage = open_stage(stage_path)
     with (
+        usd_boundary(stage_path),
         replacing_folder(parts / tile_id) as root,
         loaded(stage, tile_id, as_written=as_written) as (tile, choice),
     ):

@@ -3,7 +3,6 @@
 import argparse
 import gc
 import os
-import re
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -14,12 +13,12 @@ from typing import NoReturn
 from stereocell.cli import commands, flags
 from stereocell.cli.commands import Handler
 from stereocell.cli.places import FORCE, PLACES, require_place
+from stereocell.cli.words import prepared
 from stereocell.engine.interrupts import Terminated, answering_sigterm
 from stereocell.model.errors import StereoCellError, UsageError
 from stereocell.storage.processes import require_address_space, shortage
 
 _GARBAGE_AFTER = 20_000  # new containers; at 700, as in Python, a tenth of a short command
-_BELOW_ZERO = re.compile(r"-\.?\d")  # no flag of ours has a digit there
 EXIT_CODES = """exit codes:
   0    done; `view`, `serve`: stopped
   1    an error, told in one line; `check`: something is wrong; `doctor`: what is needed is missing
@@ -50,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _main(words: Sequence[str]) -> int:
     options = argparse.Namespace(json="--json" in words)  # until the arguments are parsed
     try:
-        options = _parser(words).parse_args(_with_their_flags(words))
+        options = _parser(words).parse_args(prepared(words))
         with answering_sigterm():
             return _run(options)
     except StereoCellError as error:
@@ -65,21 +64,6 @@ def _main(words: Sequence[str]) -> int:
         return _fail(options, "stopped; the same command goes on from here", code)
 
 
-def _with_their_flags(words: Sequence[str]) -> list[str]:
-    """Return the words, values that begin with a minus and a digit joined to their flags.
-
-    argparse takes such a value, `-20:20,:,:`, for another flag.
-    """
-    joined: list[str] = []
-    for word in words:
-        is_value = _BELOW_ZERO.match(word) is not None
-        if is_value and joined and re.fullmatch(r"--[a-z][a-z-]*", joined[-1]):
-            joined[-1] += f"={word}"
-        else:
-            joined.append(word)
-    return joined
-
-
 def _reason(error: Exception) -> str:
     """Return one line for a lack of this machine; all other errors are bugs, and raised again."""
     if words := shortage(error):
@@ -87,6 +71,10 @@ def _reason(error: Exception) -> str:
     if isinstance(error, ModuleNotFoundError):
         told = f"the package {error.name} is missing: install StereoCell anew"
         return f"{told}; `stereocell doctor` lists what else is"
+    if type(error).__module__ == "pxr.Tf":
+        from stereocell.usd.typed_values import one_line
+
+        return f"USD refuses a layer of the stage: {one_line(error)}: run `stereocell check OUT`"
     if isinstance(error, OSError):  # the disk is full, a folder was removed
         place = f"{error.filename}: " if error.filename else ""
         return f"{place}{error.strerror or error}"
@@ -94,6 +82,7 @@ def _reason(error: Exception) -> str:
 
 
 def _fail(options: argparse.Namespace, line: str, code: int) -> int:
+    line = commands.with_given_names(options, line)
     print(f"stereocell: {_shortened(line)}", file=sys.stderr)
     if options.json:
         commands.print_line(commands.to_json({"error": line, "exit_code": code}))

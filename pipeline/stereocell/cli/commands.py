@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stereocell.cli.flags import flags_of, numbers
+from stereocell.model.errors import shortened
 
 if TYPE_CHECKING:
     from stereocell.engine.run import Engine
@@ -62,6 +63,15 @@ def plain(text: str) -> str:
     )
 
 
+def with_given_names(options: argparse.Namespace, text: str) -> str:
+    """Return a text with long names that were given cut, and their line breaks escaped."""
+    for given in map(str, vars(options).values()):
+        shown = shortened(given).replace("\n", "\\n")
+        if shown != given:
+            text = text.replace(given, shown)
+    return text
+
+
 def answer(options: argparse.Namespace, found: Answer) -> int:
     """Print the answer's data with --json; return the exit code."""
     if options.json and found.data:
@@ -85,7 +95,8 @@ def _can_be_printed(text: str) -> bool:
 
 
 def _as_given(options: argparse.Namespace, text: str) -> str:
-    """Name an OUT on object storage by its address, not by its working folder."""
+    """Name an OUT on object storage by its address, not by its working folder, in one line."""
+    text = with_given_names(options, text)
     is_kept = isinstance(getattr(options, "shown", None), str)
     return text.replace(str(options.out), options.shown.rstrip("/")) if is_kept else text
 

@@ -125,6 +125,11 @@ def _named(text: str) -> str:
         raise argparse.ArgumentTypeError(
             "is empty, as a variable that is not set: expected a name (. is this folder)"
         )
+    scheme, mark, place = text.partition("://")
+    if mark and not (place if scheme == "file" else place.strip("/")):
+        raise argparse.ArgumentTypeError(
+            f"is {text!r}: expected a place behind it, as {scheme}://bucket/specimen"
+        )
     return text
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Usd
 
 from stereocell.bundle.edited_meshes import shown_lods, with_vertex_values
 from stereocell.bundle.write_tile import find_bounds
@@ -23,7 +23,7 @@ from stereocell.model.mesh import Mesh
 from stereocell.usd.layer import move_box
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
-from stereocell.usd.read_levels import mesh_at
+from stereocell.usd.read_levels import count_faces, mesh_at
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage, tile_prims
 from stereocell.usd.read_variants import TileChoice, lod_levels
@@ -170,8 +170,7 @@ class Chosen:
 
     def _count(self, tile: Usd.Prim, level: int) -> int:
         prims = [mesh_at(tile, channel.id, level) for channel in self.channels]
-        meshes = [UsdGeom.Mesh(prim) for prim in prims if prim is not None]
-        return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
+        return sum(count_faces(prim) for prim in prims if prim is not None)
 
     def levels(self, *, light: int | None = None) -> list[int]:
         """Return the levels to try, finest first: from --lod on, those within --max-triangles.

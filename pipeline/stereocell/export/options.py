@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 from stereocell.model.errors import UsageError
 
+SCALES = 1e-9, 1e9  # a kilometre is a micrometre, and the reverse
+WALLS_MM = 1e-6, 1e6
 UNITS_M = {"um": 1e-6, "mm": 1e-3, "m": 1.0}  # length of each unit in metres
 
 
@@ -48,6 +50,14 @@ class ExportOptions:
     unity: bool | None = None
     wall_mm: float | None = None
     width: int | None = None
+
+    def __post_init__(self) -> None:
+        for flag, value, (least, most) in (
+            ("--scale", self.scale, SCALES),
+            ("--wall-mm", self.wall_mm, WALLS_MM),
+        ):
+            if value is not None and not least <= value <= most:
+                raise UsageError(f"{flag} is {value:g}, expected {least:g} to {most:g}")
 
     def given(self) -> set[str]:
         """Return the names of the options that are given."""

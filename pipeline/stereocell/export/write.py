@@ -31,6 +31,7 @@ from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
 from stereocell.storage.workspace import is_file
 from stereocell.usd.stage_files import dependencies
+from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.write_usdz import MAX_TRIANGLES
 from stereocell.usd.written_files import CHANGED
 
@@ -145,10 +146,11 @@ def _export(
         raise OutputError(f"{file.parent}: no such folder")
     for place in (file, *way.beside(file, options)):  # before the work
         require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
-    chosen = Chosen(stage_path, options, report)
-    if way.is_seen:
-        chosen.show_as_viewer()
-    with _folder_beside(file) as beside:
+    with usd_boundary(stage_path):
+        chosen = Chosen(stage_path, options, report)
+        if way.is_seen:
+            chosen.show_as_viewer()
+    with usd_boundary(stage_path), _folder_beside(file) as beside:
         line = _write_smallest(chosen, way, beside / file.name)
         # what goes with the file comes first: whoever sees the file sees it whole
         made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)

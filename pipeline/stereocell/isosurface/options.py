@@ -2,11 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isfinite
 from typing import Any
 
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import AUTO, Flag, length_um, setting
+from stereocell.model.settings import (
+    AUTO,
+    COUNT,
+    LENGTH_UM,
+    MAX_VOXEL_VALUE,
+    Bounds,
+    Flag,
+    length_um,
+    require_bounds,
+    setting,
+)
 from stereocell.model.spacing import Spacing
 
 
@@ -41,14 +50,14 @@ def parse_level(where: str, given: float | str) -> tuple[float, bool]:
 
     Raises UsageError for what is neither.
     """
-    if not isinstance(given, str):
-        return float(given), False
-    number, plus, rest = given.replace(" ", "").partition("+")
+    number, plus, rest = str(given), "", ""
+    if isinstance(given, str):
+        number, plus, rest = given.replace(" ", "").partition("+")
     try:
         value = float(number)
     except ValueError:
         value = float("nan")
-    if not isfinite(value) or (plus and rest != "b"):
+    if not abs(value) <= MAX_VOXEL_VALUE or (plus and rest != "b"):
         raise UsageError(
             f"{where} is {given!r:.60}, expected a voxel value, or one above the "
             "background as 162+b"
@@ -81,9 +90,13 @@ class IsoValueOptions:
         f"which clear level has the surface: {', '.join(RUNGS)}; {APART}: the first whose largest "
         "components hold under a quarter of all, or the least of it where cells touch",
     )
-    bins: int = setting(256, "levels that a criterion of edges tries")
-    clip_percentile: float = setting(99.99, "brighter voxels (hot pixels) are left out there")
-    min_area_share: float = setting(0.02, "of the largest surface; leaves out specks there")
+    bins: int = setting(256, "levels that a criterion of edges tries", bounds=Bounds(16, 65536))
+    clip_percentile: float = setting(
+        99.99, "brighter voxels (hot pixels) are left out there", bounds=Bounds(0, 100)
+    )
+    min_area_share: float = setting(
+        0.02, "of the largest surface; leaves out specks there", bounds=Bounds(0, 1)
+    )
 
     def __post_init__(self) -> None:
         known = (LADDER, *CRITERIA, ADAPTIVE)
@@ -96,17 +109,9 @@ class IsoValueOptions:
                 raise UsageError(
                     f"isovalue.{name} is {found!r}, expected one of {', '.join(expected)}"
                 )
-        if not 16 <= self.bins <= 65536:
-            raise UsageError(
-                f"isovalue.bins is {self.bins}, expected at least 16 and at most 65536"
-            )
-        if not 0 < self.clip_percentile <= 100:
-            raise UsageError(
-                f"isovalue.clip_percentile is {self.clip_percentile:g}, "
-                "expected more than 0 and at most 100"
-            )
-        if not 0 <= self.min_area_share <= 1:
-            raise UsageError(f"isovalue.min_area_share is {self.min_area_share:g}, expected 0 to 1")
+        if self.clip_percentile == 0:
+            raise UsageError("isovalue.clip_percentile is 0, expected more than 0 and at most 100")
+        require_bounds("isovalue", self)
 
 
 WRAPS = ("voxels", "alpha-wrap")
@@ -116,33 +121,45 @@ WRAPS = ("voxels", "alpha-wrap")
 class SurfaceOptions:
     """Lengths in um; `auto` follows the voxel spacing."""
 
-    smoothing_um: float | str = setting(AUTO, "sigma of the Gaussian; auto: the finest spacing")
+    smoothing_um: float | str = setting(
+        AUTO, "sigma of the Gaussian; auto: the finest spacing", bounds=LENGTH_UM
+    )
     alpha_um: float | str = setting(
         AUTO,
         "radius of the ball that closes gaps; auto: by the channel's components, see max_alpha_um",
+        bounds=LENGTH_UM,
     )
     max_alpha_um: float | str = setting(
-        AUTO, "what auto alpha may reach; auto: 2 coarsest spacings"
+        AUTO, "what auto alpha may reach; auto: 2 coarsest spacings", bounds=LENGTH_UM
     )
     offset_um: float | str = setting(
-        0.0, "how far outside the surface lies: volumes grow by it; auto: a tenth of alpha"
+        0.0,
+        "how far outside the surface lies: volumes grow by it; auto: a tenth of alpha",
+        bounds=LENGTH_UM,
     )
     grid_um: float = setting(
         0.0,
         "planes of voxels so far apart carry the surface; 0: all; .42 alpha shows what alpha does",
+        bounds=LENGTH_UM,
     )
     max_faces: int = setting(
         5_000_000,
         "voxel faces of a unit's surface: where noise or a sponge has more, planes farther apart "
         "carry the channel's surface",
+        bounds=COUNT,
     )
-    min_diagonal_um: float | str = setting(AUTO, "smaller fragments go; auto: 3 coarsest spacings")
+    min_diagonal_um: float | str = setting(
+        AUTO, "smaller fragments go; auto: 3 coarsest spacings", bounds=LENGTH_UM
+    )
     max_fragment_um: float | str = setting(
         AUTO,
         "fragments up to this go as well if they are under half the mean of the channel's "
         "components, by diagonal or by triangles; auto: 6 coarsest spacings; 0: none do",
+        bounds=LENGTH_UM,
     )
-    max_cavity_um: float | str = setting(AUTO, "smaller cavities fill; auto: 4 coarsest spacings")
+    max_cavity_um: float | str = setting(
+        AUTO, "smaller cavities fill; auto: 4 coarsest spacings", bounds=LENGTH_UM
+    )
     wrap: str = setting(
         "voxels",
         "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)",
@@ -163,8 +180,13 @@ class SurfaceOptions:
         "whether a CT's table and head holder, long pieces apart from the body, are built too",
     )
     background_um: float | str = setting(
-        AUTO, "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none"
+        AUTO,
+        "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none",
+        bounds=LENGTH_UM,
     )
+
+    def __post_init__(self) -> None:
+        require_bounds("surface", self)
 
     def resolved(self, spacing_um: Spacing) -> "SurfaceOptions":
         """Return the options with lengths in place of `auto`, but for alpha and offset.
@@ -188,12 +210,6 @@ class SurfaceOptions:
             raise UsageError(f"surface.wrap is {self.wrap!r}, expected one of {', '.join(WRAPS)}")
         for key in ("alpha_um", "offset_um"):
             length_um(f"surface.{key}", getattr(self, key), 0.0)
-        if self.grid_um < 0:
-            raise UsageError(
-                f"surface.grid_um is {self.grid_um:g}, expected a length in um, or 0: all planes"
-            )
-        if self.max_faces < 1:
-            raise UsageError(f"surface.max_faces is {self.max_faces}, expected 1 or more")
         if self.offset_um != AUTO and float(self.offset_um) > coarsest:
             raise UsageError(
                 f"surface.offset_um is {self.offset_um:g}, expected at most a voxel ({coarsest:g})"

@@ -3,7 +3,10 @@
 from dataclasses import dataclass
 
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import setting
+from stereocell.model.settings import Bounds, require_bounds, setting
+
+MAX_ERROR = 1e6  # finest spacings; a surface of a million of them is simplified to its box
+MAX_SAMPLES = 10_000_000  # points; their distances take a gigabyte
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,11 +19,13 @@ class LodOptions:
     errors: tuple[float, ...] = setting(
         (0.1, 0.35, 1.1, 4.0),
         "aim of simplifying to lod0, lod1, ..., in finest spacings; what comes out is measured",
+        bounds=Bounds(0, MAX_ERROR),
     )
-    samples: int = setting(1000, "points at which distances are measured, each way")
+    samples: int = setting(
+        1000, "points at which distances are measured, each way", bounds=Bounds(1, MAX_SAMPLES)
+    )
 
     def __post_init__(self) -> None:
         if not self.errors or list(self.errors) != sorted(self.errors) or self.errors[0] <= 0:
             raise UsageError(f"lod.errors is {list(self.errors)}, expected rising positive numbers")
-        if self.samples < 1:
-            raise UsageError(f"lod.samples is {self.samples}, expected 1 or more")
+        require_bounds("lod", self)

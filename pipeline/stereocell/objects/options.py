@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
+from stereocell.meshes.options import MAX_ERROR, MAX_SAMPLES
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import Flag, setting
+from stereocell.model.settings import COUNT, Bounds, Flag, require_bounds, setting
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,9 +17,16 @@ class ObjectOptions:
     errors: tuple[float, ...] = setting(
         (0.1, 0.25, 0.6, 1.5),
         "aim of simplifying to lod0, lod1, ..., in finest spacings; at small objects less",
+        bounds=Bounds(0, MAX_ERROR),
     )
-    samples: int = setting(1000, "points of a tile at which distances are measured, each way")
-    smallest_voxels: int = setting(27, "objects of fewer voxels are left out, and counted")
+    samples: int = setting(
+        1000,
+        "points of a tile at which distances are measured, each way",
+        bounds=Bounds(1, MAX_SAMPLES),
+    )
+    smallest_voxels: int = setting(
+        27, "objects of fewer voxels are left out, and counted", bounds=COUNT
+    )
     table: str = setting(
         "",
         "a table with a row an object: CSV, TSV, Parquet, .h5ad, or a table of SpatialData",
@@ -64,6 +72,4 @@ class ObjectOptions:
             raise UsageError(
                 f"objects.errors is {list(self.errors)}, expected rising positive numbers"
             )
-        for name in ("samples", "smallest_voxels"):
-            if getattr(self, name) < 1:
-                raise UsageError(f"objects.{name} is {getattr(self, name)}, expected 1 or more")
+        require_bounds("objects", self)

@@ -3,7 +3,17 @@
 from dataclasses import dataclass, replace
 
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import AUTO, Flag, length_um, setting
+from stereocell.model.settings import (
+    AUTO,
+    COUNT,
+    COUNT_OR_NONE,
+    LENGTH_UM,
+    Bounds,
+    Flag,
+    length_um,
+    require_bounds,
+    setting,
+)
 from stereocell.model.spacing import Spacing
 
 TEXTURES = tuple(2**k for k in range(6, 14))  # allowed largest edges of a map, in texels
@@ -30,27 +40,38 @@ class UnwrapOptions:
             "needs the extra `maps` (default: normals and values at vertices alone)",
         ),
     )
-    first_lod: int = setting(1, "the finest level that gets UVs and baked maps")
-    texel_um: float | str = setting(AUTO, "um a texel; auto: the coarsest voxel spacing")
-    padding: int = setting(6, "texels between charts; 6 keep mip levels 0 and 1 apart, 12 also 2")
+    first_lod: int = setting(
+        1, "the finest level that gets UVs and baked maps", bounds=COUNT_OR_NONE
+    )
+    texel_um: float | str = setting(
+        AUTO, "um a texel; auto: the coarsest voxel spacing", bounds=LENGTH_UM
+    )
+    padding: int = setting(
+        6,
+        "texels between charts; 6 keep mip levels 0 and 1 apart, 12 also 2",
+        bounds=Bounds(3, MAX_PADDING),
+    )
     # Texels of one coarse voxel spacing need an edge of 1750 on a unit of 194 x 512 x 512 that is
     # full of membranes, 300 to 1000 on nuclei and vessels.
-    max_texture: int = setting(1024, "texels, largest edge of a map; texels grow up to 2.8 times")
-    max_triangles: int = setting(100_000, "levels with more triangles go without maps")
+    max_texture: int = setting(
+        1024, "texels, largest edge of a map; texels grow up to 2.8 times", bounds=COUNT
+    )
+    max_triangles: int = setting(
+        100_000, "levels with more triangles go without maps", bounds=COUNT_OR_NONE
+    )
     occlusion_um: float | str = setting(
-        AUTO, "how far ambient occlusion looks; auto: 8 coarsest spacings; 0: none"
+        AUTO,
+        "how far ambient occlusion looks; auto: 8 coarsest spacings; 0: none",
+        bounds=LENGTH_UM,
     )
     paint_um: float | str = setting(
-        AUTO, "depth below the surface within which paint's maximum counts; auto: 2 coarsest"
+        AUTO,
+        "depth below the surface within which paint's maximum counts; auto: 2 coarsest",
+        bounds=LENGTH_UM,
     )
 
     def __post_init__(self) -> None:
-        if self.first_lod < 0:
-            raise UsageError(f"unwrap.first_lod is {self.first_lod}, expected 0 or more")
-        if not 3 <= self.padding <= MAX_PADDING:
-            raise UsageError(f"unwrap.padding is {self.padding}, expected 3 to {MAX_PADDING}")
-        if self.max_triangles < 0:
-            raise UsageError(f"unwrap.max_triangles is {self.max_triangles}, expected 0 or more")
+        require_bounds("unwrap", self)
         if self.max_texture not in TEXTURES:
             raise UsageError(
                 f"unwrap.max_texture is {self.max_texture}, expected a power of two "

@@ -182,7 +182,7 @@ def _names(path: Path, session: Session, count: int) -> tuple[str, ...]:
         return tuple(f"tissue {k + 1}" for k in range(count))
     try:
         names = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         names = None
     is_list = isinstance(names, list) and all(isinstance(name, str) for name in names)
     shown = [name for name in names if name] if is_list else []

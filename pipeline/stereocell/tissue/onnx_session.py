@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from stereocell.model.errors import StereoCellError
 from stereocell.model.extra_packages import import_extra
 
+# How the runtime says that it gets no memory; it has no class of errors for it
+_NO_MEMORY = re.compile(r"bfc_arena|bad_alloc|bad allocation|[Ff]ailed to allocate")
+
 
 class OnnxError(StereoCellError):
     """The runtime refuses a network, or fails. The text is the reason without a file's name."""
@@ -93,4 +96,6 @@ def _reason(error: Exception) -> str:
     text = " ".join(str(error).split())
     if "protobuf" in text:  # the file couldn't be parsed, or holds no graph
         return "found another kind of file"
+    if _NO_MEMORY.search(text):
+        return "it asks for more memory than it gets: if it is sound, raise --model-memory-gb"
     return re.sub(r"^\[ONNXRuntimeError\] : \d+ : \w+ : ", "", text)[:200]

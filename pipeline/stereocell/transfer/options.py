@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import setting
+from stereocell.model.settings import Bounds, setting
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,8 +13,12 @@ class WindowOptions:
     Raises UsageError unless 0 <= low < high <= 100.
     """
 
-    low_percentile: float = setting(0.5, "percent of the voxels that become 0")
-    high_percentile: float = setting(99.95, "percent of the voxels that stay below 255")
+    low_percentile: float = setting(
+        0.5, "percent of the voxels that become 0", bounds=Bounds(0, 100)
+    )
+    high_percentile: float = setting(
+        99.95, "percent of the voxels that stay below 255", bounds=Bounds(0, 100)
+    )
 
     def __post_init__(self) -> None:
         if not 0 <= self.low_percentile < self.high_percentile <= 100:

@@ -1,8 +1,7 @@
 """Windows that are given by value, and those of CT that radiologists call by name."""
 
-from math import isfinite
-
 from stereocell.model.errors import UsageError
+from stereocell.model.settings import MAX_VOXEL_VALUE
 
 # width and centre in Hounsfield units, as CT consoles have them
 NAMED = {
@@ -23,7 +22,7 @@ def parse_window(where: str, text: str) -> tuple[float, float]:
         ends = float(low), float(high)
     except ValueError:
         ends = (0.0, 0.0)
-    if not colon or not all(isfinite(end) for end in ends) or not ends[0] < ends[1]:
+    if not colon or not all(abs(end) <= MAX_VOXEL_VALUE for end in ends) or not ends[0] < ends[1]:
         raise UsageError(
             f"{where} is {text!r:.60}, expected LOW:HIGH in voxel values, as -160:240, or one of "
             f"{', '.join(NAMED)} (CT)"

@@ -5,8 +5,10 @@ from numpy.typing import NDArray
 from pxr import Tf, Usd, UsdGeom, UsdUtils
 
 from stereocell.model.errors import StageError
-from stereocell.usd.read_attributes import one_line, require_still
+from stereocell.usd.read_attributes import require_still
+from stereocell.usd.typed_values import one_line
 
+_PERSPECTIVE = 1e-9  # largest deviation of an affine matrix's last column
 FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 
@@ -31,7 +33,7 @@ def is_visible(prim: Usd.Prim) -> bool:
 def to_world(prim: Usd.Prim) -> NDArray[np.float64]:
     """Return the matrix (4, 4) from a prim's space to the world, for row vectors.
 
-    Raises StageError where it is flat, infinite or leads too far away.
+    Raises StageError where it is flat or infinite, has a perspective, or leads too far away.
     """
     for path in prim.GetPath().GetAncestorsRange():
         for op in UsdGeom.Xformable(prim.GetStage().GetPrimAtPath(path)).GetOrderedXformOps():
@@ -48,5 +50,10 @@ def to_world(prim: Usd.Prim) -> NDArray[np.float64]:
         raise StageError(
             f"{prim.GetPath()}: its transform is flat, infinite or leads farther than "
             f"{FARTHEST_UM:g} um, expected one that a surface survives"
+        )
+    if not np.allclose(matrix[:, 3], (0, 0, 0, 1), rtol=0, atol=_PERSPECTIVE):
+        raise StageError(
+            f"{prim.GetPath()}: its transform has a perspective, expected the last column of its "
+            f"matrix to be 0, 0, 0, 1, found {', '.join(f'{part:g}' for part in matrix[:, 3])}"
         )
     return matrix

@@ -1,22 +1,52 @@
-"""Find the units, the up axis and the default prim that a layer over a stage does not state.
+"""Hold the units, the up axis and the default prim of the layers over a stage against the stage's.
 
 USD takes them from the layer that is opened, and never from its sublayers. Without them, other
 programs take the numbers for centimetres.
 """
 
-from pxr import Usd, UsdGeom
+from collections.abc import Iterator
 
+from pxr import Sdf, Usd, UsdGeom
+
+from stereocell.model.errors import StageError
 from stereocell.usd.layer import METERS_PER_UNIT, ROOT, UP_AXIS
 
 _FALLBACK_UNIT = 0.01  # metres: USD's unit where a layer states none
-STATED_UNIT = "metersPerUnit = 1e-6"
-STATED_AXIS = f'upAxis = "{UP_AXIS}"'
 # field of a layer -> the line that states it
 LINES = {
-    UsdGeom.Tokens.metersPerUnit: STATED_UNIT,
-    UsdGeom.Tokens.upAxis: STATED_AXIS,
+    UsdGeom.Tokens.metersPerUnit: "metersPerUnit = 1e-6",
+    UsdGeom.Tokens.upAxis: f'upAxis = "{UP_AXIS}"',
     "defaultPrim": f'defaultPrim = "{ROOT.name}"',
 }
+
+
+def require_units(stage: Usd.Stage) -> None:
+    """Raise StageError for a layer that states another unit, up axis or default prim.
+
+    Every layer of the stack counts, sublayers of sublayers too: USD rescales and turns none. A
+    payload's layer is not looked at. The default prim is that of the stage's root layer alone:
+    other programs open no other.
+    """
+    for layer in stage.GetLayerStack(includeSessionLayers=False):
+        for field, found, expected, effect in _wrong_fields(layer, layer == stage.GetRootLayer()):
+            raise StageError(
+                f"{layer.realPath}: {field} is {found}, expected {expected}: write {LINES[field]} "
+                f"there; {effect}"
+            )
+
+
+def _wrong_fields(layer: Sdf.Layer, is_root: bool) -> Iterator[tuple[str, str, str, str]]:
+    """Yield the fields that a layer states wrongly: name, value, expected value, effect."""
+    root = layer.pseudoRoot
+    unit, axis = UsdGeom.Tokens.metersPerUnit, UsdGeom.Tokens.upAxis
+    if root.HasInfo(unit) and not UsdGeom.LinearUnitsAre(root.GetInfo(unit), METERS_PER_UNIT):
+        effect = "this scales nothing, a stage's numbers are um"
+        yield unit, f"{root.GetInfo(unit):g}", f"{METERS_PER_UNIT:g}", effect
+    if root.HasInfo(axis) and root.GetInfo(axis) != UP_AXIS:
+        yield axis, str(root.GetInfo(axis)), str(UP_AXIS), "this turns nothing"
+    if is_root and layer.defaultPrim and layer.defaultPrim not in (ROOT.name, str(ROOT)):
+        effect = "other programs open that prim alone"
+        yield "defaultPrim", str(layer.defaultPrim), ROOT.name, effect
 
 
 def note_missing(stage: Usd.Stage) -> str:

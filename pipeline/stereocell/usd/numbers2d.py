@@ -18,6 +18,7 @@ from stereocell.model.errors import StageError
 from stereocell.storage.assets import find_asset
 from stereocell.usd.layer import set_attribute
 from stereocell.usd.read_attributes import shortest
+from stereocell.usd.typed_values import read_as
 
 
 def attribute_of(field: str) -> str:
@@ -45,7 +46,7 @@ def read_numbers(prim: Usd.Prim) -> dict[str, float]:
     """
     found = {}
     for field, attribute in ATTRIBUTES.items():
-        value = prim.GetAttribute(attribute).Get()
+        value = read_as(prim.GetAttribute(attribute), Sdf.ValueTypeNames.Float, may_be_nan=True)
         if value is None:
             continue
         expected = _outside(value, _limits()[attribute])

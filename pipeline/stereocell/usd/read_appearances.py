@@ -6,7 +6,7 @@ from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
 from stereocell.formats.gltf import Material
 from stereocell.model.channel import (
@@ -16,6 +16,7 @@ from stereocell.model.channel import (
     normalized,
 )
 from stereocell.model.errors import StageError
+from stereocell.model.settings import MAX_VOXEL_VALUE
 from stereocell.usd.layer import BUILT_COLOR, CHANNELS
 from stereocell.usd.numbers2d import read_numbers
 from stereocell.usd.read_attributes import (
@@ -27,6 +28,7 @@ from stereocell.usd.read_attributes import (
 )
 from stereocell.usd.read_shapes2d import read_shapes
 from stereocell.usd.read_textures import feeder
+from stereocell.usd.typed_values import read_as, text_of
 from stereocell.usd.write_appearances import DEFAULT_FUNCTION
 
 WHITE = (1.0, 1.0, 1.0)
@@ -182,14 +184,14 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         color_of(_channel_color(prim)),
         window,
         # only stages of other programs lack it
-        _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).Get() else window,
+        _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).HasValue() else window,
         _number(prim, "stereocell:isoValue"),
         _surface_confidence(prim, "stereocell:surfaceVerdict"),
         chosen,
         functions,
         TransferFunctions2d(functions=shapes, **read_numbers(prim)),
         _number(prim, "stereocell:threshold"),
-        str(prim.GetAttribute("stereocell:surfaceReason").Get() or ""),
+        text_of(prim.GetAttribute("stereocell:surfaceReason")),
         _level(prim),
     )
 
@@ -209,16 +211,21 @@ def _window(prim: Usd.Prim, name: str) -> tuple[float, float]:
     low, high = (shortest(number) for number in numbers_of(prim, name, 2))
     if not low < high:
         raise StageError(f"{prim.GetPath()}.{name}: ({low:g}, {high:g}), expected them to rise")
+    if max(-low, high) > MAX_VOXEL_VALUE:
+        raise StageError(
+            f"{prim.GetPath()}.{name}: ({low:g}, {high:g}), expected voxel values within "
+            f"{MAX_VOXEL_VALUE:g}"
+        )
     return low, high
 
 
 def _number(prim: Usd.Prim, name: str) -> float | None:
-    value = prim.GetAttribute(name).Get()
+    value = read_as(prim.GetAttribute(name), Sdf.ValueTypeNames.Float)
     return None if value is None else shortest(value)
 
 
 def _surface_confidence(prim: Usd.Prim, name: str) -> SurfaceConfidence:
-    value = prim.GetAttribute(name).Get()
+    value = read_as(prim.GetAttribute(name), Sdf.ValueTypeNames.Token)
     if value is None:  # only stages of other programs lack it
         return "clear"
     for confidence in get_args(SurfaceConfidence):
@@ -230,10 +237,8 @@ def _surface_confidence(prim: Usd.Prim, name: str) -> SurfaceConfidence:
 
 def _opacity_points(prim: Usd.Prim) -> OpacityPoints:
     field = f"{prim.GetPath()}.stereocell:opacityPoints"
-    try:
-        points = tuple((float(x), float(y)) for x, y in value_of(prim, "stereocell:opacityPoints"))
-    except (TypeError, ValueError):
-        raise StageError(f"{field}: no pairs, expected intensity and opacity") from None
+    given = value_of(prim, "stereocell:opacityPoints", Sdf.ValueTypeNames.Float2Array)
+    points = tuple((float(x), float(y)) for x, y in given)
     if not points:
         raise StageError(f"{field}: empty, expected pairs of intensity and opacity")
     if not all(0 <= number <= 1 for point in points for number in point):
@@ -245,7 +250,7 @@ def _opacity_points(prim: Usd.Prim) -> OpacityPoints:
 
 def _share(surface: UsdShade.Shader, name: str, default: float) -> float:
     source = _source(surface, name)
-    value = None if source is None else source.Get()
+    value = read_as(source, Sdf.ValueTypeNames.Float)
     return default if value is None else min(max(shortest(value), 0.0), 1.0)
 
 

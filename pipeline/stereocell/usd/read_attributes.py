@@ -5,16 +5,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Tf, Usd
+from pxr import Sdf, Usd
 
 from stereocell.model.errors import StageError
+from stereocell.usd.typed_values import read_as
 
 Point = tuple[float, float, float]
 
 
-def value_of(prim: Usd.Prim, name: str) -> Any:  # USD's type of the attribute
-    """Return an attribute's value at the default time. Raises StageError where it has none."""
-    value = prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
+def value_of(prim: Usd.Prim, name: str, expected: Sdf.ValueTypeName) -> Any:  # USD's type of it
+    """Return an attribute's value at the default time.
+
+    Raises StageError where it has none, or one of another type than `expected`.
+    """
+    value = read_as(prim.GetAttribute(name), expected)
     if value is None:
         raise StageError(f"{prim.GetPath()}.{name}: no value")
     return value
@@ -32,7 +36,7 @@ def require_still(*attributes: Usd.Attribute) -> None:
 
 def file_of(attribute: Usd.Attribute) -> Path:
     """Return the file that an asset attribute resolves to. Raises StageError if there is none."""
-    asset = attribute.Get() if attribute else None
+    asset = read_as(attribute, Sdf.ValueTypeNames.Asset)
     if asset is None or not asset.resolvedPath:
         named = asset.path if asset is not None else ""
         raise StageError(f"{attribute.GetPath()}: no file at {named!r}")
@@ -41,7 +45,7 @@ def file_of(attribute: Usd.Attribute) -> Path:
 
 def color_of(attribute: Usd.Attribute) -> tuple[float, float, float]:
     """Return a colour, linear RGB. Raises StageError where a part is absent or outside 0..1."""
-    value = attribute.Get() if attribute else None
+    value = read_as(attribute, Sdf.ValueTypeNames.Color3f, may_be_nan=True)
     if value is None or not all(0 <= part <= 1 for part in value):
         raise StageError(f"{attribute.GetPath()}: {value}, expected three numbers in 0..1")
     r, g, b = (shortest(part) for part in value)
@@ -50,7 +54,9 @@ def color_of(attribute: Usd.Attribute) -> tuple[float, float, float]:
 
 def numbers_of(prim: Usd.Prim, name: str, count: int) -> list[float]:
     """Return an attribute's numbers. Raises StageError unless there are `count`, all finite."""
-    value = value_of(prim, name)
+    value = prim.GetAttribute(name).Get()
+    if value is None:
+        raise StageError(f"{prim.GetPath()}.{name}: no value")
     try:
         numbers = [] if isinstance(value, str) else [float(part) for part in np.ravel(value)]
     except (TypeError, ValueError):
@@ -86,13 +92,3 @@ def select_variant(prim: Usd.Prim, variant_set: str, variant: str) -> None:
     stage = prim.GetStage()
     with Usd.EditContext(stage, stage.GetSessionLayer()):
         prim.GetVariantSet(variant_set).SetVariantSelection(variant)
-
-
-def one_line(error: object) -> str:
-    """Return USD's message of an error without line breaks and places in USD's source."""
-    args = error.args if isinstance(error, Tf.ErrorException) else ()
-    try:
-        text = "; ".join(entry.commentary for entry in args) or str(error)
-    except UnicodeDecodeError:  # the message quotes bytes that aren't text
-        text = "a layer or a file of it is damaged"
-    return " ".join(text.split())

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.formats.gltf import Material
 from stereocell.model.errors import StageError
@@ -30,6 +30,9 @@ from stereocell.usd.read_mesh import LargeFaceError, read_mesh
 from stereocell.usd.read_objects import without_hidden
 from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import lod_levels
+from stereocell.usd.typed_values import read_as, text_of
+
+_Types = Sdf.ValueTypeNames
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +83,7 @@ def read_lods(tile: Usd.Prim, channel_id: str, *, finest: int = 0) -> Iterator[C
         if prim is None:
             continue
         matrix = to_world(prim)
-        built = str(prim.GetAttribute(SHAPE_HASH).Get() or "")
+        built = text_of(prim.GetAttribute(SHAPE_HASH))
         shape = hash_shape(UsdGeom.Mesh(prim)) if built else ""
         try:
             surface = surface_of(prim)
@@ -126,7 +129,8 @@ def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> Compose
     if "displayColor" in fed and mesh.colors is None:
         lost.append("colours")
         has_color = False
-    colors = np.array(UsdGeom.Gprim(prim).GetDisplayColorAttr().Get() or [], np.float64)
+    given = read_as(UsdGeom.Gprim(prim).GetDisplayColorAttr(), _Types.Color3fArray)
+    colors = np.array(given or [], np.float64)
     if not has_color and colors.size:  # one average colour replaces them
         r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
         lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
@@ -150,11 +154,17 @@ def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
     found = []
     for level in lod_levels(tile) or [0]:
         prim = mesh_at(tile, channel_id, level)
-        if prim is None or not prim.GetAttribute(SHAPE_HASH).Get():
+        if prim is None or not text_of(prim.GetAttribute(SHAPE_HASH)):
             continue
-        if not UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get():
+        if not count_faces(prim):
             found.append(level)
     return found
+
+
+def count_faces(mesh: Usd.Prim) -> int:
+    """Return the number of faces of a mesh. Raises StageError where they aren't whole numbers."""
+    counts = UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr()
+    return len(read_as(counts, _Types.IntArray) or ())
 
 
 def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:

@@ -10,18 +10,28 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.usd.read_attributes import require_still
 from stereocell.usd.read_objects import objects_of
+from stereocell.usd.typed_values import read_as, require_type
 from stereocell.usd.write_objects import PAINT
 
 # Most corners of a face. All its triangles meet at one corner, so the time to look for crossings
 # among them grows with the square of the number. Measured with `bundle` on 2 cores of an Intel Xeon
 # that other work shared: a flat face of 5000 corners took 90 s, one of 20 000 took 212 s.
 MAX_CORNERS = 20_000
+_Types = Sdf.ValueTypeNames
+_PRIMVARS = {
+    "normals": _Types.Normal3fArray,
+    "st": _Types.TexCoord2fArray,
+    "tangents": _Types.Float4Array,
+    "displayColor": _Types.Color3fArray,
+    "occlusion": _Types.FloatArray,
+    PAINT: _Types.FloatArray,
+}
 _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolation
 
 
@@ -47,9 +57,9 @@ def read_mesh(
     require_still(
         mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
     )
-    points = _values(mesh.GetPointsAttr(), np.float32)
-    counts = _values(mesh.GetFaceVertexCountsAttr(), np.int64)
-    indices = _values(mesh.GetFaceVertexIndicesAttr(), np.int64)
+    points = _values(mesh.GetPointsAttr(), _Types.Point3fArray, np.float32)
+    counts = _values(mesh.GetFaceVertexCountsAttr(), _Types.IntArray, np.int64)
+    indices = _values(mesh.GetFaceVertexIndicesAttr(), _Types.IntArray, np.int64)
     if len(counts) == 0:
         return None
     path = mesh.GetPath()
@@ -116,13 +126,8 @@ def read_mesh(
     )
 
 
-def _values(attribute: Usd.Attribute, dtype: type) -> NDArray[Any]:
-    try:
-        return _array(attribute.Get(), dtype)
-    except (TypeError, ValueError):
-        raise StageError(
-            f"{attribute.GetPath()}: found {attribute.GetTypeName()}, expected an array of numbers"
-        ) from None
+def _values(attribute: Usd.Attribute, expected: Sdf.ValueTypeName, dtype: type) -> NDArray[Any]:
+    return _array(read_as(attribute, expected), dtype)
 
 
 def _array(value: object, dtype: type) -> NDArray[Any]:
@@ -132,7 +137,7 @@ def _array(value: object, dtype: type) -> NDArray[Any]:
 def _normals(mesh: UsdGeom.Mesh) -> _Values | None:
     """`primvars:normals` is stronger than `normals`."""
     primvar = _primvar(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals"))
-    value = mesh.GetNormalsAttr().Get()
+    value = read_as(mesh.GetNormalsAttr(), _Types.Normal3fArray)
     if primvar is not None or value is None:
         return primvar
     return _array(value, np.float32), str(mesh.GetNormalsInterpolation())
@@ -141,7 +146,10 @@ def _normals(mesh: UsdGeom.Mesh) -> _Values | None:
 def _primvar(primvar: UsdGeom.Primvar) -> _Values | None:
     if not primvar or not primvar.HasValue():
         return None
-    return _array(primvar.ComputeFlattened(), np.float32), str(primvar.GetInterpolation())
+    flat = primvar.ComputeFlattened()
+    if flat is not None:
+        require_type(primvar.GetAttr().GetPath(), flat, _PRIMVARS[primvar.GetPrimvarName()])
+    return _array(flat, np.float32), str(primvar.GetInterpolation())
 
 
 def _at_vertices(

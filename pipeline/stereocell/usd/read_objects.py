@@ -11,6 +11,7 @@ from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import Column, SharedWalls
 from stereocell.usd.layer import CHANNELS, PAINTED_BY
+from stereocell.usd.typed_values import read_as, require_type, text_of
 from stereocell.usd.write_objects import (
     COLUMN,
     COLUMNS,
@@ -22,6 +23,8 @@ from stereocell.usd.write_objects import (
     TOUCHING,
     WALL_UM2,
 )
+
+_Types = Sdf.ValueTypeNames
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
     Raises StageError for a column that isn't described.
     """
     prim = stage.GetPrimAtPath(CHANNELS.AppendChild(channel_id))
-    ids = prim.GetAttribute(COLUMNS).Get()
+    ids = read_as(prim.GetAttribute(COLUMNS), _Types.TokenArray)
     if ids is None:
         return None
     columns = []
@@ -56,7 +59,7 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
             raise StageError(f"{prim.GetPath()}.{COLUMN}{name}: missing, expected a column's name")
         data = attribute.GetCustomData()
         categories = tuple(map(str, data.get("categories", ())))
-        colors = np.array(data.get("colors", ()), np.float64).reshape(-1, 3).clip(0, 1)
+        colors = _colors_of(attribute, data)
         if len(colors) != len(categories):
             raise StageError(
                 f"{attribute.GetPath()}: found {len(colors)} colours for {len(categories)} "
@@ -65,7 +68,7 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
         columns.append(
             Column(
                 name,
-                str(attribute.Get() or name),
+                text_of(attribute) or name,
                 np.zeros(0, np.float32),
                 str(attribute.GetDocumentation()),
                 str(data.get("unit", "")),
@@ -73,16 +76,25 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
                 tuple((float(r), float(g), float(b)) for r, g, b in colors),
             )
         )
-    return columns, str(prim.GetAttribute(DEFAULT).Get() or "")
+    return columns, text_of(prim.GetAttribute(DEFAULT))
+
+
+def _colors_of(attribute: Usd.Attribute, data: dict[str, Any]) -> NDArray[np.float64]:
+    """Return the colours (n, 3) in 0..1 of a column's categories. Raises StageError."""
+    given = data.get("colors")
+    if given is None:
+        return np.zeros((0, 3))
+    require_type(f"{attribute.GetPath()}: colors", given, _Types.Float3Array)
+    return np.array(given, np.float64).reshape(-1, 3).clip(0, 1)
 
 
 def shown_objects(mesh: Usd.Prim) -> NDArray[np.bool_] | None:
     """Return which of a tile's objects an edit has not hidden; None: the mesh has no objects."""
-    labels = mesh.GetAttribute(LABELS).Get()
+    labels = read_as(mesh.GetAttribute(LABELS), _Types.UInt64Array)
     if labels is None:
         return None
     channel = mesh.GetStage().GetPrimAtPath(CHANNELS.AppendChild(mesh.GetParent().GetName()))
-    hidden = channel.GetAttribute(HIDDEN).Get() if channel else None
+    hidden = read_as(channel.GetAttribute(HIDDEN), _Types.UInt64Array) if channel else None
     own, gone = (np.array(list(one or ()), np.uint64) for one in (labels, hidden))
     return ~np.isin(own, gone)
 
@@ -114,17 +126,18 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
 
     Raises StageError where a column has another number of values.
     """
-    labels = mesh.GetAttribute(LABELS).Get()
+    labels = read_as(mesh.GetAttribute(LABELS), _Types.UInt64Array)
     if labels is None:
         return None
     count = len(labels)
-    names = tuple(map(str, mesh.GetAttribute(NAMES).Get() or ()))
+    names = tuple(map(str, read_as(mesh.GetAttribute(NAMES), _Types.StringArray) or ()))
     if names and len(names) != count:
         raise StageError(f"{mesh.GetPath()}.{NAMES}: found {len(names)}, expected {count}")
     primvars = UsdGeom.PrimvarsAPI(mesh)
     values = {}
     for column in columns:
-        given = primvars.GetPrimvar(column.id).Get()
+        primvar = primvars.GetPrimvar(column.id)
+        given = read_as(primvar.GetAttr(), _Types.FloatArray, may_be_nan=True) if primvar else None
         found = np.array([] if given is None else given, np.float32)
         if given is not None and found.shape != (count,):
             raise StageError(
@@ -136,10 +149,12 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
             codes = values[column.id]
             is_known = (codes >= 0) & (codes < len(column.categories))
             values[column.id] = np.where(is_known, codes, -1).astype(np.float32)
-    pairs = np.array(list(mesh.GetAttribute(TOUCHING).Get() or ()), np.uint64)
+    touching = read_as(mesh.GetAttribute(TOUCHING), _Types.UInt64Array)
+    pairs = np.array(list(touching or ()), np.uint64)
     if len(pairs) % 2:
         raise StageError(f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected pairs")
-    given = mesh.GetAttribute(WALL_UM2).Get()  # stages of earlier versions have none
+    # stages of earlier versions have none
+    given = read_as(mesh.GetAttribute(WALL_UM2), _Types.FloatArray, may_be_nan=True)
     areas = np.full(len(pairs) // 2, np.nan) if given is None else given
     if len(areas) != len(pairs) // 2:
         raise StageError(
@@ -159,7 +174,7 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
 def painter_of(stage: Usd.Stage, channel_id: str) -> str:
     """Return the ID of the channel whose intensity objects' vertices have; empty: none is there."""
     path = CHANNELS.AppendChild(channel_id)
-    name = str(stage.GetPrimAtPath(path).GetAttribute(PAINTED_BY).Get() or "")
+    name = text_of(stage.GetPrimAtPath(path).GetAttribute(PAINTED_BY))
     is_there = Sdf.Path.IsValidIdentifier(name) and stage.GetPrimAtPath(CHANNELS.AppendChild(name))
     return name if is_there else ""
 
@@ -170,4 +185,7 @@ def objects_of(mesh: UsdGeom.Mesh) -> NDArray[np.int64] | None:
     if not primvar or primvar.GetInterpolation() != UsdGeom.Tokens.uniform:
         return None
     flat = primvar.ComputeFlattened()
-    return None if flat is None else np.array(flat, np.int64)
+    if flat is None:
+        return None
+    require_type(primvar.GetAttr().GetPath(), flat, _Types.IntArray)
+    return np.array(flat, np.int64)

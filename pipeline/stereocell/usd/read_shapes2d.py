@@ -2,16 +2,24 @@
 
 from typing import Any
 
-from pxr import Usd
+from pxr import Sdf, Usd
 
 from stereocell.model.channel import Shape, Shapes
 from stereocell.model.errors import StageError
 from stereocell.transfer.shapes2d import MAX_SHAPES, find_fault
 from stereocell.usd.read_attributes import shortest
+from stereocell.usd.typed_values import read_as
 
 _BOXES = "stereocell:shapes"
 _KINDS, _COLORS = "stereocell:shapeKinds", "stereocell:shapeColors"
 _TIPS, _SOFTNESS = "stereocell:shapeTips", "stereocell:shapeSoftness"
+_TYPES = {
+    _BOXES: Sdf.ValueTypeNames.Float4Array,
+    _KINDS: Sdf.ValueTypeNames.TokenArray,
+    _COLORS: Sdf.ValueTypeNames.Color4fArray,
+    _TIPS: Sdf.ValueTypeNames.FloatArray,
+    _SOFTNESS: Sdf.ValueTypeNames.FloatArray,
+}
 
 
 def read_shapes(prim: Usd.Prim) -> Shapes:
@@ -43,7 +51,7 @@ def read_shapes(prim: Usd.Prim) -> Shapes:
 
 
 def _values(prim: Usd.Prim, name: str) -> list[Any]:  # what USD holds there
-    return list(prim.GetAttribute(name).Get() or [])
+    return list(read_as(prim.GetAttribute(name), _TYPES[name]) or [])
 
 
 def _as_long(prim: Usd.Prim, name: str, count: int, default: list[Any] | None) -> list[Any]:

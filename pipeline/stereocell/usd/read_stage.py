@@ -17,30 +17,31 @@ from stereocell.storage.workspace import cached
 from stereocell.usd.drawn_prims import FARTHEST_UM, is_visible, require_composed, to_world
 from stereocell.usd.layer import (
     CHANNELS,
-    METERS_PER_UNIT,
     PATIENT_API,
     ROOT,
     SIDES,
     TILES,
-    UP_AXIS,
     move_box,
 )
-from stereocell.usd.layer_units import STATED_AXIS, STATED_UNIT
+from stereocell.usd.layer_units import require_units
 from stereocell.usd.read_attributes import (
     Point,
-    one_line,
     point_of,
     select_variant,
 )
 from stereocell.usd.read_variants import TileChoice, read_choice
+from stereocell.usd.typed_values import one_line, read_as, text_of
 from stereocell.usd.written_files import AsWritten
 
 _SIDE_DIGITS = 9  # decimals of the unit vectors to a patient's sides: scanners state fewer
+_Types = Sdf.ValueTypeNames
 
 
 def open_stage(path: Path) -> Usd.Stage:
-    """Open a stage without its payloads. Raises StageError where it can't, or for other
-    units or another up axis."""
+    """Open a stage without its payloads.
+
+    Raises StageError where it can't, or for a layer of other units, up axis or default prim.
+    """
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
     try:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
@@ -52,19 +53,7 @@ def open_stage(path: Path) -> Usd.Stage:
     finally:
         del quiet
     require_composed(stage)
-    if UsdGeom.StageHasAuthoredMetersPerUnit(stage):
-        unit = UsdGeom.GetStageMetersPerUnit(stage)
-        if not UsdGeom.LinearUnitsAre(unit, METERS_PER_UNIT):
-            raise StageError(
-                f"{path}: metersPerUnit is {unit:g}, expected {METERS_PER_UNIT:g}: "
-                f"write {STATED_UNIT} there; this scales nothing, a stage's numbers are um"
-            )
-    axis = UsdGeom.GetStageUpAxis(stage)
-    if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis) and axis != UP_AXIS:
-        raise StageError(
-            f"{path}: upAxis is {axis}, expected {UP_AXIS}: write {STATED_AXIS} there; this turns "
-            "nothing"
-        )
+    require_units(stage)
     for needed in (ROOT, CHANNELS, TILES):
         if not stage.GetPrimAtPath(needed):
             raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")
@@ -79,8 +68,7 @@ def specimen_name(stage: Usd.Stage) -> str:
 
 def modality_of(stage: Usd.Stage) -> str:
     """Return DICOM's code of the modality, `MR` or the like; empty: the stage states none."""
-    attribute = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality")
-    return str((attribute.Get() if attribute else None) or "")
+    return text_of(stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality"))
 
 
 def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
@@ -116,7 +104,8 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
     The tile need not be loaded. Raises StageError where it has no hint or an invalid one.
     """
-    hint = UsdGeom.ModelAPI(tile).GetExtentsHintAttr().Get()
+    attribute = UsdGeom.ModelAPI(tile).GetExtentsHintAttr()
+    hint = read_as(attribute, _Types.Float3Array, may_be_nan=True)
     if not hint:
         raise StageError(f"{tile.GetPath()}.extentsHint: no value")
     corners = np.array(hint, np.float64)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdVol
+from pxr import Sdf, Usd, UsdVol
 
 from stereocell.formats.vdb import GRID_NAME, MEASURED_NAME
 from stereocell.model.errors import StageError
@@ -16,6 +16,7 @@ from stereocell.usd.read_attributes import (
     point_of,
     sizes_of,
 )
+from stereocell.usd.typed_values import read_as
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,5 +73,6 @@ def _field_of(volume: Usd.Prim, name: str) -> Path | None:
     """Return the file of a field of a volume; None where there is none."""
     path = UsdVol.Volume(volume).GetFieldPath(name)
     prim = volume.GetStage().GetPrimAtPath(path) if path else None
-    asset = UsdVol.FieldAsset(prim).GetFilePathAttr().Get() if prim else None
+    path_of_file = UsdVol.FieldAsset(prim).GetFilePathAttr() if prim else None
+    asset = read_as(path_of_file, Sdf.ValueTypeNames.Asset) if path_of_file else None
     return Path(asset.resolvedPath) if asset and asset.resolvedPath else None

@@ -12,6 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from stereocell.usd.layer import LIGHTS
 from stereocell.usd.read_attributes import file_of
+from stereocell.usd.typed_values import read_as
 
 _IMAGES = (".exr", ".png", ".jpg", ".jpeg")
 
@@ -40,7 +41,8 @@ def _copy_light(light: Usd.Prim, small: Usd.Stage) -> dict[str, Path]:
         UsdGeom.Xformable(copy).AddTransformOp().Set(turn)
     images = {}
     for attribute in light.GetAuthoredPropertiesInNamespace("inputs"):
-        value = attribute.Get()
+        kind = _type_of(light, attribute)
+        value = read_as(attribute, kind)
         if isinstance(value, Sdf.AssetPath):
             if not value.path or Path(value.path).suffix.lower() not in _IMAGES:
                 continue
@@ -49,5 +51,11 @@ def _copy_light(light: Usd.Prim, small: Usd.Stage) -> dict[str, Path]:
             images[name] = file
             value = Sdf.AssetPath(name)
         if value is not None:
-            copy.CreateAttribute(attribute.GetName(), attribute.GetTypeName(), False).Set(value)
+            copy.CreateAttribute(attribute.GetName(), kind, False).Set(value)
     return images
+
+
+def _type_of(light: Usd.Prim, attribute: Usd.Attribute) -> Sdf.ValueTypeName:
+    """Return the type that a light's schema has for an attribute, or the attribute's own."""
+    known = light.GetPrimDefinition().GetAttributeDefinition(attribute.GetName())
+    return known.GetTypeName() if known else attribute.GetTypeName()

@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,11 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdValidation, UsdVol
 from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.model.errors import StageError
 from stereocell.usd.layer import CHANNEL_API, METERS_PER_UNIT, UP_AXIS
-from stereocell.usd.read_attributes import one_line
+from stereocell.usd.typed_values import one_line, read_as
 
+_Types = Sdf.ValueTypeNames
+# a volume's box, without the namespace
+_BOX = {"boundsMin": _Types.Double3, "boundsMax": _Types.Double3, "atlasSize": _Types.Int3}
 _ALL_SHOWN = {"representation": "both"}
 _TOLERANCE = 1e-4  # share of a box's size: extents are float32
 
@@ -75,7 +79,10 @@ def validate_usdz(path: Path) -> list[Finding]:
         findings.append(Finding("units", str(path), message))
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.Mesh):
-            findings += _check_mesh(UsdGeom.Mesh(prim))
+            try:
+                findings += _check_mesh(UsdGeom.Mesh(prim))
+            except StageError as error:  # a value of another type
+                findings.append(Finding("type", _place(prim), str(error)))
         elif prim.IsA(UsdVol.Volume):
             findings.append(Finding("volume", _place(prim), "no client of usdz draws volumes"))
     del quiet
@@ -89,15 +96,22 @@ def _check_all(stage: Usd.Stage) -> Iterator[Finding]:
     yield from _check_names(stage)
     boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
     for prim in stage.Traverse():
-        if prim.IsA(UsdGeom.Mesh):
-            yield from _check_mesh(UsdGeom.Mesh(prim))
-        elif prim.IsA(UsdVol.Volume):
-            yield from _check_volume(UsdVol.Volume(prim))
-        elif prim.HasAPI(UsdGeom.ModelAPI):
-            yield from _check_extents_hint(UsdGeom.ModelAPI(prim), boxes)
-        elif CHANNEL_API in prim.GetAppliedSchemas():
-            yield from _check_windows(prim)
-            yield from _check_opacity(prim)
+        try:
+            yield from _check_prim(prim, boxes)
+        except StageError as error:  # a value of another type
+            yield Finding("type", _place(prim), str(error))
+
+
+def _check_prim(prim: Usd.Prim, boxes: UsdGeom.BBoxCache) -> Iterator[Finding]:
+    if prim.IsA(UsdGeom.Mesh):
+        yield from _check_mesh(UsdGeom.Mesh(prim))
+    elif prim.IsA(UsdVol.Volume):
+        yield from _check_volume(UsdVol.Volume(prim))
+    elif prim.HasAPI(UsdGeom.ModelAPI):
+        yield from _check_extents_hint(UsdGeom.ModelAPI(prim), boxes)
+    elif CHANNEL_API in prim.GetAppliedSchemas():
+        yield from _check_windows(prim)
+        yield from _check_opacity(prim)
 
 
 def _run_validators(stage: Usd.Stage) -> Iterator[Finding]:
@@ -183,10 +197,10 @@ def _select_variants(stage: Usd.Stage, turn: int) -> int:
 
 def _check_mesh(mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     where = _place(mesh.GetPrim())
-    points = _array(mesh.GetPointsAttr(), 3)
+    points = _array(mesh.GetPointsAttr(), _Types.Point3fArray)
     counts, indices = (
-        _array(mesh.GetFaceVertexCountsAttr()),
-        _array(mesh.GetFaceVertexIndicesAttr()),
+        _array(mesh.GetFaceVertexCountsAttr(), _Types.IntArray),
+        _array(mesh.GetFaceVertexIndicesAttr(), _Types.IntArray),
     )
     if not np.isfinite(points).all():
         yield Finding("mesh", where, "points holds numbers that are not finite")
@@ -201,7 +215,7 @@ def _check_mesh(mesh: UsdGeom.Mesh) -> Iterator[Finding]:
         return
     sizes = {"vertex": len(points), "varying": len(points), "faceVarying": len(indices)}
     sizes |= {"uniform": len(counts), "constant": 1}
-    normals = _array(mesh.GetNormalsAttr(), 3)
+    normals = _array(mesh.GetNormalsAttr(), _Types.Normal3fArray)
     expected = sizes[mesh.GetNormalsInterpolation()]
     if len(normals) != expected or not np.isfinite(normals).all():
         yield Finding("mesh", where, f"{len(normals)} normals, expected {expected} finite ones")
@@ -250,19 +264,17 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
     for name, path in sorted(fields.items()):
         asset = UsdVol.OpenVDBAsset(prim.GetStage().GetPrimAtPath(path))
         if asset:
-            file = asset.GetFilePathAttr().Get()
+            file = read_as(asset.GetFilePathAttr(), _Types.Asset)
             files.add(file.resolvedPath or file.path if file else "")
             yield from _check_grid(prim, asset)
         else:
             yield Finding("volume", where, f"field {name} is no OpenVDBAsset at {path}")
     if len(files) > 1:
         yield Finding("volume", where, f"{len(files)} files, expected 1: clients read one")
-    names = ("boundsMin", "boundsMax", "atlasSize")
-    low, high, size = (prim.GetAttribute(f"stereocell:{name}").Get() for name in names)
+    low, high, size, apron = _box_of(prim)
     if low is None or high is None or size is None:
-        yield Finding("volume", where, f"lacks one of stereocell:{', stereocell:'.join(names)}")
+        yield Finding("volume", where, f"lacks one of stereocell:{', stereocell:'.join(_BOX)}")
         return
-    apron = prim.GetAttribute("stereocell:apron").Get() or 0
     cells = np.array(size) - 2 * apron - 1
     box = np.array([low, high])
     if (cells < 1).any() or (box[1] <= box[0]).any():
@@ -274,7 +286,7 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
 
 def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Finding]:
     """Yield fields whose file lacks the grid or states other units: clients draw nothing then."""
-    where, file = str(asset.GetPath()), asset.GetFilePathAttr().Get()
+    where, file = str(asset.GetPath()), read_as(asset.GetFilePathAttr(), _Types.Asset)
     if file is None or not file.resolvedPath:
         return  # a validator of USD's reports it
     try:
@@ -297,18 +309,25 @@ def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Findin
 
 def _voxel_spacing(volume: Usd.Prim) -> NDArray[np.float64] | None:
     """Return the voxel spacing (x, y, z), um, by the volume's own attributes; None if missing."""
-    names = ("boundsMin", "boundsMax", "atlasSize")
-    low, high, size = (volume.GetAttribute(f"stereocell:{name}").Get() for name in names)
+    low, high, size, apron = _box_of(volume)
     if low is None or high is None or size is None:
         return None
-    cells = np.array(size) - 2 * (volume.GetAttribute("stereocell:apron").Get() or 0) - 1
+    cells = np.array(size) - 2 * apron - 1
     return (np.array(high) - np.array(low)) / cells if (cells > 0).all() else None
+
+
+def _box_of(volume: Usd.Prim) -> tuple[Any, Any, Any, int]:
+    """Return the corners of a volume's box, its voxels and its apron; None where it lacks one."""
+    low, high, size = (
+        read_as(volume.GetAttribute(f"stereocell:{name}"), kind) for name, kind in _BOX.items()
+    )
+    return low, high, size, read_as(volume.GetAttribute("stereocell:apron"), _Types.Int) or 0
 
 
 def _check_extent(
     boundable: UsdGeom.Boundable, where: str, box: NDArray[np.float64], slack: NDArray[np.float64]
 ) -> Iterator[Finding]:
-    extent = _array(boundable.GetExtentAttr(), 3)
+    extent = _array(boundable.GetExtentAttr(), _Types.Float3Array)
     tolerance = slack + _TOLERANCE * max(1e-3, float((box[1] - box[0]).max()))
     if extent.shape != (2, 3) or (np.abs(extent - box) > tolerance).any():
         message = f"extent is {extent.round(4).tolist()}, expected {box.round(4).tolist()}"
@@ -330,13 +349,13 @@ def _check_extents_hint(model: UsdGeom.ModelAPI, boxes: UsdGeom.BBoxCache) -> It
 
 def _check_windows(prim: Usd.Prim) -> Iterator[Finding]:
     for name in ("window", "volumeWindow"):
-        window = prim.GetAttribute(f"stereocell:{name}").Get()
+        window = read_as(prim.GetAttribute(f"stereocell:{name}"), _Types.Float2)
         if window is not None and not window[0] < window[1]:
             yield Finding("look", _place(prim), f"{name} is {window}, expected it to rise")
 
 
 def _check_opacity(prim: Usd.Prim) -> Iterator[Finding]:
-    points = _array(prim.GetAttribute("stereocell:opacityPoints"), 2)
+    points = _array(prim.GetAttribute("stereocell:opacityPoints"), _Types.Float2Array)
     rising = bool((np.diff(points[:, 0]) >= 0).all())
     if len(points) < 2 or not rising or points.min() < 0 or points.max() > 1:
         message = f"opacityPoints {points.tolist()}, expected 2 or more, 0..1, intensity rising"
@@ -352,8 +371,11 @@ def _place(prim: Usd.Prim) -> str:
     return str(prim.GetPath())
 
 
-def _array(attribute: Usd.Attribute, width: int = 0) -> NDArray[np.float64]:
-    """Return the value as float64, (n,) or (n, width); n = 0 for an attribute without a value."""
-    value = attribute.Get() if attribute else None
-    shape = (-1, width) if width else (-1,)
+def _array(attribute: Usd.Attribute, kind: Sdf.ValueTypeName) -> NDArray[np.float64]:
+    """Return the value as float64, (n,) or (n, width); n = 0 for an attribute without a value.
+
+    Raises StageError for a value of another type.
+    """
+    value = read_as(attribute, kind, may_be_nan=True)
+    shape = (-1, *np.shape(kind.scalarType.defaultValue))
     return np.asarray([] if value is None else value, dtype=np.float64).reshape(shape)

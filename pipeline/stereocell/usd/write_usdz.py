@@ -31,7 +31,7 @@ from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
 from stereocell.storage.workspace import fetch, remove
 from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
-from stereocell.usd.read_levels import ComposedLod, mesh_at, read_lods
+from stereocell.usd.read_levels import ComposedLod, count_faces, mesh_at, read_lods
 from stereocell.usd.read_objects import read_columns
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage, specimen_name, tile_prims
 from stereocell.usd.read_variants import lod_levels
@@ -127,8 +127,7 @@ def _choose_level(stage: Usd.Stage, channels: Collection[str], as_written: AsWri
 
 def _count_triangles(tile: Usd.Prim, channels: Collection[str], level: int) -> int:
     found = (mesh_at(tile, channel, level) for channel in channels)
-    meshes = (UsdGeom.Mesh(prim) for prim in found if prim is not None)
-    return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)
+    return sum(count_faces(prim) for prim in found if prim is not None)
 
 
 def _read_parts(

@@ -1,0 +1,104 @@
+"""Read values of a composed stage as the types that their readers expect.
+
+A layer over the stage may hold any type at any place: USD composes a text where the stage has a
+colour. All readers of a composed stage get values from `read_as`, so another type, or a number that
+is not finite, is one line that names the prim, the attribute and both types.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, Vt
+
+from stereocell.model.errors import StageError
+
+_TEXTS = (Vt.StringArray, Vt.TokenArray)
+
+
+def read_as(
+    attribute: Usd.Attribute | None, expected: Sdf.ValueTypeName, *, may_be_nan: bool = False
+) -> Any:  # USD's type of the attribute
+    """Return an attribute's value at the default time; None: it has none.
+
+    expected    the type; its precision may be another, and a whole number may stand for a number
+    may_be_nan  whether numbers need not be finite, where NaN means that there is no value
+
+    Raises StageError for a value of another type.
+    """
+    if not attribute:
+        return None
+    try:
+        value = attribute.Get()
+    except Tf.ErrorException as error:
+        raise StageError(f"{attribute.GetPath()}: {one_line(error)}") from error
+    if value is not None:
+        require_type(attribute.GetPath(), value, expected, may_be_nan=may_be_nan)
+    return value
+
+
+def text_of(attribute: Usd.Attribute | None) -> str:
+    """Return an attribute's text; empty: it has none. Raises StageError for another type."""
+    return str(read_as(attribute, Sdf.ValueTypeNames.String) or "")
+
+
+def require_type(
+    where: object, value: object, expected: Sdf.ValueTypeName, *, may_be_nan: bool = False
+) -> None:
+    """Raise StageError unless a value is of a type; `where` is its path. See `read_as`."""
+    if not _is_of(value, expected):
+        found = Sdf.GetValueTypeNameForValue(value) or type(value).__name__
+        raise StageError(f"{where}: found a value of type {found}, expected {expected}")
+    if may_be_nan or not _is_number(expected):
+        return
+    numbers = np.asarray(value, np.float64)
+    is_finite = np.isfinite(numbers)
+    if not is_finite.all():
+        found = numbers[~is_finite].flat[0]
+        raise StageError(f"{where}: found {found:g}, expected {expected} of finite numbers")
+
+
+def _is_of(value: object, expected: Sdf.ValueTypeName) -> bool:
+    sample = expected.scalarType.defaultValue
+    if isinstance(sample, str):
+        return isinstance(value, _TEXTS if expected.isArray else str)
+    if not _is_number(expected):
+        return isinstance(value, Vt.AssetArray if expected.isArray else type(sample))
+    if isinstance(value, (str, bool, *_TEXTS)):
+        return False
+    numbers = np.asarray(value)
+    kinds = "iu" if np.asarray(sample).dtype.kind in "iu" else "iuf"
+    rows = numbers.shape[1:] if expected.isArray else numbers.shape
+    return (
+        numbers.dtype.kind in kinds
+        and rows == np.shape(sample)
+        and numbers.ndim == expected.isArray + np.ndim(sample)
+    )
+
+
+def _is_number(expected: Sdf.ValueTypeName) -> bool:
+    return np.asarray(expected.scalarType.defaultValue).dtype.kind in "iuf"
+
+
+@contextmanager
+def usd_boundary(stage_path: Path) -> Iterator[None]:
+    """Turn an error that USD raises inside the block into a StageError of one line."""
+    try:
+        yield
+    except Tf.ErrorException as error:
+        raise StageError(
+            f"{stage_path}: USD refuses what it composes: {one_line(error)}: correct the layer "
+            "that holds it, or write the stage anew"
+        ) from error
+
+
+def one_line(error: object) -> str:
+    """Return USD's message of an error without line breaks and places in USD's source."""
+    args = error.args if isinstance(error, Tf.ErrorException) else ()
+    try:
+        text = "; ".join(entry.commentary for entry in args) or str(error)
+    except UnicodeDecodeError:  # the message quotes bytes that aren't text
+        text = "a layer or a file of it is damaged"
+    return " ".join(text.split())
