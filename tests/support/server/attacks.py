@@ -32,6 +32,7 @@ from stereocell.serve.limits import (
     TARGET_BYTES,
 )
 from stereocell.serve.server import BundleServer
+from support import plain_bundle
 from support.server.raw_sockets import (
     DEADLINE_S,
     GOODBYE,
@@ -414,8 +415,7 @@ def write_bundle(out: Path) -> Path:
     """Write a bundle as far as it is served, with links that lead out; return its OUT."""
     bundle = out / "bundle"
     (bundle / "channels").mkdir(parents=True)
-    (bundle / "manifest.json").write_text("{}")
-    (bundle / "index.html").write_text("<!doctype html>")
+    plain_bundle.write(out, {"index.html": b"<!doctype html>"})
     (bundle / "data.bin").write_bytes(bytes(4096))
     with (bundle / "large.bin").open("wb") as file:
         file.truncate(LARGE)
