@@ -17,7 +17,7 @@ from stereocell.engine.run import Engine
 from stereocell.formats.exr import read_atlas, write_atlas
 from stereocell.formats.ktx2 import encode_2d, encode_3d
 from stereocell.model.errors import SourceError
-from stereocell.usd.written_files import write_list
+from stereocell.usd.written_files import digest_of, read_stage_list, write_list
 from stereocell.verify import deep
 from stereocell.verify.bundle_files import read_texels
 from stereocell.verify.check_line import CheckLine
@@ -230,6 +230,8 @@ def leave_a_texture_stale(out: Path) -> None:
     # as if the build had written it so: bundles are made of nothing that is damaged
     (out / "stage" / "files.json").unlink()
     write_list(out / "stage", {}, out / "stage")
+    written = digest_of(read_stage_list(out / "stage"))
+    edit_sealed(out / "phases.json", lambda phases: phases["stage"].update(results=written))
 
 
 def spoil_a_voxel(out: Path) -> None:
