@@ -13,7 +13,7 @@ import pytest
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import COMMANDS, main
-from support import phantoms
+from support import phantoms, plain_bundle
 
 
 @pytest.fixture
@@ -214,9 +214,8 @@ def test_no_color_leaves_the_colours_out() -> None:
 def test_who_goes_away_in_the_middle_of_an_answer_is_no_error(
     arguments: list[str], code: int, told: str, tmp_path: Path
 ) -> None:
-    (tmp_path / "manifest.json").write_text('{"format": "stereocell-bundle"}')
-    (tmp_path / "index.html").write_text("{}")
-    arguments = [str(tmp_path) if word == "BUNDLE" else word for word in arguments]
+    plain_bundle.write(tmp_path, plain_bundle.FILES)
+    arguments = [str(tmp_path / "bundle") if word == "BUNDLE" else word for word in arguments]
     reader, writer = os.pipe()
     os.close(reader)
     command = [sys.executable, "-m", "stereocell.cli", *arguments]

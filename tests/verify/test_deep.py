@@ -230,8 +230,8 @@ def leave_a_texture_stale(out: Path) -> None:
     # as if the build had written it so: bundles are made of nothing that is damaged
     (out / "stage" / "files.json").unlink()
     write_list(out / "stage", {}, out / "stage")
-    written = digest_of(read_stage_list(out / "stage"))
-    edit_sealed(out / "phases.json", lambda phases: phases["stage"].update(results=written))
+    digest = digest_of(read_stage_list(out / "stage"))
+    edit_sealed(out / "phases.json", lambda phases: phases["stage"].update(results=digest))
 
 
 def spoil_a_voxel(out: Path) -> None:
