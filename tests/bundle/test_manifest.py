@@ -12,7 +12,7 @@ from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError
 from stereocell.notebook.bundle_files import NotebookBundle
 from stereocell.serve.brick_library import BrickLibrary
-from stereocell.usd.layer_units import STATED_AXIS, STATED_UNIT
+from stereocell.usd.layer_units import LINES
 from support import plain_bundle
 from support.bundles import write_tiles
 
@@ -33,8 +33,7 @@ def _state(layer_file: Path, fingerprint: object) -> None:
 def _over(stage: Path, place: Path) -> Path:
     """Write a layer of an artist over a stage, which states no source."""
     place.write_text(
-        f'#usda 1.0\n(\n    defaultPrim = "Specimen"\n    {STATED_UNIT}\n    {STATED_AXIS}\n'
-        f"    subLayers = [@{stage}@]\n)\n"
+        "#usda 1.0\n(\n" + "\n".join(LINES.values()) + f"\nsubLayers = [@{stage}@]\n)\n"
     )
     return place
 

@@ -57,6 +57,8 @@ def test_values_below_zero_are_joined_to_their_flags() -> None:
         ([*PLAN, "--preset=a\udce9"], "--preset is 'a\\xe9', expected UTF-8"),
         ([*PLAN[:3], "\udcff"], "-o is '\\xff', expected UTF-8"),
         (["plan", "caf\udce9.tif", "-o", "out"], "argument 2 is 'caf\\xe9.tif', expected UTF-8"),
+        ([*PLAN, "--labels=a\udce9=b"], "--labels is 'a\\xe9=b', expected UTF-8"),
+        ([*PLAN, "--\udce9"], "argument 5 is '--\\xe9', expected UTF-8"),
         (["export", "out", "\udcff.glb"], "argument 3 is '\\xff.glb', expected UTF-8"),
         ([*PLAN, "--preset", "\ud800"], "--preset is '\\ud800', expected UTF-8"),
     ],

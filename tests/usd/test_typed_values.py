@@ -9,6 +9,8 @@ from pxr import Sdf, Tf, Usd
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
+from stereocell.export.options import ExportOptions
+from stereocell.export.write import export_stage
 from stereocell.model.errors import StereoCellError
 from stereocell.usd import read_stage, typed_values
 from stereocell.usd.read_attributes import color_of
@@ -63,6 +65,11 @@ def refusal_of_bundle(layer: Path, folder: Path) -> str:
         (CHANNEL, "int stereocell:surfaceReason = 3", "surfaceReason: found a value of type int"),
         (CHANNEL, "float2 stereocell:window = (-3e38, 3e38)", "expected voxel values within 1e+30"),
         (CHANNEL, 'string stereocell:opacityPoints = "ab"', "type string, expected float2[]"),
+        (
+            CHANNEL,
+            f"float2[] stereocell:opacityPoints = [{', '.join(['(0.5, 0.5)'] * 10_001)}]",
+            "opacityPoints: found 10001 pairs, expected at most 10000",
+        ),
         (CHANNEL, 'string stereocell:shapes = "ab"', "type string, expected float4[]"),
         (CHANNEL, 'string stereocell:columns = "a"', "type string, expected token[]"),
         (SURFACE, 'string inputs:roughness = "a"', "roughness: found a value of type"),
@@ -139,8 +146,21 @@ def test_a_bundle_without_channels_is_refused(
     stage = Usd.Stage.Open(str(stage_path))
     channels = stage.GetPrimAtPath("/Specimen/Channels").GetChildren()
     each = "\n".join(f'over "{prim.GetName()}" (active = false) {{}}' for prim in channels)
-    refusal = refusal_of_bundle(edited("/Specimen/Channels", each), tmp_path)
-    assert refusal == f"{layer}: no channel is active below /Specimen/Channels, expected one"
+    none = edited("/Specimen/Channels", each)
+    told = f"{layer}: no channel is active below /Specimen/Channels, expected one or more"
+    assert refusal_of_bundle(none, tmp_path) == told
+    with pytest.raises(StereoCellError) as raised:
+        export_stage(none, tmp_path / "s.glb", options=ExportOptions())
+    assert str(raised.value) == told
+
+
+def test_usd_prints_no_warnings_of_its_own(
+    edited: Callable[[str, str], Path], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    normals = 'normal3f[] primvars:normals = [(0, 0, 1)] (interpolation = "vertex")'
+    layer = edited(MESH, f"{normals}\nint[] primvars:normals:indices = [7, -1]")
+    assert "normals for" in refusal_of_bundle(layer, tmp_path)
+    assert "Warning" not in capfd.readouterr().err
 
 
 def raise_type_mismatch(*_: object) -> None:

@@ -29,6 +29,7 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         path = _require_stage(out_folder, stage)
         viewer = viewer_dist()
         key = _key_of(out_folder, path, viewer)
+        _require_kept(out_folder)
         if objects_below(path.parent) is not None and out_folder.is_begun("bundle"):
             bundle_writer.remove_half(out_folder.bundle_dir)
         if not is_forced():
@@ -42,15 +43,8 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
 
 
 def _require_stage(out_folder: OutFolder, layer: Path | None) -> Path:
-    """Return the path of the stage to export. Raises OutputError where that can't be begun.
-
-    Raises StageError where a file that the stage's phase wrote is lost or damaged; a layer that may
-    have been edited in place passes, and the bundle's writer names it.
-    """
+    """Return the path of the stage to export. Raises OutputError where that can't be begun."""
     out_folder.require_finished("stage")
-    if out_folder.has_begun("stage"):  # else it is none that this build wrote
-        listed = written_files.read_stage_list(out_folder.stage_dir)
-        written_files.require_kept(out_folder.stage_dir, listed, out_folder.stage_list)
     if is_file(out_folder.plan_file):
         plan = out_folder.plan()  # no phase goes on beside a plan that was changed by hand
         if plan.settings.unwrap.maps:
@@ -59,6 +53,16 @@ def _require_stage(out_folder: OutFolder, layer: Path | None) -> Path:
     if not is_file(path):
         raise no_layer(path, is_given=layer is not None)
     return path
+
+
+def _require_kept(out_folder: OutFolder) -> None:
+    """Raise StageError where a file that the stage's phase wrote is lost or damaged.
+
+    A layer that may have been edited in place passes, and the bundle's writer names it.
+    """
+    if out_folder.has_begun("stage"):  # otherwise this build did not write the stage
+        listed = written_files.read_stage_list(out_folder.stage_dir)
+        written_files.require_kept(out_folder.stage_dir, listed, out_folder.stage_list)
 
 
 def _key_of(out_folder: OutFolder, path: Path, viewer: Path | None) -> str:

@@ -44,7 +44,6 @@ from stereocell.storage.file_list import encode, to_json
 from stereocell.storage.json_files import compact_json, sealed
 from stereocell.storage.workspace import is_file, move, remove, sizes_below
 from stereocell.transfer.opacity import evaluate
-from stereocell.usd.layer import CHANNELS
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
 from stereocell.usd.read_objects import painter_of, read_columns
@@ -126,8 +125,6 @@ def _fill(
     if note := note_missing(stage):
         report_line(note)
     appearances = read_appearances(stage)
-    if not appearances:
-        raise StageError(f"{stage_path}: no channel is active below {CHANNELS}, expected one")
     prims = tile_prims(stage)
     if not prims:
         raise StageError(f"{stage_path}: no tile is visible")

@@ -8,7 +8,7 @@ from stereocell.model.utf8 import escaped_bytes
 
 _BELOW_ZERO = re.compile(r"-\.?\d")  # no flag of ours has a digit there
 # argparse of Python 3.11 removes `--` from the values of flags, so that no value is left
-_NO_VALUE = re.compile(r"(--[a-z][a-z-]*|-[a-z])=?--")
+_NO_VALUE = re.compile(r"(--[a-z][a-z-]*(?==)|-[a-z])=?--")
 
 
 def prepared(words: Sequence[str]) -> list[str]:
@@ -22,9 +22,10 @@ def prepared(words: Sequence[str]) -> list[str]:
     is_open = True  # flags end at the first bare `--`
     for place, word in enumerate(words, 1):
         before = joined[-1] if joined else ""
-        flag, _, value = word.rpartition("=") if word.startswith("--") else ("", "", word)
+        flag, is_joined, value = word.partition("=") if word.startswith("--") else ("", "", word)
         is_flag = re.fullmatch(r"--?[a-z][a-z-]*", before) is not None
-        _require_utf8(flag or (before if is_flag else f"argument {place}"), value)
+        where = before if is_flag else f"argument {place}"
+        _require_utf8(flag if is_joined else where, value if is_joined else word)
         is_open = is_open and word != "--"
         if is_open and (found := _NO_VALUE.fullmatch(word)):
             raise UsageError(f"{found[1]} is '--', expected a value (a file of this name is ./--)")

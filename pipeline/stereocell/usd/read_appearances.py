@@ -32,6 +32,7 @@ from stereocell.usd.typed_values import read_as, text_of
 from stereocell.usd.write_appearances import DEFAULT_FUNCTION
 
 WHITE = (1.0, 1.0, 1.0)
+_MAX_POINTS = 10_000  # pairs of a transfer function, which is drawn with 256 values
 _VOLUME_WINDOW = "stereocell:volumeWindow"
 
 
@@ -101,9 +102,13 @@ class ComposedAppearance:
 
 
 def read_appearances(stage: Usd.Stage) -> list[ComposedAppearance]:
-    """Return the channels' appearances, in the stage's order. Raises StageError."""
+    """Return the channels' appearances, in the stage's order: one or more. Raises StageError."""
     prims = stage.GetPrimAtPath(CHANNELS).GetChildren()
-    return [_read_appearance(prim) for prim in prims if prim.IsA(UsdShade.Material)]
+    found = [_read_appearance(prim) for prim in prims if prim.IsA(UsdShade.Material)]
+    if not found:
+        layer = stage.GetRootLayer().realPath
+        raise StageError(f"{layer}: no channel is active below {CHANNELS}, expected one or more")
+    return found
 
 
 def surface_of(prim: Usd.Prim) -> UsdShade.Shader:
@@ -238,6 +243,8 @@ def _surface_confidence(prim: Usd.Prim, name: str) -> SurfaceConfidence:
 def _opacity_points(prim: Usd.Prim) -> OpacityPoints:
     field = f"{prim.GetPath()}.stereocell:opacityPoints"
     given = value_of(prim, "stereocell:opacityPoints", Sdf.ValueTypeNames.Float2Array)
+    if len(given) > _MAX_POINTS:
+        raise StageError(f"{field}: found {len(given)} pairs, expected at most {_MAX_POINTS}")
     points = tuple((float(x), float(y)) for x, y in given)
     if not points:
         raise StageError(f"{field}: empty, expected pairs of intensity and opacity")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, Vt
+from pxr import Sdf, Tf, Usd, UsdUtils, Vt
 
 from stereocell.model.errors import StageError
 
@@ -84,14 +84,20 @@ def _is_number(expected: Sdf.ValueTypeName) -> bool:
 
 @contextmanager
 def usd_boundary(stage_path: Path) -> Iterator[None]:
-    """Turn an error that USD raises inside the block into a StageError of one line."""
+    """Turn an error that USD raises inside the block into a StageError of one line.
+
+    Warnings of USD are not shown: our own lines say what is wrong with a stage.
+    """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         yield
     except Tf.ErrorException as error:
         raise StageError(
-            f"{stage_path}: USD refuses what it composes: {one_line(error)}: correct the layer "
-            "that holds it, or write the stage anew"
+            f"{stage_path}: USD refuses what it composes: {one_line(error)}: correct the "
+            "layer that holds it, or write the stage anew"
         ) from error
+    finally:
+        del quiet
 
 
 def one_line(error: object) -> str:
@@ -101,4 +107,4 @@ def one_line(error: object) -> str:
         text = "; ".join(entry.commentary for entry in args) or str(error)
     except UnicodeDecodeError:  # the message quotes bytes that aren't text
         text = "a layer or a file of it is damaged"
-    return " ".join(text.split())
+    return " ".join(text.split()).removesuffix(".")
