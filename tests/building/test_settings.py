@@ -118,6 +118,7 @@ def test_wrong_settings_are_one_clear_line(tmp_path: Path, text: str, message: s
     with pytest.raises(UsageError) as raised:
         settings_module.load(None, file, flags={})
     assert message in str(raised.value)
+    assert str(raised.value).startswith(f"{file}: ")
     assert ("'auto'" in str(raised.value)) == ("'auto'" in message)
     assert "\n" not in str(raised.value)
 

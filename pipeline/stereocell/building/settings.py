@@ -289,10 +289,20 @@ def load(
     """
     settings = Settings()
     if preset not in (None, NO_PRESET):
-        settings = apply(settings, _read(preset_path(preset)), f"preset {preset}")
+        settings = _apply_file(settings, preset_path(preset), f"preset {preset}")
     if config is not None:
-        settings = apply(settings, _read(config), str(config))
+        settings = _apply_file(settings, config, str(config))
     return apply(settings, flags, where)
+
+
+def _apply_file(settings: Settings, path: Path, where: str) -> Settings:
+    """Return the settings with those of a file put in. Raises UsageError, which names the file."""
+    values = _read(path)
+    try:
+        return apply(settings, values, where)
+    except UsageError as error:
+        line = str(error)
+        raise UsageError(line if line.startswith(where) else f"{where}: {line}") from None
 
 
 def preset_names() -> list[str]:
