@@ -1,7 +1,5 @@
 """Find texts that are not UTF-8, as arguments and file names of another encoding become."""
 
-import os
-
 
 def escaped_bytes(text: str) -> str:
     """Return a text that is not UTF-8, with its other bytes escaped; empty: it is UTF-8.
@@ -13,7 +11,7 @@ def escaped_bytes(text: str) -> str:
         text.encode()
     except UnicodeEncodeError:
         try:
-            return os.fsencode(text).decode("utf-8", "backslashreplace")
+            return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
         except UnicodeEncodeError:  # no bytes become such a text
             return text.encode("utf-8", "backslashreplace").decode()
     return ""
