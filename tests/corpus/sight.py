@@ -54,7 +54,7 @@ def look_at(case: Case) -> Sight:
     sigma = min(case.spacing_um)
     field = denoise(Volume(voxels, case.spacing_um), sigma)
     darkest: float | None = float(voxels.min())
-    padding = find_padding(voxels, darkest, denoising_reach(sigma, case.spacing_um))
+    padding = find_padding(voxels, darkest, denoising_reach(sigma, case.spacing_um, 0))
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, scale_above, above, under = Scale.of(voxels, padding), None, field, None

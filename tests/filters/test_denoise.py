@@ -19,6 +19,24 @@ def test_median_is_scipy_s(dtype: Any, shape: tuple[int, int, int]) -> None:
     np.testing.assert_array_equal(found, wanted.astype(np.float32))
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_denoising_follows_the_plane_of_the_images(axis: int) -> None:
+    voxels = np.random.default_rng(0).integers(0, 60_000, (9, 14, 11)).astype(np.uint16)
+    spacing, size = [1.0, 1.0, 1.0], [3, 3, 3]
+    spacing[axis], size[axis] = 5.0, 1
+    found = denoise(Volume(voxels, tuple(spacing), slice_axis=axis), 1.0)
+    median = ndimage.median_filter(voxels.astype(np.float64), size, mode="nearest")
+    wanted = ndimage.gaussian_filter(median, 1 / np.array(spacing), mode="nearest", truncate=4.0)
+    np.testing.assert_allclose(found, wanted, rtol=1e-6)
+    assert found.flags.c_contiguous
+
+
+def test_no_median_reaches_across_a_coarse_axis_of_the_plane() -> None:
+    voxels = np.random.default_rng(0).integers(0, 250, (5, 9, 8)).astype(np.uint8)
+    found = denoise(Volume(voxels, (9.0, 3.0, 1.0)), 0.0)
+    np.testing.assert_array_equal(found, voxels)
+
+
 @pytest.mark.parametrize("shape", [(11, 17, 23), (2, 3, 40), (1, 1, 1)])
 @pytest.mark.parametrize("sigma_um", [0.1, 0.28, 1.1])
 def test_gaussian_is_scipy_s(shape: tuple[int, int, int], sigma_um: float) -> None:

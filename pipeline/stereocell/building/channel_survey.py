@@ -58,6 +58,7 @@ from stereocell.building.tasks.window import (
     write_window,
 )
 from stereocell.engine.run import Engine, console
+from stereocell.filters.denoise import median_size
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import CRITERIA, LADDER
 from stereocell.isosurface.repair_rules import choose_repair
@@ -199,6 +200,7 @@ def _of_channel(
             found.background,
             float(plan.settings.surface.smoothing_um),
             make_iso_field(plan.tiles, values) if len(set(known)) > 1 else None,
+            median_size(plan.spacing_um, plan.slice_axis),
         )
     appearance = make_appearance(
         channel.name,

@@ -156,6 +156,7 @@ def settle(source: str, settings: Settings) -> Plan:
         settings=settings,
         modality=modality,
         placement=dataset.placement,
+        slice_axis=dataset.slice_axis(level[0]),
         has_sides=dataset.has_sides,
         labels=labels,
         formats={format_of(location), *(format_of(one.ref.source) for one in labels)},

@@ -52,6 +52,7 @@ class Plan:
     modality    DICOM's code of the modality: `MR`, `CT`, ...; empty: not known
     placement   rows of a (4, 4) matrix for columns, um: from the world of the voxels
                 (volume.zyx_to_xyz) to the specimen's place
+    slice_axis  of z, y, x: the source's images lie across it (model/image_plane.py)
     has_sides   whether the source states where the patient's left, back and head are: then the
                 specimen's place is the patient's world (read/anatomical_axes.py)
     labels      label maps whose objects are built, channels beside `channels`
@@ -72,6 +73,7 @@ class Plan:
     settings: Settings
     modality: str = ""
     placement: Matrix = IDENTITY
+    slice_axis: int = 0
     has_sides: bool = False
     labels: tuple[Labels, ...] = ()
     formats: tuple[str, ...] = ()
@@ -198,6 +200,7 @@ def make_plan(
     formats: Collection[str],
     modality: str = "",
     placement: Matrix = IDENTITY,
+    slice_axis: int = 0,
     has_sides: bool = False,
     labels: Sequence[Labels] = (),
 ) -> Plan:
@@ -246,6 +249,7 @@ def make_plan(
         settings=settings,
         modality=modality,
         placement=placement,
+        slice_axis=slice_axis,
         has_sides=has_sides,
         labels=tuple(labels),
         formats=tuple(sorted(formats)),

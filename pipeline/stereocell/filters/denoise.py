@@ -4,16 +4,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.smoothing import smooth_in_place
+from stereocell.model.image_plane import (
+    MAX_RATIO,
+    back_of_three,
+    first_of_three,
+    slices_back,
+    slices_first,
+)
+from stereocell.model.spacing import Spacing
 from stereocell.model.volume import Volume
 
-MEDIAN_REACH = 1  # voxels that the median reaches in plane
+MEDIAN_REACH = 1  # voxels that the median reaches in the plane of the images
 SMOOTHING_REACH = 4.0  # radius of the Gaussian, in sigmas
 
 
 def denoise(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
-    """Return the voxels after a 3 x 3 median in plane and a Gaussian.
+    """Return the voxels after a 3 x 3 median in the plane of the images and a Gaussian.
 
-    The median removes hot voxels, which a Gaussian would spread.
+    The median removes hot voxels, which a Gaussian would spread. There is none where the spacings
+    in that plane differ too much.
 
     sigma_um  sigma of the Gaussian; 0 turns it off
     result    float32 (z, y, x), voxel values
@@ -27,11 +36,27 @@ def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
 
 
 def _filtered(volume: Volume, sigma_um: float, has_median: bool) -> NDArray[np.float32]:
-    field = np.array(volume.voxels, np.float32, order="C")
+    axis = volume.slice_axis
+    field = np.array(slices_first(volume.voxels, axis), np.float32, order="C")
+    has_median = has_median and any(median_reach(volume.spacing_um, axis))
     if field.size and (sigma_um > 0 or has_median):
-        z, y, x = (gaussian(sigma_um / step) for step in volume.spacing_um)
-        smooth_in_place(field, z, y, x, has_median)
-    return field
+        steps = first_of_three(volume.spacing_um, axis)
+        across, rows, columns = (gaussian(sigma_um / step) for step in steps)
+        smooth_in_place(field, across, rows, columns, has_median)
+    return np.ascontiguousarray(slices_back(field, axis))
+
+
+def median_reach(spacing_um: Spacing, slice_axis: int) -> tuple[int, int, int]:
+    """Return how many voxels (z, y, x) the median reaches to each side; 0, 0, 0: there is none."""
+    _, row, column = first_of_three(spacing_um, slice_axis)
+    reach = MEDIAN_REACH if max(row, column) <= MAX_RATIO * min(row, column) else 0
+    return back_of_three((0, reach, reach), slice_axis)
+
+
+def median_size(spacing_um: Spacing, slice_axis: int) -> tuple[int, int, int]:
+    """Return over how many voxels (z, y, x) the median is taken; 1, 1, 1: there is none."""
+    z, y, x = (2 * reach + 1 for reach in median_reach(spacing_um, slice_axis))
+    return z, y, x
 
 
 def gaussian(sigma: float) -> NDArray[np.float64]:

@@ -16,6 +16,12 @@ from stereocell.isosurface.level_evidence import (
     gather_evidence,
 )
 from stereocell.isosurface.level_histogram import Scale
+from stereocell.model.image_plane import (
+    find_slice_axis,
+    first_of_three,
+    slices_back,
+    slices_first,
+)
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 
@@ -54,11 +60,13 @@ def find_array_levels(
     >>> 400 < found.levels.clear[0].value < 700
     True
     """
-    spacing, voxels = volume.spacing_um, volume.voxels
+    axis = find_slice_axis(volume.slice_axis, volume.spacing_um)
+    spacing = first_of_three(volume.spacing_um, axis)
+    voxels = slices_first(volume.voxels, axis)
     sigma = min(spacing) if smoothing_um is None else smoothing_um
-    field = denoise(volume, sigma)
+    field = denoise(Volume(voxels, spacing), sigma)
     darkest: float | None = float(voxels.min())
-    padding = find_padding(voxels, darkest, denoising_reach(sigma, spacing))
+    padding = find_padding(voxels, darkest, denoising_reach(sigma, spacing, 0))
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, scale_above, under = Scale.of(voxels, padding), None, None
@@ -69,17 +77,18 @@ def find_array_levels(
         )
         under, scale_above = lattice.at(whole), scale.above(lattice)
     counting = Counting(scale, scale_above, darkest)
-    z, y, x = (slice(0, n) for n in voxels.shape)
+    slices, rows, columns = (slice(0, n) for n in voxels.shape)
     evidence = gather_evidence(
         field,
         padding,
-        (z, y, x),
+        (slices, rows, columns),
         voxels=voxels,
         spacing_um=spacing,
         counting=counting,
         background=under,
     )
     levels = find_levels([evidence], counting=counting, finest_um=min(spacing), modality=modality)
-    if not levels.subtracts or under is None:
-        return ArrayLevels(field, levels, 0.0)
-    return ArrayLevels(field - under, levels, float(under.mean(dtype=np.float64)))
+    below = 0.0
+    if levels.subtracts and under is not None:
+        field, below = field - under, float(under.mean(dtype=np.float64))
+    return ArrayLevels(np.ascontiguousarray(slices_back(field, axis)), levels, below)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.filters.denoise import MEDIAN_REACH, SMOOTHING_REACH
+from stereocell.filters.denoise import SMOOTHING_REACH, median_reach
 from stereocell.isosurface.axis_profiles import Profiles
 from stereocell.isosurface.distance_field import gradient_magnitude
 from stereocell.isosurface.edge_criteria import EdgeSums, gather_edges
@@ -22,8 +22,10 @@ from stereocell.kernels.level_sums import count_differences, sum_by_value
 from stereocell.model.spacing import Spacing
 
 MAX_PADDING = 0.8  # share of the voxels: padding that covers more is the ground, without noise
-LAG = 4  # voxels along x between the two values whose difference is noise: beyond the denoising
-HALO = (1, 1, LAG)  # voxels (z, y, x) around a tile that its evidence reads
+# Voxels along a row of an image between the two values whose difference is noise: beyond the
+# denoising
+LAG = 4
+HALO = (1, 1, LAG)  # voxels (slice, row, column) around a tile that its evidence reads
 NOISE_BINS = 1024
 _PLANES = 16  # planes counted at once
 _FINITE = 255 << 6  # upper 15 bits of the first float32 that is no finite number
@@ -97,20 +99,24 @@ class Counting:
     mask: tuple[float, float] | None = None
 
 
-def denoising_reach(sigma_um: float, spacing_um: Spacing) -> tuple[int, int, int]:
+def denoising_reach(sigma_um: float, spacing_um: Spacing, slice_axis: int) -> tuple[int, int, int]:
     """Return how many voxels (z, y, x) away a denoised voxel depends on others."""
-    z, y, x = (int(np.ceil(SMOOTHING_REACH * sigma_um / step)) for step in spacing_um)
-    return z, y + MEDIAN_REACH, x + MEDIAN_REACH
+    medians = median_reach(spacing_um, slice_axis)
+    z, y, x = (
+        int(np.ceil(SMOOTHING_REACH * sigma_um / step)) + median
+        for step, median in zip(spacing_um, medians, strict=True)
+    )
+    return z, y, x
 
 
 def find_padding(
     voxels: NDArray[Any], darkest: float | None, reach: tuple[int, int, int]
 ) -> NDArray[np.bool_]:
-    """Return which voxels are padding, or so near to it that denoising mixes them, bool (z, y, x).
+    """Return which voxels are padding, or so near to it that denoising mixes them, bool.
 
-    voxels   (z, y, x), as read
+    voxels   (slice, row, column), as read, and so is the result
     darkest  the channel's least value; None: the channel has no padding
-    reach    voxels (z, y, x) that denoising reaches
+    reach    voxels (slice, row, column) that denoising reaches
 
     Padding are runs of the darkest value as long as the reach on both sides in plane: a stitched
     mosaic's corners, a scanner's circle, a border. Single dark voxels of a noisy dark end are none.
@@ -152,13 +158,15 @@ def gather_evidence(
 ) -> TileEvidence:
     """Return a tile's evidence.
 
-    field        denoised, float32 (z, y, x), voxel values, of a window around the tile: HALO voxels
-                 more each way, where the data has them
+    All axes are (slice, row, column): `slices_first` turns a volume so.
+
+    field        denoised, float32, voxel values, of a window around the tile: HALO voxels more each
+                 way, where the data has them
     padding      bool, the same window, as `find_padding` returns it
     own          the tile in the window
-    voxels       (z, y, x), as read, the same window
-    spacing_um   (z, y, x)
-    start        voxels (z, y, x) of the dataset at which the tile begins
+    voxels       as read, the same window
+    spacing_um   of the three axes
+    start        voxels of the dataset at which the tile begins
     background   float32, broadcasts over the window, voxel values; None: none is tried
     criterion    the one that scores edges; None: none does
 

@@ -45,14 +45,16 @@ class SurfaceLevel:
 
     iso           voxel values above the background; the mean of `by_tile`
     background    voxel values, knots in voxels of the level that is built; None: 0 everywhere
-    smoothing_um  sigma of the Gaussian after the median of 3 x 3 voxels in each plane
+    smoothing_um  sigma of the Gaussian after the median
     by_tile       where tiles have levels of their own (`--iso-scope tile`): the field of them
+    median_size   voxels (z, y, x) that the median is taken over; 1, 1, 1: there is none
     """
 
     iso: float
     background: LatticeField | None
     smoothing_um: float
     by_tile: LatticeField | None = None
+    median_size: tuple[int, int, int] = (1, 3, 3)
 
     @property
     def field(self) -> LatticeField:

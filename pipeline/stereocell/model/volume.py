@@ -16,11 +16,13 @@ class Volume:
     voxels      (z, y, x), integer or float32
     spacing_um  distance between voxels in um, (z, y, x)
     origin_um   CENTRE of voxel (0, 0, 0) in um, (z, y, x)
+    slice_axis  of z, y, x: the source's images lie across it; see model/image_plane.py
     """
 
     voxels: NDArray[Any]
     spacing_um: Spacing
     origin_um: Point = (0.0, 0.0, 0.0)
+    slice_axis: int = 0
 
 
 def zyx_to_xyz(points_um: ArrayLike) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
+from stereocell.model.image_plane import find_slice_axis
 from stereocell.model.object_notes import ObjectNotes
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.spacing import Point
@@ -175,7 +176,8 @@ class Dataset:
         channel  index into `channels`
         box      voxels of `level`; only the chunks that it touches are read
 
-        The result's `origin_um` is (z, y, x), um, from the centre of level 0's voxel (0, 0, 0).
+        The result's `origin_um` is (z, y, x), um, from the centre of level 0's voxel (0, 0, 0), and
+        its `slice_axis` is the source's.
         NaN and infinity are read as the smallest finite value (read/unmeasured.py). Raises
         SourceError where a chunk can't be decoded, where no voxel of the channel is finite or where
         one is beyond MAX_VALUE; ValueError where the channel, the level or the box is out of range.
@@ -206,7 +208,11 @@ class Dataset:
                 place.origin_um, box.start, place.spacing_um, strict=True
             )
         )
-        return Volume(voxels, place.spacing_um, (z, y, x))
+        return Volume(voxels, place.spacing_um, (z, y, x), self.slice_axis(level))
+
+    def slice_axis(self, level: int = 0) -> int:
+        """Return the axis (of z, y, x) across which the images of a level lie."""
+        return find_slice_axis(self.acquired.axis, self.levels[level].spacing_um)
 
     @property
     def stored_dtype(self) -> np.dtype[Any]:

@@ -23,7 +23,7 @@ from typing import Any
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from stereocell.filters.denoise import MEDIAN_REACH, SMOOTHING_REACH
+from stereocell.filters.denoise import SMOOTHING_REACH
 from stereocell.formats.exr import write_lut
 from stereocell.model.channel import Appearance, OpacityPoints, Shapes, SurfaceLevel
 from stereocell.model.object_table import ObjectTable
@@ -94,7 +94,7 @@ def level_to_json(level: SurfaceLevel) -> dict[str, Any]:
         "iso_by_tile": None if level.by_tile is None else level.by_tile.to_json(),
         "background": None if level.background is None else level.background.to_json(),
         "denoising": {
-            "median_voxels": [1, 2 * MEDIAN_REACH + 1, 2 * MEDIAN_REACH + 1],
+            "median_voxels": list(level.median_size),
             "gaussian_sigma_um": level.smoothing_um,
             "gaussian_truncate": SMOOTHING_REACH,
         },

@@ -25,6 +25,7 @@ from stereocell.isosurface.level_evidence import (
 )
 from stereocell.isosurface.neighbours import Neighbours
 from stereocell.isosurface.options import CRITERIA
+from stereocell.model.image_plane import back_of_three, first_of_three, slices_first
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.storage.json_files import write_sealed
@@ -53,24 +54,28 @@ class EvidenceTask:
 def measure_evidence(task: EvidenceTask) -> TileEvidence:
     """Read a tile with its halo, and return its evidence."""
     dataset = open_source(task.ref)
-    spacing = dataset.levels[task.level].spacing_um
-    reach = denoising_reach(task.smoothing_um, spacing)
-    z, y, x = (r + h for r, h in zip(reach, HALO, strict=True))
+    spacing, axis = dataset.levels[task.level].spacing_um, dataset.slice_axis(task.level)
+    reach = denoising_reach(task.smoothing_um, spacing, axis)
+    z, y, x = (r + h for r, h in zip(reach, back_of_three(HALO, axis), strict=True))
     window = task.box.grown((z, y, x), task.region)
     volume = dataset.read(task.channel, window, task.level)
-    inner_z, inner_y, inner_x = (
+    own = [
         slice(a - start, b - start)
         for a, b, start in zip(task.box.start, task.box.stop, window.start, strict=True)
-    )
+    ]
+    voxels = slices_first(volume.voxels, axis)
+    background = None
+    if task.background is not None:
+        background = slices_first(task.background.at(window), axis)
     return gather_evidence(
-        denoise(volume, task.smoothing_um),
-        find_padding(volume.voxels, task.counting.darkest, reach),
-        (inner_z, inner_y, inner_x),
-        voxels=volume.voxels,
-        spacing_um=spacing,
+        np.ascontiguousarray(slices_first(denoise(volume, task.smoothing_um), axis)),
+        find_padding(voxels, task.counting.darkest, first_of_three(reach, axis)),
+        first_of_three(own, axis),
+        voxels=voxels,
+        spacing_um=first_of_three(spacing, axis),
         counting=task.counting,
-        start=task.box.start,
-        background=None if task.background is None else task.background.at(window),
+        start=first_of_three(task.box.start, axis),
+        background=background,
         criterion=CRITERIA.get(task.criterion),
     )
 

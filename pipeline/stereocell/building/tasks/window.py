@@ -21,6 +21,7 @@ from stereocell.isosurface.level_evidence import (
     find_padding,
 )
 from stereocell.isosurface.level_histogram import Scale
+from stereocell.model.image_plane import first_of_three, slices_back, slices_first
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
 from stereocell.storage.json_files import write_sealed
@@ -117,8 +118,13 @@ def measure_window(task: StatisticsTask) -> Window:
     mask = _mask_of([voxels] if level == task.level else _blocks(task, dataset))
     # a mask's ground is even, and no padding
     darkest = float(voxels.min()) if mask is None else None
-    reach = denoising_reach(float(surface.smoothing_um), dataset.levels[level].spacing_um)
-    padding = find_padding(voxels, darkest, reach if step == 1 else (0, *reach[1:]))
+    spacing, axis = dataset.levels[level].spacing_um, dataset.slice_axis(level)
+    reach = denoising_reach(float(surface.smoothing_um), spacing, axis)
+    if step > 1:
+        reach = (0, *reach[1:])
+    padding = slices_back(
+        find_padding(slices_first(voxels, axis), darkest, first_of_three(reach, axis)), axis
+    )
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, background = Scale.of(voxels, padding), None
@@ -134,7 +140,7 @@ def measure_window(task: StatisticsTask) -> Window:
         )
     holder = None
     if task.finds_holder:
-        z, y, x = dataset.levels[level].spacing_um
+        z, y, x = spacing
         holder = find_holder(voxels, (step * z, y, x), task.region)
     scale_above = None if background is None else scale.above(background)
     counting = Counting(scale, scale_above, darkest, mask)

@@ -1,0 +1,57 @@
+"""The plane in which a source's images lie, and arrays turned so that the images come first.
+
+A volume is turned into the patient's frame after it is read, so that the images of a CT may lie
+across any of its axes. All that belongs "in the plane" of an image (a median, the noise between
+neighbours, runs of padding) works on arrays that `slices_first` has turned.
+"""
+
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.spacing import Spacing
+
+T = TypeVar("T")
+
+# Ratio of two spacings above which voxels along the coarser axis are no neighbours any more: a
+# filter across it would mix structures that have nothing to do with one another.
+MAX_RATIO = 2.0
+
+
+def find_slice_axis(stated: int, spacing_um: Spacing) -> int:
+    """Return the axis (of z, y, x) across which the images of a volume lie.
+
+    stated      the axis that the source states, or that its reader takes for it
+    spacing_um  (z, y, x)
+
+    One axis that is much coarser than both others is that axis, whatever is stated: a volume may
+    have been sampled anew along other axes than the scanner's.
+    """
+    _, middle, coarsest = sorted(spacing_um)
+    return spacing_um.index(coarsest) if coarsest > MAX_RATIO * middle else stated
+
+
+def slices_first(array: NDArray[Any], slice_axis: int) -> NDArray[Any]:
+    """Return a view of an array (z, y, x) as (slice, row, column)."""
+    return np.moveaxis(array, slice_axis, 0)
+
+
+def slices_back(array: NDArray[Any], slice_axis: int) -> NDArray[Any]:
+    """Return a view of an array (slice, row, column) as (z, y, x)."""
+    return np.moveaxis(array, 0, slice_axis)
+
+
+def first_of_three(values: Sequence[T], slice_axis: int) -> tuple[T, T, T]:
+    """Return values by (z, y, x) in the order (slice, row, column)."""
+    rows, columns = (value for axis, value in enumerate(values) if axis != slice_axis)
+    return values[slice_axis], rows, columns
+
+
+def back_of_three(values: Sequence[T], slice_axis: int) -> tuple[T, T, T]:
+    """Return values by (slice, row, column) in the order (z, y, x)."""
+    along, *in_plane = values
+    in_plane.insert(slice_axis, along)
+    z, y, x = in_plane
+    return z, y, x

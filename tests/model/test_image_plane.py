@@ -1,0 +1,40 @@
+"""The axis across which images lie, and arrays that are turned by it."""
+
+import numpy as np
+import pytest
+
+from stereocell.model.image_plane import (
+    back_of_three,
+    find_slice_axis,
+    first_of_three,
+    slices_back,
+    slices_first,
+)
+
+
+@pytest.mark.parametrize(
+    ("stated", "spacing_um", "axis"),
+    [
+        (0, (1.0, 1.0, 1.0), 0),
+        (2, (1.0, 1.0, 1.0), 2),
+        (0, (5.0, 1.0, 1.0), 0),
+        (1, (1.0, 5.0, 1.0), 1),
+        (0, (1.0, 5.0, 1.0), 1),  # sampled anew along other axes than the scanner's
+        (0, (1.0, 2.0, 1.0), 0),  # not much coarser
+        (0, (1.0, 4.0, 4.0), 0),  # a coarse level of a microscope's pyramid
+    ],
+)
+def test_one_axis_that_is_much_coarser_is_the_slice_axis(
+    stated: int, spacing_um: tuple[float, float, float], axis: int
+) -> None:
+    assert find_slice_axis(stated, spacing_um) == axis
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_arrays_and_triples_turn_alike_and_back(axis: int) -> None:
+    array = np.zeros((2, 3, 4))
+    turned = slices_first(array, axis)
+    assert turned.shape == first_of_three(array.shape, axis)
+    assert turned.shape[0] == array.shape[axis]
+    assert slices_back(turned, axis).shape == array.shape
+    assert back_of_three(turned.shape, axis) == array.shape
