@@ -41,6 +41,7 @@ from stereocell.building.plan_notes import (
 )
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
 from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
+from stereocell.building.surface_cover import notes_on_cover
 from stereocell.building.survey_file import appearance_to_json, read_survey
 from stereocell.building.tasks import components, evidence, unit, window
 from stereocell.building.unit_files import load_objects
@@ -250,6 +251,9 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
         phase.about = "" if built == units else f"{built} of {units} units"
         if missing:
             console.print(f"units: {missing} of {units} are still to be built")
+        elif built:
+            for note in notes_on_cover(out_folder, plan):
+                console.print(f"units: {note}", markup=False, soft_wrap=True)
     require_table(plan.settings.objects.table)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from stereocell.building.closed_copy import close_tile
 from stereocell.building.settings import EIGHT_BITS, Settings
 from stereocell.filters.denoise import denoise
+from stereocell.isosurface.cover import measure_cover
 from stereocell.isosurface.distance_field import to_distance
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.holder import Holder
@@ -20,7 +21,7 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
 from stereocell.model.tile_content import APRON
 from stereocell.model.timing import Clock
-from stereocell.model.unit import Unit
+from stereocell.model.unit import Cover, Unit
 from stereocell.model.volume import Volume
 from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.bake import FineSurface
@@ -79,9 +80,13 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
     repaired, by_triangles = _repaired(volume, given, lattice, given.iso, clock)
     fine = _extract(repaired, by_triangles, given, lattice, clock)
     dropped, filled = repaired.fragments_dropped, repaired.cavities_filled
+    with clock("cover"):
+        cover = find_cover(volume, given, repaired)
     if not len(fine.triangles):
         reason = "no voxel crosses the iso-value"
-        return Unit((), None, eight_bit, reason, dropped, filled, clock.seconds, measured)
+        return Unit(
+            (), None, eight_bit, reason, dropped, filled, clock.seconds, measured, None, cover
+        )
     closed = None
     if given.settings.surface.closed_tiles:
         with clock("close"):
@@ -98,19 +103,37 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
         box=lattice.own_box(),
         get_texturer=shading.texturer,
     )
-    return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds, measured)
+    return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds, measured, None, cover)
 
 
-def find_surface(volume: Volume, given: UnitInput) -> Mesh:
+def find_surface(volume: Volume, given: UnitInput) -> tuple[Mesh, Cover | None]:
     """Return a unit's iso-surface, repaired, before levels of detail are made; it may be empty.
 
-    It has the same numbers as in `build_unit`.
+    The other value is how it covers the source's voxels; None: the channel has no level. Both have
+    the same numbers as in `build_unit`.
     """
     if given.iso is None:
         nothing = np.zeros((0, 3), np.float32)
-        return Mesh(nothing, np.zeros((0, 3), np.uint32), nothing)
+        return Mesh(nothing, np.zeros((0, 3), np.uint32), nothing), None
     lattice = given.lattice.thinned(given.step)
-    return _extract(*_repaired(volume, given, lattice, given.iso, Clock()), given, lattice, Clock())
+    repaired, by_triangles = _repaired(volume, given, lattice, given.iso, Clock())
+    cover = find_cover(volume, given, repaired)
+    return _extract(repaired, by_triangles, given, lattice, Clock()), cover
+
+
+def find_cover(volume: Volume, given: UnitInput, repaired: Repaired) -> Cover | None:
+    """Return how a unit's solid covers the source's voxels; None: the channel has no level."""
+    if given.iso is None:
+        return None
+    return measure_cover(
+        volume.voxels,
+        repaired.distance,
+        given.lattice,
+        given.step,
+        iso=given.iso,
+        background=given.background,
+        holder=given.holder,
+    )
 
 
 def _repaired(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from stereocell.formats.stl import write_stl
 from stereocell.model.errors import OutputError
 from stereocell.model.mesh import Baked, Lod, Mesh, Quality, Spread
-from stereocell.model.unit import Closed, ObjectFacts, Unit
+from stereocell.model.unit import Closed, Cover, ObjectFacts, Unit
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import DAMAGED, MISSING, find_faults, is_same, measure
 from stereocell.storage.json_files import (
@@ -68,6 +68,7 @@ def save_unit(directory: Path, unit: Unit) -> None:
             "volume": [] if unit.volume is None else list(unit.volume.shape),
             "fragments_dropped": unit.fragments_dropped,
             "cavities_filled": unit.cavities_filled,
+            "cover": None if unit.cover is None else asdict(unit.cover),
             "files": {file.name: measure(file) for file in sorted(folder.iterdir())},
         }
         write_sealed(folder / _RECORD, record)
@@ -99,6 +100,11 @@ def find_damage(directory: Path) -> dict[str, str]:
 def load_record(directory: Path) -> dict[str, Any]:
     """Return the content of unit.json: triangles, distances, reason. Raises OutputError."""
     return read_sealed(directory / _RECORD, SCHEMA, _remedy(directory))
+
+
+def cover_of(record: Mapping[str, Any]) -> Cover | None:
+    """Return how a unit's surface covers the source's voxels, from the content of unit.json."""
+    return None if record["cover"] is None else Cover(**record["cover"])
 
 
 def _as_written(directory: Path, file: Path) -> Path:

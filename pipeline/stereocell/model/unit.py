@@ -57,6 +57,47 @@ class ObjectFacts:
     thin: NDArray[np.uint64]
 
 
+# Share of the source's voxels above a level, beyond which a surface that leaves them out is named
+MAX_MISSING = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Cover:
+    """Voxels of the source above a surface's level, and the solid that is built, by their number.
+
+    source   voxels above the level, as they were read
+    covered  those of them that lie in the solid
+    solid    voxels in the solid
+    """
+
+    source: int
+    covered: int
+    solid: int
+
+    def __add__(self, other: "Cover") -> "Cover":
+        return Cover(
+            self.source + other.source, self.covered + other.covered, self.solid + other.solid
+        )
+
+    @property
+    def missing(self) -> float:
+        """The share of the source's voxels above the level that the solid leaves out, 0..1."""
+        return 1 - self.covered / self.source if self.source else 0.0
+
+    @property
+    def added(self) -> float:
+        """The share of the solid in which the source lies below the level, 0..1."""
+        return 1 - self.covered / self.solid if self.solid else 0.0
+
+    @property
+    def words(self) -> str:
+        """Both shares, for a reader."""
+        return (
+            f"it covers {1 - self.missing:.1%} of the source's voxels above its level, and "
+            f"{self.added:.1%} of it lie below"
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """The result of one unit of work.
@@ -68,6 +109,7 @@ class Unit:
     seconds  time spent, by step
     measured  the same voxels as they were read; None: not kept, or `volume` is no different
     objects   of a label map; None: of an image's channel
+    cover     of the surface by the source's voxels; None: there is no level, or a label map's
     """
 
     lods: tuple[Lod, ...]
@@ -79,3 +121,4 @@ class Unit:
     seconds: dict[str, float]
     measured: NDArray[Any] | None = None
     objects: ObjectFacts | None = None
+    cover: Cover | None = None

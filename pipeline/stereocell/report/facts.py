@@ -13,8 +13,9 @@ from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.survey_file import Survey, TileIso, read_survey
-from stereocell.building.unit_files import find_seconds, load_record, lod_file
+from stereocell.building.unit_files import cover_of, find_seconds, load_record, lod_file
 from stereocell.model.tiling import Tile
+from stereocell.model.unit import Cover
 from stereocell.storage.workspace import sizes_below
 
 PHASES = ("plan", "units", "stage", "bundle")
@@ -67,6 +68,7 @@ class UnitFacts:
     ktx2_bytes: int
     fragments_dropped: int
     cavities_filled: int
+    cover: Cover | None
     seconds: dict[str, float]
 
     @property
@@ -185,6 +187,7 @@ def _unit(
         ktx2_bytes=sum(size for file in ktx2 for size in sizes_below(file).values()),
         fragments_dropped=record["fragments_dropped"],
         cavities_filled=record["cavities_filled"],
+        cover=cover_of(record),
         seconds=find_seconds(directory),
     )
 

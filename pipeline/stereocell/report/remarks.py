@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from stereocell.model.counted import counted
+from stereocell.model.unit import MAX_MISSING, Cover
 from stereocell.report.facts import Facts, UnitFacts
 
 MIN_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
@@ -44,11 +45,32 @@ def find_remarks(facts: Facts) -> list[Remark]:
             "channel",
             is_note=True,
         ),
+        _remark(
+            f"whose surface leaves out more than {MAX_MISSING:.0%} of the source's voxels above "
+            "its level",
+            [line for line, cover in _covers(units) if cover.missing > MAX_MISSING],
+            "channel",
+        ),
+        _remark(
+            "whose surface covers the source's voxels above its level",
+            [line for line, cover in _covers(units) if cover.missing <= MAX_MISSING],
+            "channel",
+            is_note=True,
+        ),
         _remark("with a table or a holder left out", _holders(facts), "channel", is_note=True),
         _counts(("fragment", "fragments"), "dropped", units, lambda u: u.fragments_dropped),
         _counts(("cavity", "cavities"), "filled", units, lambda u: u.cavities_filled),
     ]
     return [remark for remark in found if remark is not None]
+
+
+def _covers(units: Iterable[UnitFacts]) -> list[tuple[str, Cover]]:
+    """Return a line for each channel with a surface, and how it covers the source's voxels."""
+    found: dict[str, Cover] = {}
+    for unit in units:
+        if unit.cover is not None:
+            found[unit.channel.name] = found.get(unit.channel.name, Cover(0, 0, 0)) + unit.cover
+    return [(f"{name}: {cover.words}", cover) for name, cover in found.items() if cover.source]
 
 
 def _holders(facts: Facts) -> list[str]:

@@ -14,6 +14,7 @@ from stereocell.building.survey_file import read_survey
 from stereocell.bundle.manifest import MANIFEST
 from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError, StageError, StereoCellError
+from stereocell.model.unit import Cover
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import open_stage, tile_prims
@@ -166,7 +167,10 @@ def _channel_lines(
 
     def sum_up() -> str:
         raise_on(problems)
-        return f"{len(units)} units: surfaces as stated, volumes equal, also as measured"
+        covers = [unit.cover for unit in units if unit.cover is not None]
+        total = sum(covers, Cover(0, 0, 0))
+        told = f"; {total.words}" if total.source else ""
+        return f"{len(units)} units: surfaces as stated, volumes equal, also as measured{told}"
 
     yield _line(f"{channel.name} against source", sum_up)
 

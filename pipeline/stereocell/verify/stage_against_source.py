@@ -21,7 +21,7 @@ from PIL import Image
 from stereocell.building.open_source import open_source
 from stereocell.building.tasks.unit import UnitTask
 from stereocell.building.unit import UnitInput, cut_voxels, find_measured, find_surface
-from stereocell.building.unit_files import load_lods, load_quality, load_record
+from stereocell.building.unit_files import cover_of, load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas
 from stereocell.formats.vdb import write_vdb
 from stereocell.meshes.distance import Nearest, measure_spread
@@ -31,6 +31,7 @@ from stereocell.model.errors import StereoCellError
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.rigid_transform import Matrix
 from stereocell.model.tile_content import APRON
+from stereocell.model.unit import Cover
 from stereocell.storage.workspace import cached
 from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.usd.read_levels import ComposedLod, read_lods
@@ -68,11 +69,15 @@ class SourceTask:
 
 @dataclass(frozen=True, slots=True)
 class UnitFinding:
-    """The result of one unit: problems, and (stated, found, largest) distance of each level, um."""
+    """The result of one unit: problems, and (stated, found, largest) distance of each level, um.
+
+    cover  of the source's voxels by its surface; None: the channel has no level
+    """
 
     name: str
     levels: tuple[tuple[float, float, float], ...]
     problems: tuple[str, ...]
+    cover: Cover | None
 
 
 def compare_unit(task: SourceTask) -> UnitFinding:
@@ -80,13 +85,15 @@ def compare_unit(task: SourceTask) -> UnitFinding:
     given = task.unit.given
     dataset = open_source(task.unit.ref)
     volume = dataset.read(task.unit.channel, given.lattice.window, task.unit.level)
-    fine = find_surface(volume, given)
+    fine, cover = find_surface(volume, given)
     problems = []
     stage = open_stage(task.stage_file)
     with cached(task.unit.directory), loaded(stage, task.tile_id) as (tile, _):
         lods = list(read_lods(tile, task.channel_id))
         composed = read_volume(tile, task.channel_id)
         record = load_record(task.unit.directory)
+        if cover_of(record) != cover:
+            problems.append("the share of the source's voxels that it covers is not as recorded")
         surfaces = _Surfaces(fine, given, task.placement, task.samples)
         levels, faults = _compare_lods(surfaces, lods, record)
         problems += faults
@@ -95,7 +102,7 @@ def compare_unit(task: SourceTask) -> UnitFinding:
             problems.append("no volume in the stage")
         elif composed is not None:
             problems += _compare_volume(cut_voxels(volume.voxels, given), composed, task)
-    return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems))
+    return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems), cover)
 
 
 def _placed(mesh: Mesh, placement: Matrix) -> Mesh:

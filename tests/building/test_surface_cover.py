@@ -1,0 +1,94 @@
+"""How a surface covers the source's voxels above its level, beside what filters removed of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.unit_files import cover_of, load_record
+from stereocell.cli.__main__ import main
+from stereocell.isosurface.cover import measure_cover
+from stereocell.model.lattice import Lattice
+from stereocell.model.lattice_field import LatticeField
+from stereocell.model.tiling import Box
+from stereocell.model.unit import Cover
+from stereocell.report.facts import gather
+from stereocell.report.remarks import find_remarks
+from support import phantoms
+from support.validators import make_assets
+
+SHAPE, LEVEL = (24, 48, 60), 500.0
+
+
+def _voxels() -> NDArray[np.uint16]:
+    """Return a thick ball, and sheets of one voxel that the median and the Gaussian remove."""
+    ball = phantoms.blurred_ball(SHAPE, (1.0, 1.0, 1.0), (12.0, 24.0, 18.0), 9.0, 1.0)
+    voxels = 100 + 900 * ball
+    voxels[4:20, 8:40, 40:56:4] = 1000
+    return voxels.round().astype(np.uint16)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("cover") / "sheets.ome.zarr"
+    scales = [{"z": 1.0, "y": 1.0, "x": 1.0}]
+    return phantoms.write_ome_zarr(place, [_voxels()], scales=scales)
+
+
+def test_shares_are_those_of_both_counts() -> None:
+    cover = Cover(200, 150, 160) + Cover(0, 0, 0)
+    assert cover.missing == pytest.approx(0.25)
+    assert cover.added == pytest.approx(10 / 160)
+    assert "covers 75.0% of the source's voxels above its level, and 6.2% of it lie below" in (
+        cover.words
+    )
+    assert (Cover(0, 0, 0).missing, Cover(0, 0, 0).added) == (0, 0)
+
+
+@pytest.mark.parametrize("step", [(1, 1, 1), (2, 2, 2)])
+def test_voxels_are_counted_on_the_tile_s_own_points(step: tuple[int, int, int]) -> None:
+    rng = np.random.default_rng(0)
+    voxels = rng.integers(0, 1000, (20, 24, 28)).astype(np.uint16)
+    window, own = Box((2, 4, 6), (18, 24, 28)), Box((4, 8, 12), (15, 19, 23))
+    region = Box((0, 0, 0), voxels.shape)
+    lattice = Lattice(window, own, region, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+    every = np.zeros(voxels.shape, bool)
+    every[:: step[0], :: step[1], :: step[2]] = True
+    inside = ndimage.gaussian_filter(voxels.astype(float), 1) > 500
+    kept = lattice.slices_of_thinned(step)
+    distance = np.where(inside[window.slices], 1.0, -1.0).astype(np.float32)[kept]
+    iso = LatticeField(((0.0,), (0.0,), (0.0,)), np.full((1, 1, 1), 400.0))
+    under = LatticeField(((0.0,), (0.0,), (0.0,)), np.full((1, 1, 1), 100.0))
+    found = measure_cover(
+        voxels[window.slices], distance, lattice, step, iso=iso, background=under, holder=None
+    )
+    above, solid = ((part & every)[own.slices] for part in (voxels > 500, inside))
+    assert found == Cover(int(above.sum()), int((above & solid).sum()), int(solid.sum()))
+
+
+@pytest.mark.slow
+def test_a_surface_that_loses_sheets_says_so_everywhere(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    level = ("--iso-value", str(LEVEL))
+    assert make_assets(source, out, "1x1", "--workers", "0", plan=level) == 0
+    units = capsys.readouterr().err
+    assert main(["check", str(out), "--deep", "--workers", "0"]) == 0
+    deep = capsys.readouterr().out
+    index = OutFolder(out).index()
+    ((name, key),) = index.items()
+    cover = cover_of(load_record(OutFolder(out).unit_dir(*name.split("/"), key)))
+    above = _voxels() > LEVEL
+    assert cover is not None
+    assert cover.source == above.sum()
+    sheets = above[:, :, 40:].sum()
+    assert cover.missing == pytest.approx(sheets / above.sum(), abs=0.03)  # and the ball's skin
+    assert f"its surface leaves out {cover.missing:.0%} of the source's voxels" in units
+    assert cover.words in deep
+    titles = {remark.title: remark.lines for remark in find_remarks(gather(OutFolder(out)))}
+    (lines,) = (lines for title, lines in titles.items() if "leaves out more than 5%" in title)
+    assert cover.words in lines[0]
