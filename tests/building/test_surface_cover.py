@@ -74,7 +74,7 @@ def test_a_surface_that_loses_sheets_says_so_everywhere(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    level = ("--iso-value", str(LEVEL))
+    level = ("--iso-value", f"Channel0={LEVEL:g}")
     assert make_assets(source, out, "1x1", "--workers", "0", plan=level) == 0
     units = capsys.readouterr().err
     assert main(["check", str(out), "--deep", "--workers", "0"]) == 0

@@ -223,6 +223,7 @@ def _unit(**changed: object) -> UnitFacts:
         "ktx2_bytes": 30,
         "fragments_dropped": 0,
         "cavities_filled": 0,
+        "cover": None,
         "seconds": {"read": 1.0},
     }
     return UnitFacts(**{**values, **changed})  # type: ignore[arg-type]

@@ -52,6 +52,7 @@ class UnitFacts:
     reason      the reason for a missing surface; empty: there is one
     voxels      (x, y, z) of the stored volume, with its apron
     volume_bytes, ktx2_bytes  stored 8-bit voxels; volume and bricks in the bundle (0: none yet)
+    cover       of the source's voxels by the surface; None: the channel has no level
     seconds     by step; empty where they were lost
     """
 
