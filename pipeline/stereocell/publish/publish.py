@@ -64,7 +64,7 @@ class _File:
 
 @dataclass(frozen=True, slots=True)
 class _Work:
-    """What there is to do at a target.
+    """The changes that a run makes at a target.
 
     there    bytes of each file at the target
     before   the entries of the files that an earlier run has put there
@@ -156,7 +156,7 @@ def _put(
     entries = {path: file.entry for path, file in files.items()}
     if not (work.changed or work.gone or work.before != entries):
         return
-    # what is about to be there is ours, too, should this run be killed
+    # The list names the coming files first. A run that is killed then finds them as its own.
     unsure = dict.fromkeys((*work.gone, *work.changed))
     target.write(PUBLISHED, list_of({**work.before, **entries, **unsure}, specimen))
     _upload(target, files, work.changed, report)

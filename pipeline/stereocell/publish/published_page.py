@@ -1,4 +1,4 @@
-"""What lies at a target already: an earlier page of the same specimen, as it was published, or not.
+"""Compare a target with what an earlier run published there, and protect what somebody changed.
 
 The list that publishing leaves there holds the specimen and a hash of each file. So a page of
 another specimen, a file that somebody changed since, and files of somebody else are refused by
