@@ -52,7 +52,7 @@ def find_remarks(facts: Facts) -> list[Remark]:
             "channel",
         ),
         _remark(
-            "whose surface covers the source's voxels above its level",
+            "with the share of the source's voxels above the level that the surface covers",
             [line for line, cover in _covers(units) if cover.missing <= MAX_MISSING],
             "channel",
             is_note=True,

@@ -32,6 +32,15 @@ export type MediumTexels = Readonly<{
 /** Where a channel's volumes come from, by tile. */
 export type ChannelSources = Readonly<{ id: string; tiles: ReadonlyMap<string, VolumeSource> }>;
 
+/**
+ * The channels that have volumes of their own. A second surface of a channel has none, because it
+ * shares the first one's. A list that could not be loaded (null) has been reported before.
+ */
+export const withVolumes = (
+  channels: readonly Readonly<{ id: string; tiles: ChannelSources["tiles"] | null }>[],
+): readonly ChannelSources[] =>
+  channels.flatMap(({ id, tiles }) => (tiles === null || tiles.size === 0 ? [] : [{ id, tiles }]));
+
 export class MediumLoader {
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private worker: Worker | null = null;

@@ -18,7 +18,7 @@ import { showsBelow } from "../volumes/volume_set";
 import type { VolumeSource } from "../volumes/volume_source";
 import type { Marched } from "./denoise_and_tone";
 import { loadEnvironment, readEnvironment } from "./environment_file";
-import { type ChannelSources, MediumLoader, type MediumTexels } from "./medium_loader";
+import { type ChannelSources, MediumLoader, type MediumTexels, withVolumes } from "./medium_loader";
 import type { Tracer } from "./path_tracer";
 import { frameOf } from "./texel_frame";
 import type { TraceScene } from "./uniforms";
@@ -271,10 +271,7 @@ export class TracedVolume {
         channels.map(async (id) => ({ id, tiles: await this.volumes.sourcesOf(id) })),
       );
       if (abort.signal.aborted) return;
-      // a missing list of a channel has been reported
-      this.sources = found.flatMap((each) =>
-        each.tiles === null ? [] : [{ id: each.id, tiles: each.tiles }],
-      );
+      this.sources = withVolumes(found);
       if (this.sources.length > 0 && !this.streams(tiles)) {
         await this.loader.load(this.sources, tiles, this.limits, abort.signal, (texels) => {
           this.texels = texels;
