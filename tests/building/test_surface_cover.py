@@ -42,8 +42,9 @@ def test_shares_are_those_of_both_counts() -> None:
     cover = Cover(200, 150, 160) + Cover(0, 0, 0)
     assert cover.missing == pytest.approx(0.25)
     assert cover.added == pytest.approx(10 / 160)
-    assert "covers 75.0% of the source's voxels above its level, and 6.2% of it lie below" in (
-        cover.words
+    assert cover.words == (
+        "the solid covers 75.0% of the source's voxels above the level, and 6.2% of the solid lies "
+        "below it"
     )
     assert (Cover(0, 0, 0).missing, Cover(0, 0, 0).added) == (0, 0)
 

@@ -93,8 +93,8 @@ class Cover:
     def words(self) -> str:
         """Both shares, for a reader."""
         return (
-            f"it covers {1 - self.missing:.1%} of the source's voxels above its level, and "
-            f"{self.added:.1%} of it lie below"
+            f"the solid covers {1 - self.missing:.1%} of the source's voxels above the level, and "
+            f"{self.added:.1%} of the solid lies below it"
         )
 
 
