@@ -46,7 +46,8 @@ def count_absent(
     count = _COUNTERS.get(format_of(dataset.source))
     if count is None or not states.is_complete:
         return None
-    return count(array.array, _spans(array, dataset.time, channels, box), states)
+    stored = getattr(array.array, "array", array.array)  # the array that --dark inverts
+    return count(stored, _spans(array, dataset.time, channels, box), states)
 
 
 def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
