@@ -33,6 +33,7 @@ _ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
 _FILE_SUFFIXES = {
     "tiff": _TIFF_SUFFIXES,
     "nifti": _NIFTI_SUFFIXES,
+    "mgh": (".mgh", ".mgz", ".mgh.gz"),
     "ims": (".ims",),
     "hdf5": (".h5", ".hdf5", ".hdf", ".nc", ".nc4", ".mat", ".emd"),
     "nrrd": (".nrrd", ".nhdr"),
