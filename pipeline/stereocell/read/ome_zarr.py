@@ -35,7 +35,14 @@ from stereocell.read.zarr_collections import (
     part_of,
     series_of,
 )
-from stereocell.read.zarr_store import GuardedStore, files_of, open_array, open_store, quiet
+from stereocell.read.zarr_store import (
+    GuardedStore,
+    files_of,
+    notes_on_names,
+    open_array,
+    open_store,
+    quiet,
+)
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -120,7 +127,7 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
         colors,
         len(multiscales),
         files=files_of(location, paths),
-        notes=notes_on_labels(tree),
+        notes=(*notes_on_names(level.array for level in arrays), *notes_on_labels(tree)),
         labels=labels_evidence(ome, location),
         objects=notes_of_ngff(ome.get("image-label")),
     )

@@ -13,6 +13,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Any
 
 import zarr
@@ -23,6 +24,7 @@ from zarr.core.buffer import BufferPrototype
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
 from stereocell.read import zarr_ending  # noqa: F401  (it registers a function for Python's end)
+from stereocell.read.zarr_chunk_names import OtherNames, find_other_names
 from stereocell.storage.first_bytes import HEAD_BYTES, pointer_words
 from stereocell.storage.library_errors import (
     DamagedError,
@@ -39,43 +41,65 @@ _ROOM = 1 << 20  # bytes beyond a chunk's decoded size: poor compression, checks
 _BLOSC_HEADER = struct.Struct("<4B3I")  # last three, bytes: decoded, of a block, encoded
 
 
+@dataclass(frozen=True, slots=True)
+class Chunks:
+    """The chunks of one array.
+
+    codecs  names of the bytes-to-bytes codecs, in the order of encoding
+    size    bytes of a decoded chunk; None: only metadata are read
+    array   path of the array's metadata file: once it is gone, a missing chunk isn't empty
+    others  names of chunks that the metadata name otherwise; None: there are none
+    """
+
+    codecs: tuple[str, ...] = ()
+    size: int | None = None
+    array: str = ""
+    others: OtherNames | None = None
+
+
 class GuardedStore(WrapperStore[Store]):
     """Refuses files outside the group, truncated chunks and chunks that decode to too many bytes.
 
     location  of the group
-    codecs    names of the bytes-to-bytes codecs, in the order of encoding
-    chunk     bytes of a decoded chunk; None: only metadata are read
-    array     path of the array's metadata file: once it is gone, a missing chunk isn't empty
+    chunks    of the array that is read; None: only metadata are read
 
     Reads raise OSError for these, SourceError for a path outside the group.
     """
 
-    def __init__(
-        self,
-        store: Store,
-        location: Location,
-        codecs: tuple[str, ...] = (),
-        chunk: int | None = None,
-        array: str = "",
-    ) -> None:
+    def __init__(self, store: Store, location: Location, chunks: Chunks | None = None) -> None:
         super().__init__(store)
         self._location, self._folder = location, location.folder
-        self._codecs, self._chunk, self._array = codecs, chunk, array
+        self._chunks = chunks or Chunks()
 
     def _with_store(self, store: Store) -> "GuardedStore":
-        return type(self)(store, self._location, self._codecs, self._chunk, self._array)
+        return type(self)(store, self._location, self._chunks)
+
+    @property
+    def other_names(self) -> OtherNames | None:
+        """The names of chunks that the array's metadata name otherwise; None: there are none."""
+        return self._chunks.others
 
     async def get(
         self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
-        """Return the bytes at a key, checked; None: there are none."""
+        """Return the bytes at a key, or at the other name of its chunk; None: there are none."""
+        value = await self._checked(key, prototype, byte_range)
+        others = self._chunks.others
+        if value is None and others is not None and (other := others.key_of(key)):
+            return await self._checked(other, prototype, byte_range)
+        return value
+
+    async def _checked(
+        self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None
+    ) -> Buffer | None:
         is_metadata = key.rsplit("/", 1)[-1] in _METADATA
-        most = _METADATA_BYTES if is_metadata or self._chunk is None else self._most(2)
+        size, array = self._chunks.size, self._chunks.array
+        most = _METADATA_BYTES if is_metadata or size is None else self._most(2)
         self._require_own(key, most)
         value = await self._store.get(key, prototype, byte_range)
-        if value is None and self._array and not await self._store.exists(self._array):
-            raise OSError(f"{self._array} is gone since it was opened")
-        if value is not None and not is_metadata and byte_range is None and self._chunk is not None:
+        if value is None and array and not await self._store.exists(array):
+            raise OSError(f"{array} is gone since it was opened")
+        if value is not None and not is_metadata and byte_range is None and size is not None:
             if words := pointer_words(value[:HEAD_BYTES].to_bytes()):
                 raise OSError(f"chunk {key}: found {words}")
             self._require_fit(key, value)
@@ -105,10 +129,10 @@ class GuardedStore(WrapperStore[Store]):
             raise OSError(f"{key}: {found.st_size} bytes, over the {most} that it may have")
 
     def _most(self, times: int) -> int:
-        return times * (self._chunk or 0) + _ROOM
+        return times * (self._chunks.size or 0) + _ROOM
 
     def _require_fit(self, key: str, value: Buffer) -> None:
-        codecs = list(self._codecs)
+        codecs = list(self._chunks.codecs)
         end = len(value)
         while codecs and codecs[-1] == "crc32c":
             codecs.pop()
@@ -198,6 +222,12 @@ def open_store(location: Location) -> Store:
         )
 
 
+def notes_on_names(arrays: Iterable["zarr.Array[Any]"]) -> tuple[str, ...]:
+    """Return a note for each array whose chunks are not named as its metadata state."""
+    found = ((array, getattr(array.store, "other_names", None)) for array in arrays)
+    return tuple(names.note(array.ndim) for array, names in found if names is not None)
+
+
 def files_of(location: Location, arrays: Sequence[str]) -> tuple[str, ...]:
     """Return all that is read of a group: the folders of its arrays, and its own metadata.
 
@@ -234,5 +264,7 @@ def open_array(
         size = math.prod(array.shards or array.chunks) * (item_bytes or array.dtype.itemsize)
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
         # not `path`, which may end in a slash
-        guard = GuardedStore(store, location, codecs, size, f"{array.path}/{named}".lstrip("/"))
+        names = find_other_names(location, array)
+        chunks = Chunks(codecs, size, f"{array.path}/{named}".lstrip("/"), names)
+        guard = GuardedStore(store, location, chunks)
         return zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
