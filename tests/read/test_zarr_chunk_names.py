@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,6 @@ import zarr
 from stereocell import read
 from stereocell.building import input_files
 from stereocell.cli.__main__ import main
-from stereocell.read.zarr_chunk_names import find_other_names
-from stereocell.storage.location import Location
 from support.phantoms import f_phantom, write_ome_zarr
 
 BODY = f_phantom()
@@ -81,15 +80,14 @@ def test_a_bare_array_is_read_by_the_names_of_its_files(tmp_path: Path) -> None:
     assert "the files are named as 0.0.0" in dataset.notes[0]
 
 
-def test_names_are_looked_for_at_an_address_that_lists_no_folder(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.zarr", 2, NAMED[2][1], NAMED[2][0])
-    array = zarr.open_array(path / "0", mode="r")
-    found = find_other_names(Location("https://there/a.zarr/0", False), array)
-    assert found is not None
-    assert found.key_of("1/2/0") == "1.2.0"
-    own = write(tmp_path / "b.zarr", 2, NAMED[2][0], NAMED[2][0])
-    there = zarr.open_array(own / "0", mode="r")
-    assert find_other_names(Location("https://there/b.zarr/0", False), there) is None
+def test_chunks_are_read_by_their_names_at_an_address(
+    tmp_path: Path, serve: Callable[[Path], Any]
+) -> None:
+    for number, (lies, says) in enumerate(zip(NAMED[2], reversed(NAMED[2]), strict=True)):
+        path = write(tmp_path / f"{number}.zarr", 2, lies, says)
+        server = serve(tmp_path)
+        voxels, _ = voxels_of(f"{server.url}/{path.name}")
+        np.testing.assert_array_equal(voxels, BODY)
 
 
 def plan(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset, VoxelArray
+from stereocell.read.file_array import FlippedArray
 from stereocell.read.readers import format_of
 from stereocell.storage.file_states import FileStates
 
@@ -43,10 +44,14 @@ def count_absent(
     states  the source's files, as they were listed
     """
     array = dataset.arrays[level]
+    stored: Any = array.array
+    spans = _spans(array, dataset.time, channels, box)
+    while isinstance(stored, FlippedArray):
+        stored, spans = stored.stored, stored.stored_spans(spans)
     count = _COUNTERS.get(format_of(dataset.source))
     if count is None or not states.is_complete:
         return None
-    return count(array.array, _spans(array, dataset.time, channels, box), states)
+    return count(stored, spans, states)
 
 
 def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
@@ -57,7 +62,7 @@ def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
     sizes, noun = (stored.shards, "shard") if stored.shards else (stored.chunks, "chunk")
     if _number(sizes, spans) > _MOST_COUNTED:
         return None
-    others, names = stored.store.other_names, states.names()
+    others, names = stored.store.other_names, stored.store.members or states.names()
 
     def is_present(place: tuple[int, ...]) -> bool:
         key = f"{stored.path}/{stored.metadata.encode_chunk_key(place)}".lstrip("/")

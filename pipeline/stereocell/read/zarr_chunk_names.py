@@ -3,14 +3,14 @@
 A copy through another program or an edited `.zarray` leaves chunks `0.0.0` behind metadata that
 state `0/0/0`, or the reverse. Zarr then reads each chunk as absent, and the volume as empty. Both
 separators of both encodings are looked for, and a chunk without a file of the stated name is read
-from a file of the other name.
+from a file of the other name. On this machine the folder is listed when it is opened; at an address
+the other names are tried when a chunk is absent, which costs no request before.
 
 References: Zarr 3 specification, section on chunk key encodings; Zarr 2, `dimension_separator`
 """
 
 import os
 import re
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,6 @@ from zarr.core.chunk_key_encodings import (
     DefaultChunkKeyEncoding,
     V2ChunkKeyEncoding,
 )
-from zarr.core.sync import sync
 
 from stereocell.storage.location import Location
 
@@ -66,21 +65,23 @@ class OtherNames:
         )
 
 
-def find_other_names(location: Location, array: "zarr.Array[Any]") -> OtherNames | None:
+def possible_names(array: "zarr.Array[Any]") -> tuple[OtherNames, ...]:
+    """Return the names that chunks may have beside those that the metadata state."""
+    count = len(array.shape)
+    if count < 2:
+        return ()
+    first = array.metadata.encode_chunk_key((0,) * count)
+    others = (one for one in _ENCODINGS if _form(one, count) != first)
+    return tuple(OtherNames(array.path, first, one) for one in others)
+
+
+def names_on_disk(location: Location, array: "zarr.Array[Any]") -> OtherNames | None:
     """Return the names by which chunks lie that the metadata name otherwise; None: there are none.
 
-    On this machine the folder is listed. At an address the first, the middle and the last chunk are
-    looked for, and only where none of them has its stated name.
+    The array is on this machine, in a folder that can be listed.
     """
-    sizes = array.shards or array.chunks
-    counts = [max(-(-n // size), 1) for n, size in zip(array.shape, sizes, strict=True)]
-    if len(counts) < 2:
-        return None
-    first = array.metadata.encode_chunk_key((0,) * len(counts))
-    others = [one for one in _ENCODINGS if one.encode_chunk_key((0,) * len(counts)) != first]
-    has_files = _listed(location, array) if location.is_local else _probed(array, counts, others)
-    found = next((one for one in others if _form(one, len(counts)) in has_files), None)
-    return None if found is None else OtherNames(array.path, first, found)
+    forms, count = _listed(location, array), len(array.shape)
+    return next((one for one in possible_names(array) if _form(one.found, count) in forms), None)
 
 
 def _form(encoding: ChunkKeyEncoding, dimensions: int) -> str:
@@ -103,26 +104,3 @@ def _listed(location: Location, array: "zarr.Array[Any]") -> set[str]:
     except OSError:  # the reader reports it
         return set()
     return forms
-
-
-def _probed(
-    array: "zarr.Array[Any]", counts: Sequence[int], others: Sequence[ChunkKeyEncoding]
-) -> set[str]:
-    """Return the forms of the names that some chunks have at an address."""
-    if any(_is_there(array, array.metadata.encode_chunk_key(at)) for at in _places(counts)):
-        return set()
-    return {
-        _form(one, len(counts))
-        for one in others
-        if any(_is_there(array, one.encode_chunk_key(at)) for at in _places(counts))
-    }
-
-
-def _places(counts: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    """Yield the first, the middle and the last chunk, each once."""
-    ends = [(0,) * len(counts), tuple(n // 2 for n in counts), tuple(n - 1 for n in counts)]
-    yield from dict.fromkeys(ends)
-
-
-def _is_there(array: "zarr.Array[Any]", key: str) -> bool:
-    return bool(sync(array.store.exists(f"{array.path}/{key}".lstrip("/"))))

@@ -11,7 +11,7 @@ import lzma
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
@@ -23,8 +23,10 @@ from zarr.abc.store import ByteRequest, RangeByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
+from stereocell.model.errors import SourceError
 from stereocell.read import zarr_ending  # noqa: F401  (it registers a function for Python's end)
-from stereocell.read.zarr_chunk_names import OtherNames, find_other_names
+from stereocell.read.zarr_chunk_names import OtherNames, names_on_disk, possible_names
+from stereocell.read.zarr_zip import ZippedStore, is_zipped, open_zipped
 from stereocell.storage.first_bytes import HEAD_BYTES, pointer_words
 from stereocell.storage.library_errors import (
     DamagedError,
@@ -38,6 +40,7 @@ from stereocell.storage.location import Location, require_own, require_own_key
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
 _METADATA_BYTES = 64 << 20  # largest size of a metadata file in bytes
 _ROOM = 1 << 20  # bytes beyond a chunk's decoded size: poor compression, checksums, an index
+_MOST_MISSES = 8  # absent chunks at an address for which other names are tried in vain
 _BLOSC_HEADER = struct.Struct("<4B3I")  # last three, bytes: decoded, of a block, encoded
 
 
@@ -48,13 +51,14 @@ class Chunks:
     codecs  names of the bytes-to-bytes codecs, in the order of encoding
     size    bytes of a decoded chunk; None: only metadata are read
     array   path of the array's metadata file: once it is gone, a missing chunk isn't empty
-    others  names of chunks that the metadata name otherwise; None: there are none
+    others  names of chunks that the metadata name otherwise: those that were found on this
+            machine, or those that are tried at an address
     """
 
     codecs: tuple[str, ...] = ()
     size: int | None = None
     array: str = ""
-    others: OtherNames | None = None
+    others: tuple[OtherNames, ...] = ()
 
 
 class GuardedStore(WrapperStore[Store]):
@@ -70,23 +74,37 @@ class GuardedStore(WrapperStore[Store]):
         super().__init__(store)
         self._location, self._folder = location, location.folder
         self._chunks = chunks or Chunks()
+        self._tried, self._misses = self._chunks.others, 0
 
     def _with_store(self, store: Store) -> "GuardedStore":
         return type(self)(store, self._location, self._chunks)
 
     @property
+    def members(self) -> Set[str] | None:
+        """The names of all files in a zip file; None: the source is no zip file."""
+        return self._store.sizes.keys() if isinstance(self._store, ZippedStore) else None
+
+    @property
     def other_names(self) -> OtherNames | None:
         """The names of chunks that the array's metadata name otherwise; None: there are none."""
-        return self._chunks.others
+        others = self._chunks.others
+        return others[0] if self._location.is_local and others else None
 
     async def get(
         self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
         """Return the bytes at a key, or at the other name of its chunk; None: there are none."""
         value = await self._checked(key, prototype, byte_range)
-        others = self._chunks.others
-        if value is None and others is not None and (other := others.key_of(key)):
-            return await self._checked(other, prototype, byte_range)
+        tried = self._tried
+        for names in self._tried if value is None else ():
+            if other := names.key_of(key):
+                value = await self._checked(other, prototype, byte_range)
+            if value is not None:
+                self._tried = (names,)
+                return value
+        if value is None and len(tried) > 1:
+            self._misses += 1
+            self._tried = tried if self._misses < _MOST_MISSES else ()
         return value
 
     async def _checked(
@@ -125,8 +143,11 @@ class GuardedStore(WrapperStore[Store]):
             require_own_key(key, named)
             return
         found = require_own(f"{self._location.source}/{key}", [self._folder], named=named)
-        if found is not None and found.st_size > most:
-            raise OSError(f"{key}: {found.st_size} bytes, over the {most} that it may have")
+        size = found.st_size if found is not None else 0
+        if isinstance(self._store, ZippedStore):
+            size = self._store.sizes.get(key, 0)
+        if size > most:
+            raise OSError(f"{key}: {size} bytes, over the {most} that it may have")
 
     def _most(self, times: int) -> int:
         return times * (self._chunks.size or 0) + _ROOM
@@ -214,8 +235,15 @@ def quiet() -> AbstractContextManager[None]:
 
 def open_store(location: Location) -> Store:
     """Return the store of a group or an array; its reads are to go through a GuardedStore."""
+    if is_zipped(location):
+        return open_zipped(location)
     if location.is_local:
         return LocalStore(location.source, read_only=True)
+    if location.format == "ome-zarr" and location.shown.endswith((".ozx", ".zip")):
+        raise SourceError(
+            f"{location.shown}: a zip file at an address, expected a path on this machine: copy it "
+            "here first, or unpack it there"
+        )
     with one_line(location.shown, "an address that fsspec opens"):
         return FsspecStore.from_url(
             location.source, storage_options=location.storage_options, read_only=True
@@ -233,6 +261,8 @@ def files_of(location: Location, arrays: Sequence[str]) -> tuple[str, ...]:
 
     An address of `http` can't list a folder, so it has the arrays' metadata in their place.
     """
+    if is_zipped(location):
+        return (location.path,)
     root = location.source.rstrip("/")
     metadata = [f"{root}/{name}" for name in _METADATA]
     folders = [f"{root}/{path}".rstrip("/") for path in arrays]
@@ -264,7 +294,10 @@ def open_array(
         size = math.prod(array.shards or array.chunks) * (item_bytes or array.dtype.itemsize)
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
         # not `path`, which may end in a slash
-        names = find_other_names(location, array)
+        names = possible_names(array)
+        if location.is_local:
+            found = None if is_zipped(location) else names_on_disk(location, array)
+            names = (found,) if found is not None else ()
         chunks = Chunks(codecs, size, f"{array.path}/{named}".lstrip("/"), names)
         guard = GuardedStore(store, location, chunks)
         return zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
