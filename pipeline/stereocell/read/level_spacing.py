@@ -16,7 +16,7 @@ _ROUNDING = 1.0 + 1e-6  # voxels by which repeated rounding changes the length o
 
 def settle_levels(grids: Sequence[Grid]) -> tuple[tuple[Grid, ...], tuple[str, ...]]:
     """Return grids whose spacings fit their shapes, and a note for each one that was changed."""
-    settled, notes = [grids[0]], []
+    settled, notes = [grids[0]], list[str]()
     for index, grid in enumerate(grids[1:], start=1):
         spacing = list(grid.spacing_um or ())
         offset = list(grid.offset_um or ())

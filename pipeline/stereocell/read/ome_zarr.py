@@ -101,21 +101,21 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
             "attribute `multiscales` of an image"
         )
     with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.1 to 0.6"):
-        image = ngff.parse(where, ome)
-    if not 0 < len(image.paths) <= _MAX_LEVELS:
+        multiscale = ngff.parse(where, ome)
+    if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
-            f"{where}: multiscales[0].datasets: found {len(image.paths) or 'none'}, expected a "
+            f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected a "
             f"level, and at most {_MAX_LEVELS}"
         )
-    levels, notes = _levels(location, store, image, axes, metadata.zarr_format)
+    levels, notes = _levels(location, store, multiscale, axes, metadata.zarr_format)
     missing = [axis for axis in "zyx" if axis not in levels[0].axes]
     if missing:
         raise SourceError(
             f"{where}: one plane (2D): a volume needs at least 2 planes: no axis {missing[0]} "
             f"among {', '.join(levels[0].axes)}"
         )
-    grids, more, files = _grids(location, image, levels)
-    sided = with_sides(levels, grids, [_of_axis(image, axis) for axis in "zyx"])
+    grids, more, files = _grids(location, multiscale, levels)
+    sided = with_sides(levels, grids, [_of_axis(multiscale, axis) for axis in "zyx"])
     omero = ome.get("omero", {})
     channels = omero.get("channels", []) if isinstance(omero, Mapping) else omero
     titles, colors = _channels(where, channels, levels[0].size("c"))
@@ -125,11 +125,11 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
         titles,
         colors,
         len(multiscales),
-        files=(*files_of(location, image.paths), *files),
+        files=(*files_of(location, multiscale.paths), *files),
         placement=sided.placement,
         has_sides=sided.has_sides,
         acquired=sided.acquired,
-        notes=(*image.notes, *notes, *more, *sided.notes, *notes_on_labels(tree)),
+        notes=(*multiscale.notes, *notes, *more, *sided.notes, *notes_on_labels(tree)),
         labels=labels_evidence(ome, location),
         objects=notes_of_ngff(ome.get("image-label")),
     )
