@@ -18,8 +18,8 @@ class InvertedArray:
     def __init__(self, array: StoredArray) -> None:
         self.shape, self.chunks = tuple(array.shape), tuple(array.chunks)
         self.dtype = array.dtype
-        self.array = array
+        self.stored = array
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
-        found = np.asarray(self.array[key])
+        found = np.asarray(self.stored[key])
         return -found if found.dtype.kind == "f" else ~found

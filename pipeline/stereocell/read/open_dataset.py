@@ -13,6 +13,7 @@ from stereocell.read.cast import TAKEN, built_dtype
 from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
 from stereocell.read.image import Image, printable
 from stereocell.read.inverted_array import InvertedArray
+from stereocell.read.level_spacing import settle_levels
 from stereocell.read.readers import find_reader
 from stereocell.read.remarks import cast_note
 from stereocell.read.spacing import Triple, levels_of
@@ -72,6 +73,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     where = location.shown
     finest = image.arrays[0]
     _check_arrays(where, image)
+    grids, level_notes = settle_levels(image.grids)
     if not 0 <= time < finest.size("t"):
         raise UsageError(
             f"{where}: --time: found {time}, expected 0 to {finest.size('t') - 1} "
@@ -83,7 +85,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         source=location.source,
         name=image.title or printable(location.name) or "dataset",
         dtype=built_dtype(finest.array.dtype) or np.dtype(finest.array.dtype),
-        levels=levels_of(image.grids, spacing_um, where),
+        levels=levels_of(grids, spacing_um, where),
         channels=tuple(channels),
         time_points=finest.size("t"),
         time=time,
@@ -96,6 +98,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         has_sides=image.has_sides,
         remarks=(
             *map(printable, image.notes),  # which may name files
+            *level_notes,
             *filter(None, [cast_note(finest.array.dtype)]),
             *(image.notes_at(time) if image.notes_at is not None else ()),
         ),
