@@ -1,6 +1,7 @@
 """Notes beside a plan: gaps in the data, ignored settings, changes since the plan before."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from stereocell.building.channels import ALL, Channel
 from stereocell.building.input_files import first_states, open_watched
@@ -99,7 +100,7 @@ def changes_of(there: Plan, plan: Plan) -> str:
 
     there  the plan in OUT, which `plan` replaces. Results that depend on the changes follow
     """
-    if there == plan:
+    if replace(there, notes=plan.notes) == plan:
         return ""
     old, new = to_dict(there.settings), to_dict(plan.settings)
     changes = [
