@@ -12,6 +12,7 @@ from typing import Any
 
 from stereocell.building import stage_tasks
 from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
+from stereocell.building.hounsfield import without_hounsfield
 from stereocell.building.input_files import open_anew, require_table, watch_table
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
@@ -122,6 +123,8 @@ def settle(source: str, settings: Settings) -> Plan:
     _require_labels(settings)
     dataset = open_anew(as_asked(location, options))
     modality = dataset.modality or options.modality
+    if not dataset.has_hounsfield_units:
+        settings, modality = without_hounsfield(settings), ""
     alone = are_alone(settings.labels)
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
