@@ -107,6 +107,8 @@ def require_kind(location: Location, format_name: str, title: str) -> None:
             f"{header!r:.100}, expected an MRC or CCP4 file: make NIfTI of the pair by dcm2niix"
         )
     content, kind = identify(head), _KINDS.get(format_name)
+    if format_name == "ome-zarr" and location.is_zarr_archive:
+        return
     if format_name in _FOLDERS:
         raise SourceError(
             f"{location.shown}: found a file ({content.words}), expected a folder of {title}"

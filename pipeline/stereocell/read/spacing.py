@@ -182,8 +182,9 @@ def _missing(grid: Grid) -> str:
     stated = zip("zyx", grid.partial_um, strict=True)
     found = [f"{axis} {value:.5g} um" for axis, value in stated if value is not None]
     if not found:
+        hint = f" ({grid.hint})" if grid.hint else ""
         return (
-            "not found with a unit of length; "
+            f"not found with a unit of length{hint}; "
             "expected it in the metadata, or give it with --spacing-um z,y,x"
         )
     lacking = [a for a, value in zip("zyx", grid.partial_um, strict=True) if value is None]
