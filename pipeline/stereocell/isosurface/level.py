@@ -16,8 +16,8 @@ WITHIN = {"separation": 0.66, "sharpness": 0.08, "snr": 12.0}
 # Share of each bound above that a level must reach to fall short of "clear" by only a little. At .8
 # no volume of nothing and no made volume of the corpus gets another level. At .7 noise does.
 NEARLY = 0.8
-# ... and what tells it from noise: a normal distribution has a separation of .64 at half height, and
-# noise and textures a steepness of up to .81
+# The bounds that tell a level from noise lie nearer: a normal distribution has a separation of .64
+# at half height, and noise and textures have a steepness of up to .81
 NEARLY_SEPARATION, NEARLY_STEEPNESS = 0.66, 0.85
 FEW_INSIDE = 0.01  # share of all voxels: a clear level with less inside may be a speck of the outer
 # Of a level that is an edge beyond doubt, as that of bodies much dimmer than others. An edge of its
