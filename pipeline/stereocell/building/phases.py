@@ -165,11 +165,14 @@ def settle(source: str, settings: Settings) -> Plan:
     )
     if settings.objects.table:
         watch_table(settings.objects.table)
+    objects = []
     for one in plan.labels:
-        # what can't be read, or isn't there, is told before the build
-        require_color_by(plan, one, table_of(plan, one))
+        # a table that can't be read, or lacks a column, ends the command before the build
+        table = table_of(plan, one)
+        require_color_by(plan, one, table)
+        objects += [f"{table.shown}: {note}" for note in table.notes] if table else []
     gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
-    objects = list(told_before(plan))
+    objects += told_before(plan)
     objects += filter(None, map(doubt_of, plan.labels))
     if settings.objects.table and len(plan.labels) > 1:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")

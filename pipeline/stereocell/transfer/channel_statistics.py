@@ -96,11 +96,13 @@ def make_appearance(
     confidence: float,
     doubt: str,
     modality: str = "",
+    level_percentile: float = 99.0,
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
 
     doubt     why there is no level, or why the level cannot be called clear; empty: it can
     modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
+    level_percentile  percent of the voxels below the level of a volume without a surface
     """
     iso_value, threshold = None, None
     if level is not None:
@@ -135,6 +137,7 @@ def make_appearance(
         appearance.iso_normalized,
         threshold_normalized=appearance.threshold_normalized,
         has_magnitudes=modality == "MR",
+        level_percentile=level_percentile,
     )
     if modality == "CT":
         functions |= tissue_functions(statistics.window)
