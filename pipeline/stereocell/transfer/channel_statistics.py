@@ -100,6 +100,7 @@ def make_appearance(
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
 
+    doubt     why there is no level, or why the level cannot be called clear; empty: it can
     modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
     level_percentile  percent of the voxels below the level of a volume without a surface
     """
@@ -110,7 +111,10 @@ def make_appearance(
         # where nothing tells a surface from noise, peaks of the histogram are noise too
         threshold = statistics.threshold
     surface: SurfaceConfidence = "none" if level is None else "clear"
-    if level is not None and confidence < LOW_CONFIDENCE:
+    if level is not None and doubt:
+        surface = "unsure"
+        doubt = f"unsure surface: at {level.words}: {doubt}"
+    elif level is not None and confidence < LOW_CONFIDENCE:
         surface = "unsure"
         doubt = (
             f"unsure surface: at {level.words} with a confidence of {confidence:.2f}; "
