@@ -93,7 +93,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
         if holder is not None:
             pieces = ", ".join(holder.pieces)
             console.print(
-                f"units: {name}: a table or holder is left out of the surface: {pieces}",
+                f"units: {name}: a table or holder is left out: {pieces} (--keep-holder builds it)",
                 markup=False,
             )
     evidence = _evidence(out_folder, plan, engine, windows)
@@ -189,7 +189,9 @@ def _of_channel(
     file: str,
 ) -> ChannelSurvey:
     level = found.rungs[chosen] if found.rungs else None
-    confidence = level.confidence if isinstance(level, Level) else float(level is not None)
+    # a level that the settings state is not rated: nothing was guessed
+    is_rated = isinstance(level, Level) and not found.is_given
+    confidence = level.confidence if is_rated else float(level is not None)
     values = {tile: one.value for tile, one in iso.items()}
     known = [value for value in values.values() if value is not None]
     painter, surface = plan.painter(channel), None

@@ -41,7 +41,7 @@ from stereocell.usd.layer import (
 from stereocell.usd.numbers2d import write_numbers
 from stereocell.usd.write_objects import write_columns
 
-DEFAULT_FUNCTION = "default"
+DEFAULT_FUNCTION = "default"  # what a stage that selects no function is drawn with
 _STORM = "glslfx"  # Storm's name among the render contexts of materials
 ROUGHNESS = 0.5  # roughness of all surfaces: the default of UsdPreviewSurface
 
@@ -176,7 +176,7 @@ def _author_functions(prim: Usd.Prim, appearance: Appearance) -> None:
             set_attribute(prim, "stereocell:lut", _Types.Asset, f"./{_lut_name(appearance, name)}")
             if name in appearance.transfer_2d.functions:
                 _author_shapes(prim, appearance.transfer_2d.functions[name])
-    variants.SetVariantSelection(DEFAULT_FUNCTION)
+    variants.SetVariantSelection(appearance.function)
 
 
 def _author_shapes(prim: Usd.Prim, shapes: Shapes) -> None:
