@@ -1,17 +1,20 @@
 """The transfer function that a channel opens with fits the channel's surface."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from stereocell.building.channels import Channel, has_brain
 from stereocell.building.settings import load, preset_names
 from stereocell.isosurface.options import parse_level
 from stereocell.model.channel import Appearance, SurfaceLevel
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
 from stereocell.transfer.opacity import evaluate
 from stereocell.transfer.windows import parse_window
+from support.plans import plan_of
 
 
 def _body_in_hounsfield_units(rng: np.random.Generator) -> NDArray[np.float64]:
@@ -90,3 +93,18 @@ def test_a_ct_is_solid_just_inside_its_skin() -> None:
     at = {hu: float(opacity[round(255 * (hu - low) / (high - low))]) for hu in (-700, -345, -100)}
     assert at[-700] == at[-345] == 0
     assert at[-100] > 0.4
+
+
+def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
+    plain = replace(plan_of(), modality="MR")
+    assert plain.opens_cut
+    assert not replace(plain, modality="CT").opens_cut
+    assert not plan_of().opens_cut
+    head = [
+        Channel(index, name, (1, 1, 1), source="classes.ome.zarr")
+        for index, name in enumerate(("CSF", "grey matter", "white matter"))
+    ]
+    assert not replace(plain, channels=(*plain.channels, *head)).opens_cut
+    assert replace(plain, channels=(*plain.channels, *head[:2])).opens_cut
+    # a channel of the input may have such a name
+    assert not has_brain([replace(one, source="") for one in head])

@@ -108,6 +108,7 @@ class Appearance:
     threshold         voxel value where the body begins (adaptive_threshold.py); None: not found
     surface_reason    why there is no surface, or why it is unsure; empty: a clear one
     function          the transfer function that the channel opens with
+    opens             whether the channel shows when the specimen is opened
     level             where exactly the surface lies; None: there is none
     """
 
@@ -124,6 +125,7 @@ class Appearance:
     surface_reason: str = ""
     level: SurfaceLevel | None = None
     function: str = "default"
+    opens: bool = True
 
     @property
     def id(self) -> str:

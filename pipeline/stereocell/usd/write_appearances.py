@@ -32,6 +32,7 @@ from stereocell.usd.layer import (
     BUILT_COLOR,
     CHANNEL_API,
     CHANNELS,
+    OPENS,
     PAINTED_BY,
     ROOT,
     export,
@@ -119,6 +120,8 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
         set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*appearance.window))
     set_attribute(prim, "stereocell:isoConfidence", _Types.Float, appearance.iso_confidence)
     set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, appearance.surface)
+    if not appearance.opens:
+        set_attribute(prim, OPENS, _Types.Bool, False)
     if appearance.surface_reason:
         reason = appearance.surface_reason
         set_attribute(prim, "stereocell:surfaceReason", _Types.String, reason)
