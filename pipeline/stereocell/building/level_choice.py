@@ -47,6 +47,7 @@ class Found:
               taken, unless its components speak against it
     doubt     why there is none
     is_fixed  whether all tiles have the same level, whatever they hold: a given one, or a mask's
+    is_given  whether the settings state the level: a standard, as 300 HU for bone, and no guess
     """
 
     window: Window
@@ -56,6 +57,7 @@ class Found:
     subtracts: bool
     doubt: str
     is_fixed: bool = False
+    is_given: bool = False
 
     @property
     def background(self) -> LatticeField | None:
@@ -70,7 +72,7 @@ def find_level(
     given = given_level(plan, channel)
     if not evidence:
         assert given is not None
-        return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True)
+        return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True, is_given=True)
     options = plan.settings.isovalue
     criterion = LADDER if channel.rung else options.criterion
     levels = find_levels(
@@ -90,7 +92,9 @@ def find_level(
         value, subtracts = given
         # where there is no background to be above, nothing can be said of such a level
         rated = levels.judge(value) if subtracts == levels.subtracts else value
-        return Found(window, levels, evidence, (rated,), subtracts, "", is_fixed=True)
+        return Found(
+            window, levels, evidence, (rated,), subtracts, "", is_fixed=True, is_given=True
+        )
     if (channel.rung or options.rung) == NO_SURFACE:
         reason = f"no surface is built by default (--surfaces {channel.name}=outer builds one)"
         return Found(window, levels, evidence, (), levels.subtracts, reason)
@@ -244,6 +248,8 @@ def level_of_tile(
     if found.levels is None or not isinstance(level, Level):
         return TileIso(_value_of(level), below, None, files)
     tile_evidence, value = found.evidence[tile.id], level.value
+    if found.is_given:
+        return TileIso(value, below, None, files)
     judged = found.levels.judge_tile(level, tile_evidence)
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
         value = found.levels.level_of_tile(level, tile_evidence)
