@@ -9,7 +9,7 @@ import pytest
 
 from stereocell.cli.__main__ import main
 
-_NOTE = "no unit of length in the header: mm are assumed"
+_NOTE = "unit of length: not stated"
 
 
 def _unitless(path: Path) -> str:
