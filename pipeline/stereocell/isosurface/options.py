@@ -180,6 +180,10 @@ class SurfaceOptions:
     keep_holder: bool = setting(
         False,
         "whether a CT's table and head holder, long pieces apart from the body, are built too",
+        flag=Flag(
+            "--keep-holder",
+            "build a CT's table and head holder too (default: left out of surface and volume)",
+        ),
     )
     background_um: float | str = setting(
         AUTO,
