@@ -68,7 +68,7 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
             f"{where}: axis c: found {array.size('c')}, expected at most {MAX_CHANNELS}"
         )
     unnamed = (None,) * array.size("c")
-    grid = grid_of(array.shape, found.spacing_um)
+    grid = grid_of(array.shape, found.spacing_um, found.hint)
     return Image(
         (array,), (grid,), unnamed, unnamed, 1, tree.close,
         notes=(*notes, *axes_notes, *found.notes, *value_notes), files=tree.files,
