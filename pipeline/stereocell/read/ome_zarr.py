@@ -104,8 +104,8 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
         multiscale = ngff.parse(where, ome)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
-            f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected a "
-            f"level, and at most {_MAX_LEVELS}"
+            f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
+            f"a level, and at most {_MAX_LEVELS}"
         )
     levels, notes = _levels(location, store, multiscale, axes, metadata.zarr_format)
     missing = [axis for axis in "zyx" if axis not in levels[0].axes]
