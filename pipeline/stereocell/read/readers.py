@@ -68,7 +68,7 @@ class Reader:
 
 READERS = {
     "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", has_axes=True, is_remote=True),
-    "tiff": Reader("stereocell.read.tiff", "TIFF", has_axes=True, is_remote=True),
+    "tiff": Reader("stereocell.read.tiff", "TIFF", has_series=True, has_axes=True, is_remote=True),
     "planes": Reader(
         "stereocell.read.planes",
         "a folder of TIFF, PNG or JPEG planes",

@@ -32,7 +32,9 @@ from stereocell.read.tiff.open_file import (
     refuse_short,
     require_series,
 )
+from stereocell.read.tiff.orientation import turn_of
 from stereocell.read.tiff.stated import stated_by
+from stereocell.read.turn import turned_image
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -89,7 +91,8 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         )
     unstated = (None,) * count
     shape = arrays[0].shape
-    return Image(
+    turn, turn_notes = turn_of(page)
+    image = Image(
         tuple(arrays),
         (
             grid_of(shape, stated.spacing_um, stated.hint),
@@ -99,9 +102,10 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         colors or (*stated.colors, *unstated)[:count],
         1,
         stack.close,
-        notes=tuple(notes),
+        notes=(*notes, *turn_notes),
         files=files,
     )
+    return turned_image(image, turn)
 
 
 def _are_planes(found: Sequence[TiffPageSeries]) -> bool:
