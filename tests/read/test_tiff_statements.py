@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
+from PIL import Image as PillowImage
 
 from stereocell import read
 from stereocell.model.errors import UsageError
@@ -76,13 +77,62 @@ def test_planes_stand_as_the_tag_orientation_states(tmp_path: Path, orientation:
     path = tmp_path / "a.tif"
     tifffile.imwrite(
         path, BODY, photometric="minisblack",
-        metadata={"axes": "ZYX", "spacing": 0.5, "unit": "um"}, resolution=(4.0, 5.0), extratags=[(274, "H", 1, orientation, True)],
+        metadata={"axes": "ZYX", "spacing": 0.5, "unit": "um"}, resolution=(4.0, 5.0),
+        extratags=[(274, "H", 1, orientation, True)],
     )  # fmt: skip
     dataset = read.open(path)
     np.testing.assert_array_equal(voxels_of(path), upright(BODY, orientation))
     y, x = (0.2, 0.25) if orientation < 5 else (0.25, 0.2)
     assert dataset.levels[0].spacing_um == pytest.approx((0.5, y, x))
     assert any("Orientation" in note for note in dataset.notes) == (orientation > 1)
+
+
+@pytest.mark.parametrize("orientation", [3, 4, 6, 8])
+@pytest.mark.parametrize("ending", ["tif", "jpg"])
+def test_planes_of_a_folder_stand_as_their_orientation_states(
+    tmp_path: Path, orientation: int, ending: str
+) -> None:
+    colour = np.repeat((BODY // 8).astype(np.uint8)[..., None], 3, axis=-1)
+    for number, plane in enumerate(BODY):
+        path = tmp_path / f"a_z{number:02d}.{ending}"
+        if ending == "tif":
+            tags: Any = [(274, "H", 1, orientation, True)]
+            tifffile.imwrite(path, plane, metadata=None, extratags=tags)
+        else:
+            exif = PillowImage.Exif()
+            exif[274] = orientation
+            PillowImage.fromarray(colour[number]).save(path, quality=100, exif=exif)
+    dataset = read.open(tmp_path, spacing_um=UM)
+    voxels = dataset.read(0, dataset.levels[0].box).voxels.astype(float)
+    expected = upright(BODY if ending == "tif" else colour[..., 0], orientation)
+    assert np.abs(voxels - expected).max() < (1 if ending == "tif" else 30)
+    assert any(f"Orientation {orientation}" in note for note in dataset.notes)
+
+
+@pytest.mark.parametrize(
+    ("function", "expected", "told"),
+    [
+        ({"cf": 0, "c0": -32768.0, "c1": 1.0, "vunit": "HU"}, BODY.astype(int) - 32768, "HU"),
+        ({"cf": 0, "c0": 0.5, "c1": 0.25, "vunit": "OD"}, BODY * 0.25 + 0.5, "0.5 + 0.25"),
+        ({"cf": 0, "c0": 0.0, "c1": 1.0, "vunit": "Gray Value"}, BODY, ""),
+        ({"cf": 1, "c0": 0.0, "c1": 1.0, "c2": 2.0, "vunit": "OD"}, BODY, "no straight line"),
+        ({"cf": 20}, BODY, ""),
+        ({}, BODY, ""),
+    ],
+)
+def test_a_calibration_of_imagej_is_applied(
+    tmp_path: Path, function: dict[str, Any], expected: Any, told: str
+) -> None:
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(
+        path, BODY, imagej=True, resolution=(4.0, 5.0),
+        metadata={"axes": "ZYX", "spacing": 0.5, "unit": "um", **function},
+    )  # fmt: skip
+    dataset = read.open(path)
+    np.testing.assert_array_equal(voxels_of(path), expected)
+    notes = [note for note in dataset.notes if "values:" in note]
+    assert len(notes) == bool(told)
+    assert all(told in note for note in notes)
 
 
 def test_the_orientation_of_ome_tiff_is_noted_and_not_applied(tmp_path: Path) -> None:

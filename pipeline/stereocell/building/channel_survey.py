@@ -21,6 +21,7 @@ from stereocell.building.level_choice import (
     Found,
     check_components,
     choose_rung,
+    find_doubt,
     find_level,
     given_level,
     level_of_tile,
@@ -208,8 +209,9 @@ def _of_channel(
         statistics=statistics,
         level=surface,
         confidence=confidence,
-        doubt=found.doubt,
+        doubt=found.doubt or find_doubt(found, chosen, list(iso.values())),
         modality="" if channel.source else plan.modality,
+        level_percentile=plan.settings.window.volume_percentile,
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)
     return ChannelSurvey(

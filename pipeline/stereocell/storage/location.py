@@ -36,8 +36,9 @@ _ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
 _FILE_SUFFIXES = {
     "tiff": _TIFF_SUFFIXES,
     "nifti": _NIFTI_SUFFIXES,
+    "mgh": (".mgh", ".mgz", ".mgh.gz"),
     "ims": (".ims",),
-    "hdf5": (".h5", ".hdf5", ".hdf"),
+    "hdf5": (".h5", ".hdf5", ".hdf", ".nc", ".nc4", ".mat", ".emd"),
     "nrrd": (".nrrd", ".nhdr"),
     "metaimage": (".mha", ".mhd"),
     "mrc": tuple(
@@ -51,7 +52,7 @@ _FILE_SUFFIXES = {
 }
 # formats that are known by a file's first bytes, whatever its name (IMOD calls MRC .st, .ali, ...)
 _BY_CONTENT = ("dicom", "tiff", "hdf5", "nrrd", "czi", "nd2", "lif", "mrc")
-_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf)):(.*)", re.IGNORECASE | re.DOTALL)
+_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf|nc|nc4|mat|emd)):(.*)", re.IGNORECASE | re.DOTALL)
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
 _CONNECT_S, SILENCE_S = 15.0, 30.0  # limits of one request; s3fs repeats it
 _AWS_CREDENTIALS = (

@@ -26,16 +26,18 @@ def make_transfer_functions(
     *,
     threshold_normalized: float | None = None,
     has_magnitudes: bool = False,
+    level_percentile: float = 99.0,
 ) -> dict[str, OpacityPoints]:
     """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
 
     histogram             int64 (bins,), voxel counts over 0..1 in equal bins
     iso_normalized        the iso-value, 0..1; None: the channel has no clear surface
     threshold_normalized  the adaptive threshold, 0..1; None: there is none
+    level_percentile      percent of the voxels below the level of a channel without a surface
     has_magnitudes        whether values are magnitudes, as of MR: the air is noise, voxel by voxel
 
     Opacity starts half-way between the median, since most voxels are background, and the level. The
-    level is the iso-value, or the 99th percentile in a channel without a clear surface. Noise of
+    level is the iso-value, or a percentile in a channel without a clear surface. Noise of
     magnitudes would be dust in front of a surface: opacity starts where it ends. That is below the
     level, unless the counts still fall steeply there: then a part of the air lies above the level,
     which the surface leaves out as specks, and the volume has to, too. (Of light the background has
@@ -44,8 +46,10 @@ def make_transfer_functions(
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)
-    percentile = {p: (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, 0.99)}
-    level = percentile[0.99] if iso_normalized is None else iso_normalized
+    percentile = {
+        p: (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, level_percentile / 100)
+    }
+    level = percentile[level_percentile / 100] if iso_normalized is None else iso_normalized
     level = float(np.clip(level, 0.02, 0.96))
     halfway = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
     floor = halfway

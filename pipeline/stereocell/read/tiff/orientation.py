@@ -6,6 +6,9 @@ this one for OME-TIFF, with a note.
 References: TIFF 6.0, tag 274
 """
 
+from typing import Any
+
+from numpy.typing import NDArray
 from tifffile import TiffPage
 
 from stereocell.read.turn import Turn
@@ -32,7 +35,18 @@ def turn_of(page: TiffPage, *, is_applied: bool = True) -> tuple[Turn, tuple[str
 
     is_applied  False: the pixels stay as stored, and the note says so
     """
-    value = page.tags.valueof("Orientation", default=1)
+    return turn_by(page.tags.valueof("Orientation", default=1), is_applied=is_applied)
+
+
+def turned_pixels(pixels: NDArray[Any], turn: Turn) -> NDArray[Any]:
+    """Return the pixels (rows, columns, ...) of one plane, turned."""
+    seen = pixels.swapaxes(0, 1) if turn.order == _SWAPPED else pixels
+    _, y, x = (slice(None, None, -1 if flip else 1) for flip in turn.flips)
+    return seen[y, x]
+
+
+def turn_by(value: Any, *, is_applied: bool = True) -> tuple[Turn, tuple[str, ...]]:
+    """Return the turn for a value of the tag, which EXIF has as well, and a note."""
     if value not in _TURNS:
         return Turn(), ()
     row, column = _SIDES[value]
