@@ -68,7 +68,7 @@ class Reader:
 
 READERS = {
     "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", has_axes=True, is_remote=True),
-    "tiff": Reader("stereocell.read.tiff", "TIFF", has_axes=True, is_remote=True),
+    "tiff": Reader("stereocell.read.tiff", "TIFF", has_series=True, has_axes=True, is_remote=True),
     "planes": Reader(
         "stereocell.read.planes",
         "a folder of TIFF, PNG or JPEG planes",
@@ -81,7 +81,7 @@ READERS = {
     "ims": Reader("stereocell.read.ims", "Imaris"),
     "hdf5": Reader("stereocell.read.hdf5", "HDF5 (NAME.h5:/KEY)", has_axes=True),
     "n5": Reader("stereocell.read.n5", "N5", has_axes=True, is_remote=True),
-    "bdv": Reader("stereocell.read.bdv", "BigDataViewer's XML"),
+    "bdv": Reader("stereocell.read.bdv", "BigDataViewer's XML", has_series=True),
     "nrrd": Reader("stereocell.read.nrrd", "NRRD"),
     "metaimage": Reader("stereocell.read.metaimage", "MetaImage"),
     "mrc": Reader("stereocell.read.mrc", "MRC"),

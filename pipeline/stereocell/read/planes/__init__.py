@@ -163,6 +163,7 @@ def _of_planes(location: Location, volume: Volume, first: Head, notes: list[str]
                 f"{volume.files[0, 0, 0].path!r:.100}"
             )
     rows, columns, samples = first.shape
+    notes += filter(None, sorted({head.note for head in heads.values()}))
     names, colors = _channels(volume)
     if samples > 1:
         if len(volume.channels) > 1:
