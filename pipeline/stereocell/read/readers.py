@@ -23,7 +23,7 @@ _SURFACES = (
     *(".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp", ".glb", ".gltf", ".3mf"),
     *(".usda", ".usdc", ".usdz"),
 )
-_PICTURES = (".png", ".jpg", ".jpeg")  # which are planes of a folder
+_PICTURES = (".png", ".jpg", ".jpeg", ".bmp")  # which are planes of a folder
 _FOLDERS = ("planes", "dicom")  # formats of folders whose files may have any name
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 
@@ -71,7 +71,7 @@ READERS = {
     "tiff": Reader("stereocell.read.tiff", "TIFF", has_axes=True, is_remote=True),
     "planes": Reader(
         "stereocell.read.planes",
-        "a folder of TIFF, PNG or JPEG planes",
+        "a folder of TIFF, PNG, JPEG or BMP planes",
         has_series=True,
         has_pattern=True,
     ),
