@@ -41,7 +41,7 @@ def refusal(path: Path) -> str:
         ("a.dm3", struct.pack(">3I", 3, 500, 1) + b"x" * 99, "DM3 file of Gatan", BIOFORMATS),
         ("a.dm4", struct.pack(">IQI", 4, 500, 1) + b"x" * 99, "DM4 file of Gatan", BIOFORMATS),
         ("a.mnc", b"CDF\x01" + bytes(99), "MINC", "mnc2nii"),
-        ("a.nc", b"CDF\x01" + bytes(99), "netCDF 3", "nccopy -k netCDF-4"),
+        ("a.nc", b"CDF\x01" + bytes(99), "netCDF-3", "nccopy -k nc4"),
         ("a.am", b"# AmiraMesh BINARY 2.1\n", "Amira mesh", BIOFORMATS),
         ("a.ics", b"\t\nics_version\t2.0\n", "ICS image", BIOFORMATS),
         ("a.vtk", b"# vtk DataFile Version 3.0\n", "VTK", "MetaImage"),
@@ -75,7 +75,7 @@ def test_files_that_libraries_write_are_named(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "five.mat", {"v": VOXELS})
     scipy.io.savemat(tmp_path / "four.mat", {"v": VOXELS[0].astype(float)}, format="4")
     for name in ("five.mat", "four.mat"):
-        assert "MATLAB file (save it with -v7.3, which holds HDF5" in refusal(tmp_path / name)
+        assert "MATLAB file before 7.3 (save it in MATLAB with -v7.3)" in refusal(tmp_path / name)
     np.savez(tmp_path / "a.npz", v=VOXELS)
     assert "NumPy archive of arrays (tifffile" in refusal(tmp_path / "a.npz")
     for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):

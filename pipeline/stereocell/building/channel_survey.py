@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.building.channels import Channel
+from stereocell.building.channels import BRAIN, Channel, has_brain
 from stereocell.building.level_choice import (
     Components,
     Found,
     check_components,
     choose_rung,
+    find_doubt,
     find_level,
     given_level,
     level_of_tile,
@@ -92,10 +93,8 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for name, holder in held.items():
         if holder is not None:
             pieces = ", ".join(holder.pieces)
-            console.print(
-                f"units: {name}: a table or holder is left out of the surface: {pieces}",
-                markup=False,
-            )
+            about = f"a table or holder is left out: {pieces} (--keep-holder builds it)"
+            console.print(f"units: {name}: {about}", markup=False)
     evidence = _evidence(out_folder, plan, engine, windows)
     survey, inside = {}, {}
     found = {
@@ -189,7 +188,9 @@ def _of_channel(
     file: str,
 ) -> ChannelSurvey:
     level = found.rungs[chosen] if found.rungs else None
-    confidence = level.confidence if isinstance(level, Level) else float(level is not None)
+    confidence = float(level is not None)  # of a level that the settings state: it is no guess
+    if isinstance(level, Level) and not found.is_given:
+        confidence = level.confidence
     values = {tile: one.value for tile, one in iso.items()}
     known = [value for value in values.values() if value is not None]
     painter, surface = plan.painter(channel), None
@@ -208,8 +209,9 @@ def _of_channel(
         statistics=statistics,
         level=surface,
         confidence=confidence,
-        doubt=found.doubt,
+        doubt=found.doubt or find_doubt(found, chosen, list(iso.values())),
         modality="" if channel.source else plan.modality,
+        level_percentile=plan.settings.window.volume_percentile,
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)
     return ChannelSurvey(
@@ -222,7 +224,11 @@ def _of_channel(
             surface=plan.settings.surface,
             spacing_um=plan.spacing_um,
         ),
-        replace(appearance, painted_by=painter.id if painter else ""),
+        replace(
+            appearance,
+            painted_by=painter.id if painter else "",
+            opens=channel.name in BRAIN or not has_brain(plan.channels),
+        ),
         () if found.levels is None else found.levels.ladder,
         None if found.levels is None else Curve(*found.levels.curve()),
         found.window.holder,

@@ -21,12 +21,13 @@ _GUNZIP = "a gzip file (gunzip it)"
 SHARED = (_OLE, _XML, _TEXT, _ZIP, _GUNZIP)  # containers of many formats, which names tell apart
 _FRAMES = "extract its frames as PNG, as `ffmpeg -i FILE %05d.png` does"
 _TO_TIFF = "tifffile.imwrite makes a TIFF of the array"
+_CDF = (b"\x01", b"\x02", b"\x05")  # versions of netCDF-3
 # the first bytes of formats that are not read -> words, with the way out where there is one
 _MAGIC = (
     *_POINTERS,
     (b"\0\x05\x16\x07", "a record of macOS beside a file (the file's own name has no `._`)"),
-    (b"MATLAB 7.3", "a MATLAB 7.3 file (it holds HDF5: name it .h5)"),
-    (b"MATLAB 5.0", "a MATLAB file (save it with -v7.3, which holds HDF5, and name it .h5)"),
+    (b"MATLAB 5.0", "a MATLAB file before 7.3 (save it in MATLAB with -v7.3)"),
+    *((b"CDF" + mark, "a netCDF-3 file (`nccopy -k nc4 IN OUT` makes netCDF-4)") for mark in _CDF),
     (b"\x93NUMPY", "a NumPy array (tifffile.imwrite makes a TIFF of it)"),
     (b"PK\x05\x06", "an empty zip archive"),
     (b"\x89PNG\r\n", "a PNG image"),
@@ -43,8 +44,6 @@ _MAGIC = (
     (b"\xd0\xcf\x11\xe0", _OLE),
     (b"# === DATA DESCRIPTION", "the header of Philips PAR/REC (dcm2niix makes NIfTI of it)"),
     (b"OLYMPUSRAWFORMAT", f"an OIR file of Olympus ({BIOFORMATS})"),
-    (b"CDF\x01", "a netCDF 3 file (nccopy -k netCDF-4 makes HDF5 of it: name that .h5)"),
-    (b"CDF\x02", "a netCDF 3 file (nccopy -k netCDF-4 makes HDF5 of it: name that .h5)"),
     (b"SIMPLE  =", f"a FITS file ({BIOFORMATS})"),
     (b"MATRIX7", "an ECAT 7 file (nibabel reads it, and writes NIfTI)"),
     (b"# AmiraMesh", f"an Amira mesh ({BIOFORMATS})"),
@@ -78,6 +77,7 @@ _READ = (
     (128, b"DICM", "dicom", "a DICOM file"),  # goes first: its preamble may begin a TIFF
     *((0, mark, "tiff", "a TIFF file") for mark in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
     (0, b"\x89HDF\r\n\x1a\n", "hdf5", "an HDF5 file"),
+    (0, b"MATLAB 7.3", "hdf5", "a MATLAB 7.3 file"),  # HDF5 behind a block of 512 bytes
     (0, b"NRRD0", "nrrd", "an NRRD file"),
     (0, b"ZISRAWFILE", "czi", "a CZI file of Zeiss"),
     (0, b"\xda\xce\xbe\x0a", "nd2", "an ND2 file of Nikon"),

@@ -28,17 +28,20 @@ from stereocell.read.dicom.header import SEGMENTATION, NoPlaneError, is_dicom, r
 from stereocell.read.dicom.label_stack import stack_labels
 from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels
-from stereocell.read.dicom.series import Stack, find_stacks
+from stereocell.read.dicom.series import Stack, find_stacks, is_other_kind
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
+from stereocell.read.series import counted
 from stereocell.read.spacing import Grid
+from stereocell.read.statements import omission
 from stereocell.read.whole_array import WholeArray
 from stereocell.storage.first_bytes import identify
 from stereocell.storage.location import Location, first_bytes, is_own
 
 _INSTEAD = "expected the image that it was drawn on"
+_MOST_KINDS = 4  # most kinds of images that notes name
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
@@ -311,14 +314,28 @@ def _acquired(
 
 
 def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
+    """Return what is built of several stacks, and which other kinds the same series holds."""
     if len(found.stacks) == 1:
         return ()
     number = found.stacks.index(stack) + 1
-    why = "the largest" if series == 0 else "asked for"
-    return (
-        f"{len(found.stacks)} series or orientations; building --series {number}, {why}: "
-        f"{stack.label}",
+    most = max(other.voxels * len(other.times) for other in found.stacks)
+    why = "the largest" if stack.voxels * len(stack.times) == most else "the first image of all"
+    choice = (
+        f"{len(found.stacks)} series or orientations; building --series {number}, "
+        f"{'asked for' if series else why}: {stack.label}"
     )
+    kinds = [
+        omission(
+            f"{counted(other.frames, 'image')} of the same series "
+            f"({', '.join(other.words) or 'plain'})",
+            "they are of another kind",
+            f"--series {place} builds them" if other.layout is not None else other.problem,
+        )
+        for place, other in enumerate(found.stacks, start=1)
+        if is_other_kind(other, stack)
+    ]
+    more = (f"{len(kinds) - _MOST_KINDS} more kinds of images are in `--series list`",)
+    return (choice, *kinds[:_MOST_KINDS], *(more if len(kinds) > _MOST_KINDS else ()))
 
 
 def _left_out(reasons: Counter[str]) -> tuple[str, ...]:

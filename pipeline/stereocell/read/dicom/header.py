@@ -20,12 +20,14 @@ from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.frame import Encoding, Frame, Vector
+from stereocell.read.dicom.frame_kind import KIND_TAGS, FrameKind, kind_of
 from stereocell.read.dicom.frame_offsets import (
     frame_offsets,
     has_offsets,
     is_dose,
     place_first,
 )
+from stereocell.read.dicom.header_values import find_value, first_item
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.segmentation import (
     FRACTIONAL,
@@ -34,11 +36,11 @@ from stereocell.read.dicom.segmentation import (
     segmentation_of,
 )
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.dicom.stated import STATED_TAGS, stated_of
 from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
 
 _TAGS: list[Any] = [
     "SOPClassUID",
-    "ImageType",
     "Modality",
     "SeriesInstanceUID",
     "SOPInstanceUID",
@@ -70,12 +72,12 @@ _TAGS: list[Any] = [
     "MaximumFractionalValue",
     "DetectorInformationSequence",
     "SliceVector",
-    "SpacingBetweenSlices",
-    "SliceThickness",
     "GridFrameOffsetVector",
     "DoseGridScaling",
     "SharedFunctionalGroupsSequence",
     "PerFrameFunctionalGroupsSequence",
+    *KIND_TAGS,
+    *STATED_TAGS,
 ]
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _NO_PLACE = "without a place in the patient"
@@ -156,8 +158,8 @@ def _frames(
     grey = ["MONOCHROME1", "MONOCHROME2"]
     if segmentation is not None and segmentation.kind == LABELMAP:
         grey.append("PALETTE COLOR")  # of numbers
-    kind = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
-    if int(header.get("SamplesPerPixel") or 1) != 1 or kind not in grey:
+    colours = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
+    if int(header.get("SamplesPerPixel") or 1) != 1 or colours not in grey:
         raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
     if "ModalityLUTSequence" in header:
         raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
@@ -174,7 +176,7 @@ def _frames(
         instance = f"{file}".encode()
     modality = str(header.get("Modality", "")).strip()
     is_quadruped = str(header.get("AnatomicalOrientationType", "")).strip() == "QUADRUPED"
-    shared = _first(header.get("SharedFunctionalGroupsSequence"))
+    shared = first_item(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     offsets = None
     if (own or count > 1) and len(own) != count:
@@ -187,8 +189,10 @@ def _frames(
     padding = _padding(header)
     for index in range(count):
         groups = [own[index] if own else None, shared]
-        stack = _found({}, groups, "FrameContentSequence", "StackID")
-        segment = _found({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
+        stack = find_value({}, groups, "FrameContentSequence", "StackID")
+        segment = find_value({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
+        kind = FrameKind() if is_mask else kind_of(header, groups)
+        stated = stated_of(header, groups)
         directions, spacing = _axes(header, groups)
         mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
         if offsets is not None:
@@ -208,13 +212,15 @@ def _frames(
                 tile.position,
                 *directions,
                 spacing,
-                _encoding(header, groups, kind == "MONOCHROME1", is_float, padding),
+                _encoding(header, groups, colours == "MONOCHROME1", is_float, padding),
                 number,
                 tile.corner,
                 int(segment or 0) if is_mask else 0,
                 segmentation,
                 is_quadruped,
                 (whole, parts),
+                kind,
+                stated,
             )
             for number, tile in enumerate(mosaic.tiles)
         ]
@@ -230,7 +236,7 @@ def _mosaic(
     spacing: tuple[float, float],
 ) -> Mosaic:
     """Return the slices of an image of pixels (rows, columns): most hold one."""
-    stated = _found(header, groups, "PlanePositionSequence", "ImagePositionPatient")
+    stated = find_value(header, groups, "PlanePositionSequence", "ImagePositionPatient")
     position = None if stated is None else _vector(stated)
     try:
         found = find_mosaic(
@@ -314,24 +320,6 @@ def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int, *, is_ma
     return is_float
 
 
-def _first(sequence: Any) -> Any:
-    return sequence[0] if sequence else None
-
-
-def _found(header: Any, groups: Sequence[Any], sequence: str, key: str) -> Any:
-    """Return a value from the frame's group, the shared one, or the header itself; None: nowhere.
-
-    An enhanced image states these in functional groups.
-
-    References: DICOM PS3.3 C.7.6.16 (Multi-frame Functional Groups module).
-    """
-    for group in groups:
-        item = None if group is None else _first(group.get(sequence))
-        if item is not None and item.get(key) is not None:
-            return item[key].value
-    return header.get(key)
-
-
 def _numbers(value: Any, count: int, lacking: str = _NO_PLACE) -> tuple[float, ...]:
     try:
         numbers = tuple(float(v) for v in value)
@@ -344,8 +332,8 @@ def _numbers(value: Any, count: int, lacking: str = _NO_PLACE) -> tuple[float, .
 
 def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tuple[float, float]]:
     """Return unit vectors along a row and along a column, and mm between (rows, columns)."""
-    orientation = _found(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
-    spacing = _found(header, groups, "PixelMeasuresSequence", "PixelSpacing")
+    orientation = find_value(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
+    spacing = find_value(header, groups, "PixelMeasuresSequence", "PixelSpacing")
     cosines = np.array(_numbers(orientation, 6)).reshape(2, 3)
     lengths = np.linalg.norm(cosines, axis=1)
     is_frame = np.allclose(lengths, 1, atol=0.01) and abs(cosines[0] @ cosines[1]) < 0.01
@@ -369,8 +357,8 @@ def _encoding(
     padding: tuple[int, int] | None,
 ) -> Encoding:
     sequence = "PixelValueTransformationSequence"
-    slope = _found(header, groups, sequence, "RescaleSlope")
-    intercept = _found(header, groups, sequence, "RescaleIntercept")
+    slope = find_value(header, groups, sequence, "RescaleSlope")
+    intercept = find_value(header, groups, sequence, "RescaleIntercept")
     if slope is None and is_dose(header):
         slope = header.get("DoseGridScaling")
     if header.get("SegmentationType") == FRACTIONAL:
