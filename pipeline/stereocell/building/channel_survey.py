@@ -20,7 +20,7 @@ from stereocell.building.level_choice import (
     Components,
     Found,
     check_components,
-    choose_rung,
+    choose_by_components,
     find_doubt,
     find_level,
     given_level,
@@ -122,7 +122,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             {tile.id: rung[tile.id, channel.id].read()["components"] for tile in plan.tiles}
             for rung in components[: len(one.rungs)]
         ]
-        chosen = choose_rung(of_rungs) if len(of_rungs) > 1 else 0
+        chosen = choose_by_components(plan.settings.isovalue, of_rungs)
         if of_rungs:
             inside[channel.id] = sum(one["voxels"] for one in of_rungs[chosen].values())
         if one.is_fixed and of_rungs:

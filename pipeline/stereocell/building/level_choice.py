@@ -11,16 +11,19 @@ from stereocell.building.channels import Channel
 from stereocell.building.plan import Plan
 from stereocell.building.survey_file import TileIso
 from stereocell.building.tasks.window import Window
+from stereocell.building.vessel_levels import choose_connected, find_vessel_levels
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.isosurface.options import (
     ADAPTIVE,
     APART,
+    CONNECTED,
     CRITERIA,
     LADDER,
     NO_SURFACE,
     RUNGS,
+    IsoValueOptions,
     parse_level,
 )
 from stereocell.model.lattice_field import LatticeField
@@ -98,7 +101,7 @@ def find_level(
     if (channel.rung or options.rung) == NO_SURFACE:
         reason = f"no surface is built by default (--surfaces {channel.name}=outer builds one)"
         return Found(window, levels, evidence, (), levels.subtracts, reason)
-    is_outer = options.rung == APART or RUNGS[channel.rung or options.rung] == 0
+    is_outer = options.rung in (APART, CONNECTED) or RUNGS[channel.rung or options.rung] == 0
     if half is not None and criterion == LADDER and is_outer:
         return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
     highest = highest_of(window.statistics, levels.subtracts)
@@ -115,6 +118,8 @@ def find_level(
     rung = channel.rung or options.rung
     if rung == APART:
         clear = _fit_for_cells(clear, highest)
+    elif rung == CONNECTED:
+        clear = find_vessel_levels(levels)
     elif clear:
         place = RUNGS[rung]
         if place >= len(clear):
@@ -141,7 +146,7 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
     if not isinstance(level, Level):
         return ""
     clear, highest = found.levels.clear, highest_of(found.window.statistics, found.subtracts)
-    if level not in clear and clear:
+    if level in found.levels.ladder and level not in clear and clear:
         return (
             f"it falls short of a clear level by a little ({level.doubt}), and the next one, "
             f"{clear[0].value:.5g}, leaves {clear[0].share:.3%} of the voxels inside"
@@ -171,6 +176,16 @@ def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
         return parse_level(f"--surfaces {channel.base or channel.name}", channel.rung)
     given = plan.settings.iso_values.get(channel.name)
     return None if given is None else parse_level(f"--iso-value {channel.name}", given)
+
+
+def choose_by_components(options: IsoValueOptions, of_rungs: Sequence[Components]) -> int:
+    """Return the index of the level that a channel's components speak for.
+
+    of_rungs  the ComponentSums of each tile at each level; one level alone is taken as it is
+    """
+    if len(of_rungs) < 2:
+        return 0
+    return choose_connected(of_rungs) if options.rung == CONNECTED else choose_rung(of_rungs)
 
 
 def choose_rung(of_rungs: Sequence[Components]) -> int:

@@ -174,12 +174,8 @@ def _pillow_head(path: str, named: str) -> Head:
         raise SourceError(f"{named}: {error!s:.100}, expected a smaller image") from error
     if mode not in _SAMPLES:
         raise SourceError(f"{named}: found pixels of kind {mode}, expected grey or RGB")
-<<<<<<< HEAD
-    shape = (rows, columns, _JPEG_SAMPLES[mode])
+    shape = (rows, columns, _SAMPLES[mode])
     return Head(shape, np.dtype(np.uint8), note="".join(notes))
-=======
-    return Head((rows, columns, _SAMPLES[mode]), np.dtype(np.uint8))
->>>>>>> tables
 
 
 def _pillow_plane(path: str, named: str) -> NDArray[Any]:
