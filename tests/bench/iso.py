@@ -24,6 +24,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from corpus import all_cases
 from corpus.case import Mask
+from corpus.collected import missing
+from corpus.real import data_folder
 from corpus.sight import Sight, look_at
 from stereocell.isosurface.distance_field import gradient_magnitude
 from stereocell.isosurface.edge_criteria import choose_by_edges, gather_edges
@@ -181,6 +183,14 @@ def main() -> None:
     parser.add_argument("--only", default="", help="cases whose name holds this")
     parser.add_argument("--each", action="store_true", help="a line for each case, too")
     options = parser.parse_args()
+    folder = data_folder()
+    absent = (
+        ["all: STEREOCELL_DATA names no folder"]
+        if folder is None
+        else missing(folder / "level_corpus")
+    )
+    if absent:
+        print(f"real volumes left out, not in the folder: {', '.join(absent)}", file=sys.stderr)
     chosen = [n for n, case in enumerate(all_cases()) if options.only in case.name]
     with ProcessPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         cases = []

@@ -38,6 +38,7 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--paint": (["CD31=MART1"], "paint", "CD31", "MART1"),
     "--maps": ([], "unwrap", "maps", True),
     "--labels": (["cells=a=b.tif"], "labels", "cells", "a=b.tif"),
+    "--background": (["65535"], "objects", "background", 65535),
     "--table": (["t.csv"], "objects", "table", "t.csv"),
     "--table-key": (["id"], "objects", "table_key", "id"),
     "--columns": (["CD8, type"], "objects", "columns", ("CD8", "type")),

@@ -107,6 +107,16 @@ def test_a_tilt_series_is_refused_as_projections(tmp_path: Path) -> None:
         read.open(path)
 
 
+def test_projections_of_data_exchange_are_refused_unless_axes_are_given(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["exchange/data"] = f_phantom()
+        file["exchange/theta"] = np.linspace(0, 180, len(f_phantom()))
+    with pytest.raises(SourceError, match="theta is an angle, so these are projections"):
+        read.open(tmp_path / "a.h5")
+    dataset = read.open(tmp_path / "a.h5", axes="zyx", spacing_um=(1, 1, 1))
+    np.testing.assert_array_equal(whole(dataset), f_phantom())
+
+
 def test_a_film_of_velox_is_refused_as_one_plane(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.emd", "w") as file:
         file["Data/Image/0f3a/Data"] = np.ones((40, 30, 12), np.uint16)
@@ -122,6 +132,15 @@ def test_positions_that_descend_turn_their_axis_round(tmp_path: Path) -> None:
     np.testing.assert_array_equal(whole(dataset), f_phantom()[:, ::-1])
     assert "positions of /y descend: that axis is turned round" in dataset.notes[1]
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
+
+
+def test_positions_without_a_unit_are_named_where_the_spacing_is_missing(tmp_path: Path) -> None:
+    path = write_netcdf(tmp_path / "a.nc", "zyx")
+    with h5py.File(path, "a") as file:
+        del file["z"].attrs["units"]
+    line = r"y 0.2 um, x 0.25 um, but none along z \(positions of /z have steps of 0.5 without a"
+    with pytest.raises(SourceError, match=line):
+        read.open(path)
 
 
 def test_uneven_positions_are_reported(tmp_path: Path) -> None:

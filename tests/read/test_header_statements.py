@@ -175,10 +175,10 @@ def test_an_anatomical_orientation_that_contradicts_the_matrix_is_reported(tmp_p
 @pytest.mark.parametrize(("unit", "per"), [("um", 1), ("mm", 1000), ("cm", 10_000)])
 def test_metaimage_s_unit_of_length_is_followed(tmp_path: Path, unit: str, per: float) -> None:
     lines = (f"DistanceUnits = {unit}", "TransformMatrix = 1 0 0 0 1 0 0 0 1")
-    dataset = read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 0.2 0.3 0.4"))
+    dataset = read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1.2 1.3 1.4"))
     found = sorted(dataset.levels[0].spacing_um)
-    assert found == pytest.approx([0.2 * per, 0.3 * per, 0.4 * per])
-    assert dataset.notes == ()
+    assert found == pytest.approx([1.2 * per, 1.3 * per, 1.4 * per])
+    assert bool(spacing_notes(dataset)) == (unit == "um")  # too small for a patient
 
 
 def test_a_scale_of_values_that_itk_leaves_out_is_reported(tmp_path: Path) -> None:

@@ -103,10 +103,19 @@ def test_a_missing_unit_is_an_assumption_with_its_remedy(tmp_path: Path) -> None
     )
 
 
-def test_micrometres_that_are_stated_as_millimetres_are_implausible(tmp_path: Path) -> None:
-    (note,) = read.open(write(tmp_path / "a.nii", (25.0, 25.0, 25.0))).notes
-    assert "found 25 mm along the finest axis" in note
-    assert "is it in um?" in note
+@pytest.mark.parametrize(
+    ("spacing", "words"),
+    [
+        ((25.0, 25.0, 25.0), "found 25 mm along the finest axis"),
+        ((0.0005, 0.0005, 0.002), "found 0.032 mm across the whole volume"),
+    ],
+)
+def test_sizes_that_no_scanner_has_are_reported(
+    tmp_path: Path, spacing: tuple[float, ...], words: str
+) -> None:
+    (note,) = read.open(write(tmp_path / "a.nii", spacing)).notes
+    assert words in note
+    assert "is its unit another one?" in note
 
 
 def test_an_intercept_that_the_slope_turns_off_is_reported(tmp_path: Path) -> None:

@@ -138,11 +138,11 @@ def settle(source: str, settings: Settings) -> Plan:
     ]
     channels = with_surfaces(channels, settings.surfaces)
     level = choose_level(dataset.levels, len(channels), settings)
-    labels = find_labels(
+    found = find_labels(
         dataset,
         location,
         settings.labels,
-        options=options,
+        settings=settings,
         colors=PALETTE[len(channels) :] + PALETTE[: len(channels)],
         taken=[channel.name for channel in channels],
     )
@@ -163,17 +163,17 @@ def settle(source: str, settings: Settings) -> Plan:
         placement=dataset.placement,
         slice_axis=dataset.slice_axis(level[0]),
         has_sides=dataset.has_sides,
-        labels=labels,
-        formats={format_of(location), *(format_of(one.ref.source) for one in labels)},
+        labels=found.labels,
+        formats={format_of(location), *(format_of(one.ref.source) for one in found.labels)},
     )
     if settings.objects.table:
         watch_table(settings.objects.table)
-    objects = []
+    objects = list(found.notes)
     for one in plan.labels:
         # a table that can't be read, or lacks a column, ends the command before the build
         table = table_of(plan, one)
         require_color_by(plan, one, table)
-        objects += [f"{table.shown}: {note}" for note in table.notes] if table else []
+        objects += [f"table: {note}" for note in table.notes] if table else []
     gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
     objects += told_before(plan)
     objects += filter(None, map(doubt_of, plan.labels))
@@ -195,6 +195,7 @@ def _require_labels(settings: Settings) -> None:
         "--table-key": options.table_key,
         "--columns": ",".join(options.columns),
         "--color-by": options.color_by,
+        "--background": str(options.background or ""),
     }.items():
         if value and not settings.labels:
             raise UsageError(f"{flag} is {value!r:.60}: of no objects, expected --labels with it")
@@ -302,6 +303,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             names,
             list(plan.placement),
             plan.has_sides,
+            plan.opens_cut,
             {id_: digest_of_table(table) for id_, table in tables.items()},
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
@@ -325,6 +327,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             modality=plan.modality,
             placement=plan.placement,
             has_sides=plan.has_sides,
+            opens_cut=plan.opens_cut,
             tables=tables,
         )
         out_folder.remove_other_folders(

@@ -10,6 +10,7 @@
 | Zarr's xarray convention | `_ARRAY_DIMENSIONS` | |
 | MATLAB, Octave | columns first: an array V(y, x, z) is stored as z, x, y | |
 | Velox | y, x, frame | |
+| Data Exchange | theta, y, x where angles lie beside the dataset | |
 
 References: https://docs.unidata.ucar.edu/nug/, https://emdatasets.com/format/,
 https://manual.nexusformat.org/classes/base_classes/NXdata.html, HDF5 Dimension Scale Specification.
@@ -58,6 +59,7 @@ def describe(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
         _emd(tree, dataset),
         _arrays(tree, dataset),
         _velox(dataset),
+        _projections(dataset),
         _by_columns(dataset),
     ]
     return [one for one in found if one is not None]
@@ -147,6 +149,14 @@ def _velox(dataset: h5py.Dataset) -> Described | None:
     if not is_velox or dataset.ndim != 3:
         return None
     return Described(Statement(("y", "x", "t"), "the convention of Velox"))
+
+
+def _projections(dataset: h5py.Dataset) -> Described | None:
+    """Return the axes of projections, beside which Data Exchange has their angles."""
+    angles = _beside(dataset.parent, "theta")
+    if angles is None or dataset.ndim != 3 or angles.shape != dataset.shape[:1]:
+        return None
+    return Described(Statement(("theta", "y", "x"), "theta of Data Exchange"))
 
 
 def _by_columns(dataset: h5py.Dataset) -> Described | None:

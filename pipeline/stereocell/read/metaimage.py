@@ -11,6 +11,7 @@ References: https://itk.org/Wiki/ITK/MetaIO/Documentation
 
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -64,7 +65,7 @@ def read_image(location: Location) -> Image:
         )
     array = _array(location, fields, end, (*reversed(shape), samples[0]))
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
-    affine, notes = _affine(where, header, len(shape))
+    affine, notes = _affine(where, header, shape)
     image = place(where, array, axes, affine, "TransformMatrix").image(
         NAME, notes=notes, has_sides="TransformMatrix" in fields
     )
@@ -113,10 +114,10 @@ def _array(
 
 
 def _affine(
-    where: str, header: Header, dimensions: int
+    where: str, header: Header, shape: Sequence[int]
 ) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.float64]], tuple[str, ...]]:
     """Return the affine (4, 4) to LPS in mm, and notes."""
-    n, fields = dimensions, header.fields
+    n, fields = len(shape), header.fields
     spacing = numbers(where, fields, "ElementSpacing", n)
     matrix = numbers(where, fields, "TransformMatrix", n * n)
     if spacing is None:
@@ -131,7 +132,7 @@ def _affine(
     affine[:3] *= per
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
     notes = [*header.notes, *unit_notes, *side_notes(fields, turned[:3, :3].T)]
-    return affine, (*notes, *value_notes(where, fields), *size_notes(lengths.tolist()))
+    return affine, (*notes, *value_notes(where, fields), *size_notes(lengths.tolist(), shape[:3]))
 
 
 def _flag(fields: dict[str, str], name: str, default: bool) -> bool:

@@ -130,10 +130,11 @@ def require_whole(image: Any, where: str) -> None:
             unpack(file, 0, "gzip", most_behind=_MAX_OFFSET)
     if _is_packed(name):
         return
-    end, size = data.offset + math.prod(data.shape) * data.dtype.itemsize, os.path.getsize(name)
+    shape = tuple(map(int, data.shape))  # NumPy's integers would overflow
+    end, size = data.offset + math.prod(shape) * data.dtype.itemsize, os.path.getsize(name)
     if end > size:
         raise SourceError(
-            f"{where}: found {size} bytes, expected at least {end} for {tuple(data.shape)} of "
+            f"{where}: found {size} bytes, expected at least {end} for {shape} of "
             f"{data.dtype.name} (the file is cut short)"
         )
 
@@ -158,7 +159,7 @@ def stored_voxels(name: str, data: Any, time: int) -> NDArray[Any]:
     data  nibabel's proxy of all voxels
     """
     if _is_packed(name):
-        zyx = data.shape[2::-1]
+        zyx = [int(n) for n in data.shape[2::-1]]
         skip = data.offset + time * math.prod(zyx) * data.dtype.itemsize
         return unpack_array(name, zyx, data.dtype, "gzip", 0, skip=skip).transpose()
     place = (slice(None),) * 3 + (time, 0, 0, 0)[: len(data.shape) - 3]

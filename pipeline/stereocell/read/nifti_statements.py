@@ -69,9 +69,7 @@ def stated_place(image: Any, where: str) -> Stated:
     unit, unit_notes = _unit(header)
     notes += [*_size_notes(image, sound, unit), *_direction_notes(sound), *unit_notes]
     affine = _scaled(affine, _MM[unit])
-    return Stated(
-        affine, bool(forms), (*notes, *size_notes(_lengths(affine)), *_axis_notes(header))
-    )
+    return Stated(affine, bool(forms), (*notes, *_plausible(image, affine), *_axis_notes(header)))
 
 
 def value_notes(image: Any) -> tuple[str, ...]:
@@ -94,7 +92,11 @@ def _of_analyze(image: Any, where: str) -> Stated:
     beside = image.file_map.get("mat")
     if beside is not None and beside.filename and not np.allclose(affine, _own_affine(image)):
         notes += _compared({"the matrix of SPM (.mat)": _lengths(affine)}, _pixdim(image.header))
-    return Stated(affine, False, (*notes, *size_notes(_lengths(affine))))
+    return Stated(affine, False, (*notes, *_plausible(image, affine)))
+
+
+def _plausible(image: Any, affine: Affine) -> tuple[str, ...]:
+    return size_notes(_lengths(affine), [int(n) for n in image.header.get_data_shape()[:3]])
 
 
 def _own_affine(image: Any) -> Affine:
@@ -110,7 +112,7 @@ def _of_mgh(image: Any, where: str) -> Stated:
             "goodRASFlag 0: spacing and orientation are not stated: coronal slices of voxels of "
             f"1 mm are assumed, as FreeSurfer does; {_REMEDY}",
         )
-    return Stated(affine, has_sides, (*notes, *size_notes(_lengths(affine))))
+    return Stated(affine, has_sides, (*notes, *_plausible(image, affine)))
 
 
 def _unit(header: Any) -> tuple[str, tuple[str, ...]]:

@@ -98,7 +98,7 @@ def read_image(location: Location) -> Image:
     origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
     origin = np.where(np.isfinite(origin), origin, 0.0) * factors.max(axis=0)
     affine[:3, 3] = to_lps @ origin / 1000.0
-    notes = (*notes, *size_notes(np.linalg.norm(affine[:3, :3], axis=0).tolist()))
+    notes = (*notes, *size_notes(np.linalg.norm(affine[:3, :3], axis=0).tolist(), sizes))
     image = place(where, array, axes, affine, "space directions").image(
         NAME, notes=notes, has_sides=_names_sides(fields)
     )

@@ -1,18 +1,22 @@
-"""Voxel spacings of a patient's image that no scanner has: their unit is likely another one."""
+"""Sizes of a patient's image that no scanner has: their unit is likely another one."""
 
 from collections.abc import Sequence
 
-_WIDEST_MM = 12.0  # mm; PET and SPECT have voxels of up to 10 mm
-_FINEST_MM = 1e-5  # mm; 10 nm, below the resolution of any light
+_WIDEST_MM = 12.0  # mm between voxels; PET and SPECT have up to 10 mm
+_LEAST_MM = 1.0  # mm across a whole volume
 
 
-def size_notes(spacing_mm: Sequence[float]) -> tuple[str, ...]:
-    """Return a note where the finest of three voxel spacings is implausible for its unit."""
+def size_notes(spacing_mm: Sequence[float], shape: Sequence[int]) -> tuple[str, ...]:
+    """Return a note where a volume is implausibly coarse or small for its unit.
+
+    spacing_mm, shape  along the same three axes
+    """
     finest = min(spacing_mm)
-    if _FINEST_MM <= finest <= _WIDEST_MM:
+    across = max(n * h for n, h in zip(shape, spacing_mm, strict=True))
+    if finest > _WIDEST_MM:
+        found = f"found {finest:.5g} mm along the finest axis, where scanners have up to 12 mm"
+    elif across < _LEAST_MM:
+        found = f"found {across:.3g} mm across the whole volume, where scanners have over 1 mm"
+    else:
         return ()
-    usual, named = ("at most 12 mm", "um") if finest > _WIDEST_MM else ("at least 10 nm", "mm")
-    return (
-        f"voxel spacing: found {finest:.5g} mm along the finest axis, where images of a patient "
-        f"have {usual}: is it in {named}? (--spacing-um z,y,x replaces it)",
-    )
+    return (f"voxel spacing: {found}: is its unit another one? (--spacing-um z,y,x replaces it)",)

@@ -15,7 +15,6 @@ from stereocell.read.tables.table import KEYS, clean
 SEPARATORS = "\t,;|"
 SEARCHED_LINES = 64  # first lines of a table that are searched for the header
 _STATED = re.compile(r"\s*\"?sep=(.)\"?\s*")  # a line that spreadsheets write and read
-_SHOWN = 60  # characters of a line before the header that a note quotes
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,17 +72,20 @@ def _with_key(
             if not (is_plain and is_first):
                 return None
             own = _told_apart(names, before[-1] if before else [])
-            quoted = " ".join(clean(line) for line in lines[:start] if not _STATED.fullmatch(line))
-            note = (
-                f"the names of the columns are in line {start + 1}; the lines before it are left "
-                f"out: {quoted.strip()[:_SHOWN]!r}"
-                if quoted.strip()
-                else ""
-            )
+            note = _note(lines[:start])
             return Header(separator, start, tuple(own), note)
         before.append(row)
         start = reader.line_num
     return None
+
+
+def _note(before: Sequence[str]) -> str:
+    """Return the note on lines before a header; it quotes none, as they may name a person."""
+    if not any(line.strip() and not _STATED.fullmatch(line) for line in before):
+        return ""
+    count = len(before)
+    lines = f"{count} lines before it are" if count > 1 else "line before it is"
+    return f"the names of the columns are in line {count + 1}; the {lines} left out"
 
 
 def _next(reader: "csv._reader") -> list[str] | None:
