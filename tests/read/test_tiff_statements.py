@@ -135,6 +135,18 @@ def test_a_calibration_of_imagej_is_applied(
     assert all(told in note for note in notes)
 
 
+def test_labels_that_name_channels_among_the_slices_are_noted(tmp_path: Path) -> None:
+    labels = [f"c:{c}/2 z:{z}/8 - a.nd2" for z in range(1, 9) for c in (1, 2)]
+    for given, is_told in ((labels, True), ([f"z:{z}/16" for z in range(16)], False)):
+        path = tmp_path / "a.tif"
+        tifffile.imwrite(
+            path, BODY, imagej=True, resolution=(4.0, 5.0),
+            metadata={"axes": "ZYX", "spacing": 0.5, "unit": "um", "Labels": given},
+        )  # fmt: skip
+        notes = read.open(path).notes
+        assert any("the labels of the slices name 2 channels" in note for note in notes) == is_told
+
+
 def test_the_orientation_of_ome_tiff_is_noted_and_not_applied(tmp_path: Path) -> None:
     path = write_ome(tmp_path / "a.ome.tif", BODY, extratags=[(274, "H", 1, 4, True)])
     np.testing.assert_array_equal(voxels_of(path), BODY)
