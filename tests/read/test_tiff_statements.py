@@ -179,6 +179,7 @@ def test_positions_of_planes_are_compared_with_the_depth(
     "planes",
     [
         places(np.arange(16) * 0.5),
+        places(np.arange(16) * 0.5).replace('PositionZUnit="\u00b5m"', ""),
         places(np.arange(16) * 0.5 + np.tile([0.0, 0.003], 8)),
         places(np.arange(16) * 5e-4, "mm"),
         places(np.arange(16), "reference frame"),
@@ -190,6 +191,13 @@ def test_positions_that_agree_or_are_no_lengths_need_no_note(tmp_path: Path, pla
     dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, planes=planes))
     assert dataset.levels[0].spacing_um == pytest.approx((0.5, 0.2, 0.25))
     assert dataset.notes == ()
+
+
+def test_positions_without_a_unit_are_compared_and_not_taken(tmp_path: Path) -> None:
+    planes = places(np.arange(16) * 0.6).replace('PositionZUnit="\u00b5m"', "")
+    dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, depth="1.0", planes=planes))
+    assert dataset.levels[0].spacing_um[0] == 1.0
+    assert "PositionZ of the planes (um are assumed) states 0.6 um" in dataset.notes[0]
 
 
 def test_planes_at_one_position_whose_time_rises_are_noted(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """The channels of a build, each of its surfaces one, and settings that are given by channel."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -28,6 +28,9 @@ PALETTE = tuple(
 _PALE = 0.6  # linear RGB: a colour whose least part is more has no lighter one beside it
 FLESH = (0.78, 0.66, 0.55)
 BODY_MODALITIES = ("MR", "CT")
+# Classes of tissue that an MR of a head is looked at for: skin, skull and fluid would hide them.
+GREY_MATTER, WHITE_MATTER = "grey matter", "white matter"
+BRAIN = frozenset({GREY_MATTER, WHITE_MATTER})
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,11 @@ def choose_color(place: int, modality: str) -> tuple[float, float, float]:
     if place == 0 and modality in BODY_MODALITIES:
         return FLESH
     return PALETTE[place % len(PALETTE)]
+
+
+def has_brain(channels: Iterable[Channel]) -> bool:
+    """Return whether the classes of a brain are among the channels, as `tissue` learns them."""
+    return {channel.name for channel in channels if channel.source} >= BRAIN
 
 
 def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> list[Channel]:

@@ -11,16 +11,19 @@ from stereocell.building.channels import Channel
 from stereocell.building.plan import Plan
 from stereocell.building.survey_file import TileIso
 from stereocell.building.tasks.window import Window
+from stereocell.building.vessel_levels import choose_connected, find_vessel_levels
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.isosurface.options import (
     ADAPTIVE,
     APART,
+    CONNECTED,
     CRITERIA,
     LADDER,
     NO_SURFACE,
     RUNGS,
+    IsoValueOptions,
     parse_level,
 )
 from stereocell.model.lattice_field import LatticeField
@@ -47,6 +50,7 @@ class Found:
               taken, unless its components speak against it
     doubt     why there is none
     is_fixed  whether all tiles have the same level, whatever they hold: a given one, or a mask's
+    is_given  whether the settings state the level: a standard, as 300 HU for bone, and no guess
     """
 
     window: Window
@@ -56,6 +60,7 @@ class Found:
     subtracts: bool
     doubt: str
     is_fixed: bool = False
+    is_given: bool = False
 
     @property
     def background(self) -> LatticeField | None:
@@ -70,7 +75,7 @@ def find_level(
     given = given_level(plan, channel)
     if not evidence:
         assert given is not None
-        return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True)
+        return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True, is_given=True)
     options = plan.settings.isovalue
     criterion = LADDER if channel.rung else options.criterion
     levels = find_levels(
@@ -90,11 +95,13 @@ def find_level(
         value, subtracts = given
         # where there is no background to be above, nothing can be said of such a level
         rated = levels.judge(value) if subtracts == levels.subtracts else value
-        return Found(window, levels, evidence, (rated,), subtracts, "", is_fixed=True)
+        return Found(
+            window, levels, evidence, (rated,), subtracts, "", is_fixed=True, is_given=True
+        )
     if (channel.rung or options.rung) == NO_SURFACE:
         reason = f"no surface is built by default (--surfaces {channel.name}=outer builds one)"
         return Found(window, levels, evidence, (), levels.subtracts, reason)
-    is_outer = options.rung == APART or RUNGS[channel.rung or options.rung] == 0
+    is_outer = options.rung in (APART, CONNECTED) or RUNGS[channel.rung or options.rung] == 0
     if half is not None and criterion == LADDER and is_outer:
         return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
     highest = highest_of(window.statistics, levels.subtracts)
@@ -111,6 +118,8 @@ def find_level(
     rung = channel.rung or options.rung
     if rung == APART:
         clear = _fit_for_cells(clear, highest)
+    elif rung == CONNECTED:
+        clear = find_vessel_levels(levels)
     elif clear:
         place = RUNGS[rung]
         if place >= len(clear):
@@ -137,7 +146,7 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
     if not isinstance(level, Level):
         return ""
     clear, highest = found.levels.clear, highest_of(found.window.statistics, found.subtracts)
-    if level not in clear and clear:
+    if level in found.levels.ladder and level not in clear and clear:
         return (
             f"it falls short of a clear level by a little ({level.doubt}), and the next one, "
             f"{clear[0].value:.5g}, leaves {clear[0].share:.3%} of the voxels inside"
@@ -167,6 +176,16 @@ def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
         return parse_level(f"--surfaces {channel.base or channel.name}", channel.rung)
     given = plan.settings.iso_values.get(channel.name)
     return None if given is None else parse_level(f"--iso-value {channel.name}", given)
+
+
+def choose_by_components(options: IsoValueOptions, of_rungs: Sequence[Components]) -> int:
+    """Return the index of the level that a channel's components speak for.
+
+    of_rungs  the ComponentSums of each tile at each level; one level alone is taken as it is
+    """
+    if len(of_rungs) < 2:
+        return 0
+    return choose_connected(of_rungs) if options.rung == CONNECTED else choose_rung(of_rungs)
 
 
 def choose_rung(of_rungs: Sequence[Components]) -> int:
@@ -244,6 +263,8 @@ def level_of_tile(
     if found.levels is None or not isinstance(level, Level):
         return TileIso(_value_of(level), below, None, files)
     tile_evidence, value = found.evidence[tile.id], level.value
+    if found.is_given:
+        return TileIso(value, below, None, files)
     judged = found.levels.judge_tile(level, tile_evidence)
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
         value = found.levels.level_of_tile(level, tile_evidence)

@@ -300,6 +300,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             names,
             list(plan.placement),
             plan.has_sides,
+            plan.opens_cut,
             {id_: digest_of_table(table) for id_, table in tables.items()},
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
@@ -323,6 +324,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             modality=plan.modality,
             placement=plan.placement,
             has_sides=plan.has_sides,
+            opens_cut=plan.opens_cut,
             tables=tables,
         )
         out_folder.remove_other_folders(

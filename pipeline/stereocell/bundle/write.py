@@ -52,6 +52,7 @@ from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
     open_stage,
+    opening_cut_of,
     sides_of,
     specimen_name,
     tile_prims,
@@ -180,6 +181,8 @@ def _fill(
         specimen["fingerprint"] = fingerprint
     if (sides := sides_of(stage)) is not None:
         specimen["sides"] = sides
+    if (cut := opening_cut_of(stage)) is not None:
+        specimen["cut"] = {"normal": list(cut[0]), "offset_um": cut[1]}
     ar = {"usdz": usdz, "usdz_reason": usdz_reason}
     manifest = describe_bundle(specimen, tiles, channels=channels, index=index, ar=ar)
     write_file(root, MANIFEST, manifest)
@@ -271,6 +274,7 @@ def describe_channel(
         "surface": "none" if tileset is None else appearance.surface,
         "surface_reason": appearance.surface_reason,
         "level": None if appearance.level is None else asdict(appearance.level),
+        "opens": appearance.opens,
         "transfer_function": appearance.chosen,
         "transfer_functions": list(appearance.transfer_functions),
         "transfer_functions_2d": {

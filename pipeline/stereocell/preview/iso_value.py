@@ -20,7 +20,7 @@ from stereocell.building.level_choice import (
     Components,
     Found,
     check_histogram,
-    choose_rung,
+    choose_by_components,
     find_level,
     given_level,
     highest_of,
@@ -255,7 +255,7 @@ def _choose_rung(
         for rung in found.rungs
         if isinstance(rung, Level)
     ]
-    return found.rungs[choose_rung(components)]
+    return found.rungs[choose_by_components(plan.settings.isovalue, components)]
 
 
 def _candidates(

@@ -12,7 +12,7 @@ from typing import Any
 
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset, VoxelArray
-from stereocell.read.file_array import FlippedArray
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.inverted_array import InvertedArray
 from stereocell.read.readers import format_of
 from stereocell.read.value_scale import ScaledArray

@@ -15,7 +15,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import bdv_hdf5
 from stereocell.read.array_axes import settle_stated_axes
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.file_array import FlippedArray
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.hdf5_dimensions import describe, require_plain
 from stereocell.read.hdf5_spacing import settle_spacing
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
@@ -72,7 +72,7 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
             f"{where}: axis c: found {array.size('c')}, expected at most {MAX_CHANNELS}"
         )
     unnamed = (None,) * array.size("c")
-    grid = grid_of(array.shape, found.spacing_um)
+    grid = grid_of(array.shape, found.spacing_um, found.hint)
     return Image(
         (array,), (grid,), unnamed, unnamed, 1, tree.close,
         notes=(*notes, *axes_notes, *found.notes, *value_notes), files=tree.files,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from stereocell.read.acquired import Acquired
 from stereocell.read.anatomical_axes import Canonical
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.file_array import FlippedArray
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.image import Image
 from stereocell.read.spacing import Grid, Triple
 

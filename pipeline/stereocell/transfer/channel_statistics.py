@@ -25,7 +25,7 @@ from stereocell.transfer.adaptive_threshold import (
     make_histogram,
 )
 from stereocell.transfer.boundaries import SuggestedShapes
-from stereocell.transfer.ct_tissues import tissue_functions
+from stereocell.transfer.ct_tissues import opening_function, tissue_functions
 from stereocell.transfer.opacity import make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import fall_back
@@ -138,10 +138,18 @@ def make_appearance(
         threshold_normalized=appearance.threshold_normalized,
         has_magnitudes=modality == "MR",
         level_percentile=level_percentile,
+        is_calibrated=modality == "CT",
     )
+    function = None
     if modality == "CT":
         functions |= tissue_functions(statistics.window)
+        function = opening_function(iso_value, functions)
     transfer_2d = statistics.suggested.transfer_2d
     for name_2d, shapes in transfer_2d.functions.items():
         functions[name_2d] = fall_back(shapes)
-    return replace(appearance, transfer_functions=functions, transfer_2d=transfer_2d)
+    return replace(
+        appearance,
+        transfer_functions=functions,
+        transfer_2d=transfer_2d,
+        function=function or appearance.function,
+    )

@@ -25,11 +25,12 @@ from stereocell.storage.location import Location
 TIFF = (".tif", ".tiff", ".stk", ".lsm")
 PNG = (".png",)
 JPEG = (".jpg", ".jpeg")
+BMP = (".bmp",)
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _TAIL = 1024  # bytes in which a PNG ends; some programs add a few of their own
 _PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; 3: a palette
 _EXIF_ORIENTATION = 274  # of TIFF and EXIF alike
-_JPEG_SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
+_SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ def read_plane(path: str, named: str) -> NDArray[Any]:
 
 def _kind(path: str) -> str:
     lower = path.lower()
-    return "tiff" if lower.endswith(TIFF) else "png" if lower.endswith(PNG) else "jpeg"
+    return next(kind for kind, endings in _ENDINGS.items() if lower.endswith(endings))
 
 
 def _open(path: str, stack: ExitStack) -> TiffFile:
@@ -153,6 +154,16 @@ def _png_plane(path: str, named: str) -> NDArray[Any]:
 
 def _jpeg_head(path: str, named: str) -> Head:
     _begin(path, named, b"\xff\xd8", "JPEG")
+    return _pillow_head(path, named)
+
+
+def _bmp_head(path: str, named: str) -> Head:
+    _begin(path, named, b"BM", "BMP")
+    return _pillow_head(path, named)
+
+
+def _pillow_head(path: str, named: str) -> Head:
+    """Return what a file says of itself that pillow decodes; a palette of greys is grey to it."""
     try:
         with Pillow.open(path) as image:
             turn, notes = turn_by(image.getexif().get(_EXIF_ORIENTATION, 1))
@@ -161,13 +172,13 @@ def _jpeg_head(path: str, named: str) -> Head:
             mode = image.mode
     except Pillow.DecompressionBombError as error:
         raise SourceError(f"{named}: {error!s:.100}, expected a smaller image") from error
-    if mode not in _JPEG_SAMPLES:
+    if mode not in _SAMPLES:
         raise SourceError(f"{named}: found pixels of kind {mode}, expected grey or RGB")
-    shape = (rows, columns, _JPEG_SAMPLES[mode])
+    shape = (rows, columns, _SAMPLES[mode])
     return Head(shape, np.dtype(np.uint8), note="".join(notes))
 
 
-def _jpeg_plane(path: str, named: str) -> NDArray[Any]:
+def _pillow_plane(path: str, named: str) -> NDArray[Any]:
     with Pillow.open(path) as image:
         turn, _ = turn_by(image.getexif().get(_EXIF_ORIENTATION, 1))
         return turned_pixels(np.asarray(image), turn)
@@ -190,8 +201,10 @@ class _Format:
 _FORMATS = {
     "tiff": _Format(_tiff_head, _tiff_plane),
     "png": _Format(_png_head, _png_plane),
-    "jpeg": _Format(_jpeg_head, _jpeg_plane),
+    "jpeg": _Format(_jpeg_head, _pillow_plane),
+    "bmp": _Format(_bmp_head, _pillow_plane),
 }
+_ENDINGS = {"tiff": TIFF, "png": PNG, "jpeg": JPEG, "bmp": BMP}
 
 
 def join(folder: str, path: str) -> str:
