@@ -103,7 +103,8 @@ class PlanOptions:
         flag=Flag(
             "--series",
             "which of several images of a source: series of DICOM or planes, segments, scenes of "
-            "CZI, LIF, ND2 (default: the largest); `list` shows them and does nothing else",
+            "CZI, LIF, ND2, tiles and angles of BigDataViewer, angles of OME-TIFF (default: the "
+            "largest); `list` shows them and does nothing else",
             "N|list",
         ),
         bounds=COUNT_OR_NONE,
