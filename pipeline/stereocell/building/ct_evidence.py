@@ -6,6 +6,7 @@ names the flags by which it is built as a CT.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ def find_ct_evidence(dataset: Dataset) -> CtEvidence:
     return CtEvidence(False, words, _flags(_halfway(voxels), (low, high)))
 
 
-def _halfway(voxels: NDArray[np.generic]) -> float:
+def _halfway(voxels: NDArray[Any]) -> float:
     """Return the value half-way between the means of Otsu's two classes."""
     from skimage.filters import threshold_otsu  # slow to import, and few sources need it
 
@@ -72,7 +73,7 @@ def _flags(level: float, window: tuple[float, float]) -> str:
     return f"--preset ct --iso-value 0={level:.4g} --window 0={low:.5g}:{high:.5g}"
 
 
-def _has_air(voxels: NDArray[np.generic], shift: float) -> bool:
+def _has_air(voxels: NDArray[Any], shift: float) -> bool:
     """Whether values are Hounsfield units plus a shift, by air and by the lack of larger ones."""
     is_air = np.abs(voxels - (_AIR_HU + shift)) <= _AIR_SPREAD
     return float(is_air.mean()) >= _AIR_SHARE and float(np.quantile(voxels, 0.99)) <= (
@@ -80,7 +81,7 @@ def _has_air(voxels: NDArray[np.generic], shift: float) -> bool:
     )
 
 
-def _is_shifted(voxels: NDArray[np.generic], shift: float) -> bool:
+def _is_shifted(voxels: NDArray[Any], shift: float) -> bool:
     """Whether values without a sign have the peaks of air and of soft tissue, and little between.
 
     Air alone is no sign: near 0 lies the background of any image.
