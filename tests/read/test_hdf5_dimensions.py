@@ -134,6 +134,15 @@ def test_positions_that_descend_turn_their_axis_round(tmp_path: Path) -> None:
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
 
 
+def test_positions_without_a_unit_are_named_where_the_spacing_is_missing(tmp_path: Path) -> None:
+    path = write_netcdf(tmp_path / "a.nc", "zyx")
+    with h5py.File(path, "a") as file:
+        del file["z"].attrs["units"]
+    line = r"y 0.2 um, x 0.25 um, but none along z \(positions of /z have steps of 0.5 without a"
+    with pytest.raises(SourceError, match=line):
+        read.open(path)
+
+
 def test_uneven_positions_are_reported(tmp_path: Path) -> None:
     uneven = np.cumsum(np.where(np.arange(SIZES["z"]) < 8, 0.5, 2.0))
     dataset = read.open(write_netcdf(tmp_path / "a.nc", "zyx", z=uneven))

@@ -40,8 +40,8 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
         "input",
         type=_named,
         help="a path: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of planes (TIFF, "
-        "PNG, JPEG), Imaris, HDF5 (FILE.h5:/KEY), NRRD, MRC, CZI, ...; or an http(s):// or s3:// "
-        "address of OME-Zarr, TIFF or N5",
+        "PNG, JPEG, BMP), Imaris, HDF5 (FILE.h5:/KEY), netCDF, MATLAB 7.3, NRRD, MRC, MGH, CZI, "
+        "...; or an http(s):// or s3:// address of OME-Zarr, TIFF or N5",
     )
     declare_settings(parser)
     plan = parser.add_argument_group("what to build")

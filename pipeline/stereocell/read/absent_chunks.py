@@ -12,9 +12,10 @@ from typing import Any
 
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset, VoxelArray
-from stereocell.read.file_array import FlippedArray
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.inverted_array import InvertedArray
 from stereocell.read.readers import format_of
+from stereocell.read.value_scale import ScaledArray
 from stereocell.storage.file_states import FileStates
 
 _MOST_COUNTED = 2_000_000  # most chunks that are looked for; a part with more is not counted
@@ -49,8 +50,9 @@ def count_absent(
     if isinstance(stored, InvertedArray):
         stored = stored.stored
     spans = _spans(array, dataset.time, channels, box)
-    while isinstance(stored, FlippedArray):
-        stored, spans = stored.stored, stored.stored_spans(spans)
+    while isinstance(stored, FlippedArray | ScaledArray):
+        spans = stored.stored_spans(spans) if isinstance(stored, FlippedArray) else spans
+        stored = stored.stored
     count = _COUNTERS.get(format_of(dataset.source))
     if count is None or not states.is_complete:
         return None

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stereocell.model.errors import SourceError
+from stereocell.read.foreign_files import foreign_words
 from stereocell.storage.first_bytes import Content, identify, unpacked
 from stereocell.storage.location import Location
 
@@ -135,6 +136,9 @@ def _par_beside(path: Path) -> str:
 
 
 def _refused(location: Location, content: Content, title: str) -> SourceError:
+    words = content.words
+    if not content.is_known:  # the name may say more than bytes without a mark
+        words = foreign_words(location.parts[-1]) or words
     ending = _ENDINGS.get(content.format)
     remedy = f": if that is what it is meant to be, name it {ending}" if ending else ""
-    return SourceError(f"{location.shown}: found {content.words}, expected {title}{remedy}")
+    return SourceError(f"{location.shown}: found {words}, expected {title}{remedy}")

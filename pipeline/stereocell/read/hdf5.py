@@ -15,7 +15,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import bdv_hdf5
 from stereocell.read.array_axes import settle_stated_axes
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.file_array import FlippedArray
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.hdf5_dimensions import describe, require_plain
 from stereocell.read.hdf5_spacing import settle_spacing
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
@@ -29,12 +29,22 @@ from stereocell.storage.location import Location
 _LISTED = 12  # datasets that a message names
 
 
-def read_image(location: Location, *, axes: str = "") -> Image:
-    """Return the image of one dataset. Raises SourceError where it can't be read, or is unclear."""
+def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str = "") -> Image:
+    """Return the image of one dataset. Raises SourceError where it can't be read, or is unclear.
+
+    series, xml  a view of BigDataViewer and the XML that lists it, where the XML was named
+    """
     tree = Hdf5Tree(location, "an HDF5 file that is whole")
     try:
         # all of it asks h5py, which may fail at any name or attribute of a damaged file
         with one_line(tree.where, "an HDF5 file that is whole"):
+            if not location.key and bdv_hdf5.is_container(tree):
+                if axes:
+                    raise UsageError(
+                        f"{tree.where}: --axes {axes}: BigDataViewer's axes are z, y, x, expected "
+                        "none"
+                    )
+                return bdv_hdf5.read_image(tree, location, series=series, xml=xml)
             image = _image(tree, location, axes)
             tree.end_texts()
             return image
@@ -44,12 +54,6 @@ def read_image(location: Location, *, axes: str = "") -> Image:
 
 
 def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
-    if not location.key and bdv_hdf5.is_container(tree):
-        if axes:
-            raise UsageError(
-                f"{tree.where}: --axes {axes}: BigDataViewer's axes are z, y, x, expected none"
-            )
-        return bdv_hdf5.read_image(tree, location)
     dataset, notes = _choose(tree, location.key)
     where = f"{location.path}:{dataset.name}"
     require_plain(where, dataset)
@@ -68,7 +72,7 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
             f"{where}: axis c: found {array.size('c')}, expected at most {MAX_CHANNELS}"
         )
     unnamed = (None,) * array.size("c")
-    grid = grid_of(array.shape, found.spacing_um)
+    grid = grid_of(array.shape, found.spacing_um, found.hint)
     return Image(
         (array,), (grid,), unnamed, unnamed, 1, tree.close,
         notes=(*notes, *axes_notes, *found.notes, *value_notes), files=tree.files,

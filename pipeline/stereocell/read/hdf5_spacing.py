@@ -25,11 +25,15 @@ _MAX_POSITIONS = 1_000_000  # longest list of positions that is read
 
 @dataclass(frozen=True, slots=True)
 class SettledSpacing:
-    """The spacing (z, y, x), um, None where it is not stated, and the axes that run backwards."""
+    """The spacing (z, y, x), um, None where it is not stated, and the axes that run backwards.
+
+    hint  steps of positions that have no unit of length, for the message about a missing spacing
+    """
 
     spacing_um: PartialTriple
     flips: tuple[bool, ...]
     notes: tuple[str, ...]
+    hint: str = ""
 
 
 def settle_spacing(
@@ -40,6 +44,7 @@ def settle_spacing(
     axes  of the dataset, slowest first
     """
     notes: list[str] = []
+    hints: list[str] = []
     flips = [False] * len(axes)
     stated: dict[str, list[Statement]] = {axis: [] for axis in "zyx"}
     for one in described:
@@ -48,15 +53,19 @@ def settle_spacing(
             if axis not in stated:
                 continue
             if scale is not None:
-                count = dataset.shape[place]
-                flips[place] |= _add_positions(tree, scale, count, stated[axis], notes)
+                found = _Positions(tree, scale, dataset.shape[place])
+                flips[place] |= found.descend
+                stated[axis] += found.statements
+                notes += found.notes
+                hints += found.hints
             if step is not None:
                 _add_step(one, step, stated[axis])
     nodes: list[h5py.Group | h5py.Dataset] = [dataset, dataset.parent, dataset.file["/"]]
     for node in nodes:
         _add_attributes(tree, node, axes, stated, is_own=node is dataset)
     z, y, x = (_choose(axis, stated[axis], notes) for axis in "zyx")
-    return SettledSpacing((z, y, x), tuple(flips), tuple(dict.fromkeys(notes)))
+    notes, hints = list(dict.fromkeys(notes)), list(dict.fromkeys(hints))
+    return SettledSpacing((z, y, x), tuple(flips), tuple(notes), ", ".join(hints))
 
 
 def _choose(axis: str, stated: list[Statement], notes: list[str]) -> float | None:
@@ -69,29 +78,43 @@ def _choose(axis: str, stated: list[Statement], notes: list[str]) -> float | Non
     return settled.number
 
 
-def _add_positions(
-    tree: Hdf5Tree, scale: h5py.Dataset, count: int, stated: list[Statement], notes: list[str]
-) -> bool:
-    """Add the spacing that positions state; return whether they descend."""
-    name = str(scale.name)
-    steps = _steps(tree, scale, count)
-    if steps is None:
-        return False
-    unit = tree.attribute(scale, "units")
-    per = um_per(unit)
-    if steps.mean < 0:
-        notes.append(f"positions of {name} descend: that axis is turned round, so that they rise")
-    if not steps.is_even:
-        shown = unit if isinstance(unit, str) else ""
-        notes.append(
-            f"positions of {name} are uneven: found steps of {steps.least:.5g} to "
-            f"{steps.largest:.5g} {shown:.20}".rstrip()
-            + f": their mean, {abs(steps.mean):.5g}, is used for all, so the shape is distorted; "
-            "interpolate the volume at even positions for its true shape"
-        )
-    if per is not None:
-        stated.append(Statement(abs(steps.mean) * per, f"the positions of {name}", Trust.MEASURED))
-    return steps.mean < 0
+class _Positions:
+    """What a dataset of positions along an axis of `count` voxels states.
+
+    descend     whether they descend
+    statements  the voxel spacing, um
+    """
+
+    def __init__(self, tree: Hdf5Tree, scale: h5py.Dataset, count: int) -> None:
+        self.descend = False
+        self.statements: list[Statement] = []
+        self.notes: list[str] = []
+        self.hints: list[str] = []
+        self._name = str(scale.name)
+        if (steps := _steps(tree, scale, count)) is None:
+            return
+        unit = tree.attribute(scale, "units")
+        self._look_at(steps, unit if isinstance(unit, str) else "")
+
+    def _look_at(self, steps: Steps, unit: str) -> None:
+        name, size, shown = self._name, abs(steps.mean), f" {unit:.20}" if unit else ""
+        self.descend = steps.mean < 0
+        if self.descend:
+            self.notes.append(
+                f"positions of {name} descend: that axis is turned round, so that they rise"
+            )
+        if not steps.is_even:
+            self.notes.append(
+                f"positions of {name} are uneven: found steps of {steps.least:.5g} to "
+                f"{steps.largest:.5g}{shown}: their mean, {size:.5g}, is used for all, so the "
+                "shape is distorted; interpolate the volume at even positions for its true shape"
+            )
+        if (per := um_per(unit)) is not None:
+            place = f"the positions of {name}"
+            self.statements.append(Statement(size * per, place, Trust.MEASURED))
+        else:
+            why = f"in {unit:.20}" if unit else "without a unit"
+            self.hints.append(f"positions of {name} have steps of {size:.5g} {why}")
 
 
 def _steps(tree: Hdf5Tree, scale: h5py.Dataset, count: int) -> Steps | None:

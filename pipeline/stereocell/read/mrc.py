@@ -19,7 +19,8 @@ from mrcfile.utils import data_dtype_from_header
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.file_array import FileArray, FlippedArray, PackedArray, unpack_array
+from stereocell.read.file_array import FileArray, PackedArray, unpack_array
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.image import Image
 from stereocell.read.mrc_statements import settle_sign, settle_spacing
 from stereocell.read.spacing import Grid

@@ -7,16 +7,16 @@ References: https://ngff.openmicroscopy.org/rfc/4
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.read.acquired import Acquired
-from stereocell.read.anatomical_axes import Canonical, canonical_of
+from stereocell.read.anatomical_axes import canonical_of
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.file_array import FlippedArray
-from stereocell.read.spacing import Grid, Triple
+from stereocell.read.spacing import Grid
+from stereocell.read.turn import turned_array, turned_grid
 
 _UM_PER_MM = 1000.0
 # axis of LPS (left, posterior, superior) along which each side lies, and its sign
@@ -61,8 +61,8 @@ def with_sides(
         return Sided(arrays, grids, notes=(note,))
     canonical = canonical_of(_affine(directions, grids[0]), grids[0].shape)
     return Sided(
-        tuple(_turned_array(array, canonical) for array in arrays),
-        tuple(_turned_grid(grid, canonical) for grid in grids),
+        tuple(turned_array(array, canonical) for array in arrays),
+        tuple(turned_grid(grid, canonical) for grid in grids),
         canonical.placement,
         has_sides=True,
         acquired=Acquired(axis=canonical.order.index(0)),
@@ -89,34 +89,3 @@ def _affine(directions: Sequence[tuple[int, int] | None], grid: Grid) -> np.ndar
         affine[axis, column] = sign * spacing[column] / _UM_PER_MM
         affine[axis, 3] = sign * offset[column] / _UM_PER_MM
     return affine
-
-
-def _turned_array(array: VoxelArray, canonical: Canonical) -> VoxelArray:
-    names, flips = list(array.axes), [False] * len(array.axes)
-    for name, stored, flip in zip("zyx", canonical.order, canonical.flips, strict=True):
-        place = array.axes.index("zyx"[stored])
-        names[place], flips[place] = name, flip
-    turned = FlippedArray(array.array, flips) if any(flips) else array.array
-    return VoxelArray(turned, tuple(names))
-
-
-def _turned_grid(grid: Grid, canonical: Canonical) -> Grid:
-    z, y, x = (grid.shape[axis] for axis in canonical.order)
-    spacing = _turned(grid.spacing_um, canonical)
-    offset = grid.offset_um
-    if offset is not None and grid.spacing_um is not None:
-        pairs = zip(offset, grid.spacing_um, grid.shape, strict=True)
-        ends = [first + length * (count - 1) for first, length, count in pairs]
-        a, b, c = (
-            -ends[axis] if flip else offset[axis]
-            for axis, flip in zip(canonical.order, canonical.flips, strict=True)
-        )
-        offset = (a, b, c)
-    return replace(grid, shape=(z, y, x), spacing_um=spacing, offset_um=offset)
-
-
-def _turned(values: Triple | None, canonical: Canonical) -> Triple | None:
-    if values is None:
-        return None
-    z, y, x = (values[axis] for axis in canonical.order)
-    return z, y, x

@@ -79,6 +79,46 @@ def pixels_of(root: ElementTree.Element, index: int = 0) -> ElementTree.Element 
     return None if image is None else next(_children(image, "Pixels"), None)
 
 
+def planes_of(root: ElementTree.Element) -> list[ElementTree.Element]:
+    """Return the planes of the first image that the metadata describe."""
+    pixels = pixels_of(root)
+    return [] if pixels is None else list(_children(pixels, "Plane"))
+
+
+def positions_of(root: ElementTree.Element) -> list[float]:
+    """Return PositionZ of the planes of the first channel and time, by TheZ, in any unit.
+
+    Empty: a plane has none.
+    """
+    found: dict[int, float] = {}
+    for plane in planes_of(root):
+        try:
+            at, value = int(plane.get("TheZ", "")), float(plane.get("PositionZ", ""))
+        except ValueError:
+            return []
+        found.setdefault(at, value)
+    return [found[at] for at in sorted(found)] if sorted(found) == list(range(len(found))) else []
+
+
+def modulos_of(root: ElementTree.Element) -> list[ElementTree.Element]:
+    """Return the further axes (`ModuloAlongZ`, ...) of the first image.
+
+    An annotation counts for all images where no image refers to it.
+    """
+    images = list(_children(root, "Image"))
+    refers = [
+        {one.get("ID") for one in image.iter() if _local(one) == "AnnotationRef"}
+        for image in images
+    ]
+    found = []
+    for annotation in (one for one in root.iter() if _local(one) == "XMLAnnotation"):
+        name = annotation.get("ID")
+        if any(name in some for some in refers) and name not in refers[0]:
+            continue
+        found += [one for one in annotation.iter() if _local(one).startswith("ModuloAlong")]
+    return found
+
+
 def samples_of(pixels: ElementTree.Element) -> int:
     """Return the samples in each pixel (3 of RGB) of the first channel."""
     channel = next(_children(pixels, "Channel"), None)

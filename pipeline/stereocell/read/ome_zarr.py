@@ -52,6 +52,7 @@ from stereocell.read.zarr_store import (
     open_store,
     quiet,
 )
+from stereocell.read.zarr_values import value_attributes, with_values
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -104,8 +105,8 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
         multiscale = ngff.parse(where, ome)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
-            f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected a "
-            f"level, and at most {_MAX_LEVELS}"
+            f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
+            f"a level, and at most {_MAX_LEVELS}"
         )
     levels, notes = _levels(location, store, multiscale, axes, metadata.zarr_format)
     missing = [axis for axis in "zyx" if axis not in levels[0].axes]
@@ -162,8 +163,10 @@ def _levels(
                 f"expected {dimensions} as `axes`{way}"
             )
     names, notes = settled_axes(where, arrays[0], image.names, axes)
-    levels = tuple(VoxelArray(array, names) for array in arrays)
-    return levels, (*notes, *notes_on_names(arrays))
+    attributes = value_attributes(arrays[0])
+    valued = [with_values(where, VoxelArray(array, names), attributes) for array in arrays]
+    levels = tuple(level for level, _ in valued)
+    return levels, (*notes, *notes_on_names(arrays), *valued[0][1])
 
 
 def _grids(

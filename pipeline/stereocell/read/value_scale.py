@@ -204,6 +204,11 @@ class ScaledArray:
         self._missing = [kind(value) for value in scale.missing]
         self.dtype = self._values_dtype()
 
+    @property
+    def stored(self) -> StoredArray:
+        """The array as it is stored."""
+        return self._array
+
     def _values_dtype(self) -> np.dtype[Any]:
         scale, stored = self._scale, self._stored
         if scale.has_gaps or stored.kind not in "iu":

@@ -24,7 +24,7 @@ _TIFF_SUFFIXES = (
     *(".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf"),
     *(".companion.ome", ".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
 )
-_PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg")
+_PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg", ".bmp")
 _MAX_OTHERS = 200  # files without an image's name that are looked into for DICOM
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _ARCHIVE_SUFFIXES = (".ozx", ".ome.zarr.zip", ".zarr.zip")  # of OME-Zarr in a zip file (RFC-9)
