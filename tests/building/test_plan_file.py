@@ -18,7 +18,7 @@ def test_the_schema_has_the_plan_s_fields() -> None:
     schema = json.loads(schema_path("plan.schema.json").read_bytes())
     own = ["format", "version", *(field.name for field in fields(Plan)), "sha256"]
     assert list(schema["properties"]) == own
-    assert schema["required"] == [name for name in own if name != "formats"]
+    assert schema["required"] == [name for name in own if name not in ("formats", "notes")]
     channel = schema["properties"]["channels"]["items"]
     assert list(channel["properties"]) == [field.name for field in fields(Channel)]
 
@@ -28,6 +28,14 @@ def test_a_plan_of_the_version_before_its_formats_were_in_it_is_read() -> None:
     del content["formats"]
     jsonschema.validate(seal(content), json.loads(schema_path("plan.schema.json").read_bytes()))
     assert from_json(content) == replace(plan_of(), formats=())
+
+
+def test_a_plan_without_notes_on_its_source_is_read() -> None:
+    content = to_json(replace(plan_of(), notes=("one note",)))
+    assert from_json(content).notes == ("one note",)
+    del content["notes"]
+    jsonschema.validate(seal(content), json.loads(schema_path("plan.schema.json").read_bytes()))
+    assert from_json(content) == plan_of()
 
 
 def test_results_name_the_libraries_of_their_own_reader_and_of_no_other() -> None:

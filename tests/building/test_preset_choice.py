@@ -44,6 +44,37 @@ def test_millimetres_without_are_an_mri(tmp_path: Path) -> None:
     assert "no Hounsfield units" in reason
 
 
+@pytest.mark.parametrize(
+    ("voxels", "words", "level", "window"),
+    [
+        (_body(24, 1064), "Hounsfield units plus 1024", (724, 724), "0:3024"),
+        (_body(24, 1064).clip(0).astype(np.uint16), "plus 1024", (724, 724), "0:3024"),
+        (_body(20, 180).astype(np.uint8), "8-bit values, which are no Hounsfield", (40, 160), ""),
+    ],
+    ids=["offset 1024", "offset without a sign", "8 bits"],
+)
+def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_that_build_it_are_named(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    voxels: NDArray[np.int16],
+    words: str,
+    level: tuple[float, float],
+    window: str,
+) -> None:
+    source = _nifti(tmp_path / "a.nii", voxels)
+    chosen, reason = choose_preset(open_dataset(source))
+    assert chosen == "mri"
+    assert f"{words}" in reason
+    assert "MR is assumed (for a CT --preset ct --iso-value 0=" in reason
+    flags = reason[reason.index("--preset ct") : reason.index(";")].split()
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
+    assert "is assumed" not in capsys.readouterr().err
+    plan = OutFolder(tmp_path / "out").plan()
+    assert plan.modality == "CT"
+    assert level[0] <= float(plan.settings.iso_values["NIfTI"]) <= level[1]
+    assert plan.settings.windows["NIfTI"] == (window or plan.settings.windows["NIfTI"])
+
+
 def test_padding_darker_than_air_hides_no_ct(tmp_path: Path) -> None:
     voxels = _body(-1000, 40)
     voxels[:, :8, :8] = voxels[:, -8:, -8:] = -3024  # outside of the scanner's round field

@@ -210,6 +210,7 @@ def _of_channel(
         confidence=confidence,
         doubt=found.doubt,
         modality="" if channel.source else plan.modality,
+        level_percentile=plan.settings.window.volume_percentile,
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)
     return ChannelSurvey(

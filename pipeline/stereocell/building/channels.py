@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from stereocell.building.settings import Settings
-from stereocell.isosurface.options import RUNGS, parse_level
+from stereocell.isosurface.options import NO_SURFACE, RUNGS, parse_level
 from stereocell.model.color import linear_color
 from stereocell.model.errors import UsageError
 from stereocell.model.identifiers import to_identifier
@@ -91,6 +91,9 @@ def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> lis
             found.append(channel)
             continue
         rungs = [part.strip() for part in given[channel.name].split(",")]
+        if rungs == [NO_SURFACE]:
+            found.append(replace(channel, rung=NO_SURFACE))
+            continue
         for rung in rungs:
             if rung not in RUNGS:
                 _require_level(channel.name, rung)
@@ -123,7 +126,7 @@ def _require_level(name: str, rung: str) -> None:
     except UsageError:
         raise UsageError(
             f"--surfaces {name}: found {rung!r:.40}, expected {', '.join(RUNGS)}, voxel values or "
-            "values above the background as 162+b, between commas"
+            f"values above the background as 162+b, between commas; or {NO_SURFACE}"
         ) from None
 
 
@@ -154,7 +157,7 @@ def require_no_background(settings: Settings, channels: Sequence[Channel], modal
     given += [
         (f"--surfaces {channel.base or channel.name}", channel.rung)
         for channel in channels
-        if channel.rung and channel.rung not in RUNGS
+        if channel.rung and channel.rung not in (*RUNGS, NO_SURFACE)
     ]
     for flag, value in given:
         if parse_level(flag, value)[1]:

@@ -14,7 +14,15 @@ from stereocell.building.tasks.window import Window
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import TileEvidence
-from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, LADDER, RUNGS, parse_level
+from stereocell.isosurface.options import (
+    ADAPTIVE,
+    APART,
+    CRITERIA,
+    LADDER,
+    NO_SURFACE,
+    RUNGS,
+    parse_level,
+)
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Tile
 
@@ -83,6 +91,9 @@ def find_level(
         return Found(
             window, levels, evidence, (rated,), subtracts, "", is_fixed=True, is_given=True
         )
+    if (channel.rung or options.rung) == NO_SURFACE:
+        reason = f"no surface is built by default (--surfaces {channel.name}=outer builds one)"
+        return Found(window, levels, evidence, (), levels.subtracts, reason)
     is_outer = options.rung == APART or RUNGS[channel.rung or options.rung] == 0
     if half is not None and criterion == LADDER and is_outer:
         return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
@@ -108,7 +119,7 @@ def find_level(
 def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
     """Return the iso-value that the user gives for a channel, and whether above the background."""
     if channel.rung:
-        if channel.rung in RUNGS:
+        if channel.rung in (*RUNGS, NO_SURFACE):
             return None
         return parse_level(f"--surfaces {channel.base or channel.name}", channel.rung)
     given = plan.settings.iso_values.get(channel.name)

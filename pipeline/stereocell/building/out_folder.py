@@ -216,7 +216,7 @@ class OutFolder:
         write_sealed(self.units_plan_file, {"key": self._key(plan)})
 
     def _key(self, plan: Plan) -> str:
-        return key_of(to_json(self._without_place(plan)), plan_module)
+        return key_of(to_json(replace(self._without_place(plan), notes=())), plan_module)
 
     def require_units_of(self, plan: Plan) -> None:
         """Raise OutputError unless all units of the plan are listed as built."""

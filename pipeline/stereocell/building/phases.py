@@ -5,6 +5,7 @@ work: a result is named by everything that it depends on.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -97,7 +98,7 @@ def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = 
             console.print(f"plan: {changes}", markup=False, soft_wrap=True)
         phase.is_up_to_date = not out_folder.save_plan(plan)
         write_sealed_text(out_folder.settings_file, text)
-        write_sealed(out_folder.provenance_file, provenance(plan))
+        write_sealed(out_folder.provenance_file, provenance_record(plan))
     shape = " x ".join(str(n) for n in plan.region.shape)
     console.print(
         f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
@@ -164,21 +165,21 @@ def settle(source: str, settings: Settings) -> Plan:
     )
     if settings.objects.table:
         watch_table(settings.objects.table)
+    objects = []
     for one in plan.labels:
-        # what can't be read, or isn't there, is told before the build
-        require_color_by(plan, one, table_of(plan, one))
+        # a table that can't be read, or lacks a column, ends the command before the build
+        table = table_of(plan, one)
+        require_color_by(plan, one, table)
+        objects += [f"{table.shown}: {note}" for note in table.notes] if table else []
     gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
-    objects = list(told_before(plan))
+    objects += told_before(plan)
     objects += filter(None, map(doubt_of, plan.labels))
     if settings.objects.table and len(plan.labels) > 1:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
-    for note in (
-        # numbers of objects are read as they are
-        *(note for note in dataset.notes if not (alone and note.startswith(CAST))),
-        *gaps,
-        *objects,
-        *told_in_vain(settings, channels),
-    ):  # an error stands alone
+    # numbers of objects are read as they are
+    read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
+    plan = replace(plan, notes=(*read, *gaps, *objects))
+    for note in (*plan.notes, *told_in_vain(settings, channels)):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan
 
@@ -219,6 +220,14 @@ def provenance(plan: Plan) -> dict[str, Any]:
         },
         **_added(plan),
     }
+
+
+def provenance_record(plan: Plan) -> dict[str, Any]:
+    """Return the content of provenance.json: the provenance, and the notes on reading the source.
+
+    The notes stay beside the plan, because some name the source's files.
+    """
+    return {**provenance(plan), "notes": list(plan.notes)}
 
 
 def _without_places(settings: dict[str, Any]) -> dict[str, Any]:

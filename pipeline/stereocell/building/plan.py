@@ -58,6 +58,8 @@ class Plan:
                 specimen's place is the patient's world (read/anatomical_axes.py)
     labels      label maps whose objects are built, channels beside `channels`
     formats     which formats the source and the label maps have, sorted (readers.format_of)
+    notes       what was chosen, assumed or left out in reading the source, a sentence each; no
+                result depends on them
     """
 
     source: str
@@ -78,6 +80,7 @@ class Plan:
     has_sides: bool = False
     labels: tuple[Labels, ...] = ()
     formats: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def repair(self) -> RepairOptions:

@@ -1,6 +1,7 @@
 """Notes beside a plan: gaps in the data, ignored settings, changes since the plan before."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from stereocell.building.channels import ALL, Channel
 from stereocell.building.input_files import first_states, open_watched
@@ -8,7 +9,7 @@ from stereocell.building.open_source import SourceRef
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings, to_dict
-from stereocell.isosurface.options import LADDER, RUNGS
+from stereocell.isosurface.options import LADDER, NO_SURFACE, RUNGS
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
@@ -86,7 +87,7 @@ def told_in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[st
             yield f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
         if channel.rung and options.criterion != LADDER:
             yield f"{channel.name}: built where --surfaces says, not by {options.criterion}"
-        is_number = channel.rung not in RUNGS if channel.rung else given is not None
+        is_number = channel.rung not in (*RUNGS, NO_SURFACE) if channel.rung else given is not None
         if is_number and options.scope == "tile":
             yield (
                 f"{channel.name}: its level is given, so the same in all tiles: --iso-scope tile "
@@ -99,7 +100,7 @@ def changes_of(there: Plan, plan: Plan) -> str:
 
     there  the plan in OUT, which `plan` replaces. Results that depend on the changes follow
     """
-    if there == plan:
+    if replace(there, notes=plan.notes) == plan:
         return ""
     old, new = to_dict(there.settings), to_dict(plan.settings)
     changes = [

@@ -4,22 +4,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from stereocell.building.ct_evidence import find_ct_evidence
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.settings import NO_PRESET, Settings, load
 from stereocell.engine.run import console
 from stereocell.model.errors import StereoCellError
-from stereocell.model.tiling import Box
 from stereocell.read import Dataset
 from stereocell.storage.location import Location
 
 _BY_MODALITY = {"MR": "mri", "CT": "ct"}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
 _PART_UM = 20_000.0  # um: of what is smaller across, presets of patients drop pieces half as large
-# of the voxels looked at so many lie this near to air, and 99 % below metal
-_AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MAX_HU = -1000.0, 150.0, 0.02, 4000.0
-_PLANES = 8  # in the middle, that are looked at for Hounsfield units
 
 
 def load_for(
@@ -71,26 +66,18 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
     if known:
         chosen = _BY_MODALITY.get(known)
         return chosen, _describe(chosen, f"the input is {known}")
-    chosen = "ct" if _has_hounsfield_units(dataset) else "mri"
-    looks = "values like Hounsfield units"
-    if chosen == "mri":
-        looks = "no Hounsfield units, which a CT that was shifted has not either"
-    return chosen, _describe(chosen, f"voxels of {finest / 1000:.3g} mm and {looks}")
+    evidence = find_ct_evidence(dataset)
+    chosen = "ct" if evidence.is_hounsfield else "mri"
+    reason = f"voxels of {finest / 1000:.3g} mm and {evidence.words}"
+    if evidence.flags:
+        return chosen, (
+            f"preset {chosen}: {reason}: MR is assumed (for a CT {evidence.flags}; "
+            f"--preset {NO_PRESET}: the defaults)"
+        )
+    return chosen, _describe(chosen, reason)
 
 
 def _describe(chosen: str | None, reason: str) -> str:
     if chosen is None:
         return f"no preset: {reason}: lengths follow the voxel spacing (--preset names another)"
     return f"preset {chosen}: {reason} (--preset {NO_PRESET}: the defaults)"
-
-
-def _has_hounsfield_units(dataset: Dataset) -> bool:
-    if dataset.dtype.kind == "u":
-        return False
-    depth, height, width = dataset.levels[0].shape
-    first = max(0, (depth - _PLANES) // 2)
-    # planes through the whole: corners alone may be padding, and the middle all body
-    middle = Box((first, 0, 0), (min(depth, first + _PLANES), height, width))
-    voxels = dataset.read(0, middle).voxels
-    is_air = np.abs(voxels - _AIR_HU) <= _AIR_SPREAD
-    return float(is_air.mean()) >= _AIR_SHARE and float(np.quantile(voxels, 0.99)) <= _MAX_HU

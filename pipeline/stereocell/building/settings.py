@@ -127,6 +127,16 @@ class PlanOptions:
             "where the file names none, or a TIFF's are wrong",
         ),
     )
+    dark: bool = setting(
+        False,
+        "structures are darker than their surroundings, as in electron microscopy: values are "
+        "inverted",
+        flag=Flag(
+            "--dark",
+            "structures are darker than their surroundings, as membranes in electron microscopy: "
+            "all values are inverted",
+        ),
+    )
     spacing_um: tuple[float, ...] = setting(
         (),
         "voxel spacing z, y, x, instead of the file's",
@@ -217,11 +227,11 @@ class Settings:
     surfaces: Mapping[str, str] = setting(
         {},
         "channel = the surfaces built of it: outer, inner, third, or voxel values, between "
-        "commas; a value above the background as 162+b",
+        "commas; a value above the background as 162+b; or none",
         flag=Flag(
             "--surfaces",
             "which surfaces are built of a channel: outer, inner, third, or voxel values, between "
-            "commas; may be repeated",
+            "commas; or none; may be repeated",
             "CHANNEL=SURFACE,...",
         ),
     )

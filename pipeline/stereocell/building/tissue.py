@@ -20,7 +20,7 @@ from stereocell.building.model_process import ModelBounds, opened_network
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_places, require_own_tissue
-from stereocell.building.phases import provenance
+from stereocell.building.phases import provenance_record
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.sealed_documents import require_documents
@@ -144,7 +144,7 @@ def _add(
     plan = with_tissue(plan, out, record)
     require_own_places(out_folder, is_same_plan=out_folder.plan() == plan)
     out_folder.save_plan(plan)
-    write_sealed(out_folder.provenance_file, provenance(plan))
+    write_sealed(out_folder.provenance_file, provenance_record(plan))
     return plan
 
 

@@ -54,7 +54,9 @@ def declare_setting(parser: Any, flag: Flag, field: Field[Any]) -> None:
     about = {"help": (flag.help or field.metadata["comment"]).replace("%", "%%")}
     kind = field.type
     if kind is bool:
-        parser.add_argument(flag.name, action="store_const", const=True, **about)
+        # A preset or a file may turn a setting on, and `--no-dark` turns it off again.
+        action = argparse.BooleanOptionalAction
+        parser.add_argument(flag.name, action=action, default=None, **about)
     elif get_origin(kind) is Mapping:
         read = partial(_pair, flag, get_args(kind)[1])
         parser.add_argument(flag.name, action="append", metavar=flag.form, type=read, **about)

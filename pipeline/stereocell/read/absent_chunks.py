@@ -12,6 +12,8 @@ from typing import Any
 
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset, VoxelArray
+from stereocell.read.file_array import FlippedArray
+from stereocell.read.inverted_array import InvertedArray
 from stereocell.read.readers import format_of
 from stereocell.storage.file_states import FileStates
 
@@ -43,10 +45,16 @@ def count_absent(
     states  the source's files, as they were listed
     """
     array = dataset.arrays[level]
+    stored: Any = array.array
+    if isinstance(stored, InvertedArray):
+        stored = stored.stored
+    spans = _spans(array, dataset.time, channels, box)
+    while isinstance(stored, FlippedArray):
+        stored, spans = stored.stored, stored.stored_spans(spans)
     count = _COUNTERS.get(format_of(dataset.source))
     if count is None or not states.is_complete:
         return None
-    return count(array.array, _spans(array, dataset.time, channels, box), states)
+    return count(stored, spans, states)
 
 
 def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
@@ -57,9 +65,22 @@ def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
     sizes, noun = (stored.shards, "shard") if stored.shards else (stored.chunks, "chunk")
     if _number(sizes, spans) > _MOST_COUNTED:
         return None
-    keys = (stored.metadata.encode_chunk_key(place) for place in _places(sizes, spans))
-    paths = (f"{stored.path}/{key}".lstrip("/") for key in keys)
-    return _counted(paths, states.names(), noun, stored.fill_value)
+    others, names = stored.store.other_names, stored.store.members or states.names()
+
+    def is_present(place: tuple[int, ...]) -> bool:
+        key = f"{stored.path}/{stored.metadata.encode_chunk_key(place)}".lstrip("/")
+        return key in names or (others is not None and others.key_of(key) in names)
+
+    if stored.shards and _number(stored.chunks, spans) <= _MOST_COUNTED:
+        from stereocell.read.shard_index import absent_in_shards
+
+        pairs = zip(stored.chunks, spans, strict=True)
+        touched = [_of_axis(size, ranges) for size, ranges in pairs]
+        inner = absent_in_shards(stored, touched, is_present)
+        if inner is not None and inner[2]:
+            return Absent(inner[0], inner[1], "chunk", stored.fill_value)
+    found = [is_present(place) for place in _places(sizes, spans)]
+    return Absent(found.count(False), len(found), noun, stored.fill_value)
 
 
 def _in_n5(stored: Any, spans: Spans, states: FileStates) -> Absent | None:

@@ -20,7 +20,7 @@ from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import Grid
 from stereocell.read.zarr_collections import is_collection, ome_of
-from stereocell.read.zarr_store import files_of, open_array, quiet
+from stereocell.read.zarr_store import files_of, notes_on_names, open_array, quiet
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -40,6 +40,7 @@ def read_array(location: Location, store: Store, path: str, *, axes: str = "") -
     )
     listed = [str(name).lower() for name in named] if isinstance(named, list | tuple) else []
     names, notes = settle_axes(where, array.shape, axes, named=listed)
+    notes = (*notes_on_names([array]), *notes)
     voxels = VoxelArray(array, names)
     if voxels.size("c") > MAX_CHANNELS:
         raise SourceError(

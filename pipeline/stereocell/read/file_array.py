@@ -74,6 +74,18 @@ class FlippedArray:
         self.dtype = array.dtype
         self._array, self._flips = array, tuple(flips)
 
+    @property
+    def stored(self) -> StoredArray:
+        """The array as it is stored."""
+        return self._array
+
+    def stored_spans(self, spans: Sequence[Sequence[range]]) -> list[list[range]]:
+        """Return ranges of indices along each axis as ranges of the stored array."""
+        return [
+            [range(n - one.stop, n - one.start) if flip else one for one in ranges]
+            for ranges, flip, n in zip(spans, self._flips, self.shape, strict=True)
+        ]
+
     def __getitem__(self, key: Any) -> NDArray[Any]:
         """Return voxels by whole numbers, and slices of step 1 that lie inside."""
         place = [

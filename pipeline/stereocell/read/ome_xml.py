@@ -8,6 +8,7 @@ References: https://docs.openmicroscopy.org/ome-model/latest/ome-xml/
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from xml.etree import ElementTree
 
 from stereocell.model.color import linear_color
@@ -72,9 +73,9 @@ def files_of(root: ElementTree.Element) -> Iterator[str]:
     return (uuid.get("FileName", "") for uuid in uuids_of(root) if uuid.get("FileName"))
 
 
-def pixels_of(root: ElementTree.Element) -> ElementTree.Element | None:
-    """Return the Pixels of the first image; None: there are none."""
-    image = next(_children(root, "Image"), None)
+def pixels_of(root: ElementTree.Element, index: int = 0) -> ElementTree.Element | None:
+    """Return the Pixels of an image, the first by default; None: there are none."""
+    image = next(islice(_children(root, "Image"), index, None), None)
     return None if image is None else next(_children(image, "Pixels"), None)
 
 

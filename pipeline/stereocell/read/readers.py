@@ -77,6 +77,7 @@ READERS = {
     ),
     "dicom": Reader("stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True),
     "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze"),
+    "mgh": Reader("stereocell.read.mgh", "MGH (FreeSurfer)"),
     "ims": Reader("stereocell.read.ims", "Imaris"),
     "hdf5": Reader("stereocell.read.hdf5", "HDF5 (NAME.h5:/KEY)", has_axes=True),
     "n5": Reader("stereocell.read.n5", "N5", has_axes=True, is_remote=True),

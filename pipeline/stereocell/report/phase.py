@@ -7,7 +7,7 @@ from stereocell.building.made_of import FIELD
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_report
 from stereocell.building.phase import digest_of_file, phase_of
-from stereocell.building.phases import provenance
+from stereocell.building.phases import provenance_record
 from stereocell.report import page
 from stereocell.storage.cache_key import key_of
 
@@ -26,7 +26,7 @@ def run_report(out: Path) -> None:
             for name, entry in out_folder.phases().items()
             if name != "report"
         }
-        content = [out_folder.index(), out_folder.survey(), provenance(plan), others]
+        content = [out_folder.index(), out_folder.survey(), provenance_record(plan), others]
         key = key_of([content, page.TEMPLATE.read_text("utf-8")], page)
         done = partial(digest_of_file, out_folder.report_file)
         if not phase.is_done(key, done, require_own=require_own_report):

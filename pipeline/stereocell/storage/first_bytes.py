@@ -9,10 +9,11 @@ _POINTERS = (
     (b"version https://git-lfs", "a pointer of Git LFS (`git lfs pull` gets the file)"),
     (b"/annex/objects", "a pointer of git-annex (`git annex get` gets the file)"),
 )
+_CDF = (b"\x01", b"\x02", b"\x05")  # versions of netCDF-3
 _MAGIC = (
     *_POINTERS,
-    (b"MATLAB 7.3", "a MATLAB 7.3 file (it holds HDF5: name it .h5)"),
-    (b"MATLAB 5.0", "a MATLAB file (save it with -v7.3, which holds HDF5, and name it .h5)"),
+    (b"MATLAB 5.0", "a MATLAB file before 7.3 (save it in MATLAB with -v7.3)"),
+    *((b"CDF" + mark, "a netCDF-3 file (`nccopy -k nc4 IN OUT` makes netCDF-4)") for mark in _CDF),
     (b"\x93NUMPY", "a NumPy array (tifffile.imwrite makes a TIFF of it)"),
     (b"PK\x03\x04", "a zip archive (unzip it, and name the file or folder in it)"),
     (b"PK\x05\x06", "an empty zip archive"),
@@ -33,6 +34,7 @@ _READ = (
     (128, b"DICM", "dicom", "a DICOM file"),  # goes first: its preamble may begin a TIFF
     *((0, mark, "tiff", "a TIFF file") for mark in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
     (0, b"\x89HDF\r\n\x1a\n", "hdf5", "an HDF5 file"),
+    (0, b"MATLAB 7.3", "hdf5", "a MATLAB 7.3 file"),  # HDF5 behind a block of 512 bytes
     (0, b"NRRD0", "nrrd", "an NRRD file"),
     (0, b"ZISRAWFILE", "czi", "a CZI file of Zeiss"),
     (0, b"\xda\xce\xbe\x0a", "nd2", "an ND2 file of Nikon"),

@@ -3,8 +3,10 @@
 import os
 import re
 import stat
-from collections.abc import Sequence
+import zipfile
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -25,6 +27,7 @@ _TIFF_SUFFIXES = (
 _PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg")
 _MAX_OTHERS = 200  # files without an image's name that are looked into for DICOM
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
+_ARCHIVE_SUFFIXES = (".ozx", ".ome.zarr.zip", ".zarr.zip")  # of OME-Zarr in a zip file (RFC-9)
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
 _ANALYZE_SUFFIXES = (".hdr", ".img", ".hdr.gz", ".img.gz")  # also pairs of NIfTI
@@ -33,8 +36,9 @@ _ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
 _FILE_SUFFIXES = {
     "tiff": _TIFF_SUFFIXES,
     "nifti": _NIFTI_SUFFIXES,
+    "mgh": (".mgh", ".mgz", ".mgh.gz"),
     "ims": (".ims",),
-    "hdf5": (".h5", ".hdf5", ".hdf"),
+    "hdf5": (".h5", ".hdf5", ".hdf", ".nc", ".nc4", ".mat", ".emd"),
     "nrrd": (".nrrd", ".nhdr"),
     "metaimage": (".mha", ".mhd"),
     "mrc": tuple(
@@ -48,7 +52,7 @@ _FILE_SUFFIXES = {
 }
 # formats that are known by a file's first bytes, whatever its name (IMOD calls MRC .st, .ali, ...)
 _BY_CONTENT = ("dicom", "tiff", "hdf5", "nrrd", "czi", "nd2", "lif", "mrc")
-_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf)):(.*)", re.IGNORECASE | re.DOTALL)
+_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf|nc|nc4|mat|emd)):(.*)", re.IGNORECASE | re.DOTALL)
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
 _CONNECT_S, SILENCE_S = 15.0, 30.0  # limits of one request; s3fs repeats it
 _AWS_CREDENTIALS = (
@@ -97,8 +101,9 @@ class Location:
 
     @property
     def path(self) -> str:
-        """The file or folder on this machine, without a dataset's key."""
-        return _split_key(self.source)[0]
+        """The file or folder on this machine, without a dataset's key or a path in a zip file."""
+        path = _split_key(self.source)[0]
+        return _archive_in(path) or path
 
     @property
     def key(self) -> str:
@@ -123,14 +128,15 @@ class Location:
     @property
     def parts(self) -> tuple[str, ...]:
         """The names along the path."""
-        path = self.path if self.is_local else self.shown.partition("://")[2]
+        path = _split_key(self.source)[0] if self.is_local else self.shown.partition("://")[2]
         return tuple(part for part in path.split("/") if part)
 
     @property
     def name(self) -> str:
         """The file's name without its suffix, for display; `plate.zarr/0` becomes `plate-0`."""
         parts = self.parts
-        outermost = (i for i, part in enumerate(parts) if part.endswith((".zarr", ".n5")))
+        whole = (".zarr", ".n5", *_ARCHIVE_SUFFIXES)
+        outermost = (i for i, part in enumerate(parts) if part.endswith(whole))
         first = next(outermost, len(parts) - 1)
         return "-".join(_stem(part) for part in parts[first:]) or "dataset"
 
@@ -142,6 +148,8 @@ class Location:
         a file with DICOM's first bytes.
         """
         if any(part.endswith(".zarr") for part in self.parts):
+            return "ome-zarr"
+        if self.is_zarr_archive:
             return "ome-zarr"
         if any(part.endswith(".n5") for part in self.parts) or self._is_n5():
             return "n5"
@@ -167,6 +175,14 @@ class Location:
         if last.endswith(_ANALYZE_SUFFIXES):
             return "nifti"
         return "bdv" if self._is_bdv() else None
+
+    @property
+    def is_zarr_archive(self) -> bool:
+        """Whether a source is a zip file of OME-Zarr or a group in one; at an address by name."""
+        if not self.is_local:
+            return bool(self.parts) and self.parts[-1].lower().endswith(_ARCHIVE_SUFFIXES)
+        path = _archive_in(self.source)
+        return bool(path) and zarr_root_in(_members(path, os.path.getmtime(path))) is not None
 
     def _is_bdv(self) -> bool:
         """Whether a file is the XML of BigDataViewer."""
@@ -320,6 +336,39 @@ def require_file(location: Location) -> None:
         raise SourceError(f"{location.shown}: is a folder, expected a file")
 
 
+def zarr_root_in(names: Collection[str]) -> str | None:
+    """Return the folder of a Zarr group among the members of a zip file, with a slash at its end.
+
+    It is the root, or the only folder there. None: there is no group.
+    """
+    if any(file in names for file in _ZARR_FILES):
+        return ""
+    folders = {name.partition("/")[0] for name in names if not name.startswith("__MACOSX/")}
+    folder = f"{next(iter(folders))}/" if len(folders) == 1 else ""
+    return folder if any(f"{folder}{file}" in names for file in _ZARR_FILES) else None
+
+
+def _archive_in(path: str) -> str:
+    """Return the zip file that a local path names, or leads into; empty: it does neither."""
+    lower = path.lower()
+    if ".zip" not in lower and ".ozx" not in lower:
+        return ""
+    parts = path.split("/")
+    ends = (i for i, part in enumerate(parts) if part.lower().endswith((".zip", ".ozx")))
+    paths = ("/".join(parts[: end + 1]) for end in ends)
+    return next((one for one in paths if os.path.isfile(one)), "")
+
+
+@lru_cache(maxsize=8)
+def _members(path: str, _: float) -> frozenset[str]:
+    """Return the names of a zip file's members; none where it can't be read."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return frozenset(archive.namelist())
+    except (OSError, zipfile.BadZipFile):
+        return frozenset()
+
+
 def _split_key(text: str) -> tuple[str, str]:
     """Return a path and the `:/KEY` behind it; a file whose own name holds that goes first."""
     found = _KEYED.fullmatch(text)
@@ -341,7 +390,8 @@ def first_bytes(path: str, *, count: int = HEAD_BYTES) -> bytes:
 
 def _stem(name: str) -> str:
     files = (ending for endings in _FILE_SUFFIXES.values() for ending in endings)
-    for suffix in sorted((*_ZARR_SUFFIXES, ".n5", ".xml", *files), key=len, reverse=True):
+    endings = (*_ZARR_SUFFIXES, *_ARCHIVE_SUFFIXES, ".zip", ".n5", ".xml", *files)
+    for suffix in sorted(endings, key=len, reverse=True):
         if name.lower().endswith(suffix) and len(name) > len(suffix):
             return name[: -len(suffix)]
     return name

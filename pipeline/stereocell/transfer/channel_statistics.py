@@ -96,10 +96,12 @@ def make_appearance(
     confidence: float,
     doubt: str,
     modality: str = "",
+    level_percentile: float = 99.0,
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
 
     modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
+    level_percentile  percent of the voxels below the level of a volume without a surface
     """
     iso_value, threshold = None, None
     if level is not None:
@@ -132,6 +134,7 @@ def make_appearance(
         threshold_normalized=appearance.threshold_normalized,
         has_magnitudes=modality == "MR",
         is_calibrated=modality == "CT",
+        level_percentile=level_percentile,
     )
     function = None
     if modality == "CT":

@@ -31,20 +31,24 @@ def make_transfer_functions(
     threshold_normalized: float | None = None,
     has_magnitudes: bool = False,
     is_calibrated: bool = False,
+    level_percentile: float = 99.0,
 ) -> dict[str, OpacityPoints]:
     """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
 
     histogram             int64 (bins,), voxel counts over 0..1 in equal bins
     iso_normalized        the iso-value, 0..1; None: the channel has no clear surface
     threshold_normalized  the adaptive threshold, 0..1; None: there is none
+    level_percentile      percent of the voxels below the level of a channel without a surface
     has_magnitudes        whether values are magnitudes, as of MR: the air is noise, voxel by voxel
     is_calibrated         whether values lie on an absolute scale, as the Hounsfield units of CT
 
-    The level is the iso-value, or the 99th percentile in a channel without a clear surface.
+    The level is the iso-value, or a percentile in a channel without a clear surface.
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)
-    median, high = ((int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, 0.99))
+    median, high = (
+        (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, level_percentile / 100)
+    )
     level = float(np.clip(high if iso_normalized is None else iso_normalized, 0.02, 0.96))
     has_surface = iso_normalized is not None
     if is_calibrated and has_surface:
