@@ -124,6 +124,12 @@ class SurfaceOptions:
     smoothing_um: float | str = setting(
         AUTO, "sigma of the Gaussian; auto: the finest spacing", bounds=LENGTH_UM
     )
+    max_shift: float = setting(
+        2.0,
+        "the Gaussian moves a value by no more than so many deviations of the noise, so that thin "
+        "structures stay; 0: by any",
+        bounds=Bounds(0, 1e6),
+    )
     alpha_um: float | str = setting(
         AUTO,
         "radius of the ball that closes gaps; auto: by the channel's components, see max_alpha_um",
