@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from stereocell.building.channels import FLESH
 from stereocell.building.ct_evidence import LEVELS_HU, WINDOW_HU
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.preset_choice import choose_preset, load_for
@@ -201,3 +202,20 @@ def test_a_source_that_cannot_be_read_is_told_once(
     assert (settings.plan.modality, choice) == ("", "")
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_hounsfield_units_of_a_mouse_are_a_ct_without_a_preset(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scales = [dict.fromkeys("zyx", 50.0)]  # um
+    source = phantoms.write_ome_zarr(tmp_path / "mouse.ome.zarr", [_body(-1000, 40)], scales=scales)
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
+    note = "values like Hounsfield units: taken for CT (--modality GM: it is a microscope's)"
+    assert f"plan: {note}" in capsys.readouterr().err
+    plan = OutFolder(tmp_path / "out").plan()
+    assert (plan.modality, plan.channels[0].color) == ("CT", FLESH)
+    assert note in plan.notes
+    flags = ["-o", str(tmp_path / "light"), "--modality", "GM"]
+    assert main(["plan", str(source), *flags]) == 0
+    assert "Hounsfield" not in capsys.readouterr().err
+    assert OutFolder(tmp_path / "light").plan().modality == "GM"

@@ -71,6 +71,22 @@ def find_ct_evidence(dataset: Dataset) -> CtEvidence:
     return CtEvidence(False, words, flags, least=least)
 
 
+def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:
+    """Return DICOM's code of what took a volume, empty if it is not known, and a note for the plan.
+
+    stated  the settings', where the input says none
+
+    A volume of one channel in Hounsfield units is a CT, of whatever size: of a mouse, too.
+    """
+    known = dataset.modality or stated
+    if known or len(dataset.channels) != 1 or dataset.dtype.kind == "u":
+        return known, ""
+    evidence = find_ct_evidence(dataset)
+    if not evidence.is_hounsfield:
+        return "", ""
+    return "CT", f"{evidence.words}: taken for CT (--modality GM: it is a microscope's)"
+
+
 def _halfway(voxels: NDArray[Any]) -> float:
     """Return the value half-way between the means of Otsu's two classes."""
     from skimage.filters import threshold_otsu  # slow to import, and few sources need it

@@ -84,6 +84,9 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
     across = max(n * h for n, h in zip(level.shape, level.spacing_um, strict=True))
     if across < _PART_UM:
         return None, _describe(None, f"{across / 1000:.3g} mm across, too small for a patient")
+    if not dataset.has_hounsfield_units:
+        chosen = _BY_MODALITY["CT"]
+        return chosen, _describe(chosen, "the input is CT, though without Hounsfield units")
     if known:
         chosen = _BY_MODALITY.get(known)
         return chosen, _describe(chosen, f"the input is {known}")
