@@ -132,15 +132,15 @@ def settle(source: str, settings: Settings) -> Plan:
         modality, recognised = recognise_modality(dataset, options.modality)
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
-    found = [dataset.channels[index] for index in chosen]
+    wanted = [dataset.channels[index] for index in chosen]
     colors = choose_colors(
-        [(one.name, one.color) for one in found],
+        [(one.name, one.color) for one in wanted],
         modality=modality,
         is_alone=len(dataset.channels) == 1,
     )
     channels = [
         Channel(index, one.name, color)
-        for index, one, color in zip(chosen, found, colors, strict=True)
+        for index, one, color in zip(chosen, wanted, colors, strict=True)
     ]
     channels = with_surfaces(channels, settings.surfaces)
     level = choose_level(dataset.levels, len(channels), settings)

@@ -88,8 +88,8 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
         chosen = _BY_MODALITY["CT"]
         return chosen, _describe(chosen, "the input is CT, though without Hounsfield units")
     if known:
-        chosen = _BY_MODALITY.get(known)
-        return chosen, _describe(chosen, f"the input is {known}")
+        by_kind = _BY_MODALITY.get(known)
+        return by_kind, _describe(by_kind, f"the input is {known}")
     evidence = find_ct_evidence(dataset)
     chosen = "ct" if evidence.is_hounsfield else "mri"
     reason = f"voxels of {finest / 1000:.3g} mm and {evidence.words}"
