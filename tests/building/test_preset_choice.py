@@ -111,6 +111,17 @@ def test_the_levels_that_are_shifted_are_those_of_the_presets() -> None:
         assert settings.windows["*"] == f"{WINDOW_HU[0]:g}:{WINDOW_HU[1]:g}"
 
 
+def test_a_ct_that_is_stated_without_a_sign_is_doubted(tmp_path: Path) -> None:
+    voxels = _body(24, 1064).astype("<u2")
+    head = "ObjectType = Image\nNDims = 3\nDimSize = 32 30 24\nElementType = MET_USHORT\n"
+    head += "Modality = MET_MOD_CT\nElementSpacing = 1 1 1\nElementDataFile = LOCAL\n"
+    (tmp_path / "a.mha").write_bytes(head.encode() + voxels.tobytes())
+    chosen, reason = choose_preset(open_dataset(tmp_path / "a.mha"))
+    assert chosen == "ct"
+    assert "plus 1024, and its level of -300 is meant for Hounsfield units" in reason
+    assert "--preset ct --iso-value 0=724 --window 0=0:3024" in reason
+
+
 def test_padding_darker_than_air_hides_no_ct(tmp_path: Path) -> None:
     voxels = _body(-1000, 40)
     voxels[:, :8, :8] = voxels[:, -8:, -8:] = -3024  # outside of the scanner's round field

@@ -49,20 +49,31 @@ def load_for(
 
 
 def _doubt_of(source: str | Path, preset: str, settings: Settings) -> str:
-    """Return the doubt about a preset whose level is in Hounsfield units; empty: there is none."""
+    """Return the doubt about a preset of CT that the user names; empty: there is none."""
     try:
         dataset = open_source(as_asked(Location.of(source).source, settings.plan))
-        if dataset.modality:  # the reader says whether it has Hounsfield units
+        if dataset.modality and dataset.dtype.kind != "u":  # as the source states itself
             return ""
-        evidence = find_ct_evidence(dataset)
+        doubt = _doubt(dataset, preset)
     except StereoCellError:
         return ""
+    return doubt and f"preset {preset}: {doubt}"
+
+
+def _doubt(dataset: Dataset, preset: str) -> str:
+    """Return why a level in Hounsfield units does not fit the voxels; empty: it may fit.
+
+    A reader that knows the values to be no Hounsfield units has noted it already.
+    """
+    if not dataset.has_hounsfield_units:
+        return ""
+    evidence = find_ct_evidence(dataset)
     if not evidence.has_no_air:
         return ""
     flags = evidence.bone_flags if preset == "ct-bone" else evidence.flags
     level = f"its level of {LEVELS_HU[preset]:g} is meant for Hounsfield units"
     remedy = flags or "--iso-value 0=VALUE sets another, a voxel value"
-    return f"preset {preset}: {evidence.words}, and {level} ({remedy})"
+    return f"{evidence.words}, and {level} ({remedy})"
 
 
 def print_choice(choice: str) -> None:
@@ -89,7 +100,9 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
         return chosen, _describe(chosen, "the input is CT, though without Hounsfield units")
     if known:
         by_kind = _BY_MODALITY.get(known)
-        return by_kind, _describe(by_kind, f"the input is {known}")
+        is_unsigned_ct = by_kind == "ct" and dataset.dtype.kind == "u"
+        doubt = _doubt(dataset, "ct") if is_unsigned_ct else ""
+        return by_kind, _describe(by_kind, f"the input is {known}" + (doubt and f": {doubt}"))
     evidence = find_ct_evidence(dataset)
     chosen = "ct" if evidence.is_hounsfield else "mri"
     reason = f"voxels of {finest / 1000:.3g} mm and {evidence.words}"
