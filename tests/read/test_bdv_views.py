@@ -1,5 +1,6 @@
 """Tiles, angles and registrations of BigDataViewer, in HDF5 by h5py and in N5 by tensorstore."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 
 from stereocell import read
+from stereocell.building import input_files
+from stereocell.cli.__main__ import main
 from stereocell.model.errors import UsageError
 from stereocell.read import list_series
 from support.array_files import write_n5
@@ -185,3 +188,17 @@ def test_the_xml_that_is_named_counts_among_several(tmp_path: Path) -> None:
     other.write_text(path.read_text().replace("0 0 0 0 0.5 0", "0 0 0 0 -0.5 0"))
     np.testing.assert_array_equal(voxels_of(read.open(other)), BODY[::-1])
     np.testing.assert_array_equal(voxels_of(read.open(path)), BODY)
+
+
+def test_lost_blocks_of_a_view_are_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    setups = [{"body": BODY + channel, "channel": channel} for channel in (0, 1)]
+    path = write(tmp_path / "a", [one | {"affines": [PLAIN]} for one in setups], kind="n5")
+    (tmp_path / "a" / "a.n5" / "setup1" / "timepoint0" / "s0" / "0" / "0" / "0").unlink()
+    for source in (path, tmp_path / "a" / "a.n5"):
+        input_files.forget()
+        capsys.readouterr()
+        assert main(["plan", str(source), "-o", str(tmp_path / "o"), "--as", "intensity"]) == 0
+        assert "1 of 48 blocks of level 0" in capsys.readouterr().err
+        shutil.rmtree(tmp_path / "o")

@@ -112,6 +112,21 @@ def test_a_way_to_another_coordinate_system_is_not_taken_and_noted(tmp_path: Pat
     assert any("left out: coordinate systems stage" in note for note in dataset.notes)
 
 
+def test_a_system_without_units_leads_on_to_one_that_has_them(tmp_path: Path) -> None:
+    voxels = [{"name": name, "type": "space"} for name in "zyx"]
+    systems = [{"name": "voxels", "axes": voxels}, {"name": "physical", "axes": AXES}]
+    own = {"type": "scale", "scale": [1, 1, 1], "input": "0", "output": "voxels"}
+    onwards = {"type": "scale", "scale": list(UM), "input": "voxels", "output": "physical"}
+    dataset = read.open(write_systems(tmp_path / "a.zarr", [own], systems, [onwards]))
+    assert dataset.levels[0].spacing_um == UM
+
+
+def test_steps_of_0_6_without_names_of_systems_are_all_applied(tmp_path: Path) -> None:
+    steps = [{"type": "scale", "scale": [1, 0.4, 0.5]}, {"type": "scale", "scale": [0.5] * 3}]
+    dataset = read.open(write_systems(tmp_path / "a.zarr", steps))
+    assert dataset.levels[0].spacing_um == UM
+
+
 @pytest.mark.parametrize(
     "step",
     [

@@ -135,6 +135,18 @@ def test_a_calibration_of_imagej_is_applied(
     assert all(told in note for note in notes)
 
 
+def test_labels_that_name_channels_among_the_slices_are_noted(tmp_path: Path) -> None:
+    labels = [f"c:{c}/2 z:{z}/8 - a.nd2" for z in range(1, 9) for c in (1, 2)]
+    for given, is_told in ((labels, True), ([f"z:{z}/16" for z in range(16)], False)):
+        path = tmp_path / "a.tif"
+        tifffile.imwrite(
+            path, BODY, imagej=True, resolution=(4.0, 5.0),
+            metadata={"axes": "ZYX", "spacing": 0.5, "unit": "um", "Labels": given},
+        )  # fmt: skip
+        notes = read.open(path).notes
+        assert any("the labels of the slices name 2 channels" in note for note in notes) == is_told
+
+
 def test_the_orientation_of_ome_tiff_is_noted_and_not_applied(tmp_path: Path) -> None:
     path = write_ome(tmp_path / "a.ome.tif", BODY, extratags=[(274, "H", 1, 4, True)])
     np.testing.assert_array_equal(voxels_of(path), BODY)
@@ -167,6 +179,7 @@ def test_positions_of_planes_are_compared_with_the_depth(
     "planes",
     [
         places(np.arange(16) * 0.5),
+        places(np.arange(16) * 0.5).replace('PositionZUnit="\u00b5m"', ""),
         places(np.arange(16) * 0.5 + np.tile([0.0, 0.003], 8)),
         places(np.arange(16) * 5e-4, "mm"),
         places(np.arange(16), "reference frame"),
@@ -178,6 +191,13 @@ def test_positions_that_agree_or_are_no_lengths_need_no_note(tmp_path: Path, pla
     dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, planes=planes))
     assert dataset.levels[0].spacing_um == pytest.approx((0.5, 0.2, 0.25))
     assert dataset.notes == ()
+
+
+def test_positions_without_a_unit_are_compared_and_not_taken(tmp_path: Path) -> None:
+    planes = places(np.arange(16) * 0.6).replace('PositionZUnit="\u00b5m"', "")
+    dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, depth="1.0", planes=planes))
+    assert dataset.levels[0].spacing_um[0] == 1.0
+    assert "PositionZ of the planes (um are assumed) states 0.6 um" in dataset.notes[0]
 
 
 def test_planes_at_one_position_whose_time_rises_are_noted(tmp_path: Path) -> None:

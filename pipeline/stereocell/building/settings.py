@@ -103,7 +103,8 @@ class PlanOptions:
         flag=Flag(
             "--series",
             "which of several images of a source: series of DICOM or planes, segments, scenes of "
-            "CZI, LIF, ND2 (default: the largest); `list` shows them and does nothing else",
+            "CZI, LIF, ND2, tiles and angles of BigDataViewer, angles of OME-TIFF (default: the "
+            "largest); `list` shows them and does nothing else",
             "N|list",
         ),
         bounds=COUNT_OR_NONE,
@@ -158,7 +159,12 @@ class PlanOptions:
         flag=Flag("--neurological", "pictures of a patient with right on the right"),
     )
     modality: str = setting(
-        "", "where the input says none: a term of DICOM's Modality; MR and CT open path-traced"
+        "",
+        "where the input says none: a term of DICOM's Modality; MR and CT open path-traced",
+        flag=Flag(
+            "--modality",
+            "what took a volume that does not say so: MR, CT, PT, ..., GM for a microscope",
+        ),
     )
 
     def __post_init__(self) -> None:

@@ -86,14 +86,38 @@ def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
 
 
 def _in_n5(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    if hasattr(stored, "view"):
+        return _in_views(stored, spans, states)
     if not hasattr(stored, "path_of") or _number(stored.chunks, spans) > _MOST_COUNTED:
         return None
-    paths = (stored.path_of(place) for place in _places(stored.chunks, spans))
-    return _counted(paths, states.names(), "block", 0)
+    names = states.names()
+    # Under BigDataViewer's XML the files lie beside the source, not below it.
+    outside = "" if stored.folder == states.location.source else f"{stored.folder.lstrip('/')}/"
+    paths = (outside + stored.path_of(place) for place in _places(stored.chunks, spans))
+    return _counted(paths, names, "block", 0)
 
 
-def _in_hdf5(stored: Any, _: Spans, __: FileStates) -> Absent | None:
+def _in_views(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    """Count the blocks of BigDataViewer's views, of which each is an array of its own."""
+    times, channels, *place = spans
+    found = []
+    for time in (n for one in times for n in one):
+        for channel in (n for one in channels for n in one):
+            view = stored.view(time, channel)
+            count = _in_n5 if hasattr(view, "path_of") else _in_hdf5
+            found.append(count(view, place, states))
+    known = [one for one in found if one is not None]
+    if not known or len(known) < len(found):
+        return None
+    return Absent(
+        sum(one.count for one in known), sum(one.total for one in known), known[0].noun, 0
+    )
+
+
+def _in_hdf5(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
     """Count the chunks of the whole dataset: HDF5 gives their number at no cost."""
+    if hasattr(stored, "view"):
+        return _in_views(stored, spans, states)
     dataset = getattr(stored, "dataset", None)
     if dataset is None or dataset.chunks is None:
         return None
@@ -106,6 +130,7 @@ _COUNTERS: dict[str, Callable[[Any, Spans, FileStates], Absent | None]] = {
     "ome-zarr": _in_zarr,
     "n5": _in_n5,
     "hdf5": _in_hdf5,
+    "bdv": _in_views,
 }
 
 

@@ -36,6 +36,11 @@ class _Cells:
         self.dtype = np.dtype(np.uint16) if is_unsigned else stored
         self._array = array
 
+    @property
+    def dataset(self) -> h5py.Dataset:
+        """The dataset, whose chunks can be counted."""
+        return self._array.dataset
+
     def __getitem__(self, key: Any) -> NDArray[Any]:
         found = np.asarray(self._array[key])
         return found.astype(self.dtype, copy=False)  # of int16: modulo 2^16

@@ -26,6 +26,10 @@ class _Level:
         self.dtype = first.dtype
         self._views = views
 
+    def view(self, time: int, channel: int) -> StoredArray:
+        """Return the array of one view, (z, y, x)."""
+        return self._views[time][channel]
+
     def __getitem__(self, key: Any) -> NDArray[Any]:
         time, channel, *place = key
         return np.asarray(self._views[time][channel][tuple(place)])

@@ -103,7 +103,7 @@ def _spacing(setup: Setup, parts: Parts) -> tuple[Triple | None, tuple[str, ...]
     unit = setup.unit_um
     if abs(min(parts.scale) - 1.0) <= _ALMOST:  # the world is one of voxels
         unit = min(setup.spacing_um)
-    chosen, notes = [], []
+    chosen, notes = [], list[str]()
     for axis, stated, scale in zip("zyx", setup.spacing_um, reversed(parts.scale), strict=True):
         subject = Subject(f"voxel spacing along {axis}", "um", _TOLERANCE)
         own = Statement(stated, "voxelSize")

@@ -85,6 +85,11 @@ class N5Array:
         kept = tuple(slice(None) if isinstance(part, slice) else 0 for part in key)
         return found[kept]
 
+    @property
+    def folder(self) -> str:
+        """The source, below which the paths of blocks lie."""
+        return self._files.source
+
     def path_of(self, index: Sequence[int]) -> str:
         """Return the path of a block below the source."""
         return "/".join([self._path, *map(str, reversed(index))]).lstrip("/")

@@ -131,18 +131,50 @@ def _axes(
 def _axes_of_system(
     multiscale: Mapping[str, Any],
 ) -> tuple[Sequence[Mapping[str, Any]], tuple[str, ...], str]:
-    """Return the axes of the coordinate system to which the levels lead, notes, and its name."""
+    """Return the axes of the coordinate system that is read, notes, and its name.
+
+    It is the one to which the levels lead, or where that has no units of length, another one that
+    has, to which a transformation of the image leads from there.
+    """
     systems = {str(one["name"]): one["axes"] for one in multiscale["coordinateSystems"]}
     own = multiscale["datasets"][0].get("coordinateTransformations") or [{}]
-    name = _system_of(own[0], "output") or next(iter(systems))
-    if name not in systems:
-        raise ValueError(f"coordinateSystems: {name!r:.60} is not among them")
-    others = [other for other in systems if other != name]
-    note = omission(
-        f"coordinate systems {', '.join(others)}",
-        f"the levels lead to {name}, the image's own",
-    )
+    first = _system_of(own[0], "output") or next(iter(systems))
+    if first not in systems:
+        raise ValueError(f"coordinateSystems: {first!r:.60} is not among them")
+    further = [
+        _system_of(step, "output")
+        for step in multiscale.get("coordinateTransformations", [])
+        if _system_of(step, "input") == first
+    ]
+    reached = [first, *(name for name in further if name in systems)]
+    name = next((one for one in reached if _has_lengths(systems[one])), first)
+    reason = f"the levels lead to {name}"
+    reason += ", the image's own" if name == first else f" by {first}, which has no units"
+    others = [other for other in systems if other not in (first, name)]
+    note = omission(f"coordinate systems {', '.join(others)}", reason)
     return systems[name], (note,) if others else (), name
+
+
+def _has_lengths(axes: Sequence[Mapping[str, Any]]) -> bool:
+    """Return whether z, y and x have a unit of length."""
+    measured = {str(axis["name"]).lower() for axis in axes if um_per(axis.get("unit")) is not None}
+    return set("zyx") <= measured
+
+
+def _way_to(
+    steps: Sequence[Mapping[str, Any]], system: str, multiscale: Mapping[str, Any]
+) -> list[Mapping[str, Any]]:
+    """Return the transformations from a level to a coordinate system."""
+    direct = [one for one in steps if _system_of(one, "output") == system]
+    if direct:
+        return direct[:1]
+    first = _system_of(steps[0], "output")
+    onwards = [
+        one
+        for one in multiscale.get("coordinateTransformations", [])
+        if (_system_of(one, "input"), _system_of(one, "output")) == (first, system)
+    ]
+    return [steps[0], *onwards[:1]]
 
 
 def _system_of(step: Mapping[str, Any], end: str) -> str:
@@ -169,8 +201,8 @@ def _placement(
     steps = list(dataset.get("coordinateTransformations", []))
     if system is None:
         steps += multiscale.get("coordinateTransformations", [])
-    else:
-        steps = [one for one in steps if _system_of(one, "output") in ("", system)][:1]
+    elif any(_system_of(one, "output") for one in steps):
+        steps = _way_to(steps, system, multiscale)
     scale: list[float] | None = None
     shift: list[float] | None = None
     for kind, values in _flat(steps, dimensions):

@@ -35,8 +35,8 @@ def value_attributes(array: Any) -> dict[str, Any]:
     """Return the attributes of an array that tell how its values are stored."""
     stated = dict(array.attrs)
     found = {name: stated.get(name) for name in ATTRIBUTES}
-    if isinstance(found[_FILL], str):
-        found[_FILL] = _decoded(found[_FILL])
+    if isinstance(text := found[_FILL], str):
+        found[_FILL] = _decoded(text)
     is_xarrays = "_ARRAY_DIMENSIONS" in stated and array.metadata.zarr_format == 2
     if found[_FILL] is None and is_xarrays and array.fill_value:
         found[_FILL] = array.fill_value

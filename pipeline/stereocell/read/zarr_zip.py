@@ -15,8 +15,9 @@ from zarr.core.buffer import BufferPrototype
 from zarr.storage import WrapperStore, ZipStore
 
 from stereocell.model.errors import SourceError
+from stereocell.storage.archives import zarr_root_in
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, zarr_root_in
+from stereocell.storage.location import Location
 
 
 def is_zipped(location: Location) -> bool:

@@ -3,10 +3,8 @@
 import os
 import re
 import stat
-import zipfile
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -17,6 +15,7 @@ from fsspec.asyn import AsyncFileSystem, sync
 from fsspec.exceptions import FSTimeoutError
 
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
+from stereocell.storage.archives import ARCHIVE_SUFFIXES, ZARR_FILES, archive_in, has_zarr
 from stereocell.storage.first_bytes import HEAD_BYTES, identify
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
@@ -27,11 +26,9 @@ _TIFF_SUFFIXES = (
 _PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg", ".bmp")
 _MAX_OTHERS = 200  # files without an image's name that are looked into for DICOM
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
-_ARCHIVE_SUFFIXES = (".ozx", ".ome.zarr.zip", ".zarr.zip")  # of OME-Zarr in a zip file (RFC-9)
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
 _ANALYZE_SUFFIXES = (".hdr", ".img", ".hdr.gz", ".img.gz")  # also pairs of NIfTI
-_ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
 # format -> endings of its files' names, in lower case
 _FILE_SUFFIXES = {
     "tiff": _TIFF_SUFFIXES,
@@ -103,7 +100,7 @@ class Location:
     def path(self) -> str:
         """The file or folder on this machine, without a dataset's key or a path in a zip file."""
         path = _split_key(self.source)[0]
-        return _archive_in(path) or path
+        return archive_in(path) or path
 
     @property
     def key(self) -> str:
@@ -135,7 +132,7 @@ class Location:
     def name(self) -> str:
         """The file's name without its suffix, for display; `plate.zarr/0` becomes `plate-0`."""
         parts = self.parts
-        whole = (".zarr", ".n5", *_ARCHIVE_SUFFIXES)
+        whole = (".zarr", ".n5", *ARCHIVE_SUFFIXES)
         outermost = (i for i, part in enumerate(parts) if part.endswith(whole))
         first = next(outermost, len(parts) - 1)
         return "-".join(_stem(part) for part in parts[first:]) or "dataset"
@@ -153,7 +150,7 @@ class Location:
             return "ome-zarr"
         if any(part.endswith(".n5") for part in self.parts) or self._is_n5():
             return "n5"
-        if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
+        if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in ZARR_FILES):
             return "ome-zarr"
         if self.is_local and _holds_planes(self.source):
             return "planes"
@@ -180,9 +177,9 @@ class Location:
     def is_zarr_archive(self) -> bool:
         """Whether a source is a zip file of OME-Zarr or a group in one; at an address by name."""
         if not self.is_local:
-            return bool(self.parts) and self.parts[-1].lower().endswith(_ARCHIVE_SUFFIXES)
-        path = _archive_in(self.source)
-        return bool(path) and zarr_root_in(_members(path, os.path.getmtime(path))) is not None
+            return bool(self.parts) and self.parts[-1].lower().endswith(ARCHIVE_SUFFIXES)
+        path = archive_in(self.source)
+        return bool(path) and has_zarr(path)
 
     def _is_bdv(self) -> bool:
         """Whether a file is the XML of BigDataViewer."""
@@ -336,39 +333,6 @@ def require_file(location: Location) -> None:
         raise SourceError(f"{location.shown}: is a folder, expected a file")
 
 
-def zarr_root_in(names: Collection[str]) -> str | None:
-    """Return the folder of a Zarr group among the members of a zip file, with a slash at its end.
-
-    It is the root, or the only folder there. None: there is no group.
-    """
-    if any(file in names for file in _ZARR_FILES):
-        return ""
-    folders = {name.partition("/")[0] for name in names if not name.startswith("__MACOSX/")}
-    folder = f"{next(iter(folders))}/" if len(folders) == 1 else ""
-    return folder if any(f"{folder}{file}" in names for file in _ZARR_FILES) else None
-
-
-def _archive_in(path: str) -> str:
-    """Return the zip file that a local path names, or leads into; empty: it does neither."""
-    lower = path.lower()
-    if ".zip" not in lower and ".ozx" not in lower:
-        return ""
-    parts = path.split("/")
-    ends = (i for i, part in enumerate(parts) if part.lower().endswith((".zip", ".ozx")))
-    paths = ("/".join(parts[: end + 1]) for end in ends)
-    return next((one for one in paths if os.path.isfile(one)), "")
-
-
-@lru_cache(maxsize=8)
-def _members(path: str, _: float) -> frozenset[str]:
-    """Return the names of a zip file's members; none where it can't be read."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return frozenset(archive.namelist())
-    except (OSError, zipfile.BadZipFile):
-        return frozenset()
-
-
 def _split_key(text: str) -> tuple[str, str]:
     """Return a path and the `:/KEY` behind it; a file whose own name holds that goes first."""
     found = _KEYED.fullmatch(text)
@@ -390,7 +354,7 @@ def first_bytes(path: str, *, count: int = HEAD_BYTES) -> bytes:
 
 def _stem(name: str) -> str:
     files = (ending for endings in _FILE_SUFFIXES.values() for ending in endings)
-    endings = (*_ZARR_SUFFIXES, *_ARCHIVE_SUFFIXES, ".zip", ".n5", ".xml", *files)
+    endings = (*_ZARR_SUFFIXES, *ARCHIVE_SUFFIXES, ".zip", ".n5", ".xml", *files)
     for suffix in sorted(endings, key=len, reverse=True):
         if name.lower().endswith(suffix) and len(name) > len(suffix):
             return name[: -len(suffix)]

@@ -22,7 +22,7 @@ def settle_depth(
 
     stated_um  PhysicalSizeZ; None: not stated
     """
-    places = _positions(root)
+    places, has_unit = _positions(root)
     numbers = sorted(places)
     if len(numbers) < 2:
         return stated_um, ()
@@ -46,13 +46,16 @@ def settle_depth(
         notes.append(
             f"the planes' PositionZ is uneven: steps of {min(sizes):.4g} to {max(sizes):.4g} um"
         )
+    if not has_unit and (stated_um is None or stated_um <= 0):
+        return stated_um, ()
     if stated_um is None or stated_um <= 0:
         notes.append(f"voxel spacing along z: {step:.5g} um by the planes' PositionZ")
         return step, tuple(notes)
     is_near = 1 / _MOST_APART < step / stated_um < _MOST_APART
-    trust = Trust.MEASURED if is_even and is_near else Trust.REPEATED
+    trust = Trust.MEASURED if is_even and is_near and has_unit else Trust.REPEATED
+    place = "PositionZ of the planes" + " (um are assumed)" * (not has_unit)
     stated = Statement(stated_um, "PhysicalSizeZ")
-    settled = settle(_SUBJECT, [stated, Statement(step, "PositionZ of the planes", trust)])
+    settled = settle(_SUBJECT, [stated, Statement(step, place, trust)])
     chosen = settled.number if settled.notes else stated_um
     return chosen, (*notes, *settled.notes)
 
@@ -70,18 +73,24 @@ def _planes(root: ElementTree.Element) -> list[ElementTree.Element]:
     return [p for p in planes if (p.get("TheT", "0"), p.get("TheC", "0")) == first]
 
 
-def _positions(root: ElementTree.Element) -> dict[int, float]:
-    """Return PositionZ in um by TheZ, of planes that state it in a unit of length."""
+def _positions(root: ElementTree.Element) -> tuple[dict[int, float], bool]:
+    """Return PositionZ in um by TheZ, and whether a unit of length is stated.
+
+    Without any unit um are assumed. The unit `reference frame` is no length.
+    """
     found: dict[int, float] = {}
-    for plane in _planes(root):
-        per, place = um_per(plane.get("PositionZUnit")), plane.get("TheZ", "")
+    planes = _planes(root)
+    has_unit = any("PositionZUnit" in plane.attrib for plane in planes)
+    for plane in planes:
+        unit = plane.get("PositionZUnit") if has_unit else "um"
+        per, place = um_per(unit), plane.get("TheZ", "")
         try:
             value = float(plane.get("PositionZ", ""))
         except ValueError:
             continue
         if per is not None and place.isdecimal() and abs(value) < 1e12:
             found[int(place)] = value * per
-    return found
+    return found, has_unit
 
 
 def _times_rise(root: ElementTree.Element) -> bool:

@@ -71,6 +71,7 @@ def _imagej(tiff: TiffFile) -> Stated:
     luts = meta.get("LUTs")
     colors = tuple(_lut_color(lut) for lut in luts) if isinstance(luts, list) else ()
     calibration, notes = _imagej_calibration(meta)
+    notes += _label_notes(meta)
     return Stated((z, y, x), _imagej_names(meta), colors, hint, calibration, notes)
 
 
@@ -114,6 +115,28 @@ def _imagej_names(meta: Mapping[str, Any]) -> tuple[str | None, ...]:
         return ()
     names = [_name(next(iter(names))) for names in shared]
     return tuple(names) if len(set(names)) == channels else ()
+
+
+def _label_notes(meta: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a note where Bio-Formats' labels name channels or times that the header lacks."""
+    labels = meta.get("Labels")
+    if not isinstance(labels, list) or not labels:
+        return ()
+    told = []
+    for letter, key, noun in (("c", "channels", "channels"), ("t", "frames", "points in time")):
+        found = [re.match(rf"(?:.*\s)?{letter}:(\d+)/(\d+)\b", str(text)) for text in labels]
+        if not all(found):
+            continue
+        numbers = {int(one[1]) for one in found if one is not None}
+        if len(numbers) > 1 and meta.get(key, 1) == 1:
+            told.append(f"{len(numbers)} {noun}")
+    if not told:
+        return ()
+    return (
+        f"the labels of the slices name {' and '.join(told)}, which the header of ImageJ counts "
+        "as slices: they are read as slices (Image > Hyperstacks > Stack to Hyperstack in ImageJ "
+        "corrects the file)",
+    )
 
 
 def _lut_color(lut: Any) -> Color | None:
