@@ -27,10 +27,10 @@ from stereocell.read.dicom.frame import Frame, NoPlaneError
 from stereocell.read.dicom.header import SEGMENTATION, is_dicom, read_frames
 from stereocell.read.dicom.label_stack import stack_labels
 from stereocell.read.dicom.pixels import decode, dtype_of
+from stereocell.read.dicom.scale_notes import reaches_air, scale_notes
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels
 from stereocell.read.dicom.series import Stack, find_stacks, is_other_kind
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
-from stereocell.read.dicom.value_scale import reaches_air, scale_notes
 from stereocell.read.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
