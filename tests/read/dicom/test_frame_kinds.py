@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pydicom
 import pytest
+import SimpleITK
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
@@ -383,3 +384,28 @@ def test_a_localizer_of_mr_follows_the_other_series(tmp_path: Path) -> None:
     first, second = read.list_series(tmp_path)
     assert "magnitude, coronal, 5 x" in first
     assert "localizer, axial, 10 x" in second
+
+
+def test_kinds_in_files_that_itk_wrote_are_told_apart(tmp_path: Path) -> None:
+    writer = SimpleITK.ImageFileWriter()
+    writer.KeepOriginalImageUIDOn()
+    for number, (word, value) in enumerate((("P", 40), ("M", 90))):
+        for k in range(4):
+            plane = SimpleITK.GetImageFromArray(np.full((8, 9), value, np.int16))
+            plane.SetSpacing((2.0, 2.0))
+            for tag, text in {
+                "0008|0016": "1.2.840.10008.5.1.4.1.1.4",
+                "0008|0018": f"1.2.3.{number}.{k + 1}",
+                "0020|000e": "1.2.3.9",
+                "0020|0052": "1.2.3.8",
+                "0008|0060": "MR",
+                "0008|0008": f"ORIGINAL\\PRIMARY\\{word}",
+                "0020|0032": f"0\\0\\{3 * k}",
+                "0020|0037": "1\\0\\0\\0\\1\\0",
+                "0020|0013": f"{4 * number + k + 1}",
+            }.items():
+                plane.SetMetaData(tag, text)
+            writer.SetFileName(str(tmp_path / f"{number}{k}.dcm"))
+            writer.Execute(plane)
+    assert [line.split(", ")[1] for line in read.list_series(tmp_path)] == ["magnitude", "phase"]
+    assert np.unique(whole(read.open(tmp_path))).tolist() == [90]

@@ -23,7 +23,8 @@ from stereocell.read.dicom.silence_logs import DICOM_FAULTS
 _RESCALE = "PixelValueTransformationSequence"
 _MAPPING = "RealWorldValueMappingSequence"
 HOUNSFIELD = "HU"
-_UNITS = tuple("CNTS CPS PROPCNTS PROPCPS BQML GML CM2ML 1CM PCNT NONE".split())  # of PET
+# Units of PET
+_UNITS = "CNTS", "CPS", "PROPCNTS", "PROPCPS", "BQML", "GML", "CM2ML", "1CM", "PCNT", "NONE"
 _TYPES = (HOUNSFIELD, "US", "OD", "PCT", "MGML", "HU_MOD", "Z_EFF", "ED", "EDW")  # RescaleType
 _PHILIPS = (0x2005, 0x0E, "PHILIPS MR IMAGING DD 001", "FL")  # the scale slope
 SCALE_TAGS: list[Any] = ["RescaleType", "Units", _MAPPING, *private_tags(*_PHILIPS[:2])]
