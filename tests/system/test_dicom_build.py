@@ -149,7 +149,8 @@ def test_the_preset_s_modality_holds_where_the_input_says_none(
 def test_series_are_listed_and_chosen_by_number(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_series(tmp_path / "s" / "a", grid(shape=(6, 30, 26)), (6, 30, 26), modality="CT")
+    small = (6, 30, 26)
+    write_series(tmp_path / "s" / "a", grid(shape=small), small, modality="CT", intercept=AIR)
     write_enhanced(tmp_path / "s" / "b", grid("coronal"), (22, 30, 26))
     out = tmp_path / "out"
     for command in ("build", "plan", "slices"):
