@@ -115,7 +115,7 @@ def measure(number: int) -> Figures:
     case = list(all_cases())[number]
     sight = look_at(case)
     result = Figures(case.name, case.group, case.held_out, rung=case.rung)
-    result.rungs = len(sight.found.clear)
+    result.rungs = len(sight.found.shown())
     truth = None if sight.truth is None else Truth(sight.truth, case.spacing_um)
     for name, inside, levels in _solids(sight):
         found = Found(float(inside.mean()), levels=levels)
@@ -123,7 +123,7 @@ def measure(number: int) -> Figures:
             found.dice = dice(inside, truth.inside)
             found.away = truth.distance(inside)
         result.found[name] = found
-    clear = sight.found.clear
+    clear = sight.found.shown()
     if clear and sight.truth is not None:
         level = clear[min(case.rung, len(clear) - 1)]
         result.confidence = level.confidence
@@ -138,7 +138,7 @@ def measure(number: int) -> Figures:
 def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
     """Yield each method's name, what it finds inside, and the tiles' levels."""
     case, values = sight.case, sight.field
-    clear = sight.found.clear
+    clear = sight.found.shown()
     if clear:
         level = clear[min(case.rung, len(clear) - 1)]
         yield OURS, sight.values > level.value, (level.value,) * len(sight.tiles)

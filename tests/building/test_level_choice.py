@@ -1,10 +1,12 @@
 """Which level of a channel has its surface, and when it cannot be called clear."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from corpus.real import data_folder
 from stereocell.building.level_choice import choose_rung
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.survey_file import Survey, read_survey
@@ -80,3 +82,27 @@ def test_a_level_that_no_tile_is_sure_of_is_unsure(tmp_path: Path) -> None:
     (channel,) = _surveyed(tmp_path, voxels, "--grid", "4x4").values()
     assert all(tile.confidence is None for tile in channel.iso.values())
     assert channel.appearance.surface == "unsure"
+
+
+DATA = data_folder()
+SHEET = None if DATA is None else next(DATA.glob("brain_cells_2ch/*.tif"), None)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SHEET, reason="needs brain_cells_2ch in STEREOCELL_DATA")
+def test_light_sheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Path) -> None:
+    """No one value parts cells from tissue: the bright layer is as bright as cells beside it."""
+    out = tmp_path / "out"
+    flags = ["--preset", "lightsheet", "--channels", "0", "--region", "8:22,100:420,0:320"]
+    assert main(["plan", str(SHEET), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    (channel,) = read_survey(OutFolder(out)).values()
+    level = channel.appearance.level
+    assert level is not None
+    assert level.background is not None
+    assert channel.appearance.surface == "clear"
+    (tile,) = channel.iso.values()
+    path = out / tile.files["components"]
+    components = json.loads(path.read_text())["components"]
+    assert components["count"] > 60
+    assert components["largest"] < 0.5 * components["voxels"]

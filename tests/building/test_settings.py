@@ -6,6 +6,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
 
 from stereocell.building import settings as settings_module
@@ -134,6 +135,25 @@ def test_unknown_preset_lists_the_known() -> None:
 def test_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"none\.toml: No such file"):
         settings_module.load(None, tmp_path / "none.toml", flags={})
+
+
+@pytest.mark.parametrize("preset", [None, "ct", "ct-bone", "mri"])
+@pytest.mark.parametrize("pixel_um", [488.0, 900.0, 1000.0])
+def test_a_body_of_20_mm_is_no_fragment_in_a_head_of_thick_slices(
+    preset: str | None, pixel_um: float
+) -> None:
+    surface = settings_module.load(preset, None, flags={}).surface
+    resolved = surface.resolved((6500.0, pixel_um, pixel_um))
+    assert float(resolved.min_diagonal_um) <= 20_000
+    assert float(resolved.max_fragment_um) <= 20_000
+    # a speck of one voxel is a fragment, however thick its slice is
+    assert float(resolved.min_diagonal_um) > np.hypot(6500.0, np.hypot(pixel_um, pixel_um))
+
+
+def test_auto_lengths_of_even_voxels_count_spacings() -> None:
+    resolved = settings_module.SurfaceOptions().resolved((2.0, 1.0, 1.0))
+    assert (resolved.min_diagonal_um, resolved.max_fragment_um) == (6.0, 12.0)
+    assert resolved.max_cavity_um == 8.0
 
 
 def test_auto_lengths_follow_the_spacing() -> None:

@@ -86,6 +86,20 @@ def _stated(out: Path, channel: str) -> dict[str, Any]:
     return content
 
 
+def _bounded(
+    field: NDArray[np.float64], voxels: NDArray[np.uint16], denoising: dict[str, Any]
+) -> NDArray[np.float64]:
+    """Return the field, moved from the voxels without hot pixels by no more than the file says."""
+    others, rank = np.ones(denoising["median_voxels"], bool), denoising["hot_pixel_rank"]
+    others[tuple(n // 2 for n in others.shape)] = False
+    low, high = (
+        ndimage.rank_filter(voxels, place, footprint=others, mode="mirror")
+        for place in (rank - 1, -rank)
+    )
+    measured = np.clip(voxels, low, high).astype(np.float64)
+    return np.clip(field, measured - denoising["max_shift"], measured + denoising["max_shift"])
+
+
 def _again(voxels: NDArray[np.uint16], stated: dict[str, Any]) -> NDArray[np.float64]:
     """Return the denoised voxels above the level, by scipy alone, from what the file says."""
     denoising = stated["denoising"]
@@ -95,6 +109,7 @@ def _again(voxels: NDArray[np.uint16], stated: dict[str, Any]) -> NDArray[np.flo
     field = ndimage.gaussian_filter(
         field.astype(np.float64), sigma, mode="nearest", truncate=truncate
     )
+    field = _bounded(field, voxels, denoising)
     if stated["background"] is not None:
         values = np.array(stated["background"]["values"])
         for axis, centres in enumerate(stated["background"]["centres"]):

@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
+from skimage.measure import marching_cubes
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.unit_files import cover_of, load_record
+from stereocell.building.unit_files import cover_of, load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.cover import measure_cover
 from stereocell.model.lattice import Lattice
@@ -18,6 +20,7 @@ from stereocell.model.unit import Cover
 from stereocell.report.facts import gather
 from stereocell.report.remarks import find_remarks
 from support import phantoms
+from support.thin_shells import BODY, GROUND, ThinBody
 from support.validators import make_assets
 
 SHAPE, LEVEL = (24, 48, 60), 500.0
@@ -74,8 +77,9 @@ def test_voxels_are_counted_on_the_tile_s_own_points(step: tuple[int, int, int])
 def test_a_surface_that_loses_sheets_says_so_everywhere(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = tmp_path / "out"
-    level = ("--iso-value", f"Channel0={LEVEL:g}")
+    out, unbounded = tmp_path / "out", tmp_path / "unbounded.toml"
+    unbounded.write_text("[surface]\nmax_shift = 0.0\n")
+    level = ("--iso-value", f"Channel0={LEVEL:g}", "--config", str(unbounded))
     assert make_assets(source, out, "1x1", "--workers", "0", plan=level) == 0
     units = capsys.readouterr().err
     assert main(["check", str(out), "--deep", "--workers", "0"]) == 0
@@ -93,3 +97,32 @@ def test_a_surface_that_loses_sheets_says_so_everywhere(
     titles = {remark.title: remark.lines for remark in find_remarks(gather(OutFolder(out)))}
     (lines,) = (lines for title, lines in titles.items() if "leaves out more than 5%" in title)
     assert cover.words in lines[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slice_axis", range(3))
+def test_the_built_surface_of_a_thin_dome_is_whole(tmp_path: Path, slice_axis: int) -> None:
+    """A shell of two voxels, in slices four times as far apart as their pixels."""
+    body = ThinBody("sphere", 2, 4, slice_axis)
+    voxels = body.voxels().round().astype(np.uint16)
+    scales = [dict(zip("zyx", body.spacing, strict=True))]
+    source = phantoms.write_ome_zarr(tmp_path / "dome.ome.zarr", [voxels], scales=scales)
+    level = (GROUND + BODY) / 2
+    out = tmp_path / "out"
+    settings = ("--iso-value", f"Channel0={level:g}")
+    assert make_assets(source, out, "1x1", "--workers", "0", plan=settings) == 0
+    index = OutFolder(out).index()
+    ((name, key),) = index.items()
+    unit = OutFolder(out).unit_dir(*name.split("/"), key)
+    cover = cover_of(load_record(unit))
+    assert cover is not None
+    assert cover.source == (voxels > level).sum()
+    assert cover.missing < 0.06  # voxels at ends of lines, and specks that are fragments
+    mesh = load_lods(unit)[0].mesh
+    # marching cubes of the voxels as they are: no ring by itself that is not there
+    theirs = marching_cubes(np.pad(voxels, 1, constant_values=int(GROUND)), level)
+    assert _pieces(mesh.positions, mesh.triangles) <= _pieces(*theirs[:2])
+
+
+def _pieces(positions: NDArray[np.float32], triangles: NDArray[np.integer]) -> int:
+    return len(trimesh.Trimesh(positions, triangles).split(only_watertight=False))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from corpus.case import Case, Mask
 from stereocell.filters.background import find_background
 from stereocell.filters.denoise import denoise
+from stereocell.filters.noise import NoiseSample, find_max_shift
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level_evidence import (
     HALO,
@@ -21,6 +22,8 @@ from stereocell.isosurface.level_evidence import (
     gather_evidence,
 )
 from stereocell.isosurface.level_histogram import Scale
+from stereocell.isosurface.options import SurfaceOptions
+from stereocell.model.image_plane import find_slice_axis, slices_first
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 
@@ -29,7 +32,9 @@ from stereocell.model.volume import Volume
 class Sight:
     """One case.
 
-    field       denoised, float32 (z, y, x); above is it above the background, `field` where none is
+    field       smoothed, float32 (z, y, x), which levels are found on
+    above       the same above the background; `field` where there is none
+    values      the field that a surface is extracted from, above the background if levels are
     tiles       each tile's place and evidence
     """
 
@@ -37,26 +42,27 @@ class Sight:
     truth: Mask | None
     field: NDArray[np.float32]
     above: NDArray[np.float32]
+    values: NDArray[np.float32]
     padding: Mask
     tiles: tuple[tuple[Slices, TileEvidence], ...]
     scale: Scale
     found: ChannelLevels
-
-    @property
-    def values(self) -> NDArray[np.float32]:
-        """The field that the levels are of."""
-        return self.above if self.found.subtracts else self.field
 
 
 def look_at(case: Case) -> Sight:
     """Return a case with its levels."""
     voxels, truth = case.load()
     sigma = min(case.spacing_um)
-    field = denoise(Volume(voxels, case.spacing_um), sigma)
+    axis = find_slice_axis(0, case.spacing_um)
+    volume = Volume(voxels, case.spacing_um, slice_axis=axis)
+    field = denoise(volume, sigma)
     darkest: float | None = float(voxels.min())
-    padding = find_padding(voxels, darkest, denoising_reach(sigma, case.spacing_um, 0))
+    padding = find_padding(voxels, darkest, denoising_reach(sigma, case.spacing_um, axis))
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
+    noise = NoiseSample()
+    noise.add(slices_first(voxels, axis), darkest)
+    max_shift = find_max_shift(noise.deviation(), SurfaceOptions().max_shift, None)
     scale, scale_above, above, under = Scale.of(voxels, padding), None, field, None
     if case.kind == "microscopy":
         whole = Box((0, 0, 0), voxels.shape)
@@ -90,7 +96,10 @@ def look_at(case: Case) -> Sight:
         finest_um=sigma,
         modality={"CT": "CT", "MR": "MR"}.get(case.kind, ""),
     )
-    return Sight(case, truth, field, above, padding, tiles, scale, found)
+    values = denoise(volume, sigma, max_shift)
+    if found.subtracts and under is not None:
+        values -= under
+    return Sight(case, truth, field, above, values, padding, tiles, scale, found)
 
 
 def _places(shape: tuple[int, ...], grid: tuple[int, int]) -> list[Slices]:

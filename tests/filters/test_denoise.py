@@ -31,6 +31,33 @@ def test_denoising_follows_the_plane_of_the_images(axis: int) -> None:
     assert found.flags.c_contiguous
 
 
+@pytest.mark.parametrize("shape", [(5, 17, 23), (3, 2, 9), (1, 5, 2), (3, 1, 1), (2, 6, 1)])
+@pytest.mark.parametrize("sigma_um", [0.0, 1.0])
+def test_no_value_moves_farther_than_it_may(shape: tuple[int, int, int], sigma_um: float) -> None:
+    voxels = np.random.default_rng(0).integers(0, 250, shape).astype(np.float64)
+    others = np.array([[[1, 1, 1], [1, 0, 1], [1, 1, 1]]], bool)
+    low, high = (
+        ndimage.rank_filter(voxels, rank, footprint=others, mode="mirror") for rank in (1, -2)
+    )
+    measured = np.clip(voxels, low, high)
+    median = ndimage.median_filter(voxels, (1, 3, 3), mode="nearest")
+    smooth = ndimage.gaussian_filter(median, sigma_um, mode="nearest", truncate=4.0)
+    wanted = np.clip(smooth, measured - 20.0, measured + 20.0)
+    found = denoise(Volume(voxels.astype(np.uint8), (1.0, 1.0, 1.0)), sigma_um, 20.0)
+    np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-4)
+
+
+@pytest.mark.parametrize("max_shift", [None, 0.0])
+@pytest.mark.parametrize("place", [(4, 10, 10), (4, 0, 0), (4, 0, 9), (4, 19, 19)])
+def test_one_hot_voxel_goes_anywhere_and_with_any_bound(
+    place: tuple[int, int, int], max_shift: float | None
+) -> None:
+    voxels = np.full((9, 20, 20), 100, np.uint16)
+    voxels[place] = 60_000
+    found = denoise(Volume(voxels, (1.0, 1.0, 1.0)), 1.0, max_shift)
+    np.testing.assert_array_equal(found, np.full(voxels.shape, 100, np.float32))
+
+
 def test_no_median_reaches_across_a_coarse_axis_of_the_plane() -> None:
     voxels = np.random.default_rng(0).integers(0, 250, (5, 9, 8)).astype(np.uint8)
     found = denoise(Volume(voxels, (9.0, 3.0, 1.0)), 0.0)

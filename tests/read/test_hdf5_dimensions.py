@@ -166,8 +166,8 @@ def test_an_attribute_that_contradicts_positions_is_reported(tmp_path: Path) -> 
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
     (note,) = (note for note in dataset.notes if "spacing" in note)
     assert note.startswith(
-        "voxel spacing along z: the positions of /z states 0.5 um, element_size_um of /ct states "
-        "2 um"
+        "voxel spacing along z: the list of positions /z states 0.5 um, element_size_um of /ct "
+        "states 2 um"
     )
 
 
@@ -179,8 +179,7 @@ def test_labels_that_contradict_the_scales_are_reported(tmp_path: Path) -> None:
     dataset = read.open(path)
     np.testing.assert_array_equal(whole(dataset), f_phantom())
     assert any(
-        "order of the axes: the dimension scales states x, y, z, DIMENSION_LABELS states z, y, x"
-        in note
+        "the list of dimension scales states x, y, z, DIMENSION_LABELS states z, y, x" in note
         for note in dataset.notes
     )
 

@@ -106,7 +106,7 @@ def test_the_ends_of_axes_give_the_spacing_by_their_centering(
     )
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx((0.6, 0.2, 0.25))
-    assert "axis mins and axis maxs states 0.25, 0.2, 0.5" in spacing_notes(dataset)[0]
+    assert "the range of axis mins and maxs states 0.25, 0.2, 0.5" in spacing_notes(dataset)[0]
 
 
 def test_the_range_before_a_nrrd_was_mapped_is_reported(tmp_path: Path) -> None:
@@ -276,14 +276,14 @@ def test_extents_of_imaris_that_contradict_the_microscope_are_reported(tmp_path:
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
     (note,) = spacing_notes(dataset)
-    assert "the extents by 16 voxels states 0.5 um, RecordingEntryPlaneSpacing states 2.5" in note
+    assert "the extent by 16 voxels states 0.5 um, RecordingEntryPlaneSpacing states 2.5" in note
 
 
 def test_a_size_of_imaris_s_metadata_that_differs_is_reported(tmp_path: Path) -> None:
     path = write_ims(tmp_path / "a.ims", f_phantom()[None].repeat(2, 0))
     with h5py.File(path, "a") as file:
         file["DataSetInfo/Image"].attrs["Z"] = characters("8")
-    assert "the extents by Z 8 of DataSetInfo states 1 um" in spacing_notes(read.open(path))[0]
+    assert "the extent by Z 8 of DataSetInfo states 1 um" in spacing_notes(read.open(path))[0]
 
 
 def test_imaris_without_a_unit_or_a_calibration_is_an_assumption(tmp_path: Path) -> None:

@@ -202,6 +202,7 @@ def _of_channel(
             float(plan.settings.surface.smoothing_um),
             make_iso_field(plan.tiles, values) if len(set(known)) > 1 else None,
             median_size(plan.spacing_um, plan.slice_axis),
+            found.window.max_shift,
         )
     appearance = make_appearance(
         channel.name,
@@ -248,8 +249,10 @@ def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
         window = parse_window(f"--window {channel.name}", settings.windows[channel.name])
     ref = source_of(plan, channel=channel)
     finds_holder = plan.modality == "CT" and not channel.source and not settings.surface.keep_holder
+    # shares of tissue have no noise that was measured
+    max_shift = 0.0 if channel.source else settings.surface.max_shift
     return StatisticsTask(
-        ref, level, channel.index, plan.region, settings, subtracts, finds_holder, window
+        ref, level, channel.index, plan.region, settings, subtracts, max_shift, finds_holder, window
     )
 
 
@@ -284,6 +287,7 @@ def _windows(
             asdict(plan.settings.window),
             plan.settings.surface.smoothing_um,
             plan.settings.surface.background_um if task.subtracts else 0,
+            task.max_shift,
             task.finds_holder,
             task.window,
         ]
@@ -346,10 +350,12 @@ def _components(
             iso,
             around(one.background, tile.box),
             float(surface.min_diagonal_um),
+            one.window.max_shift,
         )
         return task, [
             box_to_json(tile.box),
             task.smoothing_um,
+            task.max_shift,
             task.min_diagonal_um,
             iso,
             None if task.background is None else task.background.to_json(),

@@ -65,13 +65,6 @@ class Channel:
         return to_identifier(self.name)
 
 
-def choose_color(place: int, modality: str) -> tuple[float, float, float]:
-    """Return the colour (linear RGB) of a channel without one, the `place`-th that is built."""
-    if place == 0 and modality in BODY_MODALITIES:
-        return FLESH
-    return PALETTE[place % len(PALETTE)]
-
-
 def has_brain(channels: Iterable[Channel]) -> bool:
     """Return whether the classes of a brain are among the channels, as `tissue` learns them."""
     return {channel.name for channel in channels if channel.source} >= BRAIN

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ JOINED_SHARE, MANY = 2 / 3, 30
 # Share of all voxels that cells of a cleared tissue fill at least: in a stack whose cells stood at
 # 1675, a level of 8384 left .02 % inside
 APART_LEAST = 5e-4
+APART_MOST = 0.1  # share of all voxels that sparse cells fill at most
 Components = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
 
 
@@ -78,14 +80,21 @@ def find_level(
         return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True, is_given=True)
     options = plan.settings.isovalue
     criterion = LADDER if channel.rung else options.criterion
-    levels = find_levels(
+    find = partial(
+        find_levels,
         list(evidence.values()),
         counting=window.counting,
         finest_um=min(plan.spacing_um),
         modality=plan.modality,
         options=options if criterion in CRITERIA else None,
-        subtracts=None if given is None else given[1],
     )
+    levels = find(subtracts=None if given is None else given[1])
+    if given is None and (channel.rung or options.rung) == APART and not levels.subtracts:
+        # cells in dim and in bright tissue have their height above the tissue in common; without
+        # sparse ones, a level above it is that of the tissue's own texture
+        above = find(subtracts=True)
+        has_cells = any(level.share <= APART_MOST for level in above.clear)
+        levels = above if has_cells else levels
     mask, half = window.counting.mask, None
     if mask is not None and criterion not in CRITERIA:
         # blurred, a mask has its own edge half-way; peaks of its blur are no levels
@@ -189,24 +198,25 @@ def choose_by_components(options: IsoValueOptions, of_rungs: Sequence[Components
 
 
 def choose_rung(of_rungs: Sequence[Components]) -> int:
-    """Return the first rung whose components are many.
+    """Return the index of the level that has the most components.
 
-    Where none has many, cells that touch are joined at every level: then the rung whose largest
-    components hold the least, if that is under JOINED_SHARE and there are MANY; else the outermost.
+    A level counts if its largest components, one a tile, hold less than APART_SHARE of the voxels
+    inside. Where cells touch they may hold JOINED_SHARE, if there are MANY components. Without such
+    a level the outermost is returned.
 
-    of_rungs  the ComponentSums of each tile at each rung, outermost first
+    of_rungs  the ComponentSums of each tile at each level, outermost first
     """
-    shares: list[float] = []
-    for components in of_rungs:
-        # over the tiles: what fills all of them is the largest in each
+    best, most = 0, (0, 0.0)
+    for place, components in enumerate(of_rungs):
+        # summed over the tiles: a component that fills all of them is the largest in each
         voxels, largest, count = (
             sum(one[key] for one in components.values()) for key in ("voxels", "largest", "count")
         )
-        if largest < APART_SHARE * voxels:
-            return len(shares)
-        shares.append(largest / voxels if voxels and count >= MANY else 1.0)
-    best = int(np.argmin(shares)) if shares else 0
-    return best if shares and shares[best] < JOINED_SHARE else 0
+        share = largest / voxels if voxels else 1.0
+        is_apart = share < APART_SHARE or (share < JOINED_SHARE and count >= MANY)
+        if is_apart and (count, -share) > most:
+            best, most = place, (count, -share)
+    return best
 
 
 def check_components(plan: Plan, found: Found, components: Components) -> Found:

@@ -34,9 +34,9 @@ from stereocell.engine.run import Engine
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.meshes.alpha_wrap import find_wrapper
+from stereocell.model.channel import SurfaceLevel
 from stereocell.model.errors import UsageError
 from stereocell.model.lattice import Lattice
-from stereocell.model.lattice_field import LatticeField
 from stereocell.storage.cache_key import key_of
 from stereocell.textures.map_packages import unwrapper_version
 from stereocell.transfer.channel_statistics import (
@@ -94,7 +94,6 @@ def unit_tasks(
         painter = plan.painter(channel)
         painted = None if painter is None else (painter.index, survey[painter.id].statistics.window)
         level = survey[channel.id].appearance.level
-        field = None if level is None else level.field
         repair = survey[channel.id].repair
         holder = survey[channel.id].holder
         task, key = _unit_task(
@@ -102,7 +101,7 @@ def unit_tasks(
             plan.with_grid(survey[channel.id].grid_um),
             tile_id,
             channel=channel,
-            iso=field,
+            level=level,
             repair=repair,
             statistics=statistics,
             painted=painted,
@@ -145,7 +144,7 @@ def _unit_task(
     tile_id: str,
     *,
     channel: Channel,
-    iso: LatticeField | None,
+    level: SurfaceLevel | None,
     repair: RepairOptions,
     statistics: ChannelStatistics,
     painted: tuple[int, tuple[float, float]] | None,
@@ -156,7 +155,7 @@ def _unit_task(
     window = own.grown(plan.halo, plan.region)
     given = UnitInput(
         lattice=Lattice(window, own, plan.region, plan.spacing_um, plan.origin_um),
-        iso=around(iso, window),
+        iso=None if level is None else around(level.field, window),
         background=around(statistics.background, window),
         repair=repair,
         step=plan.step,
@@ -164,6 +163,7 @@ def _unit_task(
         settings=plan.settings,
         painted=painted and painted[1],
         holder=holder and holder.around(window),
+        max_shift=None if level is None else level.max_shift,
     )
     depends = [
         input_key(plan, channel),
@@ -181,6 +181,7 @@ def _unit_task(
         plan.settings.volume.bits,
         painted,
         given.holder and given.holder.to_json(),
+        given.max_shift,
     ]
     key = key_of(depends, unit_maker, reader_module(plan, channel))
     directory = out_folder.unit_dir(tile_id, channel.id, key)

@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
-from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
+from stereocell.building.channel_colors import choose_colors
+from stereocell.building.channels import PALETTE, Channel, with_surfaces
+from stereocell.building.ct_evidence import recognise_modality
+from stereocell.building.hounsfield import without_hounsfield
 from stereocell.building.input_files import open_anew, require_table, watch_table
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
@@ -121,17 +124,23 @@ def settle(source: str, settings: Settings) -> Plan:
         require_map_packages()
     _require_labels(settings)
     dataset = open_anew(as_asked(location, options))
-    modality = dataset.modality or options.modality
     alone = are_alone(settings.labels)
+    modality, recognised = dataset.modality or options.modality, ""
+    if not dataset.has_hounsfield_units:
+        settings, modality = without_hounsfield(settings), ""
+    elif not alone:
+        modality, recognised = recognise_modality(dataset, options.modality)
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
+    wanted = [dataset.channels[index] for index in chosen]
+    colors = choose_colors(
+        [(one.name, one.color) for one in wanted],
+        modality=modality,
+        is_alone=len(dataset.channels) == 1,
+    )
     channels = [
-        Channel(
-            index,
-            dataset.channels[index].name,
-            dataset.channels[index].color or choose_color(place, modality),
-        )
-        for place, index in enumerate(chosen)
+        Channel(index, one.name, color)
+        for index, one, color in zip(chosen, wanted, colors, strict=True)
     ]
     channels = with_surfaces(channels, settings.surfaces)
     level = choose_level(dataset.levels, len(channels), settings)
@@ -178,7 +187,8 @@ def settle(source: str, settings: Settings) -> Plan:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
     # numbers of objects are read as they are
     read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
-    plan = replace(plan, notes=(*read, *gaps, *objects))
+    kind = [recognised] if recognised else []
+    plan = replace(plan, notes=(*read, *kind, *gaps, *objects))
     for note in (*plan.notes, *told_in_vain(settings, channels)):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan

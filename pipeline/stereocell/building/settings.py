@@ -159,7 +159,12 @@ class PlanOptions:
         flag=Flag("--neurological", "pictures of a patient with right on the right"),
     )
     modality: str = setting(
-        "", "where the input says none: a term of DICOM's Modality; MR and CT open path-traced"
+        "",
+        "where the input says none: a term of DICOM's Modality; MR and CT open path-traced",
+        flag=Flag(
+            "--modality",
+            "what took a volume that does not say so: MR, CT, PT, ..., GM for a microscope",
+        ),
     )
 
     def __post_init__(self) -> None:

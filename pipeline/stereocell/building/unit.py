@@ -46,6 +46,7 @@ class UnitInput:
     step        voxels (z, y, x) between planes that carry the surface
     intensity_window  voxel values that become 0 and 255
     holder      what is left out of surface and volume; None: nothing is
+    max_shift   by how much smoothing may move a value, voxel values; None: by any
     painted     the same of the channel that is sampled onto the surface; None: none is
     """
 
@@ -58,6 +59,7 @@ class UnitInput:
     settings: Settings
     painted: tuple[float, float] | None = None
     holder: Holder | None = None
+    max_shift: float | None = None
 
 
 def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = None) -> Unit:
@@ -147,7 +149,7 @@ def _repaired(
     """
     surface, spacing = given.settings.surface, lattice.spacing_um
     with clock("distance"):
-        field = denoise(volume, float(surface.smoothing_um))
+        field = denoise(volume, float(surface.smoothing_um), given.max_shift)
         if given.background is not None:
             field -= given.background.at(given.lattice.window)
         field -= iso.at(given.lattice.window)

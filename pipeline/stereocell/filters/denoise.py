@@ -1,4 +1,12 @@
-"""Filters applied before a surface is extracted: hot voxels removed, noise smoothed."""
+"""Filters applied before a surface is extracted: hot voxels removed, noise smoothed.
+
+A median of 3 x 3 voxels removes sheets of two voxels that lie across its plane, and a Gaussian of
+one voxel those of one and a half. So neither may move a value farther than noise explains. Even
+parts get as smooth as without that bound, and a wall of half a voxel stays as long as it stands out
+of the noise. Hot pixels would stay as well, so the bound counts from a voxel that is clipped to the
+second least and second largest of its eight neighbours: lines of one pixel pass that, and a hot
+pixel, or two side by side, do not.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,35 +22,40 @@ from stereocell.model.image_plane import (
 from stereocell.model.spacing import Spacing
 from stereocell.model.volume import Volume
 
+HOT_PIXEL_RANK = 2  # of the eight neighbours by value: what passes it has two like itself
 MEDIAN_REACH = 1  # voxels that the median reaches in the plane of the images
 SMOOTHING_REACH = 4.0  # radius of the Gaussian, in sigmas
 
 
-def denoise(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
+def denoise(volume: Volume, sigma_um: float, max_shift: float | None = None) -> NDArray[np.float32]:
     """Return the voxels after a 3 x 3 median in the plane of the images and a Gaussian.
 
     The median removes hot voxels, which a Gaussian would spread. There is none where the spacings
     in that plane differ too much.
 
-    sigma_um  sigma of the Gaussian; 0 turns it off
-    result    float32 (z, y, x), voxel values
+    sigma_um   sigma of the Gaussian; 0 turns it off
+    max_shift  by how much both may move a value, voxel values; None: by any
+    result     float32 (z, y, x), voxel values
     """
-    return _filtered(volume, sigma_um, True)
+    return _filtered(volume, sigma_um, True, max_shift)
 
 
 def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
     """Return the voxels after a Gaussian of sigma `sigma_um` (0: none); float32 (z, y, x)."""
-    return _filtered(volume, sigma_um, False)
+    return _filtered(volume, sigma_um, False, None)
 
 
-def _filtered(volume: Volume, sigma_um: float, has_median: bool) -> NDArray[np.float32]:
+def _filtered(
+    volume: Volume, sigma_um: float, has_median: bool, max_shift: float | None
+) -> NDArray[np.float32]:
     axis = volume.slice_axis
     field = np.array(slices_first(volume.voxels, axis), np.float32, order="C")
     has_median = has_median and any(median_reach(volume.spacing_um, axis))
     if field.size and (sigma_um > 0 or has_median):
         steps = first_of_three(volume.spacing_um, axis)
         across, rows, columns = (gaussian(sigma_um / step) for step in steps)
-        smooth_in_place(field, across, rows, columns, has_median)
+        bound = np.float32(np.inf if max_shift is None else max_shift)
+        smooth_in_place(field, across, rows, columns, has_median, bound)
     return np.ascontiguousarray(slices_back(field, axis))
 
 

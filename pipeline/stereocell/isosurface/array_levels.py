@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from stereocell.filters.background import find_background
 from stereocell.filters.denoise import denoise
+from stereocell.filters.noise import NoiseSample, find_max_shift
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level_evidence import (
     MAX_PADDING,
@@ -16,6 +17,7 @@ from stereocell.isosurface.level_evidence import (
     gather_evidence,
 )
 from stereocell.isosurface.level_histogram import Scale
+from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.image_plane import (
     find_slice_axis,
     first_of_three,
@@ -69,6 +71,9 @@ def find_array_levels(
     padding = find_padding(voxels, darkest, denoising_reach(sigma, spacing, 0))
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
+    noise = NoiseSample()
+    noise.add(voxels, darkest)
+    max_shift = find_max_shift(noise.deviation(), SurfaceOptions().max_shift, None)
     scale, scale_above, under = Scale.of(voxels, padding), None, None
     if modality not in _BODIES:
         whole = Box((0, 0, 0), voxels.shape)
@@ -88,7 +93,7 @@ def find_array_levels(
         background=under,
     )
     levels = find_levels([evidence], counting=counting, finest_um=min(spacing), modality=modality)
-    below = 0.0
+    field, below = denoise(Volume(voxels, spacing), sigma, max_shift), 0.0
     if levels.subtracts and under is not None:
         field, below = field - under, float(under.mean(dtype=np.float64))
     return ArrayLevels(np.ascontiguousarray(slices_back(field, axis)), levels, below)

@@ -119,6 +119,9 @@ class IsoValueOptions:
 
 
 WRAPS = ("voxels", "alpha-wrap")
+# `auto` sizes of fragments and cavities count in spacings of the coarsest axis, of which one is
+# taken for STEP_FINEST finest at most; no size is under LEAST_COARSEST coarsest
+STEP_FINEST, LEAST_COARSEST = 3.0, 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +130,12 @@ class SurfaceOptions:
 
     smoothing_um: float | str = setting(
         AUTO, "sigma of the Gaussian; auto: the finest spacing", bounds=LENGTH_UM
+    )
+    max_shift: float = setting(
+        2.0,
+        "the Gaussian moves a value by no more than so many deviations of the noise, so that thin "
+        "structures stay; 0: by any",
+        bounds=Bounds(0, 1e6),
     )
     alpha_um: float | str = setting(
         AUTO,
@@ -153,16 +162,21 @@ class SurfaceOptions:
         bounds=COUNT,
     )
     min_diagonal_um: float | str = setting(
-        AUTO, "smaller fragments go; auto: 3 coarsest spacings", bounds=LENGTH_UM
+        AUTO,
+        "smaller fragments go; auto: 3 coarsest spacings, of 3 finest at most",
+        bounds=LENGTH_UM,
     )
     max_fragment_um: float | str = setting(
         AUTO,
         "fragments up to this go as well if they are under half the mean of the channel's "
-        "components, by diagonal or by triangles; auto: 6 coarsest spacings; 0: none do",
+        "components, by diagonal or by triangles; auto: 6 coarsest spacings, of 3 finest at most, "
+        "and at most twice a given min_diagonal_um; 0: none do",
         bounds=LENGTH_UM,
     )
     max_cavity_um: float | str = setting(
-        AUTO, "smaller cavities fill; auto: 4 coarsest spacings", bounds=LENGTH_UM
+        AUTO,
+        "smaller cavities fill; auto: 4 coarsest spacings, of 3 finest at most",
+        bounds=LENGTH_UM,
     )
     wrap: str = setting(
         "voxels",
@@ -203,12 +217,17 @@ class SurfaceOptions:
         out of range.
         """
         coarsest = max(spacing_um)
+        # thick slices say nothing of how large a body is; a speck of one slice is one all the same
+        step, least = min(coarsest, STEP_FINEST * min(spacing_um)), LEAST_COARSEST * coarsest
+        fragment = 6 * step
+        if self.min_diagonal_um != AUTO:
+            fragment = min(fragment, 2 * float(self.min_diagonal_um))
         auto = {
             "smoothing_um": min(spacing_um),
             "max_alpha_um": 2 * coarsest,
-            "min_diagonal_um": 3 * coarsest,
-            "max_fragment_um": 6 * coarsest,
-            "max_cavity_um": 4 * coarsest,
+            "min_diagonal_um": max(3 * step, least),
+            "max_fragment_um": max(fragment, least),
+            "max_cavity_um": max(4 * step, least),
             "background_um": 64 * min(spacing_um),
         }
         lengths: dict[str, Any] = {

@@ -131,7 +131,7 @@ def compile_others() -> None:
     cast_rays(voxels > 0, points, points, points, points, one, one)
 
     weights, steps = np.ones(1), np.ones(3)
-    smooth_in_place(voxels, weights, weights, weights, True)
+    smooth_in_place(voxels, weights, weights, weights, True, np.float32(1))
     measure_slopes(voxels, steps)
     divide_by_slopes(voxels, steps, 1e-6, 2.0)
     mask, every = voxels > 0, np.array([[0, 3]] * 3, np.int64)

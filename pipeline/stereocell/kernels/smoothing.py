@@ -1,4 +1,4 @@
-"""A median in plane and a Gaussian, in one pass over the planes and in place."""
+"""A median in plane and a Gaussian, both bounded, in one pass over the planes and in place."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,19 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.copying import copy_plane
 
 Field = NDArray[np.float32]
+Row = NDArray[np.float32]
 Weights = NDArray[np.float64]
+
+
+@part
+def _order_columns(above: Row, here: Row, below: Row, low: Row, mid: Row, high: Row) -> None:
+    """Put columns of three pixels in order, from the second place of low, mid and high on."""
+    for x in range(len(here)):
+        p, q, r = above[x], here[x], below[x]
+        p, q = min(p, q), max(p, q)
+        q, r = min(q, r), max(q, r)
+        p, q = min(p, q), max(p, q)
+        low[x + 1], mid[x + 1], high[x + 1] = p, q, r
 
 
 @part
@@ -23,12 +35,7 @@ def _find_median(plane: Field, out: Field, low: Field, mid: Field, high: Field) 
     height, width = plane.shape
     for y in range(height):
         above, here, below = plane[max(y - 1, 0)], plane[y], plane[min(y + 1, height - 1)]
-        for x in range(width):
-            p, q, r = above[x], here[x], below[x]
-            p, q = min(p, q), max(p, q)
-            q, r = min(q, r), max(q, r)
-            p, q = min(p, q), max(p, q)
-            low[x + 1], mid[x + 1], high[x + 1] = p, q, r
+        _order_columns(above, here, below, low, mid, high)
         low[0], mid[0], high[0] = low[1], mid[1], high[1]
         end = width + 1
         low[end], mid[end], high[end] = low[width], mid[width], high[width]
@@ -39,6 +46,35 @@ def _find_median(plane: Field, out: Field, low: Field, mid: Field, high: Field) 
             p, q, r = mid[x], mid[x + 1], mid[x + 2]
             q = max(min(p, q), min(max(p, q), r))
             row[x] = max(min(least, q), min(max(least, q), most))
+
+
+@part
+def _clip_hot_pixels(plane: Field, out: Field, low: Field, mid: Field, high: Field) -> None:
+    """Write each pixel, clipped to the second least and second largest of its eight neighbours.
+
+    A line of one pixel has two neighbours of its own brightness at each of its pixels, and stays; a
+    hot pixel, or two side by side, do not. Beyond an edge the plane is mirrored.
+    """
+    height, width = plane.shape
+    for y in range(height):
+        here = plane[y]
+        above = plane[y - 1 if y else min(1, height - 1)]
+        below = plane[y + 1 if y + 1 < height else max(y - 1, 0)]
+        _order_columns(above, here, below, low, mid, high)
+        near, far = min(2, width), max(width - 1, 1)
+        low[0], mid[0], high[0] = low[near], mid[near], high[near]
+        low[width + 1], mid[width + 1], high[width + 1] = low[far], mid[far], high[far]
+        row = out[y]
+        for x in range(width):
+            dark, bright = min(above[x], below[x]), max(above[x], below[x])
+            inner_low, inner_high = min(mid[x], mid[x + 2]), max(mid[x], mid[x + 2])
+            least = min(low[x], low[x + 2])
+            second_least = min(max(low[x], low[x + 2]), inner_low)
+            most = max(high[x], high[x + 2])
+            second_most = max(min(high[x], high[x + 2]), inner_high)
+            floor = min(max(least, dark), min(second_least, bright))
+            ceiling = max(min(most, bright), max(second_most, dark))
+            row[x] = max(floor, min(ceiling, here[x]))
 
 
 @part
@@ -77,12 +113,19 @@ def _smooth_plane(
 
 @kernel
 def smooth_in_place(
-    field: Field, along_z: Weights, along_y: Weights, along_x: Weights, has_median: bool
+    field: Field,
+    along_z: Weights,
+    along_y: Weights,
+    along_x: Weights,
+    has_median: bool,
+    max_shift: np.float32,
 ) -> None:
     """Replace a field float32 (z, y, x) by itself smoothed.
 
     along_z, along_y, along_x  weights, symmetric, of odd length; they add up to 1
     has_median                 whether a 3 x 3 median in plane goes before
+    max_shift                  by how much both may move a value that is no hot pixel; infinite: by
+                               any
 
     Edges repeat. Sums are float64, in an order that the voxel's neighbours alone decide; what is
     kept between the axes is float32.
@@ -90,6 +133,8 @@ def smooth_in_place(
     depth, height, width = field.shape
     rz, rx = len(along_z) // 2, len(along_x) // 2
     ring = np.empty((2 * rz + 1, height, width), np.float32)
+    is_bounded = max_shift < np.inf
+    measured = np.empty((rz + 1 if is_bounded else 0, height, width), np.float32)
     plane = np.empty((height, width), np.float32)
     low, mid = np.empty(width + 2, np.float32), np.empty(width + 2, np.float32)
     high = np.empty(width + 2, np.float32)
@@ -100,6 +145,10 @@ def smooth_in_place(
                 _find_median(field[z], plane, low, mid, high)
             else:
                 copy_plane(field[z], plane)
+            if is_bounded and has_median:
+                _clip_hot_pixels(field[z], measured[z % len(measured)], low, mid, high)
+            elif is_bounded:
+                copy_plane(field[z], measured[z % len(measured)])
             _smooth_plane(plane, ring[z % len(ring)], along_y, along_x, total, wide)
         done = z - rz
         if done < 0:
@@ -117,3 +166,7 @@ def smooth_in_place(
             row = field[done, y]
             for x in range(width):
                 row[x] = total[x]
+            if is_bounded:
+                own = measured[done % len(measured), y]
+                for x in range(width):
+                    row[x] = max(own[x] - max_shift, min(own[x] + max_shift, row[x]))

@@ -48,6 +48,7 @@ class SurfaceLevel:
     smoothing_um  sigma of the Gaussian after the median
     by_tile       where tiles have levels of their own (`--iso-scope tile`): the field of them
     median_size   voxels (z, y, x) that the median is taken over; 1, 1, 1: there is none
+    max_shift     by how much both may move a value, voxel values; None: by any
     """
 
     iso: float
@@ -55,6 +56,7 @@ class SurfaceLevel:
     smoothing_um: float
     by_tile: LatticeField | None = None
     median_size: tuple[int, int, int] = (1, 3, 3)
+    max_shift: float | None = None
 
     @property
     def field(self) -> LatticeField:

@@ -120,7 +120,8 @@ def preview(
     }
     found = check_histogram(find_level(plan, channel, window, evidence))
     volume = open_source(source_of(plan, channel=channel)).read(channel.index, tile.box, plan.level)
-    field = denoise(volume, float(plan.settings.surface.smoothing_um))
+    smoothing_um = float(plan.settings.surface.smoothing_um)
+    field = denoise(volume, smoothing_um, window.max_shift)
     under = np.zeros((1, 1, 1), np.float32)
     if window.statistics.background is not None:
         under = window.statistics.background.at(tile.box)

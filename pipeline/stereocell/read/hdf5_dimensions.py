@@ -97,7 +97,7 @@ def _scales(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
         return None
     first = tuple(nodes[0] if nodes else None for nodes in scales)
     names = tuple("" if node is None else _scale_name(tree, node) for node in first)
-    return Described(Statement(names, "the dimension scales"), first)
+    return Described(Statement(names, "the list of dimension scales"), first)
 
 
 def _scale_name(tree: Hdf5Tree, scale: h5py.Dataset) -> str:
@@ -135,7 +135,7 @@ def _emd(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
     names = [tree.attribute(one, "name") for one in scales if one is not None]
     if not all(isinstance(name, str) for name in names):
         return None
-    place = f"the names of dim1 to dim{dataset.ndim}"
+    place = f"the list of names dim1 to dim{dataset.ndim}"
     return Described(Statement(tuple(map(str, names)), place), scales)
 
 

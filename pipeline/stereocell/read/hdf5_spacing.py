@@ -110,7 +110,7 @@ class _Positions:
                 "shape is distorted; interpolate the volume at even positions for its true shape"
             )
         if (per := um_per(unit)) is not None:
-            place = f"the positions of {name}"
+            place = f"the list of positions {name}"
             self.statements.append(Statement(size * per, place, Trust.MEASURED))
         else:
             why = f"in {unit:.20}" if unit else "without a unit"

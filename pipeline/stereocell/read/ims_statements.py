@@ -61,9 +61,9 @@ def _along(
     stated, recorded = number(axis.upper()), number(_RECORDED[axis])
     statements = []
     if length is not None:
-        statements.append(Statement(length / size, f"the extents by {size} voxels"))
+        statements.append(Statement(length / size, f"the extent by {size} voxels"))
         if stated is not None and stated >= 1:
-            place = f"the extents by {axis.upper()} {stated:g} of DataSetInfo"
+            place = f"the extent by {axis.upper()} {stated:g} of DataSetInfo"
             statements.append(Statement(length / stated, place, Trust.REPEATED))
     if recorded is not None and recorded > 0:
         statements.append(Statement(recorded, _RECORDED[axis], Trust.REPEATED))

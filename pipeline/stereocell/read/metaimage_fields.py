@@ -7,6 +7,7 @@ References: https://itk.org/Wiki/ITK/MetaIO/Documentation
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import nibabel
 import numpy as np
@@ -135,7 +136,8 @@ def side_notes(fields: dict[str, str], axes: NDArray[np.float64]) -> tuple[str, 
     affine[:3, :3] = np.diag([-1.0, -1.0, 1.0]) @ axes
     if not is_stated or not np.isfinite(axes).all() or abs(np.linalg.det(axes)) < 1e-3:
         return ()
-    ends = nibabel.orientations.aff2axcodes(affine)
+    orientations: Any = nibabel.orientations
+    ends = orientations.aff2axcodes(affine)
     begins = tuple(_OPPOSITE[str(end)] for end in ends)
     statements = [
         Statement(begins, "TransformMatrix"),

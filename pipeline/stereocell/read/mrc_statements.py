@@ -38,7 +38,9 @@ def settle_spacing(
     if min(counts) < 1 or min(cell) <= 0:
         return None, ()
     sizes = _sizes(header)
-    found, notes, of_camera = [], [], _camera_spacing(header, extended)
+    found: list[float] = []
+    notes: list[str] = []
+    of_camera = _camera_spacing(header, extended)
     if is_stack and counts[0] == 1 and _is_like_pixels(cell, counts):
         sizes[0] = 1
     for axis, length, count, size in zip(_AXES, cell, counts, sizes, strict=True):

@@ -11,6 +11,7 @@ import nibabel
 import numpy as np
 from nibabel.cifti2.cifti2 import Cifti2Image
 from nibabel.fileslice import fileslice
+from nibabel.freesurfer import mghformat
 from nibabel.freesurfer.mghformat import MGHError, MGHHeader
 from nibabel.openers import ImageOpener
 from numpy.typing import NDArray
@@ -85,10 +86,12 @@ def _open_mgh(path: str) -> Any:
         head = file.read(_MGH_HEADER)
     if len(head) < _MGH_HEADER:
         raise EOFError
-    header = MGHHeader(head)
-    proxy = nibabel.arrayproxy.ArrayProxy(path, header, mmap=False)
-    files = {"image": nibabel.fileholders.FileHolder(filename=path)}
-    return nibabel.freesurfer.mghformat.MGHImage(proxy, header.get_affine(), header, file_map=files)
+    library: Any = nibabel
+    mgh: Any = mghformat
+    header = mgh.MGHHeader(head)
+    proxy = library.arrayproxy.ArrayProxy(path, header, mmap=False)
+    files = {"image": library.fileholders.FileHolder(filename=path)}
+    return mgh.MGHImage(proxy, header.get_affine(), header, file_map=files)
 
 
 def _cause(error: BaseException) -> str:

@@ -106,7 +106,7 @@ def _own_affine(image: Any) -> Affine:
 def _of_mgh(image: Any, where: str) -> Stated:
     affine = np.asarray(image.affine, float)
     _require_sound(affine, where, "delta and Mdc")
-    notes = ()
+    notes: tuple[str, ...] = ()
     if not (has_sides := bool(stored_header(image)["goodRASFlag"])):
         notes = (
             "goodRASFlag 0: spacing and orientation are not stated: coronal slices of voxels of "
@@ -155,7 +155,8 @@ def _direction_notes(forms: list[tuple[str, Affine]]) -> tuple[str, ...]:
     """Compare the directions of sform's and qform's axes."""
     if len(forms) < 2:
         return ()
-    letters = [tuple(map(str, nibabel.orientations.aff2axcodes(form))) for _, form in forms]
+    orientations: Any = nibabel.orientations
+    letters = [tuple(map(str, orientations.aff2axcodes(form))) for _, form in forms]
     named = zip(forms, letters, strict=True)
     notes = settle(_DIRECTIONS, [Statement(codes, name) for (name, _), codes in named]).notes
     if notes:

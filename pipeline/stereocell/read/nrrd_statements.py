@@ -37,7 +37,7 @@ def length_notes(
     axes        the axes of space
     """
     spacings, by_ends = _spacings(fields, len(sizes)), _by_ends(fields, sizes)
-    stated = [("spacings", spacings), ("axis mins and axis maxs", by_ends)]
+    stated = [("spacings", spacings), ("the range of axis mins and maxs", by_ends)]
     if fields.get("space directions") is not None:
         stated.insert(0, ("space directions", np.linalg.norm(directions, axis=1)))
     statements = [

@@ -12,6 +12,7 @@ from itertools import islice
 from xml.etree import ElementTree
 
 from stereocell.model.color import linear_color
+from stereocell.model.emission_color import color_of_light
 from stereocell.model.errors import SourceError
 from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
@@ -174,10 +175,13 @@ def _spacing(pixels: ElementTree.Element, where: str) -> PartialTriple:
 
 
 def _color(channel: ElementTree.Element, where: str) -> Color | None:
-    """Return the colour, which OME holds as a signed 32-bit number of R, G, B and A."""
+    """Return the colour, which OME holds as a signed 32-bit number of R, G, B and A.
+
+    Where it states none, that of the light.
+    """
     given = channel.get("Color")
     if given is None:
-        return None
+        return _emitted(channel)
     try:
         number = int(given)
         red, green, blue, _ = (number & 0xFFFFFFFF).to_bytes(4, "big")
@@ -186,6 +190,13 @@ def _color(channel: ElementTree.Element, where: str) -> Color | None:
             f"{where}: OME-XML: Channel Color: found {given!r:.40}, expected a whole number"
         ) from None
     return linear_color((red, green, blue))
+
+
+def _emitted(channel: ElementTree.Element) -> Color | None:
+    """Return the colour of the light that a channel took, by its wavelength or its dye."""
+    given, dye = channel.get("EmissionWavelength"), channel.get("Fluor", "")
+    is_nm = channel.get("EmissionWavelengthUnit", "nm") == "nm"
+    return color_of_light(given if is_nm else None, dye)
 
 
 def _children(element: ElementTree.Element, name: str) -> Iterator[ElementTree.Element]:

@@ -94,6 +94,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         shown=where,
         on_close=image.close,
         modality=image.modality,
+        has_hounsfield_units=image.has_hounsfield_units,
         placement=image.placement,
         has_sides=image.has_sides,
         remarks=(

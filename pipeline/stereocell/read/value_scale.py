@@ -128,7 +128,8 @@ def _gaps(
         shown.append(f"stored values {' and '.join(ends)}, by the valid range")
     if shown:
         notes.append(
-            f"values: {'; '.join(shown)} are no measurements: read as the smallest measured value"
+            f"values: voxels of {', or of '.join(shown)} are no measurements: read as the smallest "
+            "measured value"
         )
     return replace(scale, missing=missing, low=low, high=high)
 

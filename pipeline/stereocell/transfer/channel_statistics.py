@@ -18,6 +18,8 @@ from stereocell.model.channel import (
     TransferFunctions2d,
 )
 from stereocell.model.lattice_field import LatticeField
+from stereocell.model.modality import TRACER_MODALITIES
+from stereocell.transfer import heat
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
     Threshold,
@@ -145,6 +147,13 @@ def make_appearance(
         functions |= tissue_functions(statistics.window)
         function = opening_function(iso_value, functions)
     transfer_2d = statistics.suggested.transfer_2d
+    if modality in TRACER_MODALITIES:
+        organs = appearance.iso_normalized
+        if organs is None:
+            organs = next(x for x, opacity in functions["default"] if opacity > 0)
+        bands = {heat.NAME: heat.heat_shapes(organs)}
+        transfer_2d = replace(transfer_2d, functions={**transfer_2d.functions, **bands})
+        function = heat.NAME
     for name_2d, shapes in transfer_2d.functions.items():
         functions[name_2d] = fall_back(shapes)
     return replace(

@@ -133,6 +133,14 @@ def test_decimal_marks_and_marks_between_thousands(
     assert numbers(tmp_path, text) == {"a": expected}
 
 
+@pytest.mark.parametrize("cell", ["99.250,5", "99\u202f250,5", "99'250,5"])
+def test_marks_between_thousands_are_noted(tmp_path: Path, cell: str) -> None:
+    told = notes(tmp_path, f"label;a;b\n1;{cell};1,5\n2;5,5;2\n")
+    assert f"marks between thousands are left out: {cell} is 99250.5" in told
+    assert "thousands" not in notes(tmp_path, "label;a\n1;0,125\n2;12,5\n3;5\n")
+    assert "thousands" not in notes(tmp_path, "label,a,b\n1,0.125,7\n2,12.5,100\n")
+
+
 def test_a_mark_that_other_cells_do_not_explain_is_noted(tmp_path: Path) -> None:
     text = "label;count;area\n1;1.234;0,5\n2;5.678;1,5\n"
     assert numbers(tmp_path, text)["count"] == [1234, 5678]

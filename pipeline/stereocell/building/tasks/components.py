@@ -20,6 +20,7 @@ class ComponentsTask:
     iso              the tile's level, above the background, voxel values
     background       near the tile, voxel values; None: none is subtracted
     min_diagonal_um  smaller components are left out
+    max_shift        by how much smoothing may move a value, voxel values; None: by any
     """
 
     ref: SourceRef
@@ -30,13 +31,14 @@ class ComponentsTask:
     iso: float
     background: LatticeField | None
     min_diagonal_um: float
+    max_shift: float | None
 
 
 def write_components(task_and_file: tuple[ComponentsTask, Path]) -> None:
     """Sum up a tile's components and write the sums."""
     task, file = task_and_file
     volume = open_source(task.ref).read(task.channel, task.box, task.level)
-    field = denoise(volume, task.smoothing_um)
+    field = denoise(volume, task.smoothing_um, task.max_shift)
     if task.background is not None:
         field -= task.background.at(task.box)
     inside = field > np.float32(task.iso)

@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.settings import Settings
 from stereocell.filters.background import find_background
+from stereocell.filters.noise import NoiseSample, find_max_shift
 from stereocell.isosurface.holder import Holder, find_holder
 from stereocell.isosurface.level_evidence import (
     MAX_PADDING,
@@ -54,6 +55,7 @@ class StatisticsTask:
     region: Box
     settings: Settings
     subtracts: bool  # whether a background is looked for
+    max_shift: float  # deviations of the noise that smoothing may move a value by; 0: by any
     finds_holder: bool = False  # whether it is a CT whose table is looked for
     window: tuple[float, float] | None = None  # voxel values; None: to be found
 
@@ -62,13 +64,15 @@ class StatisticsTask:
 class Window:
     """What the first pass finds of a channel.
 
-    counting  how its tiles are counted
-    holder    a CT's table or head holder, which is left out; None: there is none
+    counting   how its tiles are counted
+    holder     a CT's table or head holder, which is left out; None: there is none
+    max_shift  by how much smoothing may move a value of its surface, voxel values; None: by any
     """
 
     statistics: ChannelStatistics
     counting: Counting
     holder: Holder | None = None
+    max_shift: float | None = None
 
 
 @cache
@@ -84,7 +88,7 @@ def window_to_json(window: Window) -> dict[str, Any]:
 def window_from_json(content: Mapping[str, Any]) -> Window:
     """Return the window that `window_to_json` was given; `content` has passed its schema."""
     return _adapter().validate_python(
-        {key: content[key] for key in ("statistics", "counting", "holder")}
+        {key: content[key] for key in ("statistics", "counting", "holder", "max_shift")}
     )
 
 
@@ -143,15 +147,16 @@ def measure_window(task: StatisticsTask) -> Window:
         z, y, x = spacing
         holder = find_holder(voxels, (step * z, y, x), task.region)
     scale_above = None if background is None else scale.above(background)
-    counting = Counting(scale, scale_above, darkest, mask)
     del padding
     statistics = find_statistics(
         voxels, task.settings.window, background=background, window=task.window
     )
     if len(voxels) < task.region.shape[0] and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
         statistics = replace(statistics, values=_count_values(task, dataset, statistics.window))
-    statistics = replace(statistics, suggested=_suggest(task, dataset, statistics.window))
-    return Window(statistics, counting, holder)
+    suggested, noise = _look_closely(task, dataset, statistics.window, darkest)
+    statistics = replace(statistics, suggested=suggested)
+    shift = find_max_shift(noise, task.max_shift, mask) if task.max_shift > 0 else None
+    return Window(statistics, Counting(scale, scale_above, darkest, mask), holder, shift)
 
 
 def measure_statistics(task: StatisticsTask) -> ChannelStatistics:
@@ -170,17 +175,23 @@ def _count_values(task: StatisticsTask, dataset: Dataset, window: tuple[float, f
     return replace(part, counts=tuple(int(n) for n in np.sum(counts, axis=0)))
 
 
-def _suggest(
-    task: StatisticsTask, dataset: Dataset, window: tuple[float, float]
-) -> SuggestedShapes:
-    """Return a 2D function from blocks of the level that is built: coarse levels have no edges."""
-    spacing = dataset.levels[task.level].spacing_um
-    fine = np.zeros((FINE_ROWS, COLUMNS), np.int64)
+def _look_closely(
+    task: StatisticsTask, dataset: Dataset, window: tuple[float, float], darkest: float | None
+) -> tuple[SuggestedShapes, float]:
+    """Return a 2D function and the noise's deviation, from blocks of the level that is built.
+
+    Coarser levels have softer edges and less noise.
+
+    darkest  the value of padding; None: there is none
+    """
+    spacing, axis = dataset.levels[task.level].spacing_um, dataset.slice_axis(task.level)
+    fine, noise = np.zeros((FINE_ROWS, COLUMNS), np.int64), NoiseSample()
     for voxels in _blocks(task, dataset):
+        noise.add(slices_first(voxels, axis), darkest)
         fine += count_joint(
             to_eight_bits(voxels, window), spacing, gradient_max=STEEPEST, rows=FINE_ROWS
         )
-    return suggest(fine, spacing_um=spacing)
+    return suggest(fine, spacing_um=spacing), noise.deviation()
 
 
 def _blocks(task: StatisticsTask, dataset: Dataset) -> Iterator[NDArray[Any]]:

@@ -23,13 +23,14 @@ from stereocell.read.acquired import Acquired, turned_places
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.beside import or_one_of
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.dicom.frame import Frame
-from stereocell.read.dicom.header import SEGMENTATION, NoPlaneError, is_dicom, read_frames
+from stereocell.read.dicom.frame import Frame, NoPlaneError
+from stereocell.read.dicom.header import SEGMENTATION, is_dicom, read_frames
 from stereocell.read.dicom.label_stack import stack_labels
 from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels
 from stereocell.read.dicom.series import Stack, find_stacks, is_other_kind
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.dicom.value_scale import reaches_air, scale_notes
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
@@ -89,6 +90,11 @@ def read_image(location: Location, *, series: int = 0) -> Image:
     voxels = WholeArray((len(stack.times), z, y, x), dtype, load)
     read = {frame.file for frames in stack.times for frame in frames}
     modality = stack.first.modality
+    frames = [frame for frames in stack.times for frame in frames]
+    is_hounsfield = modality != "CT" or reaches_air(
+        frames, lambda: _lowest(stack, found.paths, dtype, location.shown)
+    )
+    values = scale_notes(frames, is_hounsfield=is_hounsfield)
     return Image(
         arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
         grids=(Grid((z, y, x), canonical.spacing_um),),
@@ -97,13 +103,25 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         images=1,
         title=modality or UNKNOWN,
         modality=modality,
+        has_hounsfield_units=is_hounsfield,
         placement=canonical.placement,
         has_sides=not stack.first.is_quadruped,  # its axes are left, dorsal and cranial
         labels=_labels(stack, len(found.stacks)),
         acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
-        notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
+        notes=(
+            *_choice(found, stack, series),
+            *stack.notes,
+            *values,
+            *_left_out(found.left_out),
+        ),
         files=tuple(str(found.paths[index]) for index in sorted(read)),
     )
+
+
+def _lowest(stack: Stack, paths: Sequence[Path], dtype: np.dtype[Any], shown: str) -> float:
+    """Return the lowest grey value of the slice in the middle."""
+    frames = stack.times[0]
+    return float(decode([frames[len(frames) // 2]], paths, dtype, shown).min())
 
 
 def _require_parts(stack: Stack, shown: str) -> None:

@@ -55,21 +55,28 @@ def _distance_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, 
     between = [f.stated.between_mm for f in frames if f.stated.between_mm is not None]
     if between:
         statements.append(Statement(float(np.median(between)), "SpacingBetweenSlices"))
-    by_location = _location_step(frames)
+    by_location, rounding = _location_step(frames)
     steps = (np.array(frames[-1].position) - frames[0].position) / (len(frames) - 1)
     # locations are counted along the table, too, which a tilted gantry is not perpendicular to
     along = (distance, float(np.linalg.norm(steps)), abs(float(steps[2])))
-    if by_location and not any(abs(by_location - one) <= REGULAR * one for one in along):
+    if by_location and not any(
+        abs(by_location - one) <= max(REGULAR * one, rounding) for one in along
+    ):
         statements.append(Statement(by_location, "SliceLocation", Trust.REPEATED))
     return settle(_DISTANCE, statements).notes
 
 
-def _location_step(frames: Sequence[Frame]) -> float | None:
-    """Return the mean distance of SliceLocations; None: not stated, or the same for all."""
+def _location_step(frames: Sequence[Frame]) -> tuple[float, float]:
+    """Return the mean distance of SliceLocations, and its error where they are whole numbers.
+
+    The distance is 0 where some have no location, or all have the same.
+    """
     found = [f.stated.location_mm for f in frames if f.stated.location_mm is not None]
     if len(found) < len(frames):
-        return None
-    return float(np.ptp(found)) / (len(found) - 1) or None
+        return 0.0, 0.0
+    steps = len(found) - 1
+    is_whole = all(value.is_integer() for value in found)
+    return float(np.ptp(found)) / steps, is_whole / steps
 
 
 def _thickness_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, ...]:

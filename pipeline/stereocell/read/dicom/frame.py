@@ -5,8 +5,13 @@ from dataclasses import dataclass
 from stereocell.read.dicom.frame_kind import FrameKind
 from stereocell.read.dicom.segmentation import Segmentation
 from stereocell.read.dicom.stated import Stated
+from stereocell.read.dicom.value_scale import ValueScale
 
 Vector = tuple[float, float, float]
+
+
+class NoPlaneError(Exception):
+    """A file holds no usable plane; the text gives the reason without the file's values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +62,7 @@ class Frame:
                        number of files; 0: it is stored in one file, or the number isn't stated
     kind               magnitude, projection, echo and the like; of a segmentation nothing
     stated             values that repeat the geometry
+    scale              what is stated about the values
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
@@ -84,3 +90,4 @@ class Frame:
     parts: tuple[bytes, int] = (b"", 0)
     kind: FrameKind = FrameKind()  # noqa: RUF009  (frozen)
     stated: Stated = Stated()  # noqa: RUF009  (frozen)
+    scale: ValueScale = ValueScale()  # noqa: RUF009  (frozen)

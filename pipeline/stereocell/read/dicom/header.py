@@ -19,18 +19,17 @@ import pydicom
 from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
-from stereocell.read.dicom.frame import Encoding, Frame, Vector
+from stereocell.read.dicom.encoding import encoding_of
+from stereocell.read.dicom.frame import Frame, NoPlaneError, Vector
 from stereocell.read.dicom.frame_kind import KIND_TAGS, FrameKind, kind_of
 from stereocell.read.dicom.frame_offsets import (
     frame_offsets,
     has_offsets,
-    is_dose,
     place_first,
 )
 from stereocell.read.dicom.header_values import find_value, first_item
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.segmentation import (
-    FRACTIONAL,
     LABELMAP,
     Segmentation,
     segmentation_of,
@@ -38,6 +37,7 @@ from stereocell.read.dicom.segmentation import (
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.dicom.stated import STATED_TAGS, stated_of
 from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
+from stereocell.read.dicom.value_scale import SCALE_TAGS, ValueScale, scale_of
 
 _TAGS: list[Any] = [
     "SOPClassUID",
@@ -78,16 +78,13 @@ _TAGS: list[Any] = [
     "PerFrameFunctionalGroupsSequence",
     *KIND_TAGS,
     *STATED_TAGS,
+    *SCALE_TAGS,
 ]
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _NO_PLACE = "without a place in the patient"
 _NO_SPACING = "without a PixelSpacing above 0"
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
-
-
-class NoPlaneError(Exception):
-    """A file holds no usable plane; the text gives the reason without the file's values."""
 
 
 def is_dicom(path: Path) -> bool:
@@ -186,13 +183,13 @@ def _frames(
         if offsets is None:
             raise NoPlaneError(f"of several frames without a place for each{_kind(header)}")
     frames = []
-    padding = _padding(header)
     for index in range(count):
         groups = [own[index] if own else None, shared]
         stack = find_value({}, groups, "FrameContentSequence", "StackID")
         segment = find_value({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
         kind = FrameKind() if is_mask else kind_of(header, groups)
         stated = stated_of(header, groups)
+        scale = ValueScale() if is_mask else scale_of(header, groups)
         directions, spacing = _axes(header, groups)
         mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
         if offsets is not None:
@@ -212,7 +209,7 @@ def _frames(
                 tile.position,
                 *directions,
                 spacing,
-                _encoding(header, groups, colours == "MONOCHROME1", is_float, padding),
+                encoding_of(header, groups, colours == "MONOCHROME1", is_float, scale),
                 number,
                 tile.corner,
                 int(segment or 0) if is_mask else 0,
@@ -221,6 +218,7 @@ def _frames(
                 (whole, parts),
                 kind,
                 stated,
+                scale,
             )
             for number, tile in enumerate(mosaic.tiles)
         ]
@@ -269,28 +267,6 @@ def _kind(header: Any) -> str:
     """Return the kind of a file without pixels, in the standard's words: " (...)", or nothing."""
     kind = UID(str(header.get("SOPClassUID", "")))
     return f" ({kind.name})" if kind.name != kind else ""  # the name of a private UID is the UID
-
-
-def _padding(header: Any) -> tuple[int, int] | None:
-    """Return the lowest and highest padding value, encoded as the pixels are; None: none named.
-
-    References: DICOM PS3.3 C.7.5.1.1.2.
-    """
-    ends = []
-    for key in ("PixelPaddingValue", "PixelPaddingRangeLimit"):
-        value = header.get(key)
-        if isinstance(value, bytes) and len(value) == 2:  # where the VR is unknown
-            little = header.original_encoding[1]
-            value = int.from_bytes(value, "little" if little else "big")
-        if isinstance(value, int):
-            ends.append(value)
-        elif not ends:
-            return None
-    if header.get("PixelRepresentation"):  # the VR may have given another sign
-        ends = [((end + 0x8000) & 0xFFFF) - 0x8000 for end in ends]
-    else:
-        ends = [end & 0xFFFF for end in ends]
-    return min(ends), max(ends)
 
 
 def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int, *, is_mask: bool) -> bool:
@@ -347,31 +323,3 @@ def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tu
         raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
     along_row, along_column = ((a, b, c) for a, b, c in (cosines / lengths[:, None]).tolist())
     return (along_row, along_column), (between[0], between[1])
-
-
-def _encoding(
-    header: Any,
-    groups: Sequence[Any],
-    is_inverted: bool,
-    is_float: bool,
-    padding: tuple[int, int] | None,
-) -> Encoding:
-    sequence = "PixelValueTransformationSequence"
-    slope = find_value(header, groups, sequence, "RescaleSlope")
-    intercept = find_value(header, groups, sequence, "RescaleIntercept")
-    if slope is None and is_dose(header):
-        slope = header.get("DoseGridScaling")
-    if header.get("SegmentationType") == FRACTIONAL:
-        slope = 1 / float(header.get("MaximumFractionalValue") or 255)
-    slope, intercept = (1.0 if slope is None else float(slope)), float(intercept or 0.0)
-    if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:
-        raise NoPlaneError("of values that no rescale slope gives")
-    allocated = int(header.get("BitsAllocated") or 0)
-    if is_float:
-        return Encoding(allocated, 0, 0, True, False, slope, intercept)
-    bits = int(header.get("BitsStored") or allocated)
-    high_bit = int(header["HighBit"].value if "HighBit" in header else bits - 1)
-    if not 1 <= bits <= high_bit + 1 <= allocated:
-        raise NoPlaneError(f"of {bits} bits up to bit {high_bit} of {allocated}")
-    signed = bool(header.get("PixelRepresentation") or 0)
-    return Encoding(allocated, bits, high_bit, signed, is_inverted, slope, intercept, padding)

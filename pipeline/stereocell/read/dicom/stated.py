@@ -85,5 +85,7 @@ def _directions(header: Any) -> tuple[str, ...]:
         words = tuple(str(word).strip().upper() for word in header.get("PatientOrientation") or ())
     except DICOM_FAULTS:
         return ()
-    is_sound = len(words) == 2 and all(_DIRECTION.fullmatch(word) for word in words)
-    return words if is_sound else ()
+    if len(words) != 2 or not all(_DIRECTION.fullmatch(word) for word in words):
+        return ()
+    axes = {next(axis for axis in ("LR", "AP", "HF") if word[0] in axis) for word in words}
+    return words if len(axes) == 2 else ()  # a row and a column can't lead the same way

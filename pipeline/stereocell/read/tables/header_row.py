@@ -7,7 +7,7 @@ objects' numbers, if nothing before it looks like a row of the table.
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from stereocell.read.tables.table import KEYS, clean
@@ -38,7 +38,8 @@ def find_header(lines: Sequence[str], key: str) -> Header:
 
     key  the name of the column of the objects' numbers; empty: one of KEYS
     """
-    stated = next((found[1] for line in lines[:1] if (found := _STATED.fullmatch(line))), "")
+    given = _STATED.fullmatch(lines[0]) if lines else None
+    stated = given[1] if given else ""
     wanted = {key} if key else {name.lower() for name in KEYS}
     best = Header("", 0, ())
     for separator in stated or SEPARATORS:
@@ -88,7 +89,7 @@ def _note(before: Sequence[str]) -> str:
     return f"the names of the columns are in line {count + 1}; the {lines} left out"
 
 
-def _next(reader: "csv._reader") -> list[str] | None:
+def _next(reader: Iterator[list[str]]) -> list[str] | None:
     """Return the next row; None: there is none, or none that can be read."""
     try:
         return next(reader, None)

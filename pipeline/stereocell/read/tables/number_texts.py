@@ -34,7 +34,8 @@ _GROUPED = {
     for mark, other in ((POINT, COMMA), (COMMA, POINT))
 }
 _EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")  # a number by both conventions
-_SPACED = re.compile(r"(?<=[0-9])[\u00a0\u2009\u202f '\u2019](?=[0-9]{3}(?![0-9]))")
+_SPACES = "\u00a0\u2009\u202f '\u2019"
+_SPACED = re.compile(rf"(?<=[0-9])[{_SPACES}](?=[0-9]{{3}}(?![0-9]))")
 # words of spreadsheets and measuring programs that stand for no number, in small letters
 _NO_NUMBER = re.compile(
     r"#.*|[-+]?1\.#.*|-+|\.+|\?+|[\u2013\u2014]|[+-]?inf(inity)?|[+-]nan|n\.?d\.?"
@@ -56,7 +57,7 @@ def read_columns(named: Mapping[str, Sequence[str]], separator: str) -> Reading:
     named      the cells of each column
     separator  the mark between cells
     """
-    columns, missing, notes = [], {}, []
+    columns, missing, notes, grouped = [], {}, [], ""
     conventions = _conventions(named, separator)
     for name, texts in named.items():
         mark, note = conventions[name]
@@ -65,8 +66,10 @@ def read_columns(named: Mapping[str, Sequence[str]], separator: str) -> Reading:
             columns.append(TableColumn(name, numbers, None))
             missing[name] = words
             notes += [note] if note else []
+            grouped = grouped or _grouped_note(texts, mark)
         else:
             columns.append(TableColumn(name, None, tuple(map(word_of, texts))))
+    notes += [grouped] if grouped else []
     return Reading(tuple(columns), (*_missing_notes(missing), *notes))
 
 
@@ -120,6 +123,19 @@ def _ambiguous(name: str, example: str, mark: str, reason: str) -> str:
     )
     shown = f"a {_NAMES[mark]} ({example} is {value:.10g})"
     return settle(subject, [Statement(shown, reason, Trust.ASSUMED)]).notes[0]
+
+
+def _grouped_note(texts: Sequence[str], mark: str) -> str:
+    """Return the note on marks between thousands in a column of numbers; empty: it has none."""
+    joined = "\n".join(texts)
+    if not any(one in joined for one in (*_SPACES, COMMA if mark == POINT else POINT)):
+        return ""
+    for text in map(str.strip, texts):
+        if _SPACED.search(text) or _GROUPED[mark].fullmatch(_SPACED.sub("", text)):
+            value = _value(text, mark)
+            if isfinite(value):
+                return f"marks between thousands are left out: {text} is {value:.10g}"
+    return ""
 
 
 def _numbers(texts: Sequence[str], mark: str) -> tuple[NDArray[np.float64], Counter[str]]:
