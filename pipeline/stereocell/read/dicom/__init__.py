@@ -27,10 +27,11 @@ from stereocell.read.dicom.frame import Frame, NoPlaneError
 from stereocell.read.dicom.header import SEGMENTATION, is_dicom, read_frames
 from stereocell.read.dicom.label_stack import stack_labels
 from stereocell.read.dicom.pixels import decode, dtype_of
+from stereocell.read.dicom.scale_notes import reaches_air, scale_notes
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels
 from stereocell.read.dicom.series import Stack, find_stacks, is_other_kind
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
-from stereocell.read.dicom.value_scale import reaches_air, scale_notes
+from stereocell.read.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
@@ -80,7 +81,8 @@ def read_image(location: Location, *, series: int = 0) -> Image:
             raise _no_labels(stack, len(found.stacks), location.shown, stack.problem)
     if stack.layout is None:
         raise SourceError(
-            f"{location.shown}: {stack.problem}; expected parallel slices of one volume"
+            f"{location.shown}: {stack.problem}; expected parallel slices of one volume "
+            "(`--series list` shows what is there)"
         )
     _require_parts(stack, location.shown)
     layout, dtype = stack.layout, dtype_of([f for frames in stack.times for f in frames])
@@ -227,6 +229,7 @@ def _find(location: Location) -> Found:
         left_out["not DICOM"] = len(files) - len(paths)
     frames: dict[bytes, Frame] = {}
     copies: list[tuple[Frame, Frame]] = []
+    ways: list[str] = []
     for index, path in enumerate(paths):
         try:
             for frame in read_frames(path, index):
@@ -236,6 +239,7 @@ def _find(location: Location) -> Found:
                     copies.append((earlier, frame))
         except NoPlaneError as error:
             left_out[str(error)] += 1
+            ways.append(error.way_out)
     compare = partial(_are_equal, paths, location.shown)
     for earlier, frame in copies:  # one image stored twice; with other pixels it is another image
         if earlier.position == frame.position and compare(earlier, frame):
@@ -257,7 +261,7 @@ def _find(location: Location) -> Found:
             f"{location.shown}: no DICOM image with a place in the patient: found "
             f"{many}{held or 'an empty folder'}; expected slices of MR, CT or the like"
             f"{'' if paths else ', or a volume of another format'}"
-            f"{or_one_of(root, 'dicom')}"
+            f"{or_one_of(root, 'dicom')}{in_words(ways)}"
         )
     every = tuple(frames.values())
     return Found(tuple(paths), every, find_stacks(every, compare), left_out)

@@ -37,6 +37,7 @@ def geometry_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, .
     frames  of one point in time, rising along the normal, as they were laid out
     """
     return (
+        *dict.fromkeys(note for frame in frames for note in frame.stated.count_notes),
         *_distance_notes(frames, layout),
         *_thickness_notes(frames, layout),
         *_pixel_notes(frames),

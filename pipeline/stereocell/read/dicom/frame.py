@@ -11,7 +11,12 @@ Vector = tuple[float, float, float]
 
 
 class NoPlaneError(Exception):
-    """A file holds no usable plane; the text gives the reason without the file's values."""
+    """A file holds no usable plane; the text gives the reason without the file's values.
+
+    way_out  what the file is, and what to name or to export instead; empty: nothing is known
+    """
+
+    way_out = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pydicom
-from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
+from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.encoding import encoding_of
@@ -35,9 +35,10 @@ from stereocell.read.dicom.segmentation import (
     segmentation_of,
 )
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
-from stereocell.read.dicom.stated import STATED_TAGS, stated_of
+from stereocell.read.dicom.stated import STATED_TAGS, count_frames, stated_of
 from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
 from stereocell.read.dicom.value_scale import SCALE_TAGS, ValueScale, scale_of
+from stereocell.read.dicom.ways_out import class_name, way_out
 
 _TAGS: list[Any] = [
     "SOPClassUID",
@@ -129,13 +130,18 @@ def read_frames(path: Path, file: int) -> list[Frame]:
             try:
                 return _frames(header, opened, path, file, segmentation)
             except NoPlaneError as error:
-                if segmentation is None and str(error) == _NO_PLACE:
-                    raise NoPlaneError(f"{_NO_PLACE}{_kind(header)}") from None
-                if segmentation is None:
-                    raise
-                raise NoPlaneError(f"{SEGMENTATION} of {segmentation.words}, {error}") from None
+                raise _explained(error, header, segmentation) from None
     except DICOM_FAULTS:
         raise NoPlaneError("with a damaged header") from None
+
+
+def _explained(error: NoPlaneError, header: Any, segmentation: Segmentation | None) -> NoPlaneError:
+    """Return the error with the kind of the file, and a way out."""
+    if segmentation is not None:
+        return NoPlaneError(f"{SEGMENTATION} of {segmentation.words}, {error}")
+    found = NoPlaneError(f"{_NO_PLACE}{_kind(header)}") if str(error) == _NO_PLACE else error
+    found.way_out = way_out(header, kind_of(header, ()), str(found))
+    return found
 
 
 def _refuse_deflated(path: Path) -> None:
@@ -160,9 +166,13 @@ def _frames(
         raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
     if "ModalityLUTSequence" in header:
         raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
-    count = int(header.get("NumberOfFrames") or 1)
+    shared = first_item(header.get("SharedFunctionalGroupsSequence"))
+    own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     is_mask = segmentation is not None
-    is_float = _check_pixels(header, opened, size, rows * columns * count, is_mask=is_mask)
+    is_float, held = _check_pixels(header, opened, size, rows * columns, is_mask=is_mask)
+    count, count_notes = count_frames(int(header.get("NumberOfFrames") or 1), len(own), held)
+    if held is not None and held < count:
+        raise NoPlaneError("cut short")
     place_first(header)
     uids = "SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID", "ConcatenationUID"
     series, instance, reference, whole = (
@@ -173,8 +183,6 @@ def _frames(
         instance = f"{file}".encode()
     modality = str(header.get("Modality", "")).strip()
     is_quadruped = str(header.get("AnatomicalOrientationType", "")).strip() == "QUADRUPED"
-    shared = first_item(header.get("SharedFunctionalGroupsSequence"))
-    own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     offsets = None
     if (own or count > 1) and len(own) != count:
         if has_offsets(header):
@@ -188,7 +196,7 @@ def _frames(
         stack = find_value({}, groups, "FrameContentSequence", "StackID")
         segment = find_value({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
         kind = FrameKind() if is_mask else kind_of(header, groups)
-        stated = stated_of(header, groups)
+        stated = stated_of(header, groups, count_notes)
         scale = ValueScale() if is_mask else scale_of(header, groups)
         directions, spacing = _axes(header, groups)
         mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
@@ -265,16 +273,22 @@ def _vector(values: Any) -> Vector:
 
 def _kind(header: Any) -> str:
     """Return the kind of a file without pixels, in the standard's words: " (...)", or nothing."""
-    kind = UID(str(header.get("SOPClassUID", "")))
-    return f" ({kind.name})" if kind.name != kind else ""  # the name of a private UID is the UID
+    name = class_name(header)
+    return f" ({name})" if name else ""
 
 
-def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int, *, is_mask: bool) -> bool:
-    """Return whether the pixels are floats. Raises NoPlaneError where they are cut short.
+def _check_pixels(
+    header: Any, opened: BinaryIO, size: int, pixels: int, *, is_mask: bool
+) -> tuple[bool, int | None]:
+    """Return whether the pixels are floats, and how many whole frames there are.
 
-    opened  stands at the element of the pixels: tag, (VR, 2 bytes,) length
-    size    of the file in bytes
+    opened   stands at the element of the pixels: tag, (VR, 2 bytes,) length
+    size     of the file in bytes
+    pixels   of a frame
     is_mask  a pixel may be one bit
+
+    The number of compressed frames is None: it takes a decoder. Raises NoPlaneError where the
+    pixels can't be read.
     """
     implicit, little = header.original_encoding
     order = "<" if little else ">"
@@ -289,11 +303,9 @@ def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int, *, is_ma
     if is_compressed(syntax):
         if syntax not in PLUGINS:
             raise NoPlaneError("compressed in a way that is not read")
-        return is_float
+        return is_float, None
     begin = opened.tell() - (4 if implicit else 0)
-    if min(length, size - begin) < (count * bits + 7) // 8:
-        raise NoPlaneError("cut short")
-    return is_float
+    return is_float, 8 * min(length, size - begin) // (bits * pixels)
 
 
 def _numbers(value: Any, count: int, lacking: str = _NO_PLACE) -> tuple[float, ...]:

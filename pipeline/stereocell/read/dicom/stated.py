@@ -11,6 +11,7 @@ from typing import Any
 
 from stereocell.read.dicom.header_values import find_number, find_text
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS
+from stereocell.read.statements import Statement, Subject, Trust, settle
 
 STATED_TAGS: list[Any] = [
     "SpacingBetweenSlices",
@@ -22,6 +23,7 @@ STATED_TAGS: list[Any] = [
     "PatientPosition",
     "PatientOrientation",
 ]
+_COUNT = Subject("number of frames in a file")
 _POSITION = re.compile(r"(HF|FF)(S|P|DR|DL)|(L|R|A|P)F[SP]|(AF|PF)D[RL]")
 _DIRECTION = re.compile(r"[LRAPHF]{1,3}")
 
@@ -36,6 +38,7 @@ class Stated:
     in_stack     InStackPositionNumber
     position     PatientPosition, one of the standard's codes
     directions   PatientOrientation: where rows and columns lead, as ("L", "P")
+    count_notes  contradictions in the number of the file's frames
     """
 
     thickness_mm: float | None = None
@@ -47,9 +50,28 @@ class Stated:
     in_stack: float | None = None
     position: str = ""
     directions: tuple[str, ...] = ()
+    count_notes: tuple[str, ...] = ()
 
 
-def stated_of(header: Any, groups: Sequence[Any]) -> Stated:
+def count_frames(stated: int, groups: int, held: int | None) -> tuple[int, tuple[str, ...]]:
+    """Return the number of a file's frames, and notes where statements of it differ.
+
+    stated  NumberOfFrames, or 1
+    groups  items of PerFrameFunctionalGroupsSequence; 0: it is absent
+    held    whole frames in the pixel data; None: not known
+    """
+    statements = [Statement(stated, "NumberOfFrames")]
+    if groups:
+        # the groups describe frames that are there
+        trust = Trust.MEASURED if groups == held else Trust.REPEATED
+        statements.append(Statement(groups, "PerFrameFunctionalGroupsSequence", trust))
+    if held is not None and held > stated:
+        statements.append(Statement(held, "the pixel data", Trust.DERIVED))
+    settled = settle(_COUNT, statements)
+    return int(settled.number), settled.notes
+
+
+def stated_of(header: Any, groups: Sequence[Any], count_notes: tuple[str, ...] = ()) -> Stated:
     """Return what a frame's header and functional groups state."""
     measures = "PixelMeasuresSequence"
     between = find_number(header, groups, measures, "SpacingBetweenSlices")
@@ -66,6 +88,7 @@ def stated_of(header: Any, groups: Sequence[Any]) -> Stated:
         in_stack=find_number(header, groups, "FrameContentSequence", "InStackPositionNumber"),
         position=position if _POSITION.fullmatch(position) else "",
         directions=_directions(header),
+        count_notes=count_notes,
     )
 
 
