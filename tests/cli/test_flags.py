@@ -26,6 +26,8 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--spacing-um": (["2,.5,.5"], "plan", "spacing_um", (2.0, 0.5, 0.5)),
     "--as": (["intensity"], "plan", "taken_as", "intensity"),
     "--dark": ([], "plan", "dark", True),
+    "--modality": (["PT"], "plan", "modality", "PT"),
+    "--keep-holder": ([], "surface", "keep_holder", True),
     "--neurological": ([], "plan", "neurological", True),
     "--iso-criterion": (["adaptive"], "isovalue", "criterion", "adaptive"),
     "--wrap": (["alpha-wrap"], "surface", "wrap", "alpha-wrap"),

@@ -73,7 +73,8 @@ def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
         key = f"{stored.path}/{stored.metadata.encode_chunk_key(place)}".lstrip("/")
         return key in names or (others is not None and others.key_of(key) in names)
 
-    if stored.shards and _number(stored.chunks, spans) <= _MOST_COUNTED:
+    is_listed = stored.store.is_local and _number(stored.chunks, spans) <= _MOST_COUNTED
+    if stored.shards and is_listed:  # at an address each index is a request
         from stereocell.read.shard_index import absent_in_shards
 
         pairs = zip(stored.chunks, spans, strict=True)

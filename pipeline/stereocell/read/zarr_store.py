@@ -80,6 +80,11 @@ class GuardedStore(WrapperStore[Store]):
         return type(self)(store, self._location, self._chunks)
 
     @property
+    def is_local(self) -> bool:
+        """Whether the files are on this machine."""
+        return self._location.is_local
+
+    @property
     def members(self) -> Set[str] | None:
         """The names of all files in a zip file; None: the source is no zip file."""
         return self._store.sizes.keys() if isinstance(self._store, ZippedStore) else None
