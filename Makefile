@@ -74,7 +74,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -315,6 +315,9 @@ bench-breadth: setup ## Many small units whole: up to 22 x 11 tiles of 64^3 x 4
 
 bench-iso: setup ## Levels for a surface over the corpus, and peers; volumes of nothing
 	$(BIN)/python tests/bench/iso.py
+
+bench-level-score: setup ## A scored choice of the level beside the tests in a row, sources held out
+	$(BIN)/python tests/bench/level_score.py
 
 bench-threshold: setup ## The adaptive threshold, Otsu's and Li's on the head phantom
 	$(BIN)/python tests/bench/threshold.py

@@ -38,7 +38,7 @@ def build(
 
     source     a path, or an address (http(s)://, s3://)
     out        a folder, or an s3:// address; finished work there is not repeated
-    preset     cycif, lightsheet, mri, or a TOML file
+    preset     cycif, em, lightsheet, mri, ct, ct-bone, vessels, or a TOML file
     config     a TOML file; its values override the preset's
     settings   sections and keys that override both, as in the TOML
     workers    processes; 0: this one. A script with more needs `if __name__ == "__main__":`
@@ -115,8 +115,8 @@ def build(
 def open_volume(source: str | Path, **options: Any) -> "Dataset":
     """Open a source without reading voxels.
 
-    options  `time`, `spacing_um`, `series`, `pattern`, `axes`: see `stereocell.read.open`, with the
-             errors
+    options  `time`, `spacing_um`, `series`, `pattern`, `axes`, `dark`: see `stereocell.read.open`,
+             with the errors
 
     The dataset has `channels`, `levels` (shape in voxels and spacing in um, (z, y, x)) and
     `read(channel, box, level)`. That returns a Volume: `voxels` (z, y, x) in the source's dtype,

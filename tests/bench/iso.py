@@ -24,6 +24,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from corpus import all_cases
 from corpus.case import Mask
+from corpus.collected import missing
+from corpus.real import data_folder
 from corpus.sight import Sight, look_at
 from stereocell.isosurface.distance_field import gradient_magnitude
 from stereocell.isosurface.edge_criteria import choose_by_edges, gather_edges
@@ -113,7 +115,7 @@ def measure(number: int) -> Figures:
     case = list(all_cases())[number]
     sight = look_at(case)
     result = Figures(case.name, case.group, case.held_out, rung=case.rung)
-    result.rungs = len(sight.found.clear)
+    result.rungs = len(sight.found.shown())
     truth = None if sight.truth is None else Truth(sight.truth, case.spacing_um)
     for name, inside, levels in _solids(sight):
         found = Found(float(inside.mean()), levels=levels)
@@ -121,7 +123,7 @@ def measure(number: int) -> Figures:
             found.dice = dice(inside, truth.inside)
             found.away = truth.distance(inside)
         result.found[name] = found
-    clear = sight.found.clear
+    clear = sight.found.shown()
     if clear and sight.truth is not None:
         level = clear[min(case.rung, len(clear) - 1)]
         result.confidence = level.confidence
@@ -136,7 +138,7 @@ def measure(number: int) -> Figures:
 def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
     """Yield each method's name, what it finds inside, and the tiles' levels."""
     case, values = sight.case, sight.field
-    clear = sight.found.clear
+    clear = sight.found.shown()
     if clear:
         level = clear[min(case.rung, len(clear) - 1)]
         yield OURS, sight.values > level.value, (level.value,) * len(sight.tiles)
@@ -181,6 +183,14 @@ def main() -> None:
     parser.add_argument("--only", default="", help="cases whose name holds this")
     parser.add_argument("--each", action="store_true", help="a line for each case, too")
     options = parser.parse_args()
+    folder = data_folder()
+    absent = (
+        ["all: STEREOCELL_DATA names no folder"]
+        if folder is None
+        else missing(folder / "level_corpus")
+    )
+    if absent:
+        print(f"real volumes left out, not in the folder: {', '.join(absent)}", file=sys.stderr)
     chosen = [n for n, case in enumerate(all_cases()) if options.only in case.name]
     with ProcessPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         cases = []

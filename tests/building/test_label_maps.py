@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stereocell import read
 from stereocell.building.label_maps import find_labels
-from stereocell.building.settings import PlanOptions
+from stereocell.building.settings import Settings
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import Dataset
 from support import dicom_series, nifti_files
@@ -42,10 +42,10 @@ def labels_on(scan: tuple[Path, Dataset], path: Path) -> list[tuple[int, NDArray
         scan[1],
         str(scan[0]),
         {"organs": str(path)},
-        options=PlanOptions(),
+        settings=Settings(),
         colors=[(1, 1, 1)],
         taken=["CT"],
-    )
+    ).labels
     source = labels.open()
     voxels = source.read(source.dataset.levels[0].box)
     return [
@@ -101,7 +101,7 @@ def test_turned_skewed_and_far_ones_are_refused(scan: tuple[Path, Dataset], tmp_
             read.open(path),
             str(path),
             {"organs": "."},
-            options=PlanOptions(),
+            settings=Settings(),
             colors=[(1, 1, 1)],
             taken=[],
         )
@@ -149,7 +149,7 @@ def test_names_that_are_taken(scan: tuple[Path, Dataset], tmp_path: Path, name: 
             scan[1],
             str(scan[0]),
             {name: str(path)},
-            options=PlanOptions(),
+            settings=Settings(),
             colors=[(1, 1, 1)],
             taken=["CT"],
         )
@@ -179,7 +179,7 @@ def test_pictures_of_labels_and_names_that_would_garble_a_terminal(
             scan[1],
             str(scan[0]),
             {"\x1b[31m": str(path)},
-            options=PlanOptions(),
+            settings=Settings(),
             colors=[(1, 1, 1)],
             taken=["CT"],
         )

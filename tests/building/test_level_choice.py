@@ -1,8 +1,17 @@
-"""Which rung of a ladder has the surface where that of many components is asked for."""
+"""Which level of a channel has its surface, and when it cannot be called clear."""
 
+import json
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from corpus.real import data_folder
 from stereocell.building.level_choice import choose_rung
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.survey_file import Survey, read_survey
+from stereocell.cli.__main__ import main
+from support import phantoms
 
 Rung = dict[str, dict[str, int]]
 
@@ -35,3 +44,65 @@ def test_the_first_rung_of_many_else_that_of_many_that_touch_else_the_outer(
     rungs: list[Rung], chosen: int
 ) -> None:
     assert choose_rung(rungs) == chosen
+
+
+def _surveyed(tmp_path: Path, voxels: np.ndarray, *flags: str) -> Survey:
+    """Return what a build finds of one channel."""
+    source = phantoms.write_ome_zarr(
+        tmp_path / "one.ome.zarr", [voxels], scales=[dict(zip("zyx", (5.0, 2.0, 2.0), strict=True))]
+    )
+    out = tmp_path / "out"
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    return read_survey(OutFolder(out))
+
+
+def _bodies(radius_um: float) -> np.ndarray:
+    """Return four bright balls, each within a tile of 20 x 20, on a dim, noisy ground."""
+    shape, rng = (16, 80, 80), np.random.default_rng(2)
+    field = np.zeros(shape)
+    for y, x in ((20, 20), (60, 100), (140, 60), (100, 140)):
+        field += phantoms.blurred_ball(shape, (5.0, 2.0, 2.0), (40.0, y, x), radius_um, 2.0)
+    return (100 + 1500 * field + rng.normal(0, 6, shape)).round().astype(np.uint16)
+
+
+def test_a_level_above_the_display_window_is_unsure(tmp_path: Path) -> None:
+    voxels = _bodies(12.0)
+    flags = ("--window", "Channel0=50:300")
+    (clear,) = _surveyed(tmp_path / "a", voxels).values()
+    (unsure,) = _surveyed(tmp_path / "b", voxels, *flags).values()
+    assert clear.appearance.surface == "clear"
+    assert unsure.appearance.surface == "unsure"
+    assert "lies above the display window, which ends at" in unsure.appearance.surface_reason
+
+
+def test_a_level_that_no_tile_is_sure_of_is_unsure(tmp_path: Path) -> None:
+    """A few bright voxels a tile: the whole has a level, and no tile has enough inside."""
+    voxels = _bodies(7.6)
+    (channel,) = _surveyed(tmp_path, voxels, "--grid", "4x4").values()
+    assert all(tile.confidence is None for tile in channel.iso.values())
+    assert channel.appearance.surface == "unsure"
+
+
+DATA = data_folder()
+SHEET = None if DATA is None else next(DATA.glob("brain_cells_2ch/*.tif"), None)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SHEET, reason="needs brain_cells_2ch in STEREOCELL_DATA")
+def test_light_sheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Path) -> None:
+    """No one value parts cells from tissue: the bright layer is as bright as cells beside it."""
+    out = tmp_path / "out"
+    flags = ["--preset", "lightsheet", "--channels", "0", "--region", "8:22,100:420,0:320"]
+    assert main(["plan", str(SHEET), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    (channel,) = read_survey(OutFolder(out)).values()
+    level = channel.appearance.level
+    assert level is not None
+    assert level.background is not None
+    assert channel.appearance.surface == "clear"
+    (tile,) = channel.iso.values()
+    path = out / tile.files["components"]
+    components = json.loads(path.read_text())["components"]
+    assert components["count"] > 60
+    assert components["largest"] < 0.5 * components["voxels"]

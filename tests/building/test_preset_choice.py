@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from stereocell.building.channels import FLESH
+from stereocell.building.ct_evidence import LEVELS_HU, WINDOW_HU
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.preset_choice import choose_preset, load_for
+from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
 from stereocell.read.open_dataset import open as open_dataset
 from support import phantoms
@@ -42,6 +45,81 @@ def test_millimetres_without_are_an_mri(tmp_path: Path) -> None:
     chosen, reason = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400))))
     assert chosen == "mri"
     assert "no Hounsfield units" in reason
+
+
+@pytest.mark.parametrize(
+    ("voxels", "words", "level", "window"),
+    [
+        (_body(24, 1064), "Hounsfield units plus 1024", (724, 724), "0:3024"),
+        (_body(24, 1064).clip(0).astype(np.uint16), "plus 1024", (724, 724), "0:3024"),
+        (_body(20, 180).astype(np.uint8), "8-bit values, which are no Hounsfield", (40, 160), ""),
+    ],
+    ids=["offset 1024", "offset without a sign", "8 bits"],
+)
+def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_that_build_it_are_named(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    voxels: NDArray[np.int16],
+    words: str,
+    level: tuple[float, float],
+    window: str,
+) -> None:
+    source = _nifti(tmp_path / "a.nii", voxels)
+    chosen, reason = choose_preset(open_dataset(source))
+    assert chosen == "mri"
+    assert f"{words}" in reason
+    assert "MR is assumed (for a CT --preset ct --iso-value 0=" in reason
+    flags = reason[reason.index("--preset ct") : reason.index(";")].split()
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
+    assert "is assumed" not in capsys.readouterr().err
+    plan = OutFolder(tmp_path / "out").plan()
+    assert plan.modality == "CT"
+    assert level[0] <= float(plan.settings.iso_values["NIfTI"]) <= level[1]
+    assert plan.settings.windows["NIfTI"] == (window or plan.settings.windows["NIfTI"])
+
+
+@pytest.mark.parametrize(
+    ("preset", "voxels", "words"),
+    [
+        ("ct", _body(24, 1064), "plus 1024, and its level of -300 is meant for Hounsfield units"),
+        ("ct-bone", _body(24, 1064), "--preset ct-bone --iso-value 0=1324 --window 0=0:3024"),
+        ("ct", _body(20, 180).astype(np.uint8), "8-bit values, which are no Hounsfield units"),
+        ("ct-bone", _body(20, 180).astype(np.uint8), "--iso-value 0=VALUE"),
+        ("ct", _body(-1000, 40), ""),
+    ],
+)
+def test_a_preset_of_ct_for_other_values_is_doubted_with_the_flags_that_fit(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    preset: str,
+    voxels: NDArray[np.int16],
+    words: str,
+) -> None:
+    source = _nifti(tmp_path / "a.nii", voxels)
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", preset]) == 0
+    told = capsys.readouterr().err.replace("\n", " ")
+    assert words in told if words else "Hounsfield" not in told
+    again = [str(source), "-o", str(tmp_path / "b"), "--preset", preset, "--iso-value", "0=80"]
+    assert main(["plan", *again]) == 0
+    assert "Hounsfield" not in capsys.readouterr().err
+
+
+def test_the_levels_that_are_shifted_are_those_of_the_presets() -> None:
+    for preset, level in LEVELS_HU.items():
+        settings = load(preset, None, flags={})
+        assert settings.iso_values["*"] == level
+        assert settings.windows["*"] == f"{WINDOW_HU[0]:g}:{WINDOW_HU[1]:g}"
+
+
+def test_a_ct_that_is_stated_without_a_sign_is_doubted(tmp_path: Path) -> None:
+    voxels = _body(24, 1064).astype("<u2")
+    head = "ObjectType = Image\nNDims = 3\nDimSize = 32 30 24\nElementType = MET_USHORT\n"
+    head += "Modality = MET_MOD_CT\nElementSpacing = 1 1 1\nElementDataFile = LOCAL\n"
+    (tmp_path / "a.mha").write_bytes(head.encode() + voxels.tobytes())
+    chosen, reason = choose_preset(open_dataset(tmp_path / "a.mha"))
+    assert chosen == "ct"
+    assert "plus 1024, and its level of -300 is meant for Hounsfield units" in reason
+    assert "--preset ct --iso-value 0=724 --window 0=0:3024" in reason
 
 
 def test_padding_darker_than_air_hides_no_ct(tmp_path: Path) -> None:
@@ -135,3 +213,20 @@ def test_a_source_that_cannot_be_read_is_told_once(
     assert (settings.plan.modality, choice) == ("", "")
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_hounsfield_units_of_a_mouse_are_a_ct_without_a_preset(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scales = [dict.fromkeys("zyx", 50.0)]  # um
+    source = phantoms.write_ome_zarr(tmp_path / "mouse.ome.zarr", [_body(-1000, 40)], scales=scales)
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
+    note = "values like Hounsfield units: taken for CT (--modality GM: it is a microscope's)"
+    assert f"plan: {note}" in capsys.readouterr().err
+    plan = OutFolder(tmp_path / "out").plan()
+    assert (plan.modality, plan.channels[0].color) == ("CT", FLESH)
+    assert note in plan.notes
+    flags = ["-o", str(tmp_path / "light"), "--modality", "GM"]
+    assert main(["plan", str(source), *flags]) == 0
+    assert "Hounsfield" not in capsys.readouterr().err
+    assert OutFolder(tmp_path / "light").plan().modality == "GM"

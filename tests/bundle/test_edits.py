@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import zstandard
-from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from stereocell.bundle.edited_meshes import shown_lods
 from stereocell.bundle.write import write_bundle
@@ -219,6 +219,49 @@ def test_color_of_one_tile_stays_in_that_tile(edit):
     assert channel(edited)["color"] == [1.0, 0.2, 0.1]
     assert factor(edited) == [1.0, 0.2, 0.1, 1]
     assert factor(edited, "r0_c1") == [0, 1, 0, 1]
+
+
+def bind(stage, where, *, strength="strongerThanDescendants", purpose=""):
+    """Bind a green material on a prim; an empty `where` leaves it unbound."""
+    material = UsdShade.Material.Define(stage, "/Specimen/Mine")
+    shader = UsdShade.Shader.Define(stage, "/Specimen/Mine/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(0, 1, 0))
+    output = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+    material.CreateSurfaceOutput().ConnectToSource(output)
+    if where:
+        binding = UsdShade.MaterialBindingAPI.Apply(stage.OverridePrim(where))
+        binding.Bind(material, strength, purpose)
+
+
+@pytest.mark.parametrize("where", ["/Specimen", "/Specimen/Tiles", "/Specimen/Tiles/r0_c1"])
+def test_a_material_bound_above_the_channels_is_taken_for_surfaces_and_named(edit, where):
+    edited = edit(lambda s: bind(s, where))
+    (told,) = edit.told
+    assert told.startswith(f"material /Specimen/Mine, bound on {where}, is taken over for surfaces")
+    assert "volumes keep the channels' colours: inputs:color of /Specimen/Channels/NAME" in told
+    assert factor(edited, "r0_c1") == [0, 1, 0, 1]
+    assert (factor(edited) == [0, 1, 0, 1]) == (where != "/Specimen/Tiles/r0_c1")
+    assert channel(edited)["color"] == [1.0, 0.2, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"strength": "weakerThanDescendants"}, "the channels' own materials are stronger"),
+        ({"purpose": "preview"}, "it is bound for the purpose 'preview' alone"),
+        ({"purpose": "full"}, "it is bound for the purpose 'full' alone"),
+    ],
+)
+def test_a_material_that_reaches_no_surface_is_named(edit, options, told):
+    edited = edit(lambda s: bind(s, "/Specimen", **options))
+    assert [told in line and "is not taken over" in line for line in edit.told] == [True]
+    assert factor(edited) == [1.0, 0.2, 0.1, 1]
+
+
+def test_a_material_that_is_bound_nowhere_needs_no_word(edit):
+    edit(lambda s: bind(s, ""))
+    assert edit.told == []
 
 
 def test_moved_tile_moves_its_boxes_meshes_and_volumes(bundle, edit):

@@ -109,8 +109,8 @@ def test_an_unknown_preset_shows_no_file_of_ours(capsys: pytest.CaptureFixture[s
     for name in ("x" * 300, "../presets/cycif", "a\nb"):
         line = refusal(capsys, ["settings", "--preset", name])
         assert line.startswith("preset ")
-        assert line.endswith("is unknown, expected one of ct, ct-bone, cycif, lightsheet, mri or a "
-                             ".toml file")  # fmt: skip
+        known = "ct, ct-bone, cycif, em, lightsheet, mri, vessels"
+        assert line.endswith(f"is unknown, expected one of {known} or a .toml file")
 
 
 @pytest.mark.parametrize("address", ["s3://", "s3:///", "https://", "file://"])

@@ -26,6 +26,7 @@ class Case:
     grid        rows and columns of the tiles it is cut into
     held_out    whether it was kept from all choosing of constants
     rung        which surface the truth is of: 0 the outer, 1 the next one within it
+    source      who made the volume; volumes of one source are held out together
     """
 
     name: str
@@ -36,3 +37,4 @@ class Case:
     grid: tuple[int, int] = (2, 2)
     held_out: bool = False
     rung: int = 0
+    source: str = "made"

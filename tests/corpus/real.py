@@ -12,6 +12,7 @@ from scipy import ndimage
 from skimage.segmentation import find_boundaries
 
 from corpus.case import Case, Mask
+from corpus.collected import collected_cases
 from stereocell.model.tiling import Box
 from stereocell.read.open_dataset import open as open_dataset
 
@@ -30,19 +31,32 @@ def real_cases() -> Iterator[Case]:
     folder = data_folder()
     if folder is None:
         return
-    yield Case("nuclei", "labelled", (0.5, 0.25, 0.25), lambda: _nuclei(folder), grid=(1, 2))
-    yield Case("ovule walls", "labelled", (0.235, 0.15, 0.15), lambda: _ovule(folder))
+    yield Case(
+        "nuclei", "labelled", (0.5, 0.25, 0.25), lambda: _nuclei(folder), grid=(1, 2),
+        source="StarDist",
+    )  # fmt: skip
+    yield Case(
+        "ovule walls", "labelled", (0.235, 0.15, 0.15), lambda: _ovule(folder), source="PlantSeg"
+    )
     for name, hu, rung in (("CT skin", SKIN_HU, 0), ("CT bone", BONE_HU, 1)):
         yield Case(
-            name, "outlined", _CT_SPACING, lambda hu=hu: _ct(folder, hu), kind="CT", rung=rung
-        )
-    yield Case("MRI head", "outlined", (1400.0, 1333.0, 1333.0), lambda: _mri(folder), kind="MR")
-    yield Case("mouse brain", "outlined", (50.0, 50.0, 50.0), lambda: _mouse(folder))
+            name, "outlined", _CT_SPACING, lambda hu=hu: _ct(folder, hu), kind="CT", rung=rung,
+            source="dcm_qa_ct",
+        )  # fmt: skip
+    yield Case(
+        "MRI head", "outlined", (1400.0, 1333.0, 1333.0), lambda: _mri(folder), kind="MR",
+        source="studyforrest",
+    )  # fmt: skip
+    yield Case(
+        "mouse brain", "outlined", (50.0, 50.0, 50.0), lambda: _mouse(folder), source="cellfinder"
+    )
     for channel, name in enumerate(("cells", "autofluorescence")):
         yield Case(
             f"light sheet, {name}", "looked at", (5.0, 2.0, 2.0),
             lambda channel=channel: (_sheet(folder, channel), None),
+            source="cellfinder",
         )  # fmt: skip
+    yield from collected_cases(folder / "level_corpus")
 
 
 def _nuclei(folder: Path) -> tuple[NDArray[Any], Mask]:

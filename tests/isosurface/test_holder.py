@@ -2,9 +2,11 @@
 
 import json
 
+import cc3d
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from stereocell.isosurface.holder import Holder, find_holder
 from stereocell.model.tiling import Box
@@ -136,3 +138,49 @@ def test_an_animal_s_ears_and_tail_stay() -> None:
         hu = np.where(body | part, 40, -1000).astype(np.int16)
         out = _left_out(np.where(vertebrae & part, np.int16(800), hu))
         assert not out.any()
+
+
+def _chest(
+    table_hu: int, table_mm: tuple[float, float], gap_mm: float
+) -> tuple[NDArray[np.int16], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return a chest with lungs, ribs and a spine on a table, the table, and the bones.
+
+    table_mm  its thickness and width
+    gap_mm    between the body and the table; 0: they touch
+    """
+    z, y, x = _places()
+    body = (y / 55) ** 2 + (x / 80) ** 2 < 1
+    lungs = (y / 35) ** 2 + ((abs(x) - 38) / 26) ** 2 < 1
+    shell = abs(np.hypot(y / 48, x / 73) - 1) < 0.06
+    bones = (shell & (np.mod(z, 24) < 9)) | (np.hypot(y - 38, x) < 11)
+    thickness, width = table_mm
+    table = (y > 55 + gap_mm) & (y < 55 + gap_mm + thickness) & (abs(x) < width / 2)
+    hu = np.where(body, 40.0, -1000.0)
+    hu[lungs], hu[bones], hu[table & ~body] = -850.0, 450.0, float(table_hu)
+    blurred = ndimage.gaussian_filter(hu, 0.5)
+    noisy = blurred + np.random.default_rng(1).normal(0, 15, SHAPE)
+    return noisy.round().astype(np.int16), table & ~body, bones
+
+
+@pytest.mark.parametrize("gap_mm", [6.0, 0.0])
+@pytest.mark.parametrize(("table_hu", "thickness_mm"), [(900, 8.0), (700, 30.0)])
+def test_a_table_that_is_the_largest_piece_of_bone_in_a_chest_is_left_out(
+    table_hu: int, thickness_mm: float, gap_mm: float
+) -> None:
+    hu, table, bones = _chest(table_hu, (thickness_mm, 180.0), gap_mm)
+    sizes = np.bincount(cc3d.connected_components(hu > 300, connectivity=26).ravel())[1:]
+    assert sizes.max() > 0.9 * np.count_nonzero(hu[table] > 300)  # it is the largest piece
+    out = _left_out(hu)
+    assert (out & table).sum() > 0.7 * table.sum()
+    assert not (out & bones).any()
+
+
+def test_air_takes_the_place_of_what_is_left_out_and_all_else_is_as_measured() -> None:
+    hu, table, _ = _chest(900, (8.0, 180.0), 6.0)
+    holder = find_holder(hu, SPACING, WHOLE)
+    assert holder is not None
+    left = holder.left_out_of(hu, WHOLE)
+    out = holder.at(WHOLE)
+    assert left.dtype == hu.dtype
+    assert (left[table & out] <= -1000).all()
+    np.testing.assert_array_equal(left[~out], hu[~out])

@@ -186,7 +186,10 @@ CASES: dict[str, tuple[Maker, str]] = {
         "bioformats2raw",
     ),
     "no axes": (multiscale(lambda image: image.pop("axes")), "multiscales.0.*'axes' is missing"),
-    "axes of 0.3": (multiscale(lambda image: image.update(axes=["z", "y", "x"])), "axes"),
+    "axes without units": (
+        multiscale(lambda image: image.update(axes=["z", "y", "x"])),
+        "voxel size: not found with a unit",
+    ),
     "axis twice": (
         multiscale(lambda image: image["axes"].__setitem__(0, image["axes"][1])),
         "axes y, y, x name one twice",

@@ -363,22 +363,29 @@ def test_an_index_of_any_kind_is_read_with_chunks_that_are_not_stored(
     np.testing.assert_array_equal(whole(dataset), body)
 
 
-@pytest.mark.parametrize("name", ["axistags", "unit", "label"])
+@pytest.mark.parametrize("name", ["axistags", "unit", "label", "scale"])
 def test_a_heap_of_texts_that_makes_hdf5_loop_without_end_is_refused_at_a_time_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     """A heap object has 0 bytes, so HDF5 2.0 looks for the next object at the same place."""
     path = write(tmp_path / "a.h5", resolution=SIZE_UM)
     with h5py.File(path, "a") as file:
-        if name == "label":
+        if name in ("label", "scale"):
             for dim in file["raw"].dims:
                 dim.label = "depth of it"
+            if name == "scale":
+                file["z"] = np.arange(16.0)
+                file["z"].make_scale("z")
+                file["raw"].dims[0].attach_scale(file["z"])
         else:
             file["raw"].attrs[name] = "depth of it"
     content = bytearray(path.read_bytes())
-    size = content.rindex(b"depth of it\0\0\0\0\0") + 16 + 8  # of the free space behind it
-    content[size : size + 8] = bytes(8)
+    last = content.rindex(b"depth of it\0\0\0\0\0") + 16  # the heap's next object
+    if name == "scale":
+        last += 24  # that is the reference to the scale
+    content[last + 8 : last + 16] = bytes(8)  # size of the free space behind
     path.write_bytes(content)
     monkeypatch.setattr(hdf5_texts, "_MOST_S", 1.0)
     line = window_refusal(path)
     assert "did not end within 1 s" in line
+    assert ("dimension scales of /raw" in line) == (name == "scale")

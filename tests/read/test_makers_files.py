@@ -345,7 +345,7 @@ def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
     assert "is a folder" in refusal(tmp_path / f"b.{suffix}")
 
 
-def test_a_format_of_one_image_has_no_series(tiny_tiff: Path) -> None:
-    assert "CZI, LIF, ND2, a file for" in refusal(tiny_tiff, series=2)
-    with pytest.raises(UsageError, match="--series list: found TIFF, expected a folder of"):
-        read.list_series(tiny_tiff)
+def test_a_format_of_one_image_has_no_series(tiny_zarr_05: Path) -> None:
+    assert "CZI, LIF, ND2, a file for" in refusal(tiny_zarr_05, series=2)
+    with pytest.raises(UsageError, match="--series list: found OME-Zarr, expected"):
+        read.list_series(tiny_zarr_05)

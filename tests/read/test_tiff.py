@@ -457,7 +457,7 @@ def test_axes_that_do_not_fit_are_told(tmp_path: Path, axes: str) -> None:
 @pytest.mark.parametrize("option", [{"axes": "zyx"}, {"pattern": "{z}"}, {"series": 2}])
 def test_an_option_of_another_format_is_told(tmp_path: Path, option: dict[str, Any]) -> None:
     (name,) = option
-    if name == "axes":
+    if name != "pattern":
         source = tmp_path / "x.nii"
         source.write_bytes(bytes(344) + b"n+1\0")
     else:

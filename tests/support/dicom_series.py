@@ -131,7 +131,7 @@ def image(
     bits: int | None = None,
     photometric: str = "MONOCHROME2",
 ) -> FileDataset:
-    """Return one slice of stored values, with lies in SliceThickness and SpacingBetweenSlices."""
+    """Return one slice of stored values."""
     meta = FileMetaDataset()
     meta.MediaStorageSOPClassUID = _CLASSES[modality]
     meta.MediaStorageSOPInstanceUID = generate_uid()
@@ -143,7 +143,7 @@ def image(
     )
     ds.Modality, ds.SeriesInstanceUID, ds.FrameOfReferenceUID = modality, series, reference
     ds.StudyInstanceUID, ds.InstanceNumber = "1.2.3.8", number
-    ds.SliceThickness, ds.SpacingBetweenSlices = 99.0, 77.0
+    ds.SliceThickness = ds.SpacingBetweenSlices = pydicom.valuerep.DSfloat(gap_mm(affine), True)
     position, orientation, spacing = _geometry(affine, slice_index)
     ds.ImagePositionPatient, ds.ImageOrientationPatient = position, orientation
     ds.PixelSpacing = spacing
@@ -151,6 +151,12 @@ def image(
         ds.RescaleSlope, ds.RescaleIntercept = slope, intercept
     _fill_pixels(ds, pixels, bits, photometric)
     return ds
+
+
+def gap_mm(affine: Affine) -> float:
+    """Return the distance of neighbouring slices along their normal."""
+    normal = np.cross(affine[:3, 2], affine[:3, 1])
+    return abs(float(normal @ affine[:3, 0]) / float(np.linalg.norm(normal)))
 
 
 def _geometry(affine: Affine, slice_index: float) -> tuple[list[Any], list[Any], list[Any]]:
@@ -198,7 +204,7 @@ def write_series(
     change: Callable[[FileDataset], None] = lambda ds: None,
     **options: Any,
 ) -> list[Path]:
-    """Write one file a slice, in a shuffled order of names and numbers; return them by slice.
+    """Write one file a slice, in a shuffled order of names; return them by slice.
 
     indices  which slices; fractions lie between
     """
@@ -210,10 +216,9 @@ def write_series(
         start = affine.copy()
         start[:3, 3] += k * affine[:3, 0]
         pixels = np.rint(sample(start, (1, *shape[1:]))[0]).astype(dtype)
-        number = int(order[place]) + 1
-        ds = image(pixels, affine, k, series=series, number=number, **options)
+        ds = image(pixels, affine, k, series=series, number=place + 1, **options)
         change(ds)
-        paths.append(save(ds, folder / name(number)))
+        paths.append(save(ds, folder / name(int(order[place]) + 1)))
     return paths
 
 
@@ -255,9 +260,8 @@ def write_enhanced(
         groups.append(group)
     shared, turned, measures = Dataset(), Dataset(), Dataset()
     turned.ImageOrientationPatient, measures.PixelSpacing = orientation, spacing
-    normal = np.cross(affine[:3, 2], affine[:3, 1])
-    gap = abs(float(normal @ affine[:3, 0]) / float(np.linalg.norm(normal)))
-    measures.SliceThickness = measures.SpacingBetweenSlices = pydicom.valuerep.DSfloat(gap, True)
+    gap = pydicom.valuerep.DSfloat(gap_mm(affine), True)
+    measures.SliceThickness = measures.SpacingBetweenSlices = gap
     shared.PlaneOrientationSequence, shared.PixelMeasuresSequence = [turned], [measures]
     ds.SharedFunctionalGroupsSequence, ds.PerFrameFunctionalGroupsSequence = [shared], groups
     ds.NumberOfFrames = shape[0]

@@ -9,7 +9,10 @@ import pytest
 
 from stereocell.cli.__main__ import main
 
-_NOTE = "no unit of length in the header: mm are assumed"
+_NOTE = (
+    "unit of length: not stated, mm is assumed, as most programs of NIfTI do; --spacing-um z,y,x "
+    "replaces it"
+)
 
 
 def _unitless(path: Path) -> str:

@@ -323,6 +323,7 @@ def test_the_json_twin_of_the_schema_has_the_same_attributes() -> None:
     assert set(twin["properties"]) == {attribute.name for attribute in attributes}
     json_types = {"color3f": "array", "float2": "array", "float2[]": "array"}
     json_types |= {"float": "number", "asset": "string", "token": "string", "string": "string"}
+    json_types |= {"bool": "boolean"}
     json_types |= dict.fromkeys(("float4[]", "token[]", "float[]", "color4f[]"), "array")
     for attribute in attributes:
         field = twin["properties"][attribute.name]

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.building.channels import Channel
+from stereocell.building.channels import BRAIN, Channel, has_brain
 from stereocell.building.level_choice import (
     Components,
     Found,
     check_components,
-    choose_rung,
+    choose_by_components,
+    find_doubt,
     find_level,
     given_level,
     level_of_tile,
@@ -92,10 +93,8 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for name, holder in held.items():
         if holder is not None:
             pieces = ", ".join(holder.pieces)
-            console.print(
-                f"units: {name}: a table or holder is left out of the surface: {pieces}",
-                markup=False,
-            )
+            about = f"a table or holder is left out: {pieces} (--keep-holder builds it)"
+            console.print(f"units: {name}: {about}", markup=False)
     evidence = _evidence(out_folder, plan, engine, windows)
     survey, inside = {}, {}
     found = {
@@ -123,7 +122,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             {tile.id: rung[tile.id, channel.id].read()["components"] for tile in plan.tiles}
             for rung in components[: len(one.rungs)]
         ]
-        chosen = choose_rung(of_rungs) if len(of_rungs) > 1 else 0
+        chosen = choose_by_components(plan.settings.isovalue, of_rungs)
         if of_rungs:
             inside[channel.id] = sum(one["voxels"] for one in of_rungs[chosen].values())
         if one.is_fixed and of_rungs:
@@ -189,7 +188,9 @@ def _of_channel(
     file: str,
 ) -> ChannelSurvey:
     level = found.rungs[chosen] if found.rungs else None
-    confidence = level.confidence if isinstance(level, Level) else float(level is not None)
+    confidence = float(level is not None)  # of a level that the settings state: it is no guess
+    if isinstance(level, Level) and not found.is_given:
+        confidence = level.confidence
     values = {tile: one.value for tile, one in iso.items()}
     known = [value for value in values.values() if value is not None]
     painter, surface = plan.painter(channel), None
@@ -209,8 +210,9 @@ def _of_channel(
         statistics=statistics,
         level=surface,
         confidence=confidence,
-        doubt=found.doubt,
+        doubt=found.doubt or find_doubt(found, chosen, list(iso.values())),
         modality="" if channel.source else plan.modality,
+        level_percentile=plan.settings.window.volume_percentile,
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)
     return ChannelSurvey(
@@ -223,7 +225,11 @@ def _of_channel(
             surface=plan.settings.surface,
             spacing_um=plan.spacing_um,
         ),
-        replace(appearance, painted_by=painter.id if painter else ""),
+        replace(
+            appearance,
+            painted_by=painter.id if painter else "",
+            opens=channel.name in BRAIN or not has_brain(plan.channels),
+        ),
         () if found.levels is None else found.levels.ladder,
         None if found.levels is None else Curve(*found.levels.curve()),
         found.window.holder,

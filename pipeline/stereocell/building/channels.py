@@ -1,11 +1,11 @@
 """The channels of a build, each of its surfaces one, and settings that are given by channel."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from stereocell.building.settings import Settings
-from stereocell.isosurface.options import RUNGS, parse_level
+from stereocell.isosurface.options import NO_SURFACE, RUNGS, parse_level
 from stereocell.model.color import linear_color
 from stereocell.model.errors import UsageError
 from stereocell.model.identifiers import to_identifier
@@ -28,6 +28,9 @@ PALETTE = tuple(
 _PALE = 0.6  # linear RGB: a colour whose least part is more has no lighter one beside it
 FLESH = (0.78, 0.66, 0.55)
 BODY_MODALITIES = ("MR", "CT")
+# Classes of tissue that an MR of a head is looked at for: skin, skull and fluid would hide them.
+GREY_MATTER, WHITE_MATTER = "grey matter", "white matter"
+BRAIN = frozenset({GREY_MATTER, WHITE_MATTER})
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +65,9 @@ class Channel:
         return to_identifier(self.name)
 
 
-def choose_color(place: int, modality: str) -> tuple[float, float, float]:
-    """Return the colour (linear RGB) of a channel without one, the `place`-th that is built."""
-    if place == 0 and modality in BODY_MODALITIES:
-        return FLESH
-    return PALETTE[place % len(PALETTE)]
+def has_brain(channels: Iterable[Channel]) -> bool:
+    """Return whether the classes of a brain are among the channels, as `tissue` learns them."""
+    return {channel.name for channel in channels if channel.source} >= BRAIN
 
 
 def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> list[Channel]:
@@ -83,6 +84,9 @@ def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> lis
             found.append(channel)
             continue
         rungs = [part.strip() for part in given[channel.name].split(",")]
+        if rungs == [NO_SURFACE]:
+            found.append(replace(channel, rung=NO_SURFACE))
+            continue
         for rung in rungs:
             if rung not in RUNGS:
                 _require_level(channel.name, rung)
@@ -115,7 +119,7 @@ def _require_level(name: str, rung: str) -> None:
     except UsageError:
         raise UsageError(
             f"--surfaces {name}: found {rung!r:.40}, expected {', '.join(RUNGS)}, voxel values or "
-            "values above the background as 162+b, between commas"
+            f"values above the background as 162+b, between commas; or {NO_SURFACE}"
         ) from None
 
 
@@ -146,7 +150,7 @@ def require_no_background(settings: Settings, channels: Sequence[Channel], modal
     given += [
         (f"--surfaces {channel.base or channel.name}", channel.rung)
         for channel in channels
-        if channel.rung and channel.rung not in RUNGS
+        if channel.rung and channel.rung not in (*RUNGS, NO_SURFACE)
     ]
     for flag, value in given:
         if parse_level(flag, value)[1]:

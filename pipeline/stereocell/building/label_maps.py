@@ -3,20 +3,26 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from stereocell.building.input_files import open_anew
+from stereocell.building.label_grids import (
+    has_other_spacing,
+    note_on_assumed,
+    note_on_cover,
+    origin_on,
+    require_overlap,
+    settle_spacing,
+)
 from stereocell.building.open_source import SourceRef, as_asked, open_source
-from stereocell.building.settings import PlanOptions
+from stereocell.building.settings import PlanOptions, Settings
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
-from stereocell.model.rigid_transform import IDENTITY
 from stereocell.read.dataset import Dataset
 from stereocell.read.label_map import LabelMap
+from stereocell.read.remarks import CAST
 from stereocell.storage.location import Location
 
 SELF = "."  # in place of a path: the input itself
-_MAX_ROUNDING = 1e-6  # largest difference of two rotations' elements: rounding
+_SHOWN = 4  # names in a note
 _COLOURS = "colour pixels"  # how a reader's remark on them begins
 _AVERAGED = ("resampled", "interpolated")  # in what a reader says of voxels between others
 
@@ -33,6 +39,7 @@ class Labels:
     origin_um   (z, y, x), um: centre of its voxel (0, 0, 0), from that of the image's
     shape       voxels (z, y, x)
     color       linear RGB 0..1, of objects without one of their own
+    background  number of the voxels that are no object, beside 0; 0: there is no other
     """
 
     name: str
@@ -42,6 +49,7 @@ class Labels:
     origin_um: Triple
     shape: tuple[int, int, int]
     color: Triple
+    background: int = 0
 
     @property
     def id(self) -> str:
@@ -50,13 +58,35 @@ class Labels:
 
     def open(self) -> LabelMap:
         """Return the label map. Raises SourceError."""
-        return LabelMap(open_source(self.ref), self.channel)
+        return LabelMap(open_source(self.ref), self.channel, self.background)
 
     def position_um(self, index_zyx: Sequence[float]) -> Triple:
         """Return the place of a voxel's centre, (z, y, x) in um, as a plan's `position_um`."""
         places = zip(self.origin_um, index_zyx, self.spacing_um, strict=True)
         z, y, x = (float(o + i * s) for o, i, s in places)
         return z, y, x
+
+
+@dataclass(frozen=True, slots=True)
+class FoundLabels:
+    """The label maps of a build, and notes on what was chosen or assumed in laying them."""
+
+    labels: tuple[Labels, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Opened:
+    """A label map's dataset, how it was opened, and where its first voxel lies on the image.
+
+    origin_um  (z, y, x), from the centre of the image's first voxel
+    notes      sentences without the label map's name
+    """
+
+    dataset: Dataset
+    ref: SourceRef
+    origin_um: Triple
+    notes: tuple[str, ...] = ()
 
 
 def are_alone(wanted: Mapping[str, str]) -> bool:
@@ -69,10 +99,10 @@ def find_labels(
     source: str,
     wanted: Mapping[str, str],
     *,
-    options: PlanOptions,
+    settings: Settings,
     colors: Sequence[Triple],
     taken: Sequence[str],
-) -> tuple[Labels, ...]:
+) -> FoundLabels:
     """Return the label maps that are asked for, by name, in the order given.
 
     image   the input, which may be a label map itself
@@ -83,43 +113,50 @@ def find_labels(
     Raises UsageError, SourceError.
     """
     found: list[Labels] = []
+    notes: list[str] = []
     # but for their case: on Windows and macOS their files would be one
     ids = [to_identifier(name).lower() for name in taken]
     for name, place in wanted.items():
         if not name.isprintable():
             raise UsageError(f"--labels {name!r:.60}: expected a name without control characters")
-        dataset, ref = _opened(image, source, name, place, options)
+        opened = _opened(image, source, name, place, settings.plan)
         title = name
         if name == SELF:  # the name of a patient's file may be the patient's
             title = "labels" if image.has_sides else image.name
-        several = len(dataset.channels) > 1  # segments that overlap come as several
-        for index, channel in enumerate(dataset.channels):
+        channels = opened.dataset.channels
+        several = len(channels) > 1  # segments that overlap come as several
+        told = [*opened.notes, *_on_channels([one.name for one in channels])]
+        for index, channel in enumerate(channels):
             one = Labels(
                 f"{title} {channel.name}" if several else title,
-                ref,
+                opened.ref,
                 index,
-                dataset.levels[0].spacing_um,
-                _origin(image, dataset),
-                dataset.levels[0].shape,
+                opened.dataset.levels[0].spacing_um,
+                opened.origin_um,
+                opened.dataset.levels[0].shape,
                 colors[len(found) % len(colors)],
+                settings.objects.background,
             )
             if one.id.lower() in ids:
                 raise UsageError(
                     f"--labels {one.name}: a channel has that name (small letters or capitals), "
                     f"expected another one, as {one.name}_objects=PATH"
                 )
-            _require_overlap(image, one, dataset.shown)
             ids.append(one.id.lower())
             found.append(one)
-    return tuple(found)
+        if SELF not in (name, place):
+            require_overlap(image, opened.dataset, opened.origin_um)
+            cover = note_on_cover(image, opened.dataset, opened.origin_um)
+            told += [cover] if cover else []
+        notes += [f"labels {title!r}: {note}" for note in told]
+    return FoundLabels(tuple(found), tuple(notes))
 
 
-def _opened(
-    image: Dataset, source: str, name: str, place: str, options: PlanOptions
-) -> tuple[Dataset, SourceRef]:
+def _opened(image: Dataset, source: str, name: str, place: str, options: PlanOptions) -> _Opened:
     """Return a label map's dataset, and how it was opened."""
     if SELF in (name, place):
-        return _as_stored(image), as_asked(source, options, fingerprint=image.fingerprint)
+        ref = as_asked(source, options, fingerprint=image.fingerprint)
+        return _Opened(_as_stored(image), ref, (0.0, 0.0, 0.0))
     where = Location.of(place or f"{source.rstrip('/')}/labels/{name}").source
     ref = SourceRef(where, 0, ())
     try:
@@ -128,15 +165,75 @@ def _opened(
         if "voxel size" not in str(error):
             remedy = "" if place else f"; or give its path, as --labels {name}=PATH"
             raise SourceError(f"--labels {name}: {error}{remedy}") from error
-        # masks of segmentation programs state no lengths: they lie on the image
+        return _without_size(image, ref, options, error)
+    dataset, ref, note = _at_time(image, _as_stored(dataset), ref, options)
+    notes = [note] if note else []
+    origin = origin_on(image, dataset)
+    if has_other_spacing(image, dataset):
+        notes += settle_spacing(image, dataset)
         ref = replace(ref, spacing_um=image.levels[0].spacing_um)
         dataset = open_anew(ref)
-        if dataset.levels[0].shape != image.levels[0].shape:
-            raise SourceError(
-                f"{dataset.shown}: states no voxel size: found {_by(dataset.levels[0].shape)} "
-                f"voxels (z, y, x), expected the image's {_by(image.levels[0].shape)}"
-            ) from error
-    return _as_stored(dataset), replace(ref, fingerprint=dataset.fingerprint)
+    return _finished(dataset, ref, origin, notes)
+
+
+def _without_size(
+    image: Dataset, ref: SourceRef, options: PlanOptions, error: SourceError
+) -> _Opened:
+    """Return a label map that states no voxel size, on the image's level of the same shape."""
+    ref = replace(ref, spacing_um=image.levels[0].spacing_um)
+    dataset = _as_stored(open_anew(ref))
+    shape = dataset.levels[0].shape
+    same = (index for index, level in enumerate(image.levels) if level.shape == shape)
+    if (level := next(same, None)) is None:
+        is_turned = sorted(shape) == sorted(image.levels[0].shape)
+        hint = ": its axes are in another order, save it as (z, y, x)" if is_turned else ""
+        raise SourceError(
+            f"{dataset.shown}: states no voxel size: found {_by(shape)} voxels (z, y, x), "
+            f"expected the image's {_by(image.levels[0].shape)}{hint}"
+        ) from error
+    if level:
+        ref = replace(ref, spacing_um=image.levels[level].spacing_um)
+        dataset = open_anew(ref)
+    dataset, ref, note = _at_time(image, dataset, ref, options)
+    notes = [*([note] if note else []), note_on_assumed(image, level)]
+    origin = image.levels[level].origin_um if level else origin_on(image, dataset)
+    return _finished(dataset, ref, origin, notes)
+
+
+def _at_time(
+    image: Dataset, dataset: Dataset, ref: SourceRef, options: PlanOptions
+) -> tuple[Dataset, SourceRef, str]:
+    """Return a label map at the image's point in time, if it has several, and a note if not."""
+    if dataset.time_points == 1:
+        if image.time_points == 1:
+            return dataset, ref, ""
+        note = f"one point in time, laid on --time {options.time} of {image.time_points}"
+        return dataset, ref, note
+    if options.time >= dataset.time_points:
+        raise SourceError(
+            f"{dataset.shown}: found {dataset.time_points} points in time, expected the image's "
+            f"--time {options.time} among them"
+        )
+    if options.time:
+        ref = replace(ref, time=options.time)
+        dataset = open_anew(ref)
+    return dataset, ref, ""
+
+
+def _finished(dataset: Dataset, ref: SourceRef, origin_um: Triple, notes: Sequence[str]) -> _Opened:
+    """Return an opened label map with its reader's own notes."""
+    # numbers of objects are read as they are
+    own = [note for note in dataset.notes if not note.startswith(CAST)]
+    ref = replace(ref, fingerprint=dataset.fingerprint)
+    return _Opened(dataset, ref, origin_um, (*own, *notes))
+
+
+def _on_channels(names: Sequence[str]) -> list[str]:
+    """Return the note on a label map of several channels."""
+    if len(names) < 2:
+        return []
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return [f"{len(names)} channels, each a label map: {', '.join(names[:_SHOWN])}{more}"]
 
 
 def _as_stored(dataset: Dataset) -> Dataset:
@@ -152,53 +249,6 @@ def _as_stored(dataset: Dataset) -> Dataset:
                 "expected labels on a grid that needs none"
             )
     return dataset
-
-
-def _origin(image: Dataset, labels: Dataset) -> Triple:
-    """Return the centre of the labels' first voxel, from the image's (z, y, x), um.
-
-    Raises SourceError where they are turned to the image, or which way round they lie is not known.
-    """
-    if _ways_round(image) != _ways_round(labels):
-        raise SourceError(
-            f"{labels.shown}: found {_ways_round(labels)}, and the image has "
-            f"{_ways_round(image)}: which way round the labels lie on it is not known, expected "
-            "both in formats that say it alike, as both NIfTI or both TIFF"
-        )
-    if image.has_sides or image.placement != IDENTITY:
-        between = np.linalg.inv(np.array(image.placement)) @ np.array(labels.placement)
-        if np.abs(between[:3, :3] - np.eye(3)).max() > _MAX_ROUNDING:
-            raise SourceError(
-                f"{labels.shown}: lies turned to the image, expected labels along its axes"
-            )
-        x, y, z = (float(part) for part in between[:3, 3])
-        return z, -y, x
-    if labels.levels[0].shape == image.levels[0].shape and not any(labels.offset_um):
-        return 0.0, 0.0, 0.0  # on the same voxels; who wrote no place did not mean another one
-    places = zip(labels.offset_um, image.offset_um, strict=True)
-    z, y, x = (own - first for own, first in places)
-    return z, y, x
-
-
-def _ways_round(dataset: Dataset) -> str:
-    """Return by what a reader laid a dataset's axes, for messages."""
-    if dataset.has_sides:
-        return "axes by a patient's sides"
-    return "its file's own axes" if dataset.placement == IDENTITY else "axes by guessed sides"
-
-
-def _require_overlap(image: Dataset, labels: Labels, shown: str) -> None:
-    """Raise SourceError where labels lie beside the image: one of them states a wrong place."""
-    finest = image.levels[0]
-    ends = labels.position_um([n - 1 for n in labels.shape])
-    lasts = [(n - 1) * s for n, s in zip(finest.shape, finest.spacing_um, strict=True)]
-    pairs = zip(labels.origin_um, ends, lasts, strict=True)
-    if not all(low <= last and high >= 0 for low, high, last in pairs):
-        first = ", ".join(f"{part:g}" for part in labels.origin_um)
-        raise SourceError(
-            f"{shown}: lies beside the image: found its first voxel at {first} um (z, y, x) from "
-            "the image's, expected labels of that image"
-        )
 
 
 def _by(numbers: Sequence[int]) -> str:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,32 @@ from stereocell.building.channels import Channel
 from stereocell.building.plan import Plan
 from stereocell.building.survey_file import TileIso
 from stereocell.building.tasks.window import Window
+from stereocell.building.vessel_levels import choose_connected, find_vessel_levels
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import TileEvidence
-from stereocell.isosurface.options import ADAPTIVE, APART, CRITERIA, LADDER, RUNGS, parse_level
+from stereocell.isosurface.options import (
+    ADAPTIVE,
+    APART,
+    CONNECTED,
+    CRITERIA,
+    LADDER,
+    NO_SURFACE,
+    RUNGS,
+    IsoValueOptions,
+    parse_level,
+)
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Tile
+from stereocell.transfer.channel_statistics import ChannelStatistics
 
 APART_SHARE = 0.25  # share of all voxels inside: a rung whose largest components hold less has many
 # the same where many components may touch: the share, and the least number of components
 JOINED_SHARE, MANY = 2 / 3, 30
+# Share of all voxels that cells of a cleared tissue fill at least: in a stack whose cells stood at
+# 1675, a level of 8384 left .02 % inside
+APART_LEAST = 5e-4
+APART_MOST = 0.1  # share of all voxels that sparse cells fill at most
 Components = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
 
 
@@ -35,6 +52,7 @@ class Found:
               taken, unless its components speak against it
     doubt     why there is none
     is_fixed  whether all tiles have the same level, whatever they hold: a given one, or a mask's
+    is_given  whether the settings state the level: a standard, as 300 HU for bone, and no guess
     """
 
     window: Window
@@ -44,6 +62,7 @@ class Found:
     subtracts: bool
     doubt: str
     is_fixed: bool = False
+    is_given: bool = False
 
     @property
     def background(self) -> LatticeField | None:
@@ -58,17 +77,24 @@ def find_level(
     given = given_level(plan, channel)
     if not evidence:
         assert given is not None
-        return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True)
+        return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True, is_given=True)
     options = plan.settings.isovalue
     criterion = LADDER if channel.rung else options.criterion
-    levels = find_levels(
+    find = partial(
+        find_levels,
         list(evidence.values()),
         counting=window.counting,
         finest_um=min(plan.spacing_um),
         modality=plan.modality,
         options=options if criterion in CRITERIA else None,
-        subtracts=None if given is None else given[1],
     )
+    levels = find(subtracts=None if given is None else given[1])
+    if given is None and (channel.rung or options.rung) == APART and not levels.subtracts:
+        # cells in dim and in bright tissue have their height above the tissue in common; without
+        # sparse ones, a level above it is that of the tissue's own texture
+        above = find(subtracts=True)
+        has_cells = any(level.share <= APART_MOST for level in above.clear)
+        levels = above if has_cells else levels
     mask, half = window.counting.mask, None
     if mask is not None and criterion not in CRITERIA:
         # blurred, a mask has its own edge half-way; peaks of its blur are no levels
@@ -78,11 +104,17 @@ def find_level(
         value, subtracts = given
         # where there is no background to be above, nothing can be said of such a level
         rated = levels.judge(value) if subtracts == levels.subtracts else value
-        return Found(window, levels, evidence, (rated,), subtracts, "", is_fixed=True)
-    is_outer = options.rung == APART or RUNGS[channel.rung or options.rung] == 0
+        return Found(
+            window, levels, evidence, (rated,), subtracts, "", is_fixed=True, is_given=True
+        )
+    if (channel.rung or options.rung) == NO_SURFACE:
+        reason = f"no surface is built by default (--surfaces {channel.name}=outer builds one)"
+        return Found(window, levels, evidence, (), levels.subtracts, reason)
+    is_outer = options.rung in (APART, CONNECTED) or RUNGS[channel.rung or options.rung] == 0
     if half is not None and criterion == LADDER and is_outer:
         return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
-    clear = levels.clear
+    highest = highest_of(window.statistics, levels.subtracts)
+    clear = levels.shown(highest)
     doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
     if criterion == ADAPTIVE and clear:
         threshold = window.statistics.threshold
@@ -93,7 +125,11 @@ def find_level(
         rated = threshold.value if levels.subtracts else levels.judge(threshold.value)
         return Found(window, plain, evidence, (rated,), False, "", is_fixed=True)
     rung = channel.rung or options.rung
-    if clear and rung != APART:
+    if rung == APART:
+        clear = _fit_for_cells(clear, highest)
+    elif rung == CONNECTED:
+        clear = find_vessel_levels(levels)
+    elif clear:
         place = RUNGS[rung]
         if place >= len(clear):
             doubt = f"no clear surface: {len(clear)} clear levels, none that is the {rung}"
@@ -101,35 +137,86 @@ def find_level(
     return Found(window, levels, evidence, clear, levels.subtracts, doubt)
 
 
+def highest_of(statistics: ChannelStatistics, subtracts: bool) -> float:
+    """Return the display window's upper end, in voxel values or above the mean background."""
+    under = statistics.background if subtracts else None
+    return statistics.window[1] - (0.0 if under is None else float(under.values.mean()))
+
+
+def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
+    """Return why a level that the program found cannot be called clear; empty: it can.
+
+    chosen  index into `found.rungs`
+    tiles   the level of each tile, with its own confidence
+    """
+    if found.is_fixed or found.levels is None or not found.rungs:
+        return ""
+    level = found.rungs[chosen]
+    if not isinstance(level, Level):
+        return ""
+    clear, highest = found.levels.clear, highest_of(found.window.statistics, found.subtracts)
+    if level in found.levels.ladder and level not in clear and clear:
+        return (
+            f"it falls short of a clear level by a little ({level.doubt}), and the next one, "
+            f"{clear[0].value:.5g}, leaves {clear[0].share:.3%} of the voxels inside"
+        )
+    if level.value > highest:
+        return f"it lies above the display window, which ends at {highest:.5g}"
+    if all(tile.confidence is None for tile in tiles):
+        return "no tile by itself has enough voxels on both sides of it"
+    return ""
+
+
+def _fit_for_cells(levels: tuple[Level, ...], highest: float) -> tuple[Level, ...]:
+    """Return the levels that cells may lie at: all but specks, and none that no window shows.
+
+    The outermost stays in any case, since it is the surface where there are no cells.
+    """
+    return levels[:1] + tuple(
+        level for level in levels[1:] if level.share >= APART_LEAST and level.value <= highest
+    )
+
+
 def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
     """Return the iso-value that the user gives for a channel, and whether above the background."""
     if channel.rung:
-        if channel.rung in RUNGS:
+        if channel.rung in (*RUNGS, NO_SURFACE):
             return None
         return parse_level(f"--surfaces {channel.base or channel.name}", channel.rung)
     given = plan.settings.iso_values.get(channel.name)
     return None if given is None else parse_level(f"--iso-value {channel.name}", given)
 
 
-def choose_rung(of_rungs: Sequence[Components]) -> int:
-    """Return the first rung whose components are many.
+def choose_by_components(options: IsoValueOptions, of_rungs: Sequence[Components]) -> int:
+    """Return the index of the level that a channel's components speak for.
 
-    Where none has many, cells that touch are joined at every level: then the rung whose largest
-    components hold the least, if that is under JOINED_SHARE and there are MANY; else the outermost.
-
-    of_rungs  the ComponentSums of each tile at each rung, outermost first
+    of_rungs  the ComponentSums of each tile at each level; one level alone is taken as it is
     """
-    shares: list[float] = []
-    for components in of_rungs:
-        # over the tiles: what fills all of them is the largest in each
+    if len(of_rungs) < 2:
+        return 0
+    return choose_connected(of_rungs) if options.rung == CONNECTED else choose_rung(of_rungs)
+
+
+def choose_rung(of_rungs: Sequence[Components]) -> int:
+    """Return the index of the level that has the most components.
+
+    A level counts if its largest components, one a tile, hold less than APART_SHARE of the voxels
+    inside. Where cells touch they may hold JOINED_SHARE, if there are MANY components. Without such
+    a level the outermost is returned.
+
+    of_rungs  the ComponentSums of each tile at each level, outermost first
+    """
+    best, most = 0, (0, 0.0)
+    for place, components in enumerate(of_rungs):
+        # summed over the tiles: a component that fills all of them is the largest in each
         voxels, largest, count = (
             sum(one[key] for one in components.values()) for key in ("voxels", "largest", "count")
         )
-        if largest < APART_SHARE * voxels:
-            return len(shares)
-        shares.append(largest / voxels if voxels and count >= MANY else 1.0)
-    best = int(np.argmin(shares)) if shares else 0
-    return best if shares and shares[best] < JOINED_SHARE else 0
+        share = largest / voxels if voxels else 1.0
+        is_apart = share < APART_SHARE or (share < JOINED_SHARE and count >= MANY)
+        if is_apart and (count, -share) > most:
+            best, most = place, (count, -share)
+    return best
 
 
 def check_components(plan: Plan, found: Found, components: Components) -> Found:
@@ -186,6 +273,8 @@ def level_of_tile(
     if found.levels is None or not isinstance(level, Level):
         return TileIso(_value_of(level), below, None, files)
     tile_evidence, value = found.evidence[tile.id], level.value
+    if found.is_given:
+        return TileIso(value, below, None, files)
     judged = found.levels.judge_tile(level, tile_evidence)
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
         value = found.levels.level_of_tile(level, tile_evidence)

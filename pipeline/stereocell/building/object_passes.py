@@ -11,6 +11,7 @@ from pydantic import TypeAdapter
 
 from stereocell.building.channels import Channel
 from stereocell.building.label_maps import Labels
+from stereocell.building.label_numbers import notes_on_numbers
 from stereocell.building.located_objects import (
     AROUND,
     CUT,
@@ -37,6 +38,7 @@ from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted
 from stereocell.model.object_notes import ObjectNotes
+from stereocell.objects.options import ObjectOptions
 from stereocell.read.readers import reader_of
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
@@ -57,7 +59,7 @@ def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: En
     boxes = tile_boxes(TileGrid.of(plan, labels))
     files, tasks = {}, []
     for tile, box in boxes.items():
-        depends = [labels.ref.fingerprint, labels.channel, box_to_json(box)]
+        depends = [*_key_of(labels), box_to_json(box)]
         key = key_of(depends, extents_maker, reader_of(labels.ref.source))
         files[tile] = out_folder.tile_result("extents", tile, labels.id, key)
         if find_sealed(files[tile], EXTENTS) is None:
@@ -111,8 +113,10 @@ def _notes() -> TypeAdapter[ObjectNotes]:
 
 
 def tell_objects(labels: Labels, located: Located) -> None:
-    """Print what `told_of` says."""
-    console.print(f"units: {told_of(labels, located)}", markup=False)
+    """Print the number of objects, and the notes on their numbers if `plan` did not count them."""
+    notes = notes_on_numbers(labels, located) if _is_large(labels) else ()
+    for note in (told_of(labels, located), *notes):
+        console.print(f"units: {note}", markup=False, soft_wrap=True)
 
 
 def told_of(labels: Labels, located: Located) -> str:
@@ -127,6 +131,11 @@ def told_of(labels: Labels, located: Located) -> str:
     return f"{labels.name}: {summary}"
 
 
+def _is_large(labels: Labels) -> bool:
+    """Return whether a label map has too many voxels for `plan` to count its objects."""
+    return math.prod(labels.shape) > _COUNTED_AT_ONCE
+
+
 def told_before(plan: Plan) -> Iterator[str]:
     """Yield of each label map what its units will cut, from its voxels where these are few.
 
@@ -134,10 +143,11 @@ def told_before(plan: Plan) -> Iterator[str]:
     """
     for labels in plan.labels:
         boxes = tile_boxes(TileGrid.of(plan, labels))
-        if math.prod(labels.shape) <= _COUNTED_AT_ONCE:
+        if not _is_large(labels):
             parts = {tile: find_in_tile(ExtentsTask(labels, box)) for tile, box in boxes.items()}
             found = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
             yield told_of(labels, found)
+            yield from notes_on_numbers(labels, found)
         elif len(plan.tiles) > 1:
             largest = np.max([box.shape for box in boxes.values()], axis=0) * labels.spacing_um
             z, y, x = ((1 + 2 * AROUND) * largest).tolist()
@@ -171,8 +181,7 @@ def object_tasks(
                 "others_cut": names[others[is_cut[others]]],
             }
             depends = [
-                labels.ref.fingerprint,
-                labels.channel,
+                *_key_of(labels),
                 [labels.spacing_um, labels.origin_um],
                 window and box_to_json(window),
                 box_to_json(boxes[tile.id]),
@@ -181,8 +190,7 @@ def object_tasks(
                 step_um,
                 [_image_key(image) for image in images],
                 painted and [_image_key(painted.image), painted.window, painted.depth_um],
-                asdict(plan.settings.objects)
-                | dict.fromkeys(("table", "table_key", "columns", "color_by", "segment_labels")),
+                _options_key(plan.settings.objects),
             ]
             readers = {reader_of(ref.source) for ref in (labels.ref, *(i.ref for i in images))}
             key = key_of(depends, objects_maker, *sorted(readers))
@@ -200,6 +208,21 @@ def object_tasks(
                 directory=directory,
             )
             yield f"{tile.id}/{labels.id}", task, key
+
+
+def _key_of(labels: Labels) -> list[object]:
+    """Return the source of a label map's voxels as a part of a key."""
+    background = [labels.background] if labels.background else []
+    return [labels.ref.fingerprint, labels.channel, *background]
+
+
+def _options_key(options: ObjectOptions) -> dict[str, object]:
+    """Return the options that units depend on; the labels' background is in their own key."""
+    content = asdict(options) | dict.fromkeys(
+        ("table", "table_key", "columns", "color_by", "segment_labels")
+    )
+    del content["background"]
+    return content
 
 
 def lattice_step_um(plan: Plan, located: Mapping[str, Located]) -> float:

@@ -17,6 +17,7 @@ class SourceRef:
     series       of a source of several images, from 1; 0: the largest
     pattern      of the names of planes, or empty
     axes         letters of an array whose format leaves them open, as `czyx`, or empty
+    dark         whether structures are dark, so that values are inverted
     fingerprint  the planned one, since the address may hold another volume now; empty: any volume
     """
 
@@ -27,6 +28,7 @@ class SourceRef:
     fingerprint: str = ""
     pattern: str = ""
     axes: str = ""
+    dark: bool = False
 
 
 @lru_cache(maxsize=2)
@@ -49,6 +51,7 @@ def open_afresh(ref: SourceRef) -> read.Dataset:
         series=ref.series,
         pattern=ref.pattern,
         axes=ref.axes,
+        dark=ref.dark,
     )
 
 
@@ -62,4 +65,5 @@ def as_asked(source: str, options: PlanOptions, *, fingerprint: str = "") -> Sou
         fingerprint,
         options.pattern,
         options.axes,
+        options.dark,
     )

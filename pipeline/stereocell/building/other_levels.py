@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from stereocell.building.channels import Channel
 from stereocell.building.level_choice import given_level
 from stereocell.building.plan import Plan
-from stereocell.isosurface.level import Level, clear_of
+from stereocell.isosurface.level import Level, shown_of
 from stereocell.isosurface.options import ADAPTIVE, RUNGS
 
 MAX_TOLD = 3
@@ -44,12 +44,14 @@ def find_other_levels(
     taken: float | None,
     threshold: float | None,
     ends: tuple[float, float] | None,
+    highest: float,
 ) -> list[OtherLevel]:
     """Return the next-best levels, at most MAX_TOLD, best first; none where there is no ladder.
 
     ladder     all levels that were found; `subtracts`: above the background
     taken      the surface's level; None: there is no surface
     threshold  the adaptive one, voxel value; None: there is none
+    highest    the display window's upper end; see `shown_of`
     ends       of the values that the ladder was found in: beyond them a level parts nothing
 
     First the ladder's other rungs, clear ones before doubtful ones, then the adaptive threshold,
@@ -58,7 +60,7 @@ def find_other_levels(
     if not ladder:
         return []
     # a channel that has no surface has no rung that could be named
-    clear = () if taken is None else clear_of(ladder)
+    clear = () if taken is None else shown_of(ladder, highest)
     named, doubtful = _rungs(plan, channel, ladder, clear, subtracts)
     likely = [level for level in doubtful if (level.confidence or 0.0) >= LIKELY]
     levels = [*named, *likely]

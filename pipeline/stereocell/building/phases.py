@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
-from stereocell.building.channels import PALETTE, Channel, choose_color, with_surfaces
+from stereocell.building.channel_colors import choose_colors
+from stereocell.building.channels import PALETTE, Channel, with_surfaces
+from stereocell.building.ct_evidence import recognise_modality
+from stereocell.building.hounsfield import without_hounsfield
 from stereocell.building.input_files import open_anew, require_table, watch_table
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
@@ -121,25 +124,31 @@ def settle(source: str, settings: Settings) -> Plan:
         require_map_packages()
     _require_labels(settings)
     dataset = open_anew(as_asked(location, options))
-    modality = dataset.modality or options.modality
     alone = are_alone(settings.labels)
+    modality, recognised = dataset.modality or options.modality, ""
+    if not dataset.has_hounsfield_units:
+        settings, modality = without_hounsfield(settings), ""
+    elif not alone:
+        modality, recognised = recognise_modality(dataset, options.modality)
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
+    wanted = [dataset.channels[index] for index in chosen]
+    colors = choose_colors(
+        [(one.name, one.color) for one in wanted],
+        modality=modality,
+        is_alone=len(dataset.channels) == 1,
+    )
     channels = [
-        Channel(
-            index,
-            dataset.channels[index].name,
-            dataset.channels[index].color or choose_color(place, modality),
-        )
-        for place, index in enumerate(chosen)
+        Channel(index, one.name, color)
+        for index, one, color in zip(chosen, wanted, colors, strict=True)
     ]
     channels = with_surfaces(channels, settings.surfaces)
     level = choose_level(dataset.levels, len(channels), settings)
-    labels = find_labels(
+    found = find_labels(
         dataset,
         location,
         settings.labels,
-        options=options,
+        settings=settings,
         colors=PALETTE[len(channels) :] + PALETTE[: len(channels)],
         taken=[channel.name for channel in channels],
     )
@@ -160,22 +169,26 @@ def settle(source: str, settings: Settings) -> Plan:
         placement=dataset.placement,
         slice_axis=dataset.slice_axis(level[0]),
         has_sides=dataset.has_sides,
-        labels=labels,
-        formats={format_of(location), *(format_of(one.ref.source) for one in labels)},
+        labels=found.labels,
+        formats={format_of(location), *(format_of(one.ref.source) for one in found.labels)},
     )
     if settings.objects.table:
         watch_table(settings.objects.table)
+    objects = list(found.notes)
     for one in plan.labels:
-        # what can't be read, or isn't there, is told before the build
-        require_color_by(plan, one, table_of(plan, one))
+        # a table that can't be read, or lacks a column, ends the command before the build
+        table = table_of(plan, one)
+        require_color_by(plan, one, table)
+        objects += [f"table: {note}" for note in table.notes] if table else []
     gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
-    objects = list(told_before(plan))
+    objects += told_before(plan)
     objects += filter(None, map(doubt_of, plan.labels))
     if settings.objects.table and len(plan.labels) > 1:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
     # numbers of objects are read as they are
     read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
-    plan = replace(plan, notes=(*read, *gaps, *objects))
+    kind = [recognised] if recognised else []
+    plan = replace(plan, notes=(*read, *kind, *gaps, *objects))
     for note in (*plan.notes, *told_in_vain(settings, channels)):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan
@@ -189,6 +202,7 @@ def _require_labels(settings: Settings) -> None:
         "--table-key": options.table_key,
         "--columns": ",".join(options.columns),
         "--color-by": options.color_by,
+        "--background": str(options.background or ""),
     }.items():
         if value and not settings.labels:
             raise UsageError(f"{flag} is {value!r:.60}: of no objects, expected --labels with it")
@@ -296,6 +310,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             names,
             list(plan.placement),
             plan.has_sides,
+            plan.opens_cut,
             {id_: digest_of_table(table) for id_, table in tables.items()},
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
@@ -319,6 +334,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             modality=plan.modality,
             placement=plan.placement,
             has_sides=plan.has_sides,
+            opens_cut=plan.opens_cut,
             tables=tables,
         )
         out_folder.remove_other_folders(

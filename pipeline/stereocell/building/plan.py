@@ -13,6 +13,7 @@ from typing import Protocol
 from stereocell.building.channels import (
     Channel,
     by_name,
+    has_brain,
     painted,
     require_no_background,
     windows_of,
@@ -131,6 +132,15 @@ class Plan:
                 shared.add(channel.id)
             seen.add(channel.base)
         return frozenset(shared)
+
+    @property
+    def opens_cut(self) -> bool:
+        """Whether the specimen opens cut through its middle.
+
+        An MR is looked at for what lies inside. Classes of a brain are that already, and a cut
+        through objects would open them.
+        """
+        return self.modality == "MR" and not self.labels and not has_brain(self.channels)
 
     def level_of(self, channel: Channel) -> int:
         """Return the level of its source at which a channel is read."""

@@ -30,6 +30,9 @@ def to_json(plan: Plan) -> dict[str, Any]:
         for key in ("source", "fingerprint", "rung", "base"):
             if not channel[key]:
                 del channel[key]
+    for labels in content["labels"]:
+        if not labels["background"]:
+            del labels["background"]
     return {"format": _FORMAT, "version": _VERSION, **content}
 
 

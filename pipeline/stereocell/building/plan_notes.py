@@ -9,7 +9,7 @@ from stereocell.building.open_source import SourceRef
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings, to_dict
-from stereocell.isosurface.options import LADDER, RUNGS
+from stereocell.isosurface.options import LADDER, NO_SURFACE, RUNGS
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
@@ -87,7 +87,7 @@ def told_in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[st
             yield f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
         if channel.rung and options.criterion != LADDER:
             yield f"{channel.name}: built where --surfaces says, not by {options.criterion}"
-        is_number = channel.rung not in RUNGS if channel.rung else given is not None
+        is_number = channel.rung not in (*RUNGS, NO_SURFACE) if channel.rung else given is not None
         if is_number and options.scope == "tile":
             yield (
                 f"{channel.name}: its level is given, so the same in all tiles: --iso-scope tile "

@@ -4,22 +4,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from stereocell.building.channels import ALL
+from stereocell.building.ct_evidence import LEVELS_HU, find_ct_evidence
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.settings import NO_PRESET, Settings, load
 from stereocell.engine.run import console
 from stereocell.model.errors import StereoCellError
-from stereocell.model.tiling import Box
 from stereocell.read import Dataset
 from stereocell.storage.location import Location
 
 _BY_MODALITY = {"MR": "mri", "CT": "ct"}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
 _PART_UM = 20_000.0  # um: of what is smaller across, presets of patients drop pieces half as large
-# of the voxels looked at so many lie this near to air, and 99 % below metal
-_AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MAX_HU = -1000.0, 150.0, 0.02, 4000.0
-_PLANES = 8  # in the middle, that are looked at for Hounsfield units
 
 
 def load_for(
@@ -33,11 +29,14 @@ def load_for(
     """Return the settings of a build, by the preset that suits the source where none is given.
 
     As `settings.load` otherwise. A file of settings, `config`, leaves no choice. The text is the
-    choice with its reason, for `tell`; empty where there was none. A source that can't be read is
-    left to whoever reads it next.
+    choice with its reason, or a doubt about a preset of CT; empty where there was none. A source
+    that can't be read is left to the next reader.
     """
     if preset is not None or config is not None:
-        return load(preset, config, flags=flags, where=where), ""
+        settings = load(preset, config, flags=flags, where=where)
+        has_level = set(settings.iso_values) - {ALL} or settings.surfaces
+        doubts = preset in LEVELS_HU and config is None and not has_level
+        return settings, _doubt_of(source, preset or "", settings) if doubts else ""
     settings = load(None, None, flags=flags, where=where)
     options = settings.plan
     try:
@@ -47,6 +46,34 @@ def load_for(
     except StereoCellError:
         return settings, ""
     return (load(chosen, None, flags=flags, where=where) if chosen else settings), reason
+
+
+def _doubt_of(source: str | Path, preset: str, settings: Settings) -> str:
+    """Return the doubt about a preset of CT that the user names; empty: there is none."""
+    try:
+        dataset = open_source(as_asked(Location.of(source).source, settings.plan))
+        if dataset.modality and dataset.dtype.kind != "u":  # as the source states itself
+            return ""
+        doubt = _doubt(dataset, preset)
+    except StereoCellError:
+        return ""
+    return doubt and f"preset {preset}: {doubt}"
+
+
+def _doubt(dataset: Dataset, preset: str) -> str:
+    """Return why a level in Hounsfield units does not fit the voxels; empty: it may fit.
+
+    A reader that knows the values to be no Hounsfield units has noted it already.
+    """
+    if not dataset.has_hounsfield_units:
+        return ""
+    evidence = find_ct_evidence(dataset)
+    if not evidence.has_no_air:
+        return ""
+    flags = evidence.bone_flags if preset == "ct-bone" else evidence.flags
+    level = f"its level of {LEVELS_HU[preset]:g} is meant for Hounsfield units"
+    remedy = flags or "--iso-value 0=VALUE sets another, a voxel value"
+    return f"{evidence.words}, and {level} ({remedy})"
 
 
 def print_choice(choice: str) -> None:
@@ -68,29 +95,26 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
     across = max(n * h for n, h in zip(level.shape, level.spacing_um, strict=True))
     if across < _PART_UM:
         return None, _describe(None, f"{across / 1000:.3g} mm across, too small for a patient")
+    if not dataset.has_hounsfield_units:
+        chosen = _BY_MODALITY["CT"]
+        return chosen, _describe(chosen, "the input is CT, though without Hounsfield units")
     if known:
-        chosen = _BY_MODALITY.get(known)
-        return chosen, _describe(chosen, f"the input is {known}")
-    chosen = "ct" if _has_hounsfield_units(dataset) else "mri"
-    looks = "values like Hounsfield units"
-    if chosen == "mri":
-        looks = "no Hounsfield units, which a CT that was shifted has not either"
-    return chosen, _describe(chosen, f"voxels of {finest / 1000:.3g} mm and {looks}")
+        by_kind = _BY_MODALITY.get(known)
+        is_unsigned_ct = by_kind == "ct" and dataset.dtype.kind == "u"
+        doubt = _doubt(dataset, "ct") if is_unsigned_ct else ""
+        return by_kind, _describe(by_kind, f"the input is {known}" + (doubt and f": {doubt}"))
+    evidence = find_ct_evidence(dataset)
+    chosen = "ct" if evidence.is_hounsfield else "mri"
+    reason = f"voxels of {finest / 1000:.3g} mm and {evidence.words}"
+    if evidence.flags:
+        return chosen, (
+            f"preset {chosen}: {reason}: MR is assumed (for a CT {evidence.flags}; "
+            f"--preset {NO_PRESET}: the defaults)"
+        )
+    return chosen, _describe(chosen, reason)
 
 
 def _describe(chosen: str | None, reason: str) -> str:
     if chosen is None:
         return f"no preset: {reason}: lengths follow the voxel spacing (--preset names another)"
     return f"preset {chosen}: {reason} (--preset {NO_PRESET}: the defaults)"
-
-
-def _has_hounsfield_units(dataset: Dataset) -> bool:
-    if dataset.dtype.kind == "u":
-        return False
-    depth, height, width = dataset.levels[0].shape
-    first = max(0, (depth - _PLANES) // 2)
-    # planes through the whole: corners alone may be padding, and the middle all body
-    middle = Box((first, 0, 0), (min(depth, first + _PLANES), height, width))
-    voxels = dataset.read(0, middle).voxels
-    is_air = np.abs(voxels - _AIR_HU) <= _AIR_SPREAD
-    return float(is_air.mean()) >= _AIR_SHARE and float(np.quantile(voxels, 0.99)) <= _MAX_HU

@@ -103,7 +103,8 @@ class PlanOptions:
         flag=Flag(
             "--series",
             "which of several images of a source: series of DICOM or planes, segments, scenes of "
-            "CZI, LIF, ND2 (default: the largest); `list` shows them and does nothing else",
+            "CZI, LIF, ND2, tiles and angles of BigDataViewer, angles of OME-TIFF (default: the "
+            "largest); `list` shows them and does nothing else",
             "N|list",
         ),
         bounds=COUNT_OR_NONE,
@@ -127,6 +128,16 @@ class PlanOptions:
             "where the file names none, or a TIFF's are wrong",
         ),
     )
+    dark: bool = setting(
+        False,
+        "structures are darker than their surroundings, as in electron microscopy: values are "
+        "inverted",
+        flag=Flag(
+            "--dark",
+            "structures are darker than their surroundings, as membranes in electron microscopy: "
+            "all values are inverted",
+        ),
+    )
     spacing_um: tuple[float, ...] = setting(
         (),
         "voxel spacing z, y, x, instead of the file's",
@@ -148,7 +159,12 @@ class PlanOptions:
         flag=Flag("--neurological", "pictures of a patient with right on the right"),
     )
     modality: str = setting(
-        "", "where the input says none: a term of DICOM's Modality; MR and CT open path-traced"
+        "",
+        "where the input says none: a term of DICOM's Modality; MR and CT open path-traced",
+        flag=Flag(
+            "--modality",
+            "what took a volume that does not say so: MR, CT, PT, ..., GM for a microscope",
+        ),
     )
 
     def __post_init__(self) -> None:
@@ -217,11 +233,11 @@ class Settings:
     surfaces: Mapping[str, str] = setting(
         {},
         "channel = the surfaces built of it: outer, inner, third, or voxel values, between "
-        "commas; a value above the background as 162+b",
+        "commas; a value above the background as 162+b; or none",
         flag=Flag(
             "--surfaces",
             "which surfaces are built of a channel: outer, inner, third, or voxel values, between "
-            "commas; may be repeated",
+            "commas; or none; may be repeated",
             "CHANNEL=SURFACE,...",
         ),
     )

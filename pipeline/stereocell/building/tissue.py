@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.channels import PALETTE, Channel
+from stereocell.building.channels import GREY_MATTER, PALETTE, WHITE_MATTER, Channel
 from stereocell.building.input_unchanged import require_input, require_still
 from stereocell.building.model_process import ModelBounds, opened_network
 from stereocell.building.open_source import SourceRef, open_source
@@ -50,8 +50,8 @@ MAX_VOXELS = 250_000_000  # largest region to learn in, voxels; about 40 bytes e
 # names and colours (linear RGB) of three classes in a head, by rising T1 intensity
 HEAD = (
     ("CSF", (0.03, 0.3, 1.0)),
-    ("grey matter", (1.0, 0.22, 0.1)),
-    ("white matter", (0.95, 0.85, 0.45)),
+    (GREY_MATTER, (1.0, 0.22, 0.1)),
+    (WHITE_MATTER, (0.95, 0.85, 0.45)),
 )
 
 

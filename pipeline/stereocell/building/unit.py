@@ -20,6 +20,7 @@ from stereocell.model.lattice import Lattice, Step
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
 from stereocell.model.tile_content import APRON
+from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.model.unit import Cover, Unit
 from stereocell.model.volume import Volume
@@ -44,7 +45,7 @@ class UnitInput:
     repair      cleaning of the channel's surface
     step        voxels (z, y, x) between planes that carry the surface
     intensity_window  voxel values that become 0 and 255
-    holder      what is left out of the surface; None: nothing is
+    holder      what is left out of surface and volume; None: nothing is
     max_shift   by how much smoothing may move a value, voxel values; None: by any
     painted     the same of the channel that is sampled onto the surface; None: none is
     """
@@ -232,17 +233,26 @@ class _Shading:
 
 
 def cut_voxels(voxels: NDArray[Any], given: UnitInput) -> NDArray[Any]:
-    """Return the lattice's voxels and an apron (z, y, x); the region's ends repeat."""
+    """Return the lattice's voxels and an apron (z, y, x); the region's ends repeat.
+
+    A table or a holder that the surface leaves out is air in them: volume and surface agree.
+    """
     lattice = given.lattice
     own, region, start = lattice.own, lattice.region, lattice.window.start
-    inside, beyond = [], []
+    inside, beyond, firsts, ends = [], [], [], []
     for a, b, low, high, w in zip(
         own.start, own.stop, region.start, region.stop, start, strict=True
     ):
         first, end = max(a - APRON, low), min(b + APRON, high)
+        firsts.append(first)
+        ends.append(end)
         inside.append(slice(first - w, end - w))
         beyond.append((first - (a - APRON), b + APRON - end))
-    return np.pad(voxels[tuple(inside)], beyond, mode="edge")
+    kept = voxels[tuple(inside)]
+    if given.holder is not None:
+        (z0, y0, x0), (z1, y1, x1) = firsts, ends
+        kept = given.holder.left_out_of(kept, Box((z0, y0, x0), (z1, y1, x1)))
+    return np.pad(kept, beyond, mode="edge")
 
 
 def find_measured(kept: NDArray[Any], given: UnitInput) -> NDArray[Any] | None:

@@ -46,12 +46,14 @@ from stereocell.storage.workspace import is_file, move, remove, sizes_below
 from stereocell.transfer.opacity import evaluate
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
+from stereocell.usd.read_bindings import notes_on_bindings
 from stereocell.usd.read_objects import painter_of, read_columns
 from stereocell.usd.read_provenance import fingerprint_of
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
     open_stage,
+    opening_cut_of,
     sides_of,
     specimen_name,
     tile_prims,
@@ -88,7 +90,8 @@ def write_bundle(
     parts        a folder for the tiles that are finished, of this very stage: those that are in it
                  are taken, and all are left there; None: none are kept if this does not end well
     report_line  is given a line on each layer that is not as it was written, on each surface that
-                 was edited by hand, and on units that the layer does not state
+                 was edited by hand, on each material that is bound above the channels, and on units
+                 that the layer does not state
 
     Raises StageError where the stage lacks something or a file of it is damaged, naming prim and
     file (TasksFailedError where a tile does); OutputError where `bundle_dir` can't be written, or
@@ -123,6 +126,8 @@ def _fill(
         if layer.realPath:
             as_written.require(Path(layer.realPath))
     if note := note_missing(stage):
+        report_line(note)
+    for note in notes_on_bindings(stage):
         report_line(note)
     appearances = read_appearances(stage)
     prims = tile_prims(stage)
@@ -180,6 +185,8 @@ def _fill(
         specimen["fingerprint"] = fingerprint
     if (sides := sides_of(stage)) is not None:
         specimen["sides"] = sides
+    if (cut := opening_cut_of(stage)) is not None:
+        specimen["cut"] = {"normal": list(cut[0]), "offset_um": cut[1]}
     ar = {"usdz": usdz, "usdz_reason": usdz_reason}
     manifest = describe_bundle(specimen, tiles, channels=channels, index=index, ar=ar)
     write_file(root, MANIFEST, manifest)
@@ -271,6 +278,7 @@ def describe_channel(
         "surface": "none" if tileset is None else appearance.surface,
         "surface_reason": appearance.surface_reason,
         "level": None if appearance.level is None else asdict(appearance.level),
+        "opens": appearance.opens,
         "transfer_function": appearance.chosen,
         "transfer_functions": list(appearance.transfer_functions),
         "transfer_functions_2d": {

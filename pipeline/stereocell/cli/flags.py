@@ -40,8 +40,8 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
         "input",
         type=_named,
         help="a path: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of planes (TIFF, "
-        "PNG, JPEG), Imaris, HDF5 (FILE.h5:/KEY), NRRD, MRC, CZI, ...; or an http(s):// or s3:// "
-        "address of OME-Zarr, TIFF or N5",
+        "PNG, JPEG, BMP), Imaris, HDF5 (FILE.h5:/KEY), netCDF, MATLAB 7.3, NRRD, MRC, MGH, CZI, "
+        "...; or an http(s):// or s3:// address of OME-Zarr, TIFF or N5",
     )
     declare_settings(parser)
     plan = parser.add_argument_group("what to build")
@@ -54,7 +54,9 @@ def declare_setting(parser: Any, flag: Flag, field: Field[Any]) -> None:
     about = {"help": (flag.help or field.metadata["comment"]).replace("%", "%%")}
     kind = field.type
     if kind is bool:
-        parser.add_argument(flag.name, action="store_const", const=True, **about)
+        # A preset or a file may turn a setting on, and `--no-dark` turns it off again.
+        action = argparse.BooleanOptionalAction
+        parser.add_argument(flag.name, action=action, default=None, **about)
     elif get_origin(kind) is Mapping:
         read = partial(_pair, flag, get_args(kind)[1])
         parser.add_argument(flag.name, action="append", metavar=flag.form, type=read, **about)

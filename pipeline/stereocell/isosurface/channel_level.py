@@ -39,6 +39,7 @@ N. Otsu, IEEE Trans. Systems, Man, and Cybernetics 9, 1979. doi:10.1109/TSMC.197
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ from scipy import ndimage
 
 from stereocell.isosurface.axis_profiles import MAX_LIGHT, share_of_light
 from stereocell.isosurface.edge_criteria import EdgeSums, choose_by_edges
-from stereocell.isosurface.level import MAX_RISE, Level, clear_of
+from stereocell.isosurface.level import MAX_RISE, Level, clear_of, shown_of
 from stereocell.isosurface.level_evidence import Counting, Sums, TileEvidence, noise_edges
 from stereocell.isosurface.level_histogram import DIP, INSIDE, OUTSIDE, LevelHistogram, Scale
 from stereocell.isosurface.neighbours import MIN_KINSHIP, kinship
@@ -107,6 +108,13 @@ class ChannelLevels:
     def clear(self) -> tuple[Level, ...]:
         """The clear ones, outermost first: the rungs of the ladder that have surfaces."""
         return () if self._nothing else clear_of(self.ladder)
+
+    def shown(self, highest: float = inf) -> tuple[Level, ...]:
+        """Return the levels that may have a surface; see `shown_of`.
+
+        highest  the display window's upper end, in voxel values or above the background
+        """
+        return () if self._nothing else shown_of(self.ladder, highest)
 
     @property
     def _nothing(self) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import floor
+from math import floor, inf
 
 from stereocell.isosurface.level_histogram import DIP
 
@@ -13,6 +13,13 @@ MIN_STEEPNESS = 0.95  # ... unless the level lies on steeper slopes than there a
 # ... and less again within a clear level, where something is for sure: bone in a head's skin, in
 # planes 5 mm apart, has .67, .11 and 157
 WITHIN = {"separation": 0.66, "sharpness": 0.08, "snr": 12.0}
+# Share of each bound above that a level must reach to fall short of "clear" by only a little. At .8
+# no volume of nothing and no made volume of the corpus gets another level. At .7 noise does.
+NEARLY = 0.8
+# The bounds that tell a level from noise lie nearer: a normal distribution has a separation of .64
+# at half height, and noise and textures have a steepness of up to .81
+NEARLY_SEPARATION, NEARLY_STEEPNESS = 0.66, 0.85
+FEW_INSIDE = 0.01  # share of all voxels: a clear level with less inside may be a speck of the outer
 # Of a level that is an edge beyond doubt, as that of bodies much dimmer than others. An edge of its
 # own is no sharper than a step after a Gaussian of one voxel, 1 / sqrt(2 pi): a sharper level lies
 # on the flank of something brighter.
@@ -119,8 +126,41 @@ class Level:
         """
         return self.dip > DIP and self.stands_out < 1.0
 
+    @property
+    def is_nearly_clear(self) -> bool:
+        """Whether the level is not clear, but falls short of it by only a little."""
+        if self.is_clear:
+            return False
+        bounds = {"snr": MIN_SNR, "sharpness": MIN_SHARPNESS, "rise": MIN_RISE}
+        if not self._reaches({name: NEARLY * least for name, least in bounds.items()}):
+            return False
+        return (
+            self.dip <= DIP
+            or self.separation >= NEARLY_SEPARATION
+            or self.steepness >= NEARLY_STEEPNESS
+        )
+
     def _reaches(self, bounds: Mapping[str, float]) -> bool:
         return all(getattr(self, name) >= least for name, least in bounds.items())
+
+
+def shown_of(ladder: Sequence[Level], highest: float = inf) -> tuple[Level, ...]:
+    """Return the levels that may have a surface, outermost first; none without a clear level.
+
+    These are the clear ones. A level outside of the first clear one goes before them if it is
+    nearly clear and skipping it would cut a specimen to specks or strip it: it lies in a valley, or
+    the clear level holds few voxels, or the clear level lies above the display window.
+
+    highest  the display window's upper end, in the ladder's values
+    """
+    clear = clear_of(ladder)
+    if not clear:
+        return ()
+    for level in ladder[: ladder.index(clear[0])]:
+        is_stripped = clear[0].share < FEW_INSIDE or clear[0].value > highest
+        if level.is_nearly_clear and (level.dip <= DIP or is_stripped):
+            return (level, *clear)
+    return clear
 
 
 def clear_of(ladder: Sequence[Level]) -> tuple[Level, ...]:

@@ -42,6 +42,8 @@ CRITERIA = {
 }
 RUNGS = {"outer": 0, "inner": 1, "third": 2}  # names of the ladder's levels, outermost first
 APART = "apart"  # the first rung whose components are many: that of cells in their tissue
+CONNECTED = "connected"  # the lowest level that keeps vessels connected and floods nothing
+NO_SURFACE = "none"  # no level has a surface: the channel is drawn as a volume alone
 SCOPES = ("channel", "tile")
 
 
@@ -88,7 +90,9 @@ class IsoValueOptions:
     rung: str = setting(
         "outer",
         f"which clear level has the surface: {', '.join(RUNGS)}; {APART}: the first whose largest "
-        "components hold under a quarter of all, or the least of it where cells touch",
+        "components hold under a quarter of all, or the least of it where cells touch; "
+        f"{CONNECTED}: the lowest at which vessels hang together and nothing else is inside; "
+        f"{NO_SURFACE}: no level has one",
     )
     bins: int = setting(256, "levels that a criterion of edges tries", bounds=Bounds(16, 65536))
     clip_percentile: float = setting(
@@ -103,7 +107,7 @@ class IsoValueOptions:
         for name, found, expected in (
             ("criterion", self.criterion, known),
             ("scope", self.scope, SCOPES),
-            ("rung", self.rung, (*RUNGS, APART)),
+            ("rung", self.rung, (*RUNGS, APART, CONNECTED, NO_SURFACE)),
         ):
             if found not in expected:
                 raise UsageError(
@@ -192,6 +196,10 @@ class SurfaceOptions:
     keep_holder: bool = setting(
         False,
         "whether a CT's table and head holder, long pieces apart from the body, are built too",
+        flag=Flag(
+            "--keep-holder",
+            "build a CT's table and head holder too (default: left out of surface and volume)",
+        ),
     )
     background_um: float | str = setting(
         AUTO,

@@ -109,6 +109,8 @@ class Appearance:
     transfer_2d       those functions that are two-dimensional
     threshold         voxel value where the body begins (adaptive_threshold.py); None: not found
     surface_reason    why there is no surface, or why it is unsure; empty: a clear one
+    function          the transfer function that the channel opens with
+    opens             whether the channel shows when the specimen is opened
     level             where exactly the surface lies; None: there is none
     """
 
@@ -124,6 +126,8 @@ class Appearance:
     threshold: float | None = None
     surface_reason: str = ""
     level: SurfaceLevel | None = None
+    function: str = "default"
+    opens: bool = True
 
     @property
     def id(self) -> str:

@@ -47,3 +47,11 @@ def linear_color_of_lab(lab: tuple[float, float, float]) -> tuple[float, float, 
     xyz = _D50 * np.where(bent > 6 / 29, bent**3, (bent - 4 / 29) * 3 * (6 / 29) ** 2)
     red, green, blue = np.clip(_RGB_OF_D50 @ xyz, 0, 1).tolist()
     return red, green, blue
+
+
+def lab_of_linear(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return CIELab (n, 3) under D50 of linear RGB (n, 3), 0..1: the inverse of the above."""
+    share = linear @ np.linalg.inv(_RGB_OF_D50).T / _D50
+    bent = np.where(share > (6 / 29) ** 3, np.cbrt(share), share / (3 * (6 / 29) ** 2) + 4 / 29)
+    x, y, z = bent.T
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1)

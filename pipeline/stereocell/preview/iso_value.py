@@ -20,9 +20,10 @@ from stereocell.building.level_choice import (
     Components,
     Found,
     check_histogram,
-    choose_rung,
+    choose_by_components,
     find_level,
     given_level,
+    highest_of,
 )
 from stereocell.building.open_source import open_source
 from stereocell.building.other_levels import ends_of, find_other_levels, take
@@ -255,7 +256,7 @@ def _choose_rung(
         for rung in found.rungs
         if isinstance(rung, Level)
     ]
-    return found.rungs[choose_rung(components)]
+    return found.rungs[choose_by_components(plan.settings.isovalue, components)]
 
 
 def _candidates(
@@ -296,6 +297,9 @@ def _candidates(
         taken=value,
         threshold=None if threshold is None or found.doubt else threshold.value,
         ends=None if found.levels is None else ends_of(found.levels.curve()[0]),
+        highest=highest_of(
+            found.window.statistics, found.levels is not None and found.levels.subtracts
+        ),
     ):
         candidates.append(
             candidate(other.name, other.value, other.above, other.confidence, other.setting, False)

@@ -12,7 +12,10 @@ from typing import Any
 
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset, VoxelArray
+from stereocell.read.flipped_array import FlippedArray
+from stereocell.read.inverted_array import InvertedArray
 from stereocell.read.readers import format_of
+from stereocell.read.value_scale import ScaledArray
 from stereocell.storage.file_states import FileStates
 
 _MOST_COUNTED = 2_000_000  # most chunks that are looked for; a part with more is not counted
@@ -43,10 +46,17 @@ def count_absent(
     states  the source's files, as they were listed
     """
     array = dataset.arrays[level]
+    stored: Any = array.array
+    if isinstance(stored, InvertedArray):
+        stored = stored.stored
+    spans = _spans(array, dataset.time, channels, box)
+    while isinstance(stored, FlippedArray | ScaledArray):
+        spans = stored.stored_spans(spans) if isinstance(stored, FlippedArray) else spans
+        stored = stored.stored
     count = _COUNTERS.get(format_of(dataset.source))
     if count is None or not states.is_complete:
         return None
-    return count(array.array, _spans(array, dataset.time, channels, box), states)
+    return count(stored, spans, states)
 
 
 def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
@@ -57,20 +67,58 @@ def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
     sizes, noun = (stored.shards, "shard") if stored.shards else (stored.chunks, "chunk")
     if _number(sizes, spans) > _MOST_COUNTED:
         return None
-    keys = (stored.metadata.encode_chunk_key(place) for place in _places(sizes, spans))
-    paths = (f"{stored.path}/{key}".lstrip("/") for key in keys)
-    return _counted(paths, states.names(), noun, stored.fill_value)
+    others, names = stored.store.other_names, stored.store.members or states.names()
+
+    def is_present(place: tuple[int, ...]) -> bool:
+        key = f"{stored.path}/{stored.metadata.encode_chunk_key(place)}".lstrip("/")
+        return key in names or (others is not None and others.key_of(key) in names)
+
+    is_listed = stored.store.is_local and _number(stored.chunks, spans) <= _MOST_COUNTED
+    if stored.shards and is_listed:  # at an address each index is a request
+        from stereocell.read.shard_index import absent_in_shards
+
+        pairs = zip(stored.chunks, spans, strict=True)
+        touched = [_of_axis(size, ranges) for size, ranges in pairs]
+        inner = absent_in_shards(stored, touched, is_present)
+        if inner is not None and inner[2]:
+            return Absent(inner[0], inner[1], "chunk", stored.fill_value)
+    found = [is_present(place) for place in _places(sizes, spans)]
+    return Absent(found.count(False), len(found), noun, stored.fill_value)
 
 
 def _in_n5(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    if hasattr(stored, "view"):
+        return _in_views(stored, spans, states)
     if not hasattr(stored, "path_of") or _number(stored.chunks, spans) > _MOST_COUNTED:
         return None
-    paths = (stored.path_of(place) for place in _places(stored.chunks, spans))
-    return _counted(paths, states.names(), "block", 0)
+    names = states.names()
+    # Under BigDataViewer's XML the files lie beside the source, not below it.
+    outside = "" if stored.folder == states.location.source else f"{stored.folder.lstrip('/')}/"
+    paths = (outside + stored.path_of(place) for place in _places(stored.chunks, spans))
+    return _counted(paths, names, "block", 0)
 
 
-def _in_hdf5(stored: Any, _: Spans, __: FileStates) -> Absent | None:
+def _in_views(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    """Count the blocks of BigDataViewer's views, of which each is an array of its own."""
+    times, channels, *place = spans
+    found = []
+    for time in (n for one in times for n in one):
+        for channel in (n for one in channels for n in one):
+            view = stored.view(time, channel)
+            count = _in_n5 if hasattr(view, "path_of") else _in_hdf5
+            found.append(count(view, place, states))
+    known = [one for one in found if one is not None]
+    if not known or len(known) < len(found):
+        return None
+    return Absent(
+        sum(one.count for one in known), sum(one.total for one in known), known[0].noun, 0
+    )
+
+
+def _in_hdf5(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
     """Count the chunks of the whole dataset: HDF5 gives their number at no cost."""
+    if hasattr(stored, "view"):
+        return _in_views(stored, spans, states)
     dataset = getattr(stored, "dataset", None)
     if dataset is None or dataset.chunks is None:
         return None
@@ -83,6 +131,7 @@ _COUNTERS: dict[str, Callable[[Any, Spans, FileStates], Absent | None]] = {
     "ome-zarr": _in_zarr,
     "n5": _in_n5,
     "hdf5": _in_hdf5,
+    "bdv": _in_views,
 }
 
 

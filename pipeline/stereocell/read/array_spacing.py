@@ -4,7 +4,7 @@
 beside them: `resolution` is nm in CREMI's files and voxels per length in others.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,18 +19,24 @@ ATTRIBUTES = (_IN_UM, *_SIZES, *_UNITS)
 
 
 def spacing_from(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | None:
-    """Return the spacing (z, y, x), um; None: no attribute tells it.
+    """Return the spacing (z, y, x), um; None: no attribute states it. See `stated_spacings`."""
+    return next((spacing for _, spacing in stated_spacings(attributes, axes)), None)
+
+
+def stated_spacings(
+    attributes: Mapping[str, Any], axes: Sequence[str]
+) -> Iterator[tuple[str, Triple]]:
+    """Yield each attribute that states the spacing, and its value (z, y, x), um.
 
     axes  of the array, as stored: sizes are along all of them, or along the three of space
     """
     if len(sizes := _numbers(attributes.get(_IN_UM))) == 3:
-        return sizes[0], sizes[1], sizes[2]
+        yield _IN_UM, (sizes[0], sizes[1], sizes[2])
     unit = next((u for u in map(attributes.get, _UNITS) if u is not None), None)
     for name in _SIZES:
         sizes = _numbers(attributes.get(name))
         if sizes and (found := spacing_of(sizes, unit, axes)) is not None:
-            return found
-    return None
+            yield name, found
 
 
 def spacing_of(sizes: Sequence[float], unit: Any, axes: Sequence[str]) -> Triple | None:

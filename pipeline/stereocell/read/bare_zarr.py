@@ -13,14 +13,16 @@ import zarr
 from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
-from stereocell.read.array_axes import settle_axes
+from stereocell.read.array_axes import settle_stated_axes
 from stereocell.read.array_spacing import spacing_from
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import Grid
+from stereocell.read.statements import Statement
 from stereocell.read.zarr_collections import is_collection, ome_of
-from stereocell.read.zarr_store import files_of, open_array, quiet
+from stereocell.read.zarr_store import files_of, notes_on_names, open_array, quiet
+from stereocell.read.zarr_values import with_values
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -35,12 +37,9 @@ def read_array(location: Location, store: Store, path: str, *, axes: str = "") -
     """
     array = open_array(location, store, path)
     where = f"{location.shown}/{path}".rstrip("/")
-    named = getattr(array.metadata, "dimension_names", None) or array.attrs.get(
-        "_ARRAY_DIMENSIONS", ()
-    )
-    listed = [str(name).lower() for name in named] if isinstance(named, list | tuple) else []
-    names, notes = settle_axes(where, array.shape, axes, named=listed)
-    voxels = VoxelArray(array, names)
+    names, axes_notes = settle_stated_axes(where, array.shape, axes, _named_axes(array))
+    voxels, value_notes = with_values(where, VoxelArray(array, names))
+    notes = (*notes_on_names([array]), *axes_notes, *value_notes)
     if voxels.size("c") > MAX_CHANNELS:
         raise SourceError(
             f"{where}: axis c: found {voxels.size('c')}, expected at most {MAX_CHANNELS}"
@@ -50,6 +49,19 @@ def read_array(location: Location, store: Store, path: str, *, axes: str = "") -
     return Image(
         (voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files_of(location, [path])
     )
+
+
+def _named_axes(array: "zarr.Array[Any]") -> list[Statement]:
+    """Return the names of an array's dimensions, by each field that states them."""
+    fields = {
+        "dimension_names": getattr(array.metadata, "dimension_names", None),
+        "_ARRAY_DIMENSIONS": array.attrs.get("_ARRAY_DIMENSIONS"),
+    }
+    return [
+        Statement(tuple(str(name).lower() for name in named), place)
+        for place, named in fields.items()
+        if isinstance(named, list | tuple) and named
+    ]
 
 
 def read_only_array(

@@ -8,17 +8,33 @@ from dataclasses import replace
 
 from stereocell.model.errors import SourceError
 from stereocell.read import hdf5, n5
-from stereocell.read.bdv_xml import container_of
+from stereocell.read.bdv_xml import container_of, read_described
 from stereocell.read.file_kind import require_kind
 from stereocell.read.image import Image
+from stereocell.read.series import lines
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, is_own, require_own
 
 _READERS = {"hdf5": hdf5.read_image, "n5": n5.read_image}
 
 
-def read_image(location: Location) -> Image:
-    """Return the image of the container. Raises SourceError where there is none in the folder."""
+def read_image(location: Location, *, series: int = 0) -> Image:
+    """Return the image of one view of the container; 0 is the largest.
+
+    Raises SourceError where there is no container in the folder, UsageError for no such view.
+    """
+    container = _container_of(location)
+    image = _READERS[str(container.format)](container, series=series, xml=location.path)
+    return replace(image, files=(location.path, *(image.files or (container.path,))))
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each tile, angle and illumination. Raises SourceError."""
+    described = read_described(_container_of(location).path, location.path)
+    return lines([described.candidate(view) for view in described.views(sorted(described.setups))])
+
+
+def _container_of(location: Location) -> Location:
     where = location.shown
     with one_line(where, "BigDataViewer's XML"):
         named = container_of(location.path)
@@ -39,5 +55,4 @@ def read_image(location: Location) -> Image:
     if not os.path.exists(path) or container.format not in _READERS:
         raise SourceError(f"{field}: not found, expected HDF5 (.h5) or N5 beside the XML")
     require_kind(container, "" if container.format == "n5" else container.format, "HDF5")
-    image = _READERS[container.format](container)
-    return replace(image, files=(location.path, *(image.files or (path,))))
+    return container

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
-from stereocell.read.bdv_image import image_of
+from stereocell.read.bdv_image import chosen_view, image_of
+from stereocell.read.bdv_registration import registered
 from stereocell.read.bdv_xml import read_described
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
 from stereocell.read.image import MAX_CHANNELS, Image
@@ -35,6 +36,11 @@ class _Cells:
         self.dtype = np.dtype(np.uint16) if is_unsigned else stored
         self._array = array
 
+    @property
+    def dataset(self) -> h5py.Dataset:
+        """The dataset, whose chunks can be counted."""
+        return self._array.dataset
+
     def __getitem__(self, key: Any) -> NDArray[Any]:
         found = np.asarray(self._array[key])
         return found.astype(self.dtype, copy=False)  # of int16: modulo 2^16
@@ -45,11 +51,17 @@ def is_container(tree: Hdf5Tree) -> bool:
     return bool(_named(tree, r"t\d{5,}") and _named(tree, r"s\d{2,}"))
 
 
-def read_image(tree: Hdf5Tree, location: Location) -> Image:
-    """Return the image of a container, whose setups are channels. Raises SourceError."""
+def read_image(tree: Hdf5Tree, location: Location, *, series: int = 0, xml: str = "") -> Image:
+    """Return the image of a view, whose setups are channels. Raises SourceError, UsageError.
+
+    series  of the views as the XML lists them, from 1; 0: the largest
+    xml     path of the XML that the user named; empty: none
+    """
     times, setups = _named(tree, r"t\d{5,}"), _named(tree, r"s\d{2,}")[:MAX_CHANNELS]
-    described, numbers = read_described(location.path), [int(name[1:]) for name in setups]
-    described.require_views(tree.where, numbers, [int(name[1:]) for name in times])
+    described, every = read_described(location.path, xml), [int(name[1:]) for name in setups]
+    described.require_views(tree.where, every, [int(name[1:]) for name in times])
+    numbers, notes = chosen_view(tree.where, described, every, series, xml)
+    setups = [name for name, number in zip(setups, every, strict=True) if number in numbers]
     first = tree.find(f"/{times[0]}/{setups[0]}")
     names = set(first) if isinstance(first, h5py.Group) else set()
     count = next((n for n in range(_MAX_LEVELS) if str(n) not in names), _MAX_LEVELS)
@@ -69,7 +81,8 @@ def read_image(tree: Hdf5Tree, location: Location) -> Image:
     ]
     factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]
     image = image_of(tree.where, levels, factors, None, described.among(numbers))
-    return replace(image, close=tree.close, files=tree.files)
+    image = registered(image, described, numbers, int(times[0][1:]))
+    return replace(image, close=tree.close, files=tree.files, notes=(*notes, *image.notes))
 
 
 def _named(tree: Hdf5Tree, pattern: str) -> list[str]:

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
-from stereocell.read.bdv_xml import Setup
+from stereocell.read.bdv_xml import Described, Setup
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Image
+from stereocell.read.series import choose
 from stereocell.read.spacing import Grid, Triple
 
 Views = Sequence[Sequence[StoredArray]]  # of one level: by time, then by setup; each (z, y, x)
@@ -24,6 +25,10 @@ class _Level:
         self.chunks: tuple[int, ...] = (1, 1, *first.chunks)
         self.dtype = first.dtype
         self._views = views
+
+    def view(self, time: int, channel: int) -> StoredArray:
+        """Return the array of one view, (z, y, x)."""
+        return self._views[time][channel]
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
         time, channel, *place = key
@@ -58,7 +63,7 @@ def image_of(
     if 0 in setups and setups[0].spacing_um is not None:
         spacing_um = setups[0].spacing_um
     count = len(levels[0][0])
-    note = f"{count} setups of BigDataViewer: taken for channels, their registrations left out"
+    note = f"{count} setups of BigDataViewer: taken for channels"
     return Image(
         tuple(arrays),
         grids_of([array.shape for array in arrays], spacing_um, factors),
@@ -67,6 +72,22 @@ def image_of(
         1,
         notes=(note,) if count > 1 else (),
     )
+
+
+def chosen_view(
+    where: str, described: Described, setups: Sequence[int], series: int, xml: str
+) -> tuple[list[int], tuple[str, ...]]:
+    """Return the setups of one view, and notes. Setups without attributes are one view.
+
+    xml  the XML that the user named; empty: the container was named
+
+    Raises UsageError where there is no such view.
+    """
+    views = described.views(setups)
+    index, notes = choose(where, [described.candidate(view) for view in views], series)
+    if notes and not xml:
+        notes = (f"{notes[0]} (--series needs the name of the XML)",)
+    return views[index], notes
 
 
 def grids_of(

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.color import linear_color
+from stereocell.model.emission_color import color_of_light
 from stereocell.model.errors import SourceError
 from stereocell.read import extras
 from stereocell.read.czi_file import CziFacts, CziFile, Rectangle
@@ -206,7 +207,8 @@ def _channels(
         names.append((node.get("Name") or "").strip() or None)
         display = shown.get(node.get("Id"))
         text = node.findtext("Color") or (display.findtext("Color") if display is not None else "")
-        colors.append(_color(text or ""))
+        light = node.findtext("EmissionWavelength"), node.findtext("Fluor") or ""
+        colors.append(_color(text or "") or color_of_light(*light))
     lacking = [None] * (count - len(names))
     return (*names, *lacking), (*colors, *lacking)
 

@@ -115,6 +115,7 @@ class Dataset:
     time_points  the number of time points in the source; `time` is the index of the one to read
     images       the number of images in the source; the reader takes the first
     modality     DICOM's code of the modality (0008,0060): `MR`, `CT`, ...; empty: not known
+    has_hounsfield_units  False: a CT whose values are none, so that levels of CT mean nothing
     placement    rows of a (4, 4) matrix for columns, um: from the world whose origin is the centre
                  of voxel (0, 0, 0) (volume.zyx_to_xyz) to the patient's world; see
                  read/anatomical_axes.py
@@ -141,6 +142,7 @@ class Dataset:
     shown: str = field(repr=False)  # the source without secrets, for messages
     on_close: Callable[[], None] | None = field(repr=False, default=None)
     modality: str = ""
+    has_hounsfield_units: bool = True
     placement: Matrix = IDENTITY
     has_sides: bool = False
     remarks: tuple[str, ...] = ()

@@ -16,7 +16,6 @@ from nibabel.fileslice import fileslice
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
-from stereocell.read.dataset import StoredArray
 from stereocell.read.packed_stream import unpack
 
 
@@ -64,36 +63,6 @@ class PackedArray:
             if self._held is None:
                 self._held = self._load()
             return cast("NDArray[Any]", self._held[key])
-
-
-class FlippedArray:
-    """An array some of whose axes run backwards."""
-
-    def __init__(self, array: StoredArray, flips: Sequence[bool]) -> None:
-        self.shape, self.chunks = tuple(array.shape), tuple(array.chunks)
-        self.dtype = array.dtype
-        self._array, self._flips = array, tuple(flips)
-
-    def __getitem__(self, key: Any) -> NDArray[Any]:
-        """Return voxels by whole numbers, and slices of step 1 that lie inside."""
-        place = [
-            _mirrored(part, size) if flip else part
-            for part, size, flip in zip(key, self.shape, self._flips, strict=True)
-        ]
-        found = np.asarray(self._array[tuple(place)])
-        kept = [flip for part, flip in zip(key, self._flips, strict=True) if _is_slice(part)]
-        return found[tuple(slice(None, None, -1 if flip else 1) for flip in kept)]
-
-
-def _is_slice(part: Any) -> bool:
-    return isinstance(part, slice)
-
-
-def _mirrored(part: Any, size: int) -> Any:
-    if not isinstance(part, slice):
-        return size - 1 - int(part)
-    start, stop, _ = part.indices(size)
-    return slice(size - stop, size - start)
 
 
 def unpack_array(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stereocell.model.errors import SourceError
+from stereocell.read.foreign_files import foreign_words
 from stereocell.storage.first_bytes import Content, identify, unpacked
 from stereocell.storage.location import Location
 
@@ -71,6 +72,7 @@ _HDF5_KIND = _Kind(("hdf5",), _is_hdf5_behind_a_block)
 _KINDS = {
     "tiff": _Kind(("tiff",)),
     "nifti": _Kind(("nifti",), _is_other),  # Analyze has no mark
+    "mgh": _Kind((), _is_other),  # MGH has no mark
     "ims": _HDF5_KIND,
     "hdf5": _HDF5_KIND,
     "nrrd": _Kind(("nrrd",), lambda _, head: head.startswith(b"NRRD")),
@@ -81,6 +83,7 @@ _KINDS = {
     "nd2": _Kind(("nd2",), lambda _, head: head.startswith(_OLD_ND2)),
     "dicom": _Kind(("dicom",), _is_other),  # files of before 1993 have no mark
 }
+_PACKED = ("nifti", "mgh")  # formats whose packed files are told by what is in them
 _PAIRED, _COMPANION = (".img", ".img.gz"), ".companion.ome"
 
 
@@ -105,6 +108,8 @@ def require_kind(location: Location, format_name: str, title: str) -> None:
             f"{header!r:.100}, expected an MRC or CCP4 file: make NIfTI of the pair by dcm2niix"
         )
     content, kind = identify(head), _KINDS.get(format_name)
+    if format_name == "ome-zarr" and location.is_zarr_archive:
+        return
     if format_name in _FOLDERS:
         raise SourceError(
             f"{location.shown}: found a file ({content.words}), expected a folder of {title}"
@@ -113,11 +118,11 @@ def require_kind(location: Location, format_name: str, title: str) -> None:
         return
     if name.endswith(_COMPANION):
         title, is_sound = "OME-XML", content.words == "an XML file"
-    elif format_name == "nifti" and name.endswith(".gz"):
+    elif format_name in _PACKED and name.endswith((".gz", ".mgz")):
         title = f"{title}, packed by gzip"
         inside = unpacked(head) if head.startswith(b"\x1f\x8b") else None
         within = identify(inside) if inside else None
-        is_sound = within is not None and (within.format == "nifti" or not within.is_known)
+        is_sound = within is not None and (within.format in kind.formats or not within.is_known)
     else:
         is_sound = content.format in kind.formats or kind.may_begin(path, head)
     if not is_sound:
@@ -131,6 +136,9 @@ def _par_beside(path: Path) -> str:
 
 
 def _refused(location: Location, content: Content, title: str) -> SourceError:
+    words = content.words
+    if not content.is_known:  # the name may say more than bytes without a mark
+        words = foreign_words(location.parts[-1]) or words
     ending = _ENDINGS.get(content.format)
     remedy = f": if that is what it is meant to be, name it {ending}" if ending else ""
-    return SourceError(f"{location.shown}: found {content.words}, expected {title}{remedy}")
+    return SourceError(f"{location.shown}: found {words}, expected {title}{remedy}")

@@ -23,10 +23,21 @@ class HeapTexts:
 
     def read(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
         """Return an attribute. Raises h5py's errors, ChildError."""
+        return self._child(node).call("attribute", str(node.name), name)
+
+    def scales(self, dataset: h5py.Dataset) -> list[list[str]]:
+        """Return the paths of a dataset's dimension scales, a list for each dimension.
+
+        The references to them lie in a heap. Raises h5py's errors, ChildError.
+        """
+        found: list[list[str]] = self._child(dataset).call("scales", str(dataset.name))
+        return found
+
+    def _child(self, node: h5py.Group | h5py.Dataset) -> Child:
         path = str(node.file.filename)
         if path not in self._children:
             self._children[path] = Child(OpenHdf5, path, bounds=Bounds(_MOST_S))
-        return self._children[path].call("attribute", str(node.name), name)
+        return self._children[path]
 
     def close(self) -> None:
         """End the children; a later read starts another one."""

@@ -18,6 +18,7 @@ from itertools import islice
 from typing import Any
 
 import h5py
+import numpy as np
 
 from stereocell.model.errors import SourceError
 from stereocell.read.hdf5_chunks import ChunkIndex
@@ -107,18 +108,45 @@ class Hdf5Tree:
 
     def attribute(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
         """Return an attribute; text as str, also Imaris's arrays of characters; None: absent."""
+        value = self._attribute(node, name)
+        if isinstance(value, bytes):
+            return value.decode("utf-8", "replace")
+        if getattr(value, "dtype", None) is not None and value.dtype.kind == "S":
+            return b"".join(value.ravel().tolist()).decode("utf-8", "replace")
+        return value
+
+    def texts(self, node: h5py.Group | h5py.Dataset, name: str) -> tuple[str, ...]:
+        """Return the texts of an attribute, one for each element; none where it is absent."""
+        value = self._attribute(node, name)
+        if value is None:
+            return ()
+        return tuple(
+            one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one)
+            for one in np.ravel(np.asarray(value, dtype=object)).tolist()
+        )
+
+    def _attribute(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
         if name not in node.attrs:
             return None
         where = f"{node.file.filename}: attribute {name!r} of {node.name}"
         with one_line(where, "a readable one"):
             stored = node.attrs.get_id(name).get_type()
             require_standard(stored, where)
-            value = self._texts.read(node, name) if lies_in_heap(stored) else node.attrs[name]
-        if isinstance(value, bytes):
-            return value.decode("utf-8", "replace")
-        if getattr(value, "dtype", None) is not None and value.dtype.kind == "S":
-            return b"".join(value.ravel().tolist()).decode("utf-8", "replace")
-        return value
+            return self._texts.read(node, name) if lies_in_heap(stored) else node.attrs[name]
+
+    def scales(self, dataset: h5py.Dataset) -> list[list[h5py.Dataset]]:
+        """Return the dimension scales of a dataset, a list for each dimension; empty: it has none.
+
+        Raises SourceError where they can't be read.
+        """
+        if "DIMENSION_LIST" not in dataset.attrs:
+            return []
+        where = f"{dataset.file.filename}: dimension scales of {dataset.name}"
+        with one_line(where, "readable ones"):
+            paths = self._texts.scales(dataset)
+        root = dataset.file["/"]
+        found = [[self.find(path, start=root) for path in named if path] for named in paths]
+        return [[one for one in nodes if isinstance(one, h5py.Dataset)] for nodes in found]
 
     def volumes(self, start: h5py.Group) -> Iterator[h5py.Dataset]:
         """Yield the datasets of numbers with three axes longer than 1, below a group, by name."""

@@ -22,7 +22,7 @@ class Image:
     images         the number of images in the source
     close          frees open files, or None
     title          the image's name; None: the file's name is used
-    modality, placement, has_sides, acquired, labels, objects  as in Dataset
+    modality, has_hounsfield_units, placement, has_sides, acquired, labels, objects  as in Dataset
     notes          become Dataset's `remarks`
     files          paths or addresses of all files and folders that are read; empty: the source
     notes_at       returns more notes, about one time point; it may read that point's voxels
@@ -36,6 +36,7 @@ class Image:
     close: Callable[[], None] | None = None
     title: str | None = None
     modality: str = ""
+    has_hounsfield_units: bool = True
     placement: Matrix = IDENTITY
     has_sides: bool = False
     acquired: Acquired = Acquired()  # noqa: RUF009  (frozen)

@@ -9,6 +9,7 @@ References: https://imaris.oxinst.com/support/imaris-file-format
 
 import re
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import h5py
@@ -19,7 +20,8 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
 from stereocell.read.image import MAX_CHANNELS, Color, Image
-from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.read.ims_statements import settle_lengths
+from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -28,7 +30,6 @@ _MAX_TIMES = 1_000_000
 _FINEST = "/DataSet/ResolutionLevel 0/TimePoint 0"
 _CHANNEL = re.compile(r"Channel \d+")
 _NO_NAME = "(name not specified)"  # Imaris's own
-_UNIT = "um"  # where the file states none, as Imaris has it
 
 
 class _Level:
@@ -79,17 +80,20 @@ def _image(tree: Hdf5Tree) -> Image:
     channels = _count(tree, _FINEST, "Channel", MAX_CHANNELS)
     levels = _count(tree, "/DataSet", "ResolutionLevel", _MAX_LEVELS)
     _require_stated(tree, times, channels)
-    extents = _extents(tree)
-    arrays, grids = [], []
-    for level in range(levels):
-        array = _level(tree, level, times, channels)
+    arrays = [_level(tree, level, times, channels) for level in range(levels)]
+    info = "/DataSetInfo/Image"
+    unit = tree.attribute(tree.find(info), "Unit")
+    extents, notes = settle_lengths(partial(_number, tree, info), unit, arrays[0].shape)
+    grids = []
+    for array in arrays:
         shape = array.shape
         spacing = extents and _triple(e / n for e, n in zip(extents, shape, strict=True))
         half = spacing and _triple(0.5 * s for s in spacing)
-        arrays.append(array)
         grids.append(Grid(shape, spacing, half))
     names, colors = zip(*(_channel(tree, index) for index in range(channels)), strict=True)
-    return Image(tuple(arrays), tuple(grids), names, colors, 1, tree.close, files=tree.files)
+    return Image(
+        tuple(arrays), tuple(grids), names, colors, 1, tree.close, notes=notes, files=tree.files
+    )
 
 
 def _require_stated(tree: Hdf5Tree, times: int, channels: int) -> None:
@@ -170,23 +174,6 @@ def _require_size(tree: Hdf5Tree, group: str, stated: list[float | None]) -> Non
                 f"{tree.where}: {group}: ImageSize{axis}: found {int(own)}, expected {int(whole)} "
                 f"as {axis} of /DataSetInfo/Image: a part is missing: copy or export it again"
             )
-
-
-def _extents(tree: Hdf5Tree) -> Triple | None:
-    """Return the lengths (z, y, x) of the volume in um; None: not stated."""
-    info = tree.find("/DataSetInfo/Image")
-    unit = um_per(tree.attribute(info, "Unit") or _UNIT)
-    ends = [
-        (
-            _number(tree, "/DataSetInfo/Image", f"ExtMin{i}"),
-            _number(tree, "/DataSetInfo/Image", f"ExtMax{i}"),
-        )
-        for i in (2, 1, 0)
-    ]
-    if unit is None:
-        return None
-    lengths = [(high - low) * unit for low, high in ends if low is not None and high is not None]
-    return _triple(lengths) if len(lengths) == 3 else None
 
 
 def _number(tree: Hdf5Tree, path: str, name: str) -> float | None:

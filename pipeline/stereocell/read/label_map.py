@@ -15,10 +15,14 @@ _MAX_EXACT = 2.0**53  # whole numbers below are exact as float64
 
 @dataclass(frozen=True, eq=False)
 class LabelMap:
-    """One channel of a dataset, at its finest level: coarser ones may be averages of numbers."""
+    """One channel of a dataset, at its finest level: coarser ones may be averages of numbers.
+
+    background  the number of the voxels that are no object, beside 0, -1 and NaN
+    """
 
     dataset: Dataset
     channel: int
+    background: int = 0
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -33,9 +37,16 @@ class LabelMap:
     def read(self, box: Box) -> NDArray[np.unsignedinteger]:
         """Return the numbers of a box, (z, y, x), unsigned; 0: no object.
 
-        -1 and NaN are no object either, as some programs write it. Raises SourceError for other
-        numbers below 0, for fractions, and where a chunk can't be decoded.
+        -1 and NaN are no object either, as some programs write it, nor is `background`. Raises
+        SourceError for other numbers below 0, for fractions, and where a chunk can't be decoded.
         """
+        numbers = self._numbers(box)
+        # larger ones than the type holds are in no voxel
+        if not 0 < self.background <= np.iinfo(numbers.dtype).max:
+            return numbers
+        return np.where(numbers == self.background, numbers.dtype.type(0), numbers)
+
+    def _numbers(self, box: Box) -> NDArray[np.unsignedinteger]:
         stored = self.dataset.read_stored(self.channel, box)
         if stored.dtype.kind == "b":
             return stored.astype(np.uint8)
@@ -52,6 +63,8 @@ class LabelMap:
 
     def _whole(self, stored: NDArray[np.floating]) -> NDArray[np.int64]:
         numbers = np.where(np.isnan(stored), 0, stored)
+        if numbers.dtype == np.float16:  # it has no number as large as the limit
+            numbers = numbers.astype(np.float32)
         is_whole = (np.abs(numbers) < _MAX_EXACT) & (np.floor(numbers) == numbers)
         if not is_whole.all():
             found = float(numbers[~is_whole][0])

@@ -1,15 +1,17 @@
 """MetaImage: .mha, and .mhd with its voxels in a file beside it.
 
-The header is lines of `Key = value`, of which the short list below is read; others may identify a
-patient. As in ITK, `Offset` and the rows of `TransformMatrix` are of LPS, in mm, whatever
-`AnatomicalOrientation` says. SimpleITK (50 MB), which reads the format too, opens the file of the
-voxels without asking where it lies; the tests compare with it.
+The header is lines of `Key = value`, of which a short list is read (read/metaimage_fields.py);
+others may identify a patient. As in ITK, `Offset` and the rows of `TransformMatrix` are of LPS, in
+mm unless `DistanceUnits` says otherwise, whatever `AnatomicalOrientation` says. SimpleITK (50 MB),
+which reads the format too, opens the file of the voxels without asking where it lies; the tests
+compare with it.
 
 References: https://itk.org/Wiki/ITK/MetaIO/Documentation
 """
 
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,26 +22,26 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray
 from stereocell.read.file_array import FileArray, PackedArray, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.metaimage_fields import (
+    NAME,
+    Header,
+    integers,
+    modality_of,
+    numbers,
+    read_header,
+    require_dimensions,
+    side_notes,
+    unit_mm,
+    value_notes,
+)
 from stereocell.read.patient_grid import place
-from stereocell.storage.library_errors import one_line
+from stereocell.read.plausible_size import size_notes
 from stereocell.storage.location import Location, require_file, require_own
 
-NAME = "MetaImage"
-_MAX_HEADER = 1 << 16  # bytes
 _TYPES = {
     "MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2",
     "MET_INT": "i4", "MET_UINT": "u4", "MET_LONG": "i4", "MET_ULONG": "u4",
     "MET_LONG_LONG": "i8", "MET_ULONG_LONG": "u8", "MET_FLOAT": "f4", "MET_DOUBLE": "f8",
-}  # fmt: skip
-_OTHER_NAMES = {
-    "Position": "Offset", "Origin": "Offset", "Rotation": "TransformMatrix",
-    "Orientation": "TransformMatrix", "ElementSize": "ElementSpacing",
-    "ElementByteOrderMSB": "BinaryDataByteOrderMSB",
-}  # fmt: skip
-_READ = {
-    "NDims", "DimSize", "ElementType", "ElementNumberOfChannels", "ElementSpacing", "Offset",
-    "TransformMatrix", "BinaryData", "BinaryDataByteOrderMSB", "CompressedData", "HeaderSize",
-    "ElementDataFile",
 }  # fmt: skip
 
 
@@ -47,50 +49,30 @@ def read_image(location: Location) -> Image:
     """Return the image of the file, with all its time points. Raises SourceError."""
     where = location.shown
     require_file(location)
-    fields, end = _header(location)
-    shape = _integers(where, fields, "DimSize")
+    header = read_header(location)
+    fields, end = header.fields, header.end
+    shape = integers(where, fields, "DimSize")
     if len(shape) not in (3, 4) or min(shape) < 1:
         raise SourceError(
             f"{where}: DimSize: found {fields.get('DimSize', 'none'):.60}, expected three sizes "
             "x, y, z, or four with time (a volume needs at least 2 planes)"
         )
-    samples = _integers(where, fields, "ElementNumberOfChannels") or [1]
+    require_dimensions(where, fields, len(shape))
+    samples = integers(where, fields, "ElementNumberOfChannels") or [1]
     if len(samples) != 1 or not 0 < samples[0] <= MAX_CHANNELS:
         raise SourceError(
             f"{where}: ElementNumberOfChannels: found {samples}, expected 1 to {MAX_CHANNELS}"
         )
     array = _array(location, fields, end, (*reversed(shape), samples[0]))
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
-    affine, notes = _affine(where, fields, len(shape))
+    affine, notes = _affine(where, header, shape)
     image = place(where, array, axes, affine, "TransformMatrix").image(
         NAME, notes=notes, has_sides="TransformMatrix" in fields
     )
     beside = fields["ElementDataFile"]
     folder = os.path.dirname(os.path.realpath(location.path))
     voxels = () if beside.upper() == "LOCAL" else (os.path.join(folder, beside),)
-    return replace(image, files=(location.path, *voxels))
-
-
-def _header(location: Location) -> tuple[dict[str, str], int]:
-    """Return the fields of the header, and its length in bytes."""
-    with one_line(location.shown, f"a {NAME} file"), open(location.path, "rb") as file:
-        content = file.read(_MAX_HEADER)
-    fields: dict[str, str] = {}
-    end = 0
-    for line in content.splitlines(keepends=True):
-        end += len(line)
-        key, mark, value = line.decode("latin-1").partition("=")
-        if not mark:
-            break
-        name = _OTHER_NAMES.get(key.strip(), key.strip())
-        if name in _READ and (name not in fields or key.strip() == name):
-            fields[name] = value.strip()
-        if name == "ElementDataFile":
-            return fields, end
-    raise SourceError(
-        f"{location.shown}: header: no ElementDataFile in {len(content)} bytes, "
-        f"expected {NAME} (.mha, .mhd)"
-    )
+    return replace(image, files=(location.path, *voxels), modality=modality_of(fields))
 
 
 def _array(
@@ -124,7 +106,7 @@ def _array(
     if _flag(fields, "CompressedData", False):
         load = partial(unpack_array, path, shape, dtype, "zlib", end)
         return PackedArray(shape, dtype, load)
-    skip = (_integers(location.shown, fields, "HeaderSize") or [0])[0]
+    skip = (integers(location.shown, fields, "HeaderSize") or [0])[0]
     if skip < 0:  # the voxels are the last bytes of the file
         skip = max(0, os.path.getsize(path) - math.prod(shape) * dtype.itemsize)
         end = 0
@@ -132,15 +114,12 @@ def _array(
 
 
 def _affine(
-    where: str, fields: dict[str, str], dimensions: int
+    where: str, header: Header, shape: Sequence[int]
 ) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.float64]], tuple[str, ...]]:
     """Return the affine (4, 4) to LPS in mm, and notes."""
-    n = dimensions
-    spacing = _numbers(where, fields, "ElementSpacing", n)
-    matrix = _numbers(where, fields, "TransformMatrix", n * n)
-    notes = []
-    if matrix is None:
-        notes.append("no TransformMatrix: which side is left is a guess, x to the patient's left")
+    n, fields = len(shape), header.fields
+    spacing = numbers(where, fields, "ElementSpacing", n)
+    matrix = numbers(where, fields, "TransformMatrix", n * n)
     if spacing is None:
         raise SourceError(
             f"{where}: ElementSpacing: not found, expected {n} lengths in mm: add it to the header"
@@ -148,35 +127,14 @@ def _affine(
     turned = np.eye(n) if matrix is None else np.array(matrix).reshape(n, n)
     affine = np.eye(4)
     affine[:3, :3] = turned[:3, :3].T * np.array(spacing[:3])  # a row for each axis of the image
-    affine[:3, 3] = (_numbers(where, fields, "Offset", n) or [0.0] * n)[:3]
-    return affine, tuple(notes)
+    affine[:3, 3] = (numbers(where, fields, "Offset", n) or [0.0] * n)[:3]
+    per, unit_notes = unit_mm(fields)
+    affine[:3] *= per
+    lengths = np.linalg.norm(affine[:3, :3], axis=0)
+    notes = [*header.notes, *unit_notes, *side_notes(fields, turned[:3, :3].T)]
+    return affine, (*notes, *value_notes(where, fields), *size_notes(lengths.tolist(), shape[:3]))
 
 
 def _flag(fields: dict[str, str], name: str, default: bool) -> bool:
     text = fields.get(name, "").lower()
     return text[:1] in ("t", "1", "y") if text else default
-
-
-def _integers(where: str, fields: dict[str, str], name: str) -> list[int]:
-    values = _numbers(where, fields, name) or []
-    if not all(value.is_integer() and abs(value) < 1 << 40 for value in values):
-        raise SourceError(f"{where}: {name}: found {fields[name]:.60}, expected whole numbers")
-    return [int(value) for value in values]
-
-
-def _numbers(
-    where: str, fields: dict[str, str], name: str, count: int | None = None
-) -> list[float] | None:
-    """Return a field's numbers; None: the field isn't there. Raises SourceError."""
-    if name not in fields:
-        return None
-    try:
-        values = [float(part) for part in fields[name].split()]
-    except ValueError:
-        values = []
-    if not values or (count is not None and len(values) != count) or not np.isfinite(values).all():
-        raise SourceError(
-            f"{where}: {name}: found {fields[name]!r:.60}, expected "
-            f"{count if count is not None else 'some'} numbers"
-        )
-    return values

@@ -19,17 +19,16 @@ from mrcfile.utils import data_dtype_from_header
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.file_array import FileArray, FlippedArray, PackedArray, unpack_array
+from stereocell.read.file_array import FileArray, PackedArray, unpack_array
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.image import Image
-from stereocell.read.spacing import Grid, Triple
+from stereocell.read.mrc_statements import settle_sign, settle_spacing
+from stereocell.read.spacing import Grid
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
-_UM_PER_ANGSTROM = 1e-4
 _HEADER = 1024  # bytes; an extended header of `nsymbt` follows
 _MAGIC = {b"\x1f\x8b": "gzip", b"BZ": "bzip2"}
-_IMOD_STAMP = 1146047817
-_SIGNED = 1  # bit of IMOD's flags
 _STACK_OF_VOLUMES = 401  # space group
 
 
@@ -39,7 +38,7 @@ def read_image(location: Location) -> Image:
     require_file(location)
     path = os.path.realpath(location.path)
     with one_line(where, "an MRC or CCP4 file"):
-        header, packing = _header(path)
+        header, packing, extended = _header(path)
         dtype = data_dtype_from_header(header)
         shape = tuple(int(header[name]) for name in ("nz", "ny", "nx"))
         order = [int(header[name]) for name in ("maps", "mapr", "mapc")]
@@ -55,9 +54,13 @@ def read_image(location: Location) -> Image:
     group, sampling = int(header["ispg"]), int(header["mz"])
     kind = {_STACK_OF_VOLUMES: "volumes"}.get(group, "images")
     is_stack = group == _STACK_OF_VOLUMES or (group == 0 and sampling == 1)
-    note = (f"the header says a stack of {kind}: taken for one volume",) if is_stack else ()
-    if dtype.itemsize == 1 and not _is_signed(header):
-        dtype = np.dtype(np.uint8)
+    notes = [f"the header says a stack of {kind}: taken for one volume"] if is_stack else []
+    if dtype.itemsize == 1:
+        is_signed, sign_notes = settle_sign(header)
+        dtype = np.dtype(np.int8 if is_signed else np.uint8)
+        notes += sign_notes
+    spacing, spacing_notes = settle_spacing(header, extended, is_stack=is_stack)
+    notes += spacing_notes
     array: StoredArray
     if packing:
         array = PackedArray(
@@ -67,13 +70,15 @@ def read_image(location: Location) -> Image:
         array = FileArray(path, shape, dtype, offset, where)
     axes = tuple("xyz"[axis - 1] for axis in order)
     voxels = VoxelArray(FlippedArray(array, [axis == "y" for axis in axes]), axes)
-    return Image(
-        (voxels,), (Grid(voxels.shape, _spacing(header)),), (None,), (None,), 1, notes=note
-    )
+    grid = Grid(voxels.shape, spacing)
+    return Image((voxels,), (grid,), (None,), (None,), 1, notes=tuple(notes))
 
 
-def _header(path: str) -> tuple[Any, str]:
-    """Return the header, and how the file is packed. Raises ValueError where it isn't MRC."""
+def _header(path: str) -> tuple[Any, str, Any]:
+    """Return the header, how the file is packed, and the extended header; None: it has none.
+
+    Raises ValueError where the file isn't MRC.
+    """
     with open(path, "rb") as file:
         packing = _MAGIC.get(file.read(2), "")
     if not packing and (size := os.path.getsize(path)) < _HEADER:
@@ -81,10 +86,10 @@ def _header(path: str) -> tuple[Any, str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # on what permits reading all the same
         with mrcfile.open(path, permissive=True, header_only=True) as opened:
-            header = opened.header
+            header, extended = opened.header, opened.extended_header
     if header is None or not (bytes(header["map"]).startswith(b"MAP") or _has_size(path, header)):
         raise ValueError("no `MAP ` at byte 208")
-    return header, packing
+    return header, packing, extended
 
 
 def _has_size(path: str, header: Any) -> bool:
@@ -92,24 +97,3 @@ def _has_size(path: str, header: Any) -> bool:
     count = math.prod(int(header[name]) for name in ("nx", "ny", "nz"))
     expected = _HEADER + int(header["nsymbt"]) + count * data_dtype_from_header(header).itemsize
     return count > 0 and os.path.getsize(path) == expected
-
-
-def _is_signed(header: Any) -> bool:
-    """Whether bytes have a sign: mode 0 does in MRC2014, and in IMOD's files where a flag says so.
-
-    IMOD's stamp and flags are two 32-bit numbers in MRC2014's `extra2`, at bytes 152 and 156.
-    """
-    raw = header.tobytes()
-    order = header.dtype["nx"].str[0].replace("|", "=")
-    stamp, flags = np.frombuffer(raw[152:160], np.dtype(np.int32).newbyteorder(order))
-    return int(stamp) != _IMOD_STAMP or bool(int(flags) & _SIGNED)
-
-
-def _spacing(header: Any) -> Triple | None:
-    """Return the spacing (z, y, x), um; None: the header tells no cell or no sampling of it."""
-    cell = [float(header["cella"][axis]) for axis in "zyx"]
-    counts = [int(header[name]) for name in ("mz", "my", "mx")]
-    if min(counts) < 1 or min(cell) <= 0:
-        return None
-    z, y, x = (c / n * _UM_PER_ANGSTROM for c, n in zip(cell, counts, strict=True))
-    return z, y, x

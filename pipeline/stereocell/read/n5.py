@@ -15,6 +15,7 @@ import os
 import re
 import struct
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -24,7 +25,8 @@ from numpy.typing import NDArray
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import settle_axes
 from stereocell.read.array_spacing import spacing_of
-from stereocell.read.bdv_image import grids_of, image_of
+from stereocell.read.bdv_image import chosen_view, grids_of, image_of
+from stereocell.read.bdv_registration import registered
 from stereocell.read.bdv_xml import Described, read_described
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
@@ -83,6 +85,11 @@ class N5Array:
         kept = tuple(slice(None) if isinstance(part, slice) else 0 for part in key)
         return found[kept]
 
+    @property
+    def folder(self) -> str:
+        """The source, below which the paths of blocks lie."""
+        return self._files.source
+
     def path_of(self, index: Sequence[int]) -> str:
         """Return the path of a block below the source."""
         return "/".join([self._path, *map(str, reversed(index))]).lstrip("/")
@@ -102,8 +109,11 @@ class N5Array:
             raise OSError(f"block {path} is cut short ({len(content)} bytes)") from None
 
 
-def read_image(location: Location, *, axes: str = "") -> Image:
-    """Return the image of a dataset, a pyramid or a container. Raises SourceError."""
+def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str = "") -> Image:
+    """Return the image of a dataset, a pyramid or a container. Raises SourceError, UsageError.
+
+    series, xml  a view of BigDataViewer and the XML that lists it, where the XML was named
+    """
     if location.is_local and not os.path.isdir(location.source):
         raise SourceError(f"{location.shown}: is a file, expected a folder of N5")
     files = N5Files(location)
@@ -119,13 +129,21 @@ def read_image(location: Location, *, axes: str = "") -> Image:
         if location.is_local and number:
             described = read_described(os.path.dirname(location.source))
         own = described.setups.get(int(number[1])) if number else None
-        return _container(files, [""], Described({0: own} if own else {}, described.times))
+        placed = {
+            (time, 0): matrix
+            for (time, setup), matrix in described.registrations.items()
+            if number and setup == int(number[1])
+        }
+        alone = Described({0: own} if own else {}, described.times, placed)
+        return _container(files, [""], alone)
     if "dimensions" in files.attributes("setup0/timepoint0/s0"):
         numbers = files.numbered("setup")[:MAX_CHANNELS]
         if not numbers:
             numbers = list(range(_count(files, "setup{}/timepoint0/s0", MAX_CHANNELS)))
-        described = read_described(location.source) if location.is_local else Described({})
-        return _container(files, [f"setup{number}/" for number in numbers], described)
+        described = read_described(location.source, xml) if location.is_local else Described({})
+        return _container(
+            files, [f"setup{number}/" for number in numbers], described, (series, xml)
+        )
     found = files.datasets(_LISTED + 1)
     if len(found) == 1:
         return _pyramid(files, attributes, [(found[0], files.attributes(found[0]))], axes)
@@ -174,16 +192,28 @@ def _pyramid(
     return Image(voxels, grids, unnamed, unnamed, 1, notes=notes, files=read)
 
 
-def _container(files: N5Files, setups: Sequence[str], described: Described) -> Image:
-    """Return the image of BigDataViewer's container: setups are channels.
+def _container(
+    files: N5Files,
+    setups: Sequence[str],
+    described: Described,
+    view: tuple[int, str] = (0, ""),
+) -> Image:
+    """Return the image of a view in BigDataViewer's container: its setups are channels.
 
     setups     the folders of the setups, each with a slash at its end
     described  the setups and time points of the XML
+    view       number of the view as the XML lists them, from 1 (0: the largest), and the path of
+               the XML that the user named
     """
     numbers = [int(setup[len("setup") : -1] or 0) for setup in setups]
     times = files.numbered(f"{setups[0]}timepoint")[:_MAX_TIMES]
     times = times or list(range(_count(files, f"{setups[0]}timepoint{{}}/s0", _MAX_TIMES)))
     described.require_views(files.where, numbers, times)
+    if len(setups) > 1:
+        numbers, notes = chosen_view(files.where, described, numbers, *view)
+        setups = [f"setup{number}/" for number in numbers]
+    else:
+        notes = ()
     levels = _levels(files, f"{setups[0]}timepoint{times[0]}")
     views = [
         [[_dataset(files, f"{setup}timepoint{t}/s{index}") for setup in setups] for t in times]
@@ -197,7 +227,9 @@ def _container(files: N5Files, setups: Sequence[str], described: Described) -> I
         )
     stated = _spacing(files.attributes(f"{setups[0]}timepoint{times[0]}"), "zyx")
     scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
-    return image_of(files.where, views, scales, stated, described.among(numbers))
+    image = image_of(files.where, views, scales, stated, described.among(numbers))
+    image = registered(image, described, numbers, times[0])
+    return replace(image, notes=(*notes, *image.notes))
 
 
 def _dataset(files: N5Files, path: str) -> N5Array:

@@ -31,6 +31,11 @@ class N5Files:
                 self._remote = fsspec.url_to_fs(location.source, **location.storage_options)
         self.attributes = lru_cache(maxsize=4096)(self._attributes)
 
+    @property
+    def source(self) -> str:
+        """The path or address of the container."""
+        return self._location.source
+
     def read(self, path: str) -> bytes | None:
         """Return a file's content; None: there is none. Raises OSError, or SourceError."""
         named = f"{self.where}: {path!r:.200}"

@@ -25,8 +25,16 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.file_array import FileArray, PackedArray, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.nrrd_statements import (
+    axis_lengths,
+    kind_notes,
+    length_notes,
+    units_um,
+    value_notes,
+)
 from stereocell.read.patient_grid import place
-from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.read.plausible_size import size_notes
+from stereocell.read.spacing import PartialTriple, grid_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file, require_own
 
@@ -60,29 +68,39 @@ def read_image(location: Location) -> Image:
     require_file(location)
     fields, end = _header(location)
     shape = [int(n) for n in np.atleast_1d(fields["sizes"])]
-    directions = _directions(where, fields, len(shape))
+    directions = _directions(where, fields, shape)
     names = _axes(where, fields, shape, directions)
     array = _array(location, fields, end, shape[::-1])
     axes = tuple(reversed(names))
     sizes = [shape[names.index(axis)] for axis in "ijk"]
     if (count := shape[names.index("c")] if "c" in names else 1) > MAX_CHANNELS:
         raise SourceError(f"{where}: sizes: found {count} values, expected at most {MAX_CHANNELS}")
-    spatial = directions[[names.index(axis) for axis in "ijk"]]
+    at = [names.index(axis) for axis in "ijk"]
     to_lps, files = _to_lps(where, fields), _files(location, fields)
+    factors, unit_notes = units_um(fields, at, is_patient=to_lps is not None)
+    spatial = directions[at] * factors  # um
+    notes = (
+        *length_notes(fields, shape, directions, at),
+        *kind_notes(fields, at),
+        *unit_notes,
+        *value_notes(fields),
+    )
     if to_lps is None:
         swapped = {"i": "x", "j": "y", "k": "z"}
         voxels = VoxelArray(array, tuple(swapped.get(axis, axis) for axis in axes))
         z, y, x = reversed(sizes)
-        grid, placed_notes = Grid((z, y, x), _spacing(fields, spatial)), _turned(spatial)
+        grid = grid_of((z, y, x), _spacing(spatial))
         unnamed = (None,) * count
-        return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=placed_notes, files=files)
+        notes = (*notes, *_turned(fields, directions[at]))
+        return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files)
     affine = np.eye(4)
-    unit = _unit(fields)
-    affine[:3, :3] = to_lps @ spatial.T * (unit / 1000.0)
+    affine[:3, :3] = to_lps @ spatial.T / 1000.0
     origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
-    affine[:3, 3] = to_lps @ np.where(np.isfinite(origin), origin, 0.0) * (unit / 1000.0)
+    origin = np.where(np.isfinite(origin), origin, 0.0) * factors.max(axis=0)
+    affine[:3, 3] = to_lps @ origin / 1000.0
+    notes = (*notes, *size_notes(np.linalg.norm(affine[:3, :3], axis=0).tolist(), sizes))
     image = place(where, array, axes, affine, "space directions").image(
-        NAME, has_sides=_names_sides(fields)
+        NAME, notes=notes, has_sides=_names_sides(fields)
     )
     return replace(image, files=files)
 
@@ -108,26 +126,25 @@ def _header(location: Location) -> tuple[Mapping[str, Any], int]:
     return fields, blank.end() if blank else len(content)
 
 
-def _directions(where: str, fields: Mapping[str, Any], count: int) -> NDArray[np.float64]:
+def _directions(where: str, fields: Mapping[str, Any], shape: Sequence[int]) -> NDArray[np.float64]:
     """Return a row of the directions for each axis, (n, 3); NaN: an axis of no direction."""
     stated = fields.get("space directions")
-    found = np.full((count, 3), np.nan)
+    found = np.full((len(shape), 3), np.nan)
     if stated is None:  # only lengths; the axes of space are the first three that have one
-        spacings = np.full(count, np.nan)
-        given = np.ravel(fields.get("spacings", ())).astype(float)[:count]
-        spacings[: len(given)] = given
+        lengths = axis_lengths(fields, shape)
         kinds = list(fields.get("kinds", ()))
-        known = [i for i, kind in enumerate(kinds[:count]) if kind in ("domain", "space")]
-        known = known or [i for i in range(count) if np.isfinite(spacings[i]) or count == 3]
+        known = [i for i, kind in enumerate(kinds[: len(shape)]) if kind in ("domain", "space")]
+        count = len(shape)
+        known = known or [i for i in range(count) if np.isfinite(lengths[i]) or count == 3]
         for row, index in enumerate(known[:3]):
-            found[index] = np.eye(3)[row] * (spacings[index] if len(given) else np.nan)
-            found[index, row] = spacings[index] if np.isfinite(spacings[index]) else 0.0
-        return np.where(np.isnan(found) & np.isin(np.arange(count), known)[:, None], 0.0, found)
+            found[index] = 0.0
+            found[index, row] = lengths[index] if np.isfinite(lengths[index]) else 0.0
+        return found
     rows = [np.ravel(row) if row is not None else [np.nan] * 3 for row in stated]
-    if len(rows) != count or any(len(row) != 3 for row in rows):
+    if len(rows) != len(shape) or any(len(row) != 3 for row in rows):
         raise SourceError(
             f"{where}: space directions: found {len(rows)} of {sorted({len(r) for r in rows})} "
-            f"numbers, expected {count} of 3"
+            f"numbers, expected {len(shape)} of 3"
         )
     return np.array(rows, float)
 
@@ -184,27 +201,21 @@ def _to_lps(where: str, fields: Mapping[str, Any]) -> NDArray[np.float64] | None
     return matrix
 
 
-def _unit(fields: Mapping[str, Any]) -> float:
-    """Return um for each unit of the patient's space: mm where none is stated, as Slicer writes."""
-    return _stated_unit(fields) or 1000.0
+def _spacing(spatial: NDArray[np.float64]) -> PartialTriple:
+    """Return the lengths (z, y, x) of directions in um; None: not stated, or without a unit."""
+    lengths = np.linalg.norm(spatial, axis=1)
+    x, y, z = (float(n) if np.isfinite(n) and n > 0 else None for n in lengths)
+    return z, y, x
 
 
-def _stated_unit(fields: Mapping[str, Any]) -> float | None:
-    units = [str(unit).strip(' "') for unit in fields.get("space units", fields.get("units", ()))]
-    found = {um_per(unit) or um_per(unit.removesuffix("s")) for unit in units if unit}
-    return found.pop() if len(found) == 1 else None
-
-
-def _spacing(fields: Mapping[str, Any], spatial: NDArray[np.float64]) -> Triple | None:
-    unit = _stated_unit(fields)
-    x, y, z = (float(length) for length in np.linalg.norm(spatial, axis=1))
-    return None if unit is None or min(x, y, z) == 0 else (z * unit, y * unit, x * unit)
-
-
-def _turned(spatial: NDArray[np.float64]) -> tuple[str, ...]:
+def _turned(fields: Mapping[str, Any], spatial: NDArray[np.float64]) -> tuple[str, ...]:
     """Note directions that are not along x, y, z: outside a patient they are not followed."""
-    is_straight = np.array_equal(spatial, np.diag(np.abs(np.diag(spatial))))
-    return () if is_straight else ("axes turned or mirrored by `space directions`: as stored",)
+    notes = []
+    if not np.array_equal(spatial, np.diag(np.abs(np.diag(spatial)))):
+        notes.append("axes turned or mirrored by `space directions`: as stored")
+    if "left-handed" in str(fields.get("space", "")).lower():
+        notes.append("space: its axes are left-handed: as stored, so the volume may be mirrored")
+    return tuple(notes)
 
 
 def _files(location: Location, fields: Mapping[str, Any]) -> tuple[str, ...]:

@@ -8,9 +8,11 @@ References: https://docs.openmicroscopy.org/ome-model/latest/ome-xml/
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from xml.etree import ElementTree
 
 from stereocell.model.color import linear_color
+from stereocell.model.emission_color import color_of_light
 from stereocell.model.errors import SourceError
 from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
@@ -72,10 +74,50 @@ def files_of(root: ElementTree.Element) -> Iterator[str]:
     return (uuid.get("FileName", "") for uuid in uuids_of(root) if uuid.get("FileName"))
 
 
-def pixels_of(root: ElementTree.Element) -> ElementTree.Element | None:
-    """Return the Pixels of the first image; None: there are none."""
-    image = next(_children(root, "Image"), None)
+def pixels_of(root: ElementTree.Element, index: int = 0) -> ElementTree.Element | None:
+    """Return the Pixels of an image, the first by default; None: there are none."""
+    image = next(islice(_children(root, "Image"), index, None), None)
     return None if image is None else next(_children(image, "Pixels"), None)
+
+
+def planes_of(root: ElementTree.Element) -> list[ElementTree.Element]:
+    """Return the planes of the first image that the metadata describe."""
+    pixels = pixels_of(root)
+    return [] if pixels is None else list(_children(pixels, "Plane"))
+
+
+def positions_of(root: ElementTree.Element) -> list[float]:
+    """Return PositionZ of the planes of the first channel and time, by TheZ, in any unit.
+
+    Empty: a plane has none.
+    """
+    found: dict[int, float] = {}
+    for plane in planes_of(root):
+        try:
+            at, value = int(plane.get("TheZ", "")), float(plane.get("PositionZ", ""))
+        except ValueError:
+            return []
+        found.setdefault(at, value)
+    return [found[at] for at in sorted(found)] if sorted(found) == list(range(len(found))) else []
+
+
+def modulos_of(root: ElementTree.Element) -> list[ElementTree.Element]:
+    """Return the further axes (`ModuloAlongZ`, ...) of the first image.
+
+    An annotation counts for all images where no image refers to it.
+    """
+    images = list(_children(root, "Image"))
+    refers = [
+        {one.get("ID") for one in image.iter() if _local(one) == "AnnotationRef"}
+        for image in images
+    ]
+    found = []
+    for annotation in (one for one in root.iter() if _local(one) == "XMLAnnotation"):
+        name = annotation.get("ID")
+        if any(name in some for some in refers) and name not in refers[0]:
+            continue
+        found += [one for one in annotation.iter() if _local(one).startswith("ModuloAlong")]
+    return found
 
 
 def samples_of(pixels: ElementTree.Element) -> int:
@@ -133,10 +175,13 @@ def _spacing(pixels: ElementTree.Element, where: str) -> PartialTriple:
 
 
 def _color(channel: ElementTree.Element, where: str) -> Color | None:
-    """Return the colour, which OME holds as a signed 32-bit number of R, G, B and A."""
+    """Return the colour, which OME holds as a signed 32-bit number of R, G, B and A.
+
+    Where it states none, that of the light.
+    """
     given = channel.get("Color")
     if given is None:
-        return None
+        return _emitted(channel)
     try:
         number = int(given)
         red, green, blue, _ = (number & 0xFFFFFFFF).to_bytes(4, "big")
@@ -145,6 +190,13 @@ def _color(channel: ElementTree.Element, where: str) -> Color | None:
             f"{where}: OME-XML: Channel Color: found {given!r:.40}, expected a whole number"
         ) from None
     return linear_color((red, green, blue))
+
+
+def _emitted(channel: ElementTree.Element) -> Color | None:
+    """Return the colour of the light that a channel took, by its wavelength or its dye."""
+    given, dye = channel.get("EmissionWavelength"), channel.get("Fluor", "")
+    is_nm = channel.get("EmissionWavelengthUnit", "nm") == "nm"
+    return color_of_light(given if is_nm else None, dye)
 
 
 def _children(element: ElementTree.Element, name: str) -> Iterator[ElementTree.Element]:

@@ -1,4 +1,4 @@
-"""OME-Zarr 0.4 (Zarr v2) and 0.5 (Zarr v3), read by zarr-python.
+"""OME-Zarr 0.1 to 0.6 (Zarr v2 and v3), in a folder, a zip file or at an address, by zarr-python.
 
 bioio's reader, which stands on zarr-python, is not used. Only its JSON metadata would be left in
 use, and its import took 1.5 s of each process, four times as long as zarr's:
@@ -8,11 +8,12 @@ use, and its import took 1.5 s of each process, four times as long as zarr's:
   reads the window from the Zarr array.
 - `channel_names` is "" where a label is missing.
 
-References: OME-Zarr 0.5, https://ngff.openmicroscopy.org/0.5/
+References: https://ngff.openmicroscopy.org; ngff.py reads the metadata of all versions
 """
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import zarr
@@ -20,11 +21,19 @@ from zarr.abc.store import Store
 
 from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError, UsageError
-from stereocell.read import bare_zarr
+from stereocell.read import bare_zarr, ngff
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.label_notes import notes_of_ngff
-from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.read.ngff import Multiscale
+from stereocell.read.ngff_sides import with_sides
+from stereocell.read.ngff_statements import (
+    converted_of,
+    dimension_names,
+    settled_axes,
+    settled_spacing,
+)
+from stereocell.read.spacing import Grid, Triple
 from stereocell.read.zarr_collections import (
     ZarrTree,
     describe_group,
@@ -35,7 +44,15 @@ from stereocell.read.zarr_collections import (
     part_of,
     series_of,
 )
-from stereocell.read.zarr_store import GuardedStore, files_of, open_array, open_store, quiet
+from stereocell.read.zarr_store import (
+    GuardedStore,
+    files_of,
+    notes_on_names,
+    open_array,
+    open_store,
+    quiet,
+)
+from stereocell.read.zarr_values import value_attributes, with_values
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -54,7 +71,7 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
     UsageError where `axes` doesn't fit.
     """
     where = location.shown
-    with quiet(), one_line(where, "the group of one OME-Zarr 0.4 or 0.5 image, or a Zarr array"):
+    with quiet(), one_line(where, "the group of one OME-Zarr image, or a Zarr array"):
         store = open_store(location)
         guard = GuardedStore(store, location)
         node = zarr.open(guard, mode="r")
@@ -84,100 +101,104 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
             f"{where}: no multiscales: {describe_group(ome, series, tree)}; expected the "
             "attribute `multiscales` of an image"
         )
-    with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.4 and 0.5"):
-        names, units = _axes(multiscales[0])
-        datasets = list(multiscales[0]["datasets"])
-        paths = [str(dataset["path"]) for dataset in datasets]
-        placements = [_placement(multiscales[0], dataset, len(names)) for dataset in datasets]
-    if not 0 < len(paths) <= _MAX_LEVELS:
+    with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.1 to 0.6"):
+        multiscale = ngff.parse(where, ome)
+    if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
-            f"{where}: multiscales[0].datasets: found {len(paths) or 'none'}, expected a level, "
-            f"and at most {_MAX_LEVELS}"
+            f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
+            f"a level, and at most {_MAX_LEVELS}"
         )
-    if axes:
-        raise UsageError(
-            f"{where}: --axes {axes}: the image names its axes, {', '.join(names)}; expected none"
-        )
-    missing = [axis for axis in "zyx" if axis not in names]
+    levels, notes = _levels(location, store, multiscale, axes, metadata.zarr_format)
+    missing = [axis for axis in "zyx" if axis not in levels[0].axes]
     if missing:
         raise SourceError(
             f"{where}: one plane (2D): a volume needs at least 2 planes: no axis {missing[0]} "
-            f"among {', '.join(names)}"
+            f"among {', '.join(levels[0].axes)}"
         )
-    version = metadata.zarr_format
-    arrays = tuple(_level(location, store, path, names, version) for path in paths)
-    grids = tuple(
-        _grid(level, units, scale, shift)
-        for level, (scale, shift) in zip(arrays, placements, strict=True)
-    )
+    grids, more, files = _grids(location, multiscale, levels)
+    sided = with_sides(levels, grids, [_of_axis(multiscale, axis) for axis in "zyx"])
     omero = ome.get("omero", {})
     channels = omero.get("channels", []) if isinstance(omero, Mapping) else omero
-    titles, colors = _channels(where, channels, arrays[0].size("c"))
+    titles, colors = _channels(where, channels, levels[0].size("c"))
     return Image(
-        arrays,
-        grids,
+        sided.arrays,
+        sided.grids,
         titles,
         colors,
         len(multiscales),
-        files=files_of(location, paths),
-        notes=notes_on_labels(tree),
+        files=(*files_of(location, multiscale.paths), *files),
+        placement=sided.placement,
+        has_sides=sided.has_sides,
+        acquired=sided.acquired,
+        notes=(*multiscale.notes, *notes, *more, *sided.notes, *notes_on_labels(tree)),
         labels=labels_evidence(ome, location),
         objects=notes_of_ngff(ome.get("image-label")),
     )
 
 
-def _axes(multiscale: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[float | None, ...]]:
-    """Return the axes' names and their units in um (None: no unit of length).
+def _levels(
+    location: Location, store: Store, image: Multiscale, axes: str, zarr_format: Any
+) -> tuple[tuple[VoxelArray, ...], tuple[str, ...]]:
+    """Return the levels with the axes of the image, and notes.
 
-    Raises ValueError where the metadata are not of OME-Zarr 0.4 or 0.5 or repeat a name.
+    axes  the user's `--axes`, taken where the metadata leave the axes open
+
+    Raises SourceError where a level has another number of axes, or where the axes contradict each
+    other; UsageError where the metadata settle the axes.
     """
-    axes = multiscale["axes"]
-    if not all(isinstance(axis, Mapping) for axis in axes):
-        raise ValueError("axes are not of OME-Zarr 0.4 or 0.5")
-    names = tuple(str(axis["name"]).lower() for axis in axes)
-    if len(set(names)) != len(names):
-        raise ValueError(f"axes {', '.join(names)} name one twice")
-    return names, tuple(um_per(axis.get("unit")) for axis in axes)
-
-
-def _placement(
-    multiscale: Mapping[str, Any], dataset: Mapping[str, Any], dimensions: int
-) -> tuple[list[float] | None, list[float] | None]:
-    """Return scale and translation of a level, in the axes' units; None: not stated.
-
-    The level's own transformations come first, then those of the whole image. Raises ValueError
-    where a transformation is invalid.
-    """
-    scale: list[float] | None = None
-    shift: list[float] | None = None
-    own = dataset.get("coordinateTransformations", [])
-    for step in [*own, *multiscale.get("coordinateTransformations", [])]:
-        kind = step["type"]
-        values = [float(value) for value in step.get(kind, [])]
-        if kind == "identity":
-            continue
-        if kind not in ("scale", "translation") or len(values) != dimensions:
-            raise ValueError(
-                f"coordinateTransformations: found {kind} of {len(values)} numbers "
-                f"for {dimensions} axes"
+    where, dimensions = location.shown, len(image.names)
+    arrays = [open_array(location, store, path, zarr_format=zarr_format) for path in image.paths]
+    is_open = not image.names_axes or sorted(dimension_names(arrays[0])) == sorted(image.names)
+    is_same = image.names_axes and dimension_names(arrays[0]) == image.names
+    if axes and (is_same or not is_open):
+        raise UsageError(
+            f"{where}: --axes {axes}: the image names its axes, {', '.join(image.names)}; "
+            "expected none"
+        )
+    way = "" if image.names_axes else f", as {image.title} has them (else give --axes)"
+    for path, array in zip(image.paths, arrays, strict=True):
+        if array.ndim != dimensions and (image.names_axes or not axes):
+            raise SourceError(
+                f"{where}: level {path!r:.80}: found {array.ndim} dimensions, "
+                f"expected {dimensions} as `axes`{way}"
             )
-        if kind == "scale":
-            scale = [a * b for a, b in zip(scale or [1.0] * dimensions, values, strict=True)]
-            shift = shift and [a * b for a, b in zip(shift, values, strict=True)]
-        else:
-            shift = [a + b for a, b in zip(shift or [0.0] * dimensions, values, strict=True)]
-    return scale, shift
+    names, notes = settled_axes(where, arrays[0], image.names, axes)
+    attributes = value_attributes(arrays[0])
+    valued = [with_values(where, VoxelArray(array, names), attributes) for array in arrays]
+    levels = tuple(level for level, _ in valued)
+    return levels, (*notes, *notes_on_names(arrays), *valued[0][1])
+
+
+def _grids(
+    location: Location, image: Multiscale, levels: tuple[VoxelArray, ...]
+) -> tuple[tuple[Grid, ...], tuple[str, ...], tuple[str, ...]]:
+    """Return the levels' grids, notes, and the file beside the image that they come from."""
+    hint = "" if image.places_voxels else f"{image.title} states none"
+    grids = [
+        replace(_grid(level, image, scale, shift), hint=hint)
+        for level, (scale, shift) in zip(levels, image.placements, strict=True)
+    ]
+    converted = converted_of(location)
+    if converted is None:
+        return tuple(grids), (), ()
+    grids[0], notes = settled_spacing(grids[0], converted, levels[0])
+    return tuple(grids), notes, (converted.path,)
+
+
+def _of_axis(image: Multiscale, axis: str) -> str:
+    return image.orientations[image.names.index(axis)] if axis in image.names else ""
 
 
 def _grid(
     level: VoxelArray,
-    units: tuple[float | None, ...],
+    image: Multiscale,
     scale: Sequence[float] | None,
     shift: Sequence[float] | None,
 ) -> Grid:
-    spacing = None if scale is None else _spatial(level.axes, units, scale)
+    spacing = None if scale is None else _spatial(image.names, image.units, scale)
     # A scale without a unit is no length: writers that lack the spacing state 1.0.
-    offset = None if shift is None or spacing is None else _spatial(level.axes, units, shift)
+    is_placed = shift is not None and spacing is not None
+    offset = _spatial(image.names, image.units, shift or ()) if is_placed else None
     return Grid(level.shape, spacing, offset)
 
 
@@ -218,15 +239,3 @@ def _color(text: Any) -> Color | None:
         return None
     red, green, blue = bytes.fromhex(match[1])
     return linear_color((red, green, blue))
-
-
-def _level(
-    location: Location, store: Store, path: str, axes: tuple[str, ...], zarr_format: Any
-) -> VoxelArray:
-    array = open_array(location, store, path, zarr_format=zarr_format)
-    if array.ndim != len(axes):
-        raise SourceError(
-            f"{location.shown}: level {path!r:.80}: found {array.ndim} dimensions, "
-            f"expected {len(axes)} as `axes`"
-        )
-    return VoxelArray(array, axes)

@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.cast import TAKEN, built_dtype
 from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
 from stereocell.read.image import Image, printable
+from stereocell.read.inverted_array import InvertedArray
+from stereocell.read.level_spacing import settle_levels
 from stereocell.read.readers import find_reader
 from stereocell.read.remarks import cast_note
 from stereocell.read.spacing import Triple, levels_of
@@ -28,6 +31,7 @@ def open(
     series: int = 0,
     pattern: str = "",
     axes: str = "",
+    dark: bool = False,
 ) -> Dataset:
     """Open a source of any format of READERS (read/readers.py).
 
@@ -41,6 +45,8 @@ def open(
                 guessed
     axes        letters of an array's axes, or of those longer than 1, as `czyx`, slowest first;
                 empty: as the source names them
+    dark        whether structures are darker than their surroundings: then all values are inverted
+                (`InvertedArray`), so that structures are bright
 
     No voxels are read yet, with two exceptions: DICOM slices at the same place, to detect copies,
     and floats of NIfTI, to count NaN. Raises SourceError where the source can't be read as a
@@ -53,6 +59,8 @@ def open(
     location, reader = find_reader(source)
     with library_boundary(location.shown, f"{reader.name} that is whole"):
         image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
+        if dark:
+            image = _inverted(image)
         try:
             return _dataset(location, image, time, spacing_um)
         except BaseException:
@@ -65,6 +73,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     where = location.shown
     finest = image.arrays[0]
     _check_arrays(where, image)
+    grids, level_notes = settle_levels(image.grids)
     if not 0 <= time < finest.size("t"):
         raise UsageError(
             f"{where}: --time: found {time}, expected 0 to {finest.size('t') - 1} "
@@ -76,7 +85,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         source=location.source,
         name=image.title or printable(location.name) or "dataset",
         dtype=built_dtype(finest.array.dtype) or np.dtype(finest.array.dtype),
-        levels=levels_of(image.grids, spacing_um, where),
+        levels=levels_of(grids, spacing_um, where),
         channels=tuple(channels),
         time_points=finest.size("t"),
         time=time,
@@ -85,10 +94,12 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         shown=where,
         on_close=image.close,
         modality=image.modality,
+        has_hounsfield_units=image.has_hounsfield_units,
         placement=image.placement,
         has_sides=image.has_sides,
         remarks=(
             *map(printable, image.notes),  # which may name files
+            *level_notes,
             *filter(None, [cast_note(finest.array.dtype)]),
             *(image.notes_at(time) if image.notes_at is not None else ()),
         ),
@@ -98,6 +109,17 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         objects=image.objects,
         offset_um=image.grids[0].offset_um or (0.0, 0.0, 0.0),
     )
+
+
+def _inverted(image: Image) -> Image:
+    """Return an image whose dark voxels are bright, with a note on its values."""
+    dtype = np.dtype(image.arrays[0].array.dtype)
+    values = f"{np.iinfo(dtype).max} minus" if dtype.kind == "u" else "the negative of"
+    if dtype.kind == "i":
+        values = "-1 minus"
+    note = f"voxels are inverted (--dark): each is {values} the value in the file"
+    arrays = tuple(VoxelArray(InvertedArray(one.array), one.axes) for one in image.arrays)
+    return replace(image, arrays=arrays, notes=(*image.notes, note))
 
 
 def _check_arrays(where: str, image: Image) -> None:

@@ -12,7 +12,7 @@ from stereocell.model.rigid_transform import Matrix
 from stereocell.model.tiling import Box
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.file_array import FlippedArray
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.image import Image
 from stereocell.read.resample import orthogonal_grid, resample_sheared
 from stereocell.read.spacing import Grid

@@ -13,17 +13,19 @@ import fsspec
 
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.file_kind import require_kind
+from stereocell.read.foreign_files import bare_voxels_words, foreign_words
 from stereocell.read.image import Image, printable
 from stereocell.storage.contents import contents_of
+from stereocell.storage.first_bytes import SHARED, identify
 from stereocell.storage.kinds import Kind
 from stereocell.storage.library_errors import library_boundary, one_line
-from stereocell.storage.location import ANSWER_S, Location, does_answer, require_own
+from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
 
 _SURFACES = (
     *(".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp", ".glb", ".gltf", ".3mf"),
     *(".usda", ".usdc", ".usdz"),
 )
-_PICTURES = (".png", ".jpg", ".jpeg")  # which are planes of a folder
+_PICTURES = (".png", ".jpg", ".jpeg", ".bmp")  # which are planes of a folder
 _FOLDERS = ("planes", "dicom")  # formats of folders whose files may have any name
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 
@@ -68,19 +70,20 @@ class Reader:
 
 READERS = {
     "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", has_axes=True, is_remote=True),
-    "tiff": Reader("stereocell.read.tiff", "TIFF", has_axes=True, is_remote=True),
+    "tiff": Reader("stereocell.read.tiff", "TIFF", has_series=True, has_axes=True, is_remote=True),
     "planes": Reader(
         "stereocell.read.planes",
-        "a folder of TIFF, PNG or JPEG planes",
+        "a folder of TIFF, PNG, JPEG or BMP planes",
         has_series=True,
         has_pattern=True,
     ),
     "dicom": Reader("stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True),
     "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze"),
+    "mgh": Reader("stereocell.read.mgh", "MGH (FreeSurfer)"),
     "ims": Reader("stereocell.read.ims", "Imaris"),
     "hdf5": Reader("stereocell.read.hdf5", "HDF5 (NAME.h5:/KEY)", has_axes=True),
     "n5": Reader("stereocell.read.n5", "N5", has_axes=True, is_remote=True),
-    "bdv": Reader("stereocell.read.bdv", "BigDataViewer's XML"),
+    "bdv": Reader("stereocell.read.bdv", "BigDataViewer's XML", has_series=True),
     "nrrd": Reader("stereocell.read.nrrd", "NRRD"),
     "metaimage": Reader("stereocell.read.metaimage", "MetaImage"),
     "mrc": Reader("stereocell.read.mrc", "MRC"),
@@ -123,6 +126,8 @@ def find_reader(source: str | Path) -> tuple[Location, Reader]:
     if location.is_local and not Path(location.path).is_dir():
         require_own(location.path, [location.folder], named=location.shown)
     named = location.format
+    if location.is_local and (words := foreign_words(location.path, only_other=True)):
+        raise SourceError(f"{location.shown}: found {words}, expected a format that is read")
     if named in _FOLDERS:
         _require_no_result(location)
     if named is None and not import_module(OTHER.module).can_read(location):
@@ -179,7 +184,7 @@ def _unknown(location: Location) -> SourceError:
             f"{location.shown}: found the voxels of {printable(header):.200}, expected that file"
         )
     elif location.is_local:
-        content = contents_of(Path(location.source)).words
+        content = _words_of(Path(location.source))
         if last.endswith(_PICTURES) and content.endswith(" image"):
             return SourceError(
                 f"{location.shown}: one plane (2D): found {content}, expected a volume: name the "
@@ -187,7 +192,22 @@ def _unknown(location: Location) -> SourceError:
             )
         found += f": found {content}"
     formats = ", ".join(reader.title for reader in READERS.values())
+    if found.endswith(")"):  # the way out is the message, so the list would hide it
+        formats = "OME-Zarr, TIFF, DICOM, NIfTI, HDF5 and others that are read"
     return SourceError(f"{location.shown}: {found}; expected {formats}, or {OTHER.title}")
+
+
+def _words_of(path: Path) -> str:
+    """Return what a path of no known format holds: by its first bytes, else by its name."""
+    content = contents_of(path).words
+    if not path.is_file():
+        return content
+    found = identify(first_bytes(str(path)))
+    named = foreign_words(path.name)
+    if named and (not found.is_known or found.words in SHARED):
+        return named
+    is_bare = not found.is_known or found.words.startswith("zeros")
+    return (is_bare and bare_voxels_words(path)) or content
 
 
 def _header_beside(location: Location) -> str:

@@ -15,6 +15,11 @@ PartialTriple = tuple[float | None, float | None, float | None]
 _UM: dict[str, float] = {
     "angstrom": 1e-4,
     "\u00c5": 1e-4,
+    "\u00e5": 1e-4,  # the same letter in lower case
+    "\u212b": 1e-4,  # the sign of the unit
+    "\u00e5ngstrom": 1e-4,
+    "\u00e5ngstr\u00f6m": 1e-4,
+    "A": 1e-4,
     "picometer": 1e-6,
     "pm": 1e-6,
     "nanometer": 1e-3,
@@ -24,6 +29,10 @@ _UM: dict[str, float] = {
     "um": 1.0,
     "\u00b5m": 1.0,  # micro sign
     "\u03bcm": 1.0,  # Greek mu
+    "\u00b5": 1.0,
+    "\u03bc": 1.0,
+    "\u00b5meter": 1.0,
+    "\u03bcmeter": 1.0,
     "millimeter": 1e3,
     "mm": 1e3,
     "centimeter": 1e4,
@@ -34,6 +43,7 @@ _UM: dict[str, float] = {
     "m": 1e6,
     "inch": 25400.0,
     "in": 25400.0,
+    "inche": 25400.0,  # the plural loses its s
 }
 
 
@@ -75,10 +85,32 @@ class Grid:
 
 
 def um_per(unit: object) -> float | None:
-    """Return a length unit in um; None for no unit or one that is no length (`pixel`)."""
+    """Return a length unit in um; None for no unit or one that is no length (`pixel`).
+
+    Units are known in any case, in the plural, in quotes or brackets, with either sign of the
+    micro, and where UTF-8 was read as Latin-1.
+
+    >>> um_per("[n_m]"), um_per(" Microns "), um_per("\u00c2\u00b5m")
+    (0.001, 1.0, 1.0)
+    """
     if not isinstance(unit, str):
         return None
-    return _UM.get(unit, _UM.get(unit.strip().lower().replace("metre", "meter")))
+    if (exact := _UM.get(unit)) is not None:
+        return exact
+    text = _from_latin_1(unit).strip(" \t\r\n\0\"'[]()")
+    name = text.replace("_", "").lower().replace("metre", "meter")
+    for form in (text, name, name.removesuffix("s")):
+        if (found := _UM.get(form)) is not None:
+            return found
+    return None
+
+
+def _from_latin_1(text: str) -> str:
+    """Return the text of UTF-8 bytes that were decoded as Latin-1; other texts as they are."""
+    try:
+        return text.encode("latin-1").decode("utf-8")
+    except UnicodeError:
+        return text
 
 
 def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> tuple[Level, ...]:
@@ -150,8 +182,9 @@ def _missing(grid: Grid) -> str:
     stated = zip("zyx", grid.partial_um, strict=True)
     found = [f"{axis} {value:.5g} um" for axis, value in stated if value is not None]
     if not found:
+        hint = f" ({grid.hint})" if grid.hint else ""
         return (
-            "not found with a unit of length; "
+            f"not found with a unit of length{hint}; "
             "expected it in the metadata, or give it with --spacing-um z,y,x"
         )
     lacking = [a for a, value in zip("zyx", grid.partial_um, strict=True) if value is None]

@@ -217,7 +217,7 @@ def _cut(name: str) -> str:
 
 def _groups_below(tree: ZarrTree) -> list[str]:
     """Return the names of the groups in a folder, sorted; of an address none."""
-    if not tree.location.is_local:
+    if not tree.location.is_local or not Path(tree.location.source).is_dir():
         return []
     folder = Path(tree.location.source)
     names = sorted(path.name for path in folder.iterdir() if path.is_dir())

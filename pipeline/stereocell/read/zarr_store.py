@@ -11,8 +11,9 @@ import lzma
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Any
 
 import zarr
@@ -22,7 +23,10 @@ from zarr.abc.store import ByteRequest, RangeByteRequest, Store
 from zarr.core.buffer import BufferPrototype
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
+from stereocell.model.errors import SourceError
 from stereocell.read import zarr_ending  # noqa: F401  (it registers a function for Python's end)
+from stereocell.read.zarr_chunk_names import OtherNames, names_on_disk, possible_names
+from stereocell.read.zarr_zip import ZippedStore, is_zipped, open_zipped
 from stereocell.storage.first_bytes import HEAD_BYTES, pointer_words
 from stereocell.storage.library_errors import (
     DamagedError,
@@ -36,46 +40,89 @@ from stereocell.storage.location import Location, require_own, require_own_key
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
 _METADATA_BYTES = 64 << 20  # largest size of a metadata file in bytes
 _ROOM = 1 << 20  # bytes beyond a chunk's decoded size: poor compression, checksums, an index
+_MOST_MISSES = 8  # absent chunks at an address for which other names are tried in vain
 _BLOSC_HEADER = struct.Struct("<4B3I")  # last three, bytes: decoded, of a block, encoded
+
+
+@dataclass(frozen=True, slots=True)
+class Chunks:
+    """The chunks of one array.
+
+    codecs  names of the bytes-to-bytes codecs, in the order of encoding
+    size    bytes of a decoded chunk; None: only metadata are read
+    array   path of the array's metadata file: once it is gone, a missing chunk isn't empty
+    others  names of chunks that the metadata name otherwise: those that were found on this
+            machine, or those that are tried at an address
+    """
+
+    codecs: tuple[str, ...] = ()
+    size: int | None = None
+    array: str = ""
+    others: tuple[OtherNames, ...] = ()
 
 
 class GuardedStore(WrapperStore[Store]):
     """Refuses files outside the group, truncated chunks and chunks that decode to too many bytes.
 
     location  of the group
-    codecs    names of the bytes-to-bytes codecs, in the order of encoding
-    chunk     bytes of a decoded chunk; None: only metadata are read
-    array     path of the array's metadata file: once it is gone, a missing chunk isn't empty
+    chunks    of the array that is read; None: only metadata are read
 
     Reads raise OSError for these, SourceError for a path outside the group.
     """
 
-    def __init__(
-        self,
-        store: Store,
-        location: Location,
-        codecs: tuple[str, ...] = (),
-        chunk: int | None = None,
-        array: str = "",
-    ) -> None:
+    def __init__(self, store: Store, location: Location, chunks: Chunks | None = None) -> None:
         super().__init__(store)
         self._location, self._folder = location, location.folder
-        self._codecs, self._chunk, self._array = codecs, chunk, array
+        self._chunks = chunks or Chunks()
+        self._tried, self._misses = self._chunks.others, 0
 
     def _with_store(self, store: Store) -> "GuardedStore":
-        return type(self)(store, self._location, self._codecs, self._chunk, self._array)
+        return type(self)(store, self._location, self._chunks)
+
+    @property
+    def is_local(self) -> bool:
+        """Whether the files are on this machine."""
+        return self._location.is_local
+
+    @property
+    def members(self) -> Set[str] | None:
+        """The names of all files in a zip file; None: the source is no zip file."""
+        return self._store.sizes.keys() if isinstance(self._store, ZippedStore) else None
+
+    @property
+    def other_names(self) -> OtherNames | None:
+        """The names of chunks that the array's metadata name otherwise; None: there are none."""
+        others = self._chunks.others
+        return others[0] if self._location.is_local and others else None
 
     async def get(
         self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
-        """Return the bytes at a key, checked; None: there are none."""
+        """Return the bytes at a key, or at the other name of its chunk; None: there are none."""
+        value = await self._checked(key, prototype, byte_range)
+        tried = self._tried
+        for names in self._tried if value is None else ():
+            if other := names.key_of(key):
+                value = await self._checked(other, prototype, byte_range)
+            if value is not None:
+                self._tried = (names,)
+                return value
+        if value is None and len(tried) > 1:
+            self._misses += 1
+            self._tried = tried if self._misses < _MOST_MISSES else ()
+        return value
+
+    async def _checked(
+        self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None
+    ) -> Buffer | None:
         is_metadata = key.rsplit("/", 1)[-1] in _METADATA
-        most = _METADATA_BYTES if is_metadata or self._chunk is None else self._most(2)
+        size, array = self._chunks.size, self._chunks.array
+        most = _METADATA_BYTES if is_metadata or size is None else self._most(2)
         self._require_own(key, most)
         value = await self._store.get(key, prototype, byte_range)
-        if value is None and self._array and not await self._store.exists(self._array):
-            raise OSError(f"{self._array} is gone since it was opened")
-        if value is not None and not is_metadata and byte_range is None and self._chunk is not None:
+        if value is None and array and not await self._store.exists(array):
+            raise OSError(f"{array} is gone since it was opened")
+        if value is not None and not is_metadata and byte_range is None and size is not None:
             if words := pointer_words(value[:HEAD_BYTES].to_bytes()):
                 raise OSError(f"chunk {key}: found {words}")
             self._require_fit(key, value)
@@ -101,14 +148,17 @@ class GuardedStore(WrapperStore[Store]):
             require_own_key(key, named)
             return
         found = require_own(f"{self._location.source}/{key}", [self._folder], named=named)
-        if found is not None and found.st_size > most:
-            raise OSError(f"{key}: {found.st_size} bytes, over the {most} that it may have")
+        size = found.st_size if found is not None else 0
+        if isinstance(self._store, ZippedStore):
+            size = self._store.sizes.get(key, 0)
+        if size > most:
+            raise OSError(f"{key}: {size} bytes, over the {most} that it may have")
 
     def _most(self, times: int) -> int:
-        return times * (self._chunk or 0) + _ROOM
+        return times * (self._chunks.size or 0) + _ROOM
 
     def _require_fit(self, key: str, value: Buffer) -> None:
-        codecs = list(self._codecs)
+        codecs = list(self._chunks.codecs)
         end = len(value)
         while codecs and codecs[-1] == "crc32c":
             codecs.pop()
@@ -190,12 +240,25 @@ def quiet() -> AbstractContextManager[None]:
 
 def open_store(location: Location) -> Store:
     """Return the store of a group or an array; its reads are to go through a GuardedStore."""
+    if is_zipped(location):
+        return open_zipped(location)
     if location.is_local:
         return LocalStore(location.source, read_only=True)
+    if location.format == "ome-zarr" and location.shown.endswith((".ozx", ".zip")):
+        raise SourceError(
+            f"{location.shown}: a zip file at an address, expected a path on this machine: copy it "
+            "here first, or unpack it there"
+        )
     with one_line(location.shown, "an address that fsspec opens"):
         return FsspecStore.from_url(
             location.source, storage_options=location.storage_options, read_only=True
         )
+
+
+def notes_on_names(arrays: Iterable["zarr.Array[Any]"]) -> tuple[str, ...]:
+    """Return a note for each array whose chunks are not named as its metadata state."""
+    found = ((array, getattr(array.store, "other_names", None)) for array in arrays)
+    return tuple(names.note(array.ndim) for array, names in found if names is not None)
 
 
 def files_of(location: Location, arrays: Sequence[str]) -> tuple[str, ...]:
@@ -203,6 +266,8 @@ def files_of(location: Location, arrays: Sequence[str]) -> tuple[str, ...]:
 
     An address of `http` can't list a folder, so it has the arrays' metadata in their place.
     """
+    if is_zipped(location):
+        return (location.path,)
     root = location.source.rstrip("/")
     metadata = [f"{root}/{name}" for name in _METADATA]
     folders = [f"{root}/{path}".rstrip("/") for path in arrays]
@@ -234,5 +299,10 @@ def open_array(
         size = math.prod(array.shards or array.chunks) * (item_bytes or array.dtype.itemsize)
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
         # not `path`, which may end in a slash
-        guard = GuardedStore(store, location, codecs, size, f"{array.path}/{named}".lstrip("/"))
+        names = possible_names(array)
+        if location.is_local:
+            found = None if is_zipped(location) else names_on_disk(location, array)
+            names = (found,) if found is not None else ()
+        chunks = Chunks(codecs, size, f"{array.path}/{named}".lstrip("/"), names)
+        guard = GuardedStore(store, location, chunks)
         return zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)

@@ -16,7 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from numpy.typing import NDArray
 
 from stereocell.building.channels import Channel
-from stereocell.building.level_choice import given_level
+from stereocell.building.level_choice import given_level, highest_of
 from stereocell.building.other_levels import OtherLevel, ends_of, find_other_levels
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
@@ -265,6 +265,7 @@ def _others(facts: Facts, channel: Channel, found: ChannelSurvey) -> list[dict[s
             taken=None if found.appearance.level is None else found.appearance.level.iso,
             threshold=found.appearance.threshold,
             ends=None if found.curve is None else ends_of(found.curve.values),
+            highest=highest_of(found.statistics, found.statistics.background is not None),
         )
     ]
 

@@ -77,7 +77,7 @@ def _covers(units: Iterable[UnitFacts]) -> list[tuple[str, Cover]]:
 def _holders(facts: Facts) -> list[str]:
     """Return a line for each channel whose CT's table or head holder is left out."""
     return [
-        f"{channel.name}: {', '.join(holder.pieces)}; surface.keep_holder = true builds it too"
+        f"{channel.name}: {', '.join(holder.pieces)}; --keep-holder builds it too"
         for channel in facts.plan.channels
         if (holder := facts.survey[channel.id].holder) is not None
     ]

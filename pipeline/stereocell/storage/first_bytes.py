@@ -9,30 +9,75 @@ _POINTERS = (
     (b"version https://git-lfs", "a pointer of Git LFS (`git lfs pull` gets the file)"),
     (b"/annex/objects", "a pointer of git-annex (`git annex get` gets the file)"),
 )
+_AS_TIFF = "convert it to TIFF or PNG"
+BIOFORMATS = "Fiji opens it by Bio-Formats: save it there as OME-TIFF"
+_OLE, _XML, _TEXT = (
+    "an OLE file (Olympus OIB, older Microsoft Office)",
+    "an XML file",
+    "a text file",
+)
+_ZIP = "a zip archive (unzip it, and name the file or folder in it)"
+_GUNZIP = "a gzip file (gunzip it)"
+SHARED = (_OLE, _XML, _TEXT, _ZIP, _GUNZIP)  # containers of many formats, which names tell apart
+_FRAMES = "extract its frames as PNG, as `ffmpeg -i FILE %05d.png` does"
+_TO_TIFF = "tifffile.imwrite makes a TIFF of the array"
+_CDF = (b"\x01", b"\x02", b"\x05")  # versions of netCDF-3
+# the first bytes of formats that are not read -> words, with the way out where there is one
 _MAGIC = (
     *_POINTERS,
-    (b"MATLAB 7.3", "a MATLAB 7.3 file (it holds HDF5: name it .h5)"),
-    (b"MATLAB 5.0", "a MATLAB file (save it with -v7.3, which holds HDF5, and name it .h5)"),
+    (b"\0\x05\x16\x07", "a record of macOS beside a file (the file's own name has no `._`)"),
+    (b"MATLAB 5.0", "a MATLAB file before 7.3 (save it in MATLAB with -v7.3)"),
+    *((b"CDF" + mark, "a netCDF-3 file (`nccopy -k nc4 IN OUT` makes netCDF-4)") for mark in _CDF),
     (b"\x93NUMPY", "a NumPy array (tifffile.imwrite makes a TIFF of it)"),
-    (b"PK\x03\x04", "a zip archive (unzip it, and name the file or folder in it)"),
     (b"PK\x05\x06", "an empty zip archive"),
     (b"\x89PNG\r\n", "a PNG image"),
     (b"\xff\xd8\xff", "a JPEG image"),
+    (b"\0\0\0\x0cjP  ", f"a JPEG 2000 image ({BIOFORMATS})"),
+    (b"\xff\x4f\xff\x51", f"a JPEG 2000 image ({BIOFORMATS})"),
+    (b"GIF8", f"a GIF image ({_AS_TIFF})"),
     (b"%PDF", "a PDF document"),
     (b"Rar!", "a rar archive (unpack it)"),
     (b"7z\xbc\xaf", "a 7z archive (unpack it)"),
     (b"BZh", "a bzip2 file (unpack it)"),
     (b"\xfd7zXZ", "an xz file (unpack it)"),
-    (b"\xd0\xcf\x11\xe0", "an OLE file (Olympus OIB, older Microsoft Office)"),
+    (b"\x28\xb5\x2f\xfd", "a Zstandard file (unpack it by zstd -d)"),
+    (b"\xd0\xcf\x11\xe0", _OLE),
     (b"# === DATA DESCRIPTION", "the header of Philips PAR/REC (dcm2niix makes NIfTI of it)"),
-    (b"GIF8", "a GIF image"),
-    (b"BM", "a BMP image"),
+    (b"OLYMPUSRAWFORMAT", f"an OIR file of Olympus ({BIOFORMATS})"),
+    (b"SIMPLE  =", f"a FITS file ({BIOFORMATS})"),
+    (b"MATRIX7", "an ECAT 7 file (nibabel reads it, and writes NIfTI)"),
+    (b"# AmiraMesh", f"an Amira mesh ({BIOFORMATS})"),
+    (b"# Avizo", "an Avizo file (save it there as TIFF)"),
+    (b"# vtk DataFile", "a VTK file (ParaView or SimpleITK writes it as MetaImage or NRRD)"),
+    (b"PAR1", "a Parquet table"),
+    (b"SQLite format 3", "an SQLite database"),
+    (b"\x1a\x45\xdf\xa3", f"a video ({_FRAMES})"),
 )
+# the same for formats whose mark has gaps or choices
+_PATTERNS = (
+    (rb"BM.{4}\x00{4}", "a BMP image"),
+    (rb"RIFF.{4}AVI ", f"a video ({_FRAMES})"),
+    (rb"RIFF.{4}WEBP", f"a WebP image ({_AS_TIFF})"),
+    (rb".{4}ftyp(hei|mif|avi)", f"an HEIF image ({_AS_TIFF})"),
+    (rb".{4}ftyp", f"a video ({_FRAMES})"),
+    (rb"\x00{3}\x03.{4}\x00{3}[\x00\x01]", f"a DM3 file of Gatan ({BIOFORMATS})"),
+    (rb"\x00{3}\x04.{8}\x00{3}[\x00\x01]", f"a DM4 file of Gatan ({BIOFORMATS})"),
+    (rb"\x80[\x02-\x05][\x95}\](c]", f"a Python pickle, which is never opened ({_TO_TIFF})"),
+    (rb"\s*ics_version\s", f"the header of an ICS image ({BIOFORMATS})"),
+    (rb"PK\x03\x04.{26}mimetypeapplication/vnd\.oasis", "a document of OpenOffice"),
+    (rb"PK\x03\x04.{26}\[Content_Types\]", "a document of Microsoft Office"),
+    (rb"PK\x03\x04.{26}[^\x00]{1,80}\.npy", f"a NumPy archive of arrays ({_TO_TIFF}, one by one)"),
+    (rb"PK\x03\x04", _ZIP),
+)
+_COMPILED = tuple((re.compile(mark, re.DOTALL), words) for mark, words in _PATTERNS)
+_JSON = re.compile(rb"\{\s*[\"}]|\[\s*([\"{\[\d\]-]|true|false|null)")
+_SECTION = re.compile(rb"\[[^\]\r\n]+\]\s*\r?\n")
 # where a format's mark lies, the mark -> the format (readers.READERS), and words for it
 _READ = (
     (128, b"DICM", "dicom", "a DICOM file"),  # goes first: its preamble may begin a TIFF
     *((0, mark, "tiff", "a TIFF file") for mark in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
     (0, b"\x89HDF\r\n\x1a\n", "hdf5", "an HDF5 file"),
+    (0, b"MATLAB 7.3", "hdf5", "a MATLAB 7.3 file"),  # HDF5 behind a block of 512 bytes
     (0, b"NRRD0", "nrrd", "an NRRD file"),
     (0, b"ZISRAWFILE", "czi", "a CZI file of Zeiss"),
     (0, b"\xda\xce\xbe\x0a", "nd2", "an ND2 file of Nikon"),
@@ -86,6 +131,9 @@ def identify(head: bytes) -> Content:
     for magic, words in _MAGIC:
         if head.startswith(magic):
             return Content(words)
+    for pattern, words in _COMPILED:
+        if pattern.match(head):
+            return Content(words)
     if not any(head):
         return Content(f"zeros (a copy or a download that did not finish: {_AGAIN})")
     return _text(head)
@@ -105,16 +153,16 @@ def _text(head: bytes) -> Content:
     if text.startswith((b"<?xml", b"<ome", b"<error")):
         is_error = b"<error" in text
         return Content(
-            f"an XML error of a server (a download that failed: {_AGAIN})"
-            if is_error
-            else "an XML file"
+            f"an XML error of a server (a download that failed: {_AGAIN})" if is_error else _XML
         )
+    if _SECTION.match(text):
+        return Content("a text file of settings ([section] and key=value lines)")
     if _METAIMAGE.match(head):
         return Content("the header of a MetaImage", "metaimage")
     if head.isascii() and all(byte >= 32 or byte in b"\t\r\n\f" for byte in head):
-        if text.startswith((b"{", b"[")):
+        if _JSON.match(text):
             return Content(f"JSON (a server's error, if it was downloaded: {_AGAIN})")
-        return Content("a text file")
+        return Content(_TEXT)
     return Content(f"other content (it begins with the bytes {head[:4].hex(' ')})", is_known=False)
 
 
@@ -127,7 +175,7 @@ def _packed(head: bytes) -> Content:
         return Content(f"a gzip file of nothing, or one that is cut short ({_AGAIN})")
     within = identify(inside) if not inside.startswith(_GZIP) else Content("a gzip file")
     if not within.is_known:
-        return Content("a gzip file (gunzip it)")
+        return Content(_GUNZIP)
     if within.format:
         return Content(f"a gzip file of {within.words} (gunzip it)", f"{within.format}.gz")
     return Content(f"a gzip file of {within.words}")

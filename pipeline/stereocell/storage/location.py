@@ -15,6 +15,7 @@ from fsspec.asyn import AsyncFileSystem, sync
 from fsspec.exceptions import FSTimeoutError
 
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
+from stereocell.storage.archives import ARCHIVE_SUFFIXES, ZARR_FILES, archive_in, has_zarr
 from stereocell.storage.first_bytes import HEAD_BYTES, identify
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
@@ -22,19 +23,19 @@ _TIFF_SUFFIXES = (
     *(".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf"),
     *(".companion.ome", ".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
 )
-_PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg")
+_PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg", ".bmp")
 _MAX_OTHERS = 200  # files without an image's name that are looked into for DICOM
 _ZARR_SUFFIXES = (".ome.zarr", ".zarr")
 _NIFTI_SUFFIXES = (".nii", ".nii.gz")
 _DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
 _ANALYZE_SUFFIXES = (".hdr", ".img", ".hdr.gz", ".img.gz")  # also pairs of NIfTI
-_ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
 # format -> endings of its files' names, in lower case
 _FILE_SUFFIXES = {
     "tiff": _TIFF_SUFFIXES,
     "nifti": _NIFTI_SUFFIXES,
+    "mgh": (".mgh", ".mgz", ".mgh.gz"),
     "ims": (".ims",),
-    "hdf5": (".h5", ".hdf5", ".hdf"),
+    "hdf5": (".h5", ".hdf5", ".hdf", ".nc", ".nc4", ".mat", ".emd"),
     "nrrd": (".nrrd", ".nhdr"),
     "metaimage": (".mha", ".mhd"),
     "mrc": tuple(
@@ -48,7 +49,7 @@ _FILE_SUFFIXES = {
 }
 # formats that are known by a file's first bytes, whatever its name (IMOD calls MRC .st, .ali, ...)
 _BY_CONTENT = ("dicom", "tiff", "hdf5", "nrrd", "czi", "nd2", "lif", "mrc")
-_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf)):(.*)", re.IGNORECASE | re.DOTALL)
+_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf|nc|nc4|mat|emd)):(.*)", re.IGNORECASE | re.DOTALL)
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
 _CONNECT_S, SILENCE_S = 15.0, 30.0  # limits of one request; s3fs repeats it
 _AWS_CREDENTIALS = (
@@ -97,8 +98,9 @@ class Location:
 
     @property
     def path(self) -> str:
-        """The file or folder on this machine, without a dataset's key."""
-        return _split_key(self.source)[0]
+        """The file or folder on this machine, without a dataset's key or a path in a zip file."""
+        path = _split_key(self.source)[0]
+        return archive_in(path) or path
 
     @property
     def key(self) -> str:
@@ -123,14 +125,15 @@ class Location:
     @property
     def parts(self) -> tuple[str, ...]:
         """The names along the path."""
-        path = self.path if self.is_local else self.shown.partition("://")[2]
+        path = _split_key(self.source)[0] if self.is_local else self.shown.partition("://")[2]
         return tuple(part for part in path.split("/") if part)
 
     @property
     def name(self) -> str:
         """The file's name without its suffix, for display; `plate.zarr/0` becomes `plate-0`."""
         parts = self.parts
-        outermost = (i for i, part in enumerate(parts) if part.endswith((".zarr", ".n5")))
+        whole = (".zarr", ".n5", *ARCHIVE_SUFFIXES)
+        outermost = (i for i, part in enumerate(parts) if part.endswith(whole))
         first = next(outermost, len(parts) - 1)
         return "-".join(_stem(part) for part in parts[first:]) or "dataset"
 
@@ -143,9 +146,11 @@ class Location:
         """
         if any(part.endswith(".zarr") for part in self.parts):
             return "ome-zarr"
+        if self.is_zarr_archive:
+            return "ome-zarr"
         if any(part.endswith(".n5") for part in self.parts) or self._is_n5():
             return "n5"
-        if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in _ZARR_FILES):
+        if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in ZARR_FILES):
             return "ome-zarr"
         if self.is_local and _holds_planes(self.source):
             return "planes"
@@ -167,6 +172,14 @@ class Location:
         if last.endswith(_ANALYZE_SUFFIXES):
             return "nifti"
         return "bdv" if self._is_bdv() else None
+
+    @property
+    def is_zarr_archive(self) -> bool:
+        """Whether a source is a zip file of OME-Zarr or a group in one; at an address by name."""
+        if not self.is_local:
+            return bool(self.parts) and self.parts[-1].lower().endswith(ARCHIVE_SUFFIXES)
+        path = archive_in(self.source)
+        return bool(path) and has_zarr(path)
 
     def _is_bdv(self) -> bool:
         """Whether a file is the XML of BigDataViewer."""
@@ -341,7 +354,8 @@ def first_bytes(path: str, *, count: int = HEAD_BYTES) -> bytes:
 
 def _stem(name: str) -> str:
     files = (ending for endings in _FILE_SUFFIXES.values() for ending in endings)
-    for suffix in sorted((*_ZARR_SUFFIXES, ".n5", ".xml", *files), key=len, reverse=True):
+    endings = (*_ZARR_SUFFIXES, *ARCHIVE_SUFFIXES, ".zip", ".n5", ".xml", *files)
+    for suffix in sorted(endings, key=len, reverse=True):
         if name.lower().endswith(suffix) and len(name) > len(suffix):
             return name[: -len(suffix)]
     return name

@@ -17,3 +17,11 @@ class OpenHdf5:
     def attribute(self, node: str, name: str) -> Any:
         """Return an attribute of a group or dataset. Raises h5py's errors."""
         return self._file[node].attrs[name]
+
+    def scales(self, node: str) -> list[list[str]]:
+        """Return the paths of a dataset's dimension scales, a list for each dimension.
+
+        Raises h5py's errors.
+        """
+        listed = self._file[node].attrs["DIMENSION_LIST"]
+        return [[str(self._file[one].name or "") for one in references] for references in listed]

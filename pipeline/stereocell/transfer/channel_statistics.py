@@ -18,6 +18,8 @@ from stereocell.model.channel import (
     TransferFunctions2d,
 )
 from stereocell.model.lattice_field import LatticeField
+from stereocell.model.modality import TRACER_MODALITIES
+from stereocell.transfer import heat
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
     Threshold,
@@ -25,7 +27,7 @@ from stereocell.transfer.adaptive_threshold import (
     make_histogram,
 )
 from stereocell.transfer.boundaries import SuggestedShapes
-from stereocell.transfer.ct_tissues import tissue_functions
+from stereocell.transfer.ct_tissues import opening_function, tissue_functions
 from stereocell.transfer.opacity import make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import fall_back
@@ -96,10 +98,13 @@ def make_appearance(
     confidence: float,
     doubt: str,
     modality: str = "",
+    level_percentile: float = 99.0,
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
 
+    doubt     why there is no level, or why the level cannot be called clear; empty: it can
     modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
+    level_percentile  percent of the voxels below the level of a volume without a surface
     """
     iso_value, threshold = None, None
     if level is not None:
@@ -108,7 +113,10 @@ def make_appearance(
         # where nothing tells a surface from noise, peaks of the histogram are noise too
         threshold = statistics.threshold
     surface: SurfaceConfidence = "none" if level is None else "clear"
-    if level is not None and confidence < LOW_CONFIDENCE:
+    if level is not None and doubt:
+        surface = "unsure"
+        doubt = f"unsure surface: at {level.words}: {doubt}"
+    elif level is not None and confidence < LOW_CONFIDENCE:
         surface = "unsure"
         doubt = (
             f"unsure surface: at {level.words} with a confidence of {confidence:.2f}; "
@@ -131,10 +139,26 @@ def make_appearance(
         appearance.iso_normalized,
         threshold_normalized=appearance.threshold_normalized,
         has_magnitudes=modality == "MR",
+        level_percentile=level_percentile,
+        is_calibrated=modality == "CT",
     )
+    function = None
     if modality == "CT":
         functions |= tissue_functions(statistics.window)
+        function = opening_function(iso_value, functions)
     transfer_2d = statistics.suggested.transfer_2d
+    if modality in TRACER_MODALITIES:
+        organs = appearance.iso_normalized
+        if organs is None:
+            organs = next(x for x, opacity in functions["default"] if opacity > 0)
+        bands = {heat.NAME: heat.heat_shapes(organs)}
+        transfer_2d = replace(transfer_2d, functions={**transfer_2d.functions, **bands})
+        function = heat.NAME
     for name_2d, shapes in transfer_2d.functions.items():
         functions[name_2d] = fall_back(shapes)
-    return replace(appearance, transfer_functions=functions, transfer_2d=transfer_2d)
+    return replace(
+        appearance,
+        transfer_functions=functions,
+        transfer_2d=transfer_2d,
+        function=function or appearance.function,
+    )

@@ -9,6 +9,8 @@ P. F. J. New & S. Aronow, "Attenuation measurements of whole blood and blood fra
 tomography", Radiology 121, 1976. doi:10.1148/121.3.635 (whole blood to retracted clot, 40 to 90)
 """
 
+from collections.abc import Collection
+
 from stereocell.model.channel import OpacityPoints
 
 TISSUES: dict[str, tuple[float, float]] = {
@@ -19,7 +21,19 @@ TISSUES: dict[str, tuple[float, float]] = {
     "bone": (250.0, 3071.0),
 }
 _OPACITY = {"air": 0.05, "fat": 0.3, "soft_tissue": 0.25, "blood": 0.5, "bone": 0.8}
+BONE = "bone"
+BONE_LEVEL_HU = 150.0  # from here on a surface is one of bone: soft tissue ends there
 _SOFT_HU = 10.0  # Hounsfield units over which opacity rises
+
+
+def opening_function(level: float | None, functions: Collection[str]) -> str | None:
+    """Return the tissue whose function fits a surface best; None: the general one does.
+
+    level      where the surface lies, Hounsfield units; None: there is none
+    functions  names of the functions that there are
+    """
+    is_bone = level is not None and level >= BONE_LEVEL_HU
+    return BONE if is_bone and BONE in functions else None
 
 
 def tissue_functions(window: tuple[float, float]) -> dict[str, OpacityPoints]:

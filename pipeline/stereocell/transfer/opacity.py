@@ -15,6 +15,10 @@ NAMES = ("default", "soft", "sharp", "surface")
 THRESHOLD = "threshold"  # name of the function of channels that have a threshold
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
+# Share of the window by which a body's opacity begins below its surface: 36 HU of a CT's. The edge
+# of a body crosses it within a voxel, and a step would be jagged.
+BELOW_BODY = 0.012
+SOLID_BODY = 0.06  # share of the window above the surface in which a body becomes opaque: 180 HU
 NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them
 FAINT = 1e-2  # share of the peak's count: rarer noise is left, since dim materials are as rare
 MAX_SHIFT = 1.5  # x the level, to which noise may push the start of the opacity
@@ -26,41 +30,38 @@ def make_transfer_functions(
     *,
     threshold_normalized: float | None = None,
     has_magnitudes: bool = False,
+    level_percentile: float = 99.0,
+    is_calibrated: bool = False,
 ) -> dict[str, OpacityPoints]:
     """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
 
     histogram             int64 (bins,), voxel counts over 0..1 in equal bins
     iso_normalized        the iso-value, 0..1; None: the channel has no clear surface
     threshold_normalized  the adaptive threshold, 0..1; None: there is none
+    level_percentile      percent of the voxels below the level of a channel without a surface
     has_magnitudes        whether values are magnitudes, as of MR: the air is noise, voxel by voxel
+    is_calibrated         whether values lie on an absolute scale, as the Hounsfield units of CT
 
-    Opacity starts half-way between the median, since most voxels are background, and the level. The
-    level is the iso-value, or the 99th percentile in a channel without a clear surface. Noise of
-    magnitudes would be dust in front of a surface: opacity starts where it ends. That is below the
-    level, unless the counts still fall steeply there: then a part of the air lies above the level,
-    which the surface leaves out as specks, and the volume has to, too. (Of light the background has
-    structure, and a foot so steep would show the steps of rays: of the brain-cells stack 35 instead
-    of over 40 dB.)
+    The level is the iso-value, or a percentile in a channel without a clear surface.
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)
-    percentile = {p: (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, 0.99)}
-    level = percentile[0.99] if iso_normalized is None else iso_normalized
-    level = float(np.clip(level, 0.02, 0.96))
-    halfway = min(max(0.5 * (percentile[0.5] + level), 0.5 * level), 0.9 * level)
-    floor = halfway
-    bright = max(level + 0.5 * (1 - level), level + 0.02)
-    if has_magnitudes and iso_normalized is not None:
-        below = histogram[: int(level * bins)]
-        floor = max(floor, min(_end_of_noise(below) / bins, FOOT * level))
-        beyond = level + _noise_beyond(below) / bins
-        if beyond > level:
-            floor = min(beyond, MAX_SHIFT * level, FOOT * (level + bright) / 2)
-    top = max(level, floor / FOOT)
+    median, high = (
+        (int(np.searchsorted(share, p)) + 1) / bins for p in (0.5, level_percentile / 100)
+    )
+    level = float(np.clip(high if iso_normalized is None else iso_normalized, 0.02, 0.96))
+    has_surface = iso_normalized is not None
+    if is_calibrated and has_surface:
+        rise = _rise_of_body(level)
+    else:
+        below = histogram[: int(level * bins)] if has_magnitudes and has_surface else None
+        rise = _rise(level, median, below, bins)
+    floor, top, bright = rise
     at_top = 0.12 + (0.45 - 0.12) * (top - level) / (bright - level)
+    soft = floor if is_calibrated and has_surface else 0.6 * floor
     functions = {
         "default": _points((floor, 0.0), (top, at_top), (bright, 0.45), (1.0, 0.6)),
-        "soft": _points((0.6 * floor, 0.0), (level, 0.04), (1.0, 0.2)),
+        "soft": _points((soft, 0.0), (level, 0.04), (1.0, 0.2)),
         "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
         "surface": _points(
             (0.85 * level, 0.0), (level, 0.5), (min(1.15 * level, 0.99), 0.0), (1.0, 0.0)
@@ -71,6 +72,39 @@ def make_transfer_functions(
         top = start + min(RAMP, 0.9 * (1 - start))
         functions[THRESHOLD] = _points((start, 0.0), (top, 0.45), (1.0, 0.6))
     return functions
+
+
+def _rise_of_body(level: float) -> tuple[float, float, float]:
+    """Return where the opacity of a CT's body starts, where its level is, and where it is solid.
+
+    On a calibrated scale nothing between air and the surface is of interest: opacity that starts
+    half-way would be a veil before the skin, and before bone all of the soft tissue.
+    """
+    return max(level - BELOW_BODY, 0.5 * level), level, min(level + SOLID_BODY, 0.99)
+
+
+def _rise(
+    level: float, median: float, below: NDArray[np.int64] | None, bins: int
+) -> tuple[float, float, float]:
+    """Return where opacity starts, where it is that of the level, and where the body is bright.
+
+    below  int64, voxel counts below the surface of magnitudes; None: values are none
+
+    Opacity starts half-way between the median, since most voxels are background, and the level.
+    Noise of magnitudes would be dust in front of a surface: opacity starts where it ends. That is
+    below the level, unless the counts still fall steeply there: then a part of the air lies above
+    the level, which the surface leaves out as specks, and the volume has to, too. (The background
+    of fluorescence has structure, and a foot so steep would show the steps of rays: of the
+    brain-cells stack 35 instead of over 40 dB.)
+    """
+    floor = min(max(0.5 * (median + level), 0.5 * level), 0.9 * level)
+    bright = max(level + 0.5 * (1 - level), level + 0.02)
+    if below is not None:
+        floor = max(floor, min(_end_of_noise(below) / bins, FOOT * level))
+        beyond = level + _noise_beyond(below) / bins
+        if beyond > level:
+            floor = min(beyond, MAX_SHIFT * level, FOOT * (level + bright) / 2)
+    return floor, max(level, floor / FOOT), bright
 
 
 def _end_of_noise(below: NDArray[np.int64]) -> float:

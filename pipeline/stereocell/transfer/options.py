@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import Bounds, setting
+from stereocell.model.settings import Bounds, require_bounds, setting
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,15 @@ class WindowOptions:
         99.95, "percent of the voxels that stay below 255", bounds=Bounds(0, 100)
     )
 
+    volume_percentile: float = setting(
+        99.0,
+        "percent of the voxels that are fainter than what the volume of a channel without a "
+        "surface shows",
+        bounds=Bounds(1, 100),
+    )
+
     def __post_init__(self) -> None:
+        require_bounds("window", self)
         if not 0 <= self.low_percentile < self.high_percentile <= 100:
             raise UsageError(
                 f"window percentiles are {self.low_percentile:g} and {self.high_percentile:g}, "

@@ -20,6 +20,9 @@ from stereocell.storage.atomic_write import replacing
 METERS_PER_UNIT = 1e-6  # a stage unit is 1 um
 UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
+# on /Specimen: the plane that it opens cut by, as its normal (x, y, z) and its offset, um, world
+OPENING_CUT = "stereocell:openingCut"
+OPENS = "stereocell:opens"  # on a channel's prim: whether it shows when the specimen is opened
 PAINTED_BY = "stereocell:paintedBy"  # on a channel's prim: ID of the channel that is painted on it
 BUILT_COLOR = "stereocellBuiltColor"  # custom data of a surface's colour: the colour of the build
 CHANNELS = ROOT.AppendChild("Channels")

@@ -17,7 +17,7 @@ from stereocell.model.channel import (
 )
 from stereocell.model.errors import StageError
 from stereocell.model.settings import MAX_VOXEL_VALUE
-from stereocell.usd.layer import BUILT_COLOR, CHANNELS
+from stereocell.usd.layer import BUILT_COLOR, CHANNELS, OPENS
 from stereocell.usd.numbers2d import read_numbers
 from stereocell.usd.read_attributes import (
     color_of,
@@ -63,6 +63,7 @@ class ComposedAppearance:
     chosen         a transfer function
     transfer_2d    those functions that are two-dimensional
     threshold      where the body begins, in voxel values; None: it is not known
+    opens          whether the channel shows when the specimen is opened
     """
 
     id: str
@@ -78,6 +79,7 @@ class ComposedAppearance:
     threshold: float | None = None
     surface_reason: str = ""
     level: StatedLevel | None = None
+    opens: bool = True
 
     @property
     def iso_normalized(self) -> float | None:
@@ -198,6 +200,7 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         _number(prim, "stereocell:threshold"),
         text_of(prim.GetAttribute("stereocell:surfaceReason")),
         _level(prim),
+        read_as(prim.GetAttribute(OPENS), Sdf.ValueTypeNames.Bool) is not False,
     )
 
 

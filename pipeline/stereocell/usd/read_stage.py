@@ -17,6 +17,7 @@ from stereocell.storage.workspace import cached
 from stereocell.usd.drawn_prims import FARTHEST_UM, is_visible, require_composed, to_world
 from stereocell.usd.layer import (
     CHANNELS,
+    OPENING_CUT,
     PATIENT_API,
     ROOT,
     SIDES,
@@ -26,6 +27,7 @@ from stereocell.usd.layer import (
 from stereocell.usd.layer_units import require_units
 from stereocell.usd.read_attributes import (
     Point,
+    numbers_of,
     point_of,
     select_variant,
 )
@@ -90,6 +92,23 @@ def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
         x, y, z = (float(part) for part in np.round(along / length, _SIDE_DIGITS) + 0.0)
         sides[side] = (x, y, z)
     return sides
+
+
+def opening_cut_of(stage: Usd.Stage) -> tuple[Point, float] | None:
+    """Return the plane that the specimen opens cut by: its unit normal, which leads to what is cut
+    away, and its offset, um, world; None: it opens whole.
+
+    Raises StageError for a normal without a direction.
+    """
+    root = stage.GetPrimAtPath(ROOT)
+    if root.GetAttribute(OPENING_CUT).Get() is None:
+        return None
+    *normal, offset = numbers_of(root, OPENING_CUT, 4)
+    length = float(np.linalg.norm(normal))
+    if not 0 < length < FARTHEST_UM or not abs(offset) < FARTHEST_UM * length:
+        raise StageError(f"{ROOT}.{OPENING_CUT}: found {normal}, {offset:g}, expected a plane")
+    x, y, z = (float(part) for part in np.round(np.array(normal) / length, _SIDE_DIGITS) + 0.0)
+    return (x, y, z), offset / length
 
 
 def tile_prims(stage: Usd.Stage) -> list[Usd.Prim]:

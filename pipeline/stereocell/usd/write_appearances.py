@@ -32,6 +32,7 @@ from stereocell.usd.layer import (
     BUILT_COLOR,
     CHANNEL_API,
     CHANNELS,
+    OPENS,
     PAINTED_BY,
     ROOT,
     export,
@@ -41,7 +42,7 @@ from stereocell.usd.layer import (
 from stereocell.usd.numbers2d import write_numbers
 from stereocell.usd.write_objects import write_columns
 
-DEFAULT_FUNCTION = "default"
+DEFAULT_FUNCTION = "default"  # what a stage that selects no function is drawn with
 _STORM = "glslfx"  # Storm's name among the render contexts of materials
 ROUGHNESS = 0.5  # roughness of all surfaces: the default of UsdPreviewSurface
 
@@ -123,6 +124,8 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
         set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*appearance.window))
     set_attribute(prim, "stereocell:isoConfidence", _Types.Float, appearance.iso_confidence)
     set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, appearance.surface)
+    if not appearance.opens:
+        set_attribute(prim, OPENS, _Types.Bool, False)
     if appearance.surface_reason:
         reason = appearance.surface_reason
         set_attribute(prim, "stereocell:surfaceReason", _Types.String, reason)
@@ -180,7 +183,7 @@ def _author_functions(prim: Usd.Prim, appearance: Appearance) -> None:
             set_attribute(prim, "stereocell:lut", _Types.Asset, f"./{_lut_name(appearance, name)}")
             if name in appearance.transfer_2d.functions:
                 _author_shapes(prim, appearance.transfer_2d.functions[name])
-    variants.SetVariantSelection(DEFAULT_FUNCTION)
+    variants.SetVariantSelection(appearance.function)
 
 
 def _author_shapes(prim: Usd.Prim, shapes: Shapes) -> None:

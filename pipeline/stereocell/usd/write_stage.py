@@ -33,6 +33,7 @@ from stereocell.storage.workspace import cached
 from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import (
     LAYER_SUFFIXES,
+    OPENING_CUT,
     PATIENT_API,
     ROOT,
     SIDES,
@@ -87,6 +88,7 @@ def write_stage(
     modality: str = "",
     placement: Matrix = IDENTITY,
     has_sides: bool = False,
+    opens_cut: bool = False,
     tables: Mapping[str, ObjectTable] | None = None,
 ) -> None:
     """Write stage.usda and looks/ over tiles that `write_tile` has written.
@@ -101,6 +103,8 @@ def write_stage(
                 identity is not written
     has_sides   whether the placed specimen lies as read/anatomical_axes.py has it: then the group
                 of the tiles says where left, posterior and superior are
+    opens_cut   whether a plane through the specimen's middle opens it to the first view, which is
+                from the right of the front; of a patient it lies between left and right
 
     tables      of the objects of label maps, by the ID of their channel
 
@@ -139,6 +143,8 @@ def write_stage(
         box[:] = every[:, 0].min(axis=0), every[:, 1].max(axis=0)
         UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(box))
     moved = np.array([move_box(low, high, move) for low, high in boxes])
+    if opens_cut:
+        _state_cut(root, moved)
     define_cameras(stage, moved[:, 0].min(axis=0), moved[:, 1].max(axis=0))
 
     layer = stage.GetRootLayer()
@@ -147,6 +153,15 @@ def write_stage(
     del stage  # the sublayers' paths only resolve beside the file
     layer.subLayerPaths = ["./looks/channels.usda", "./looks/lights.usda"]
     export(layer, stage_dir / STAGE_NAME)
+
+
+def _state_cut(root: Usd.Prim, boxes: NDArray[np.float64]) -> None:
+    """State the plane that the specimen opens cut by: what lies beyond its middle along x is gone.
+
+    boxes  (tiles, 2, 3), lower and upper corners (x, y, z), um, world
+    """
+    middle = float(boxes[:, 0, 0].min() + boxes[:, 1, 0].max()) / 2
+    set_attribute(root, OPENING_CUT, Sdf.ValueTypeNames.Double4, Gf.Vec4d(1, 0, 0, middle))
 
 
 def _state_sides(group: Usd.Prim, move: NDArray[np.float64]) -> None:

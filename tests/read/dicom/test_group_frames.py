@@ -123,7 +123,8 @@ def test_planes_that_wobble_about_their_middles_make_no_tilt(
 
     write_series(tmp_path / "s", affine, shape, change=change)
     dataset = read.open(tmp_path / "s")
-    assert dataset.notes == ()
+    (note,) = dataset.notes
+    assert note.startswith("ImageOrientationPatient changes by up to 0.046 degrees")
     assert error(dataset) <= 0.51 + 0.01 * 1000 / 3.5  # um, by the steepest body's slope
 
 
@@ -151,23 +152,55 @@ def test_localizers_of_one_series_are_not_said_to_interleave(tmp_path: Path) -> 
     assert not any("among" in line for line in lines)
 
 
-@pytest.mark.parametrize("name", ["SeriesInstanceUID", "FrameOfReferenceUID"])
-def test_a_series_or_frame_of_reference_for_each_slice_is_said(tmp_path: Path, name: str) -> None:
-    write_series(tmp_path / "s", AFFINE, SHAPE, change=lambda ds: setattr(ds, name, generate_uid()))
+def test_a_series_for_each_slice_is_said(tmp_path: Path) -> None:
+    def change(ds: pydicom.Dataset) -> None:
+        ds.SeriesInstanceUID = generate_uid()
+
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=change)
     with pytest.raises(SourceError) as caught:
         read.open(tmp_path / "s")
     line = str(caught.value)
-    assert f"found 10 stacks of one slice each, told apart by {name}; expected" in line
+    assert "found 10 stacks of one slice each, told apart by SeriesInstanceUID; expected" in line
 
 
-def test_points_in_time_do_not_hide_that_each_slice_is_a_stack(tmp_path: Path) -> None:
+def new_reference(ds: pydicom.Dataset) -> None:
+    ds.FrameOfReferenceUID = generate_uid()
+
+
+@pytest.mark.parametrize("plane", ["axial", "sagittal"])
+def test_slices_of_a_frame_of_reference_each_are_joined(tmp_path: Path, plane: str) -> None:
+    affine = grid(plane, SHAPE, (2.5, 2.0, 2.2), rotation=turn((1, 2, -0.5), 23.0))
+    write_series(tmp_path / "s", affine, SHAPE, change=new_reference)
+    dataset = read.open(tmp_path / "s")
+    assert error(dataset) <= 0.51
+    (note,) = dataset.notes
+    assert note.startswith("each of 10 slices has a FrameOfReferenceUID of its own")
+
+
+def test_points_in_time_of_joined_slices_stay(tmp_path: Path) -> None:
     for time in range(2):
 
         def change(ds: pydicom.Dataset, time: int = time) -> None:
-            ds.FrameOfReferenceUID = f"1.2.{round(float(ds.ImagePositionPatient[2]) * 10) + 999}"
-            ds.PixelData = bytes([time]) + ds.PixelData[1:]
+            new_reference(ds)
+            ds.RescaleIntercept = 7 * time
 
         folder = tmp_path / "s" / str(time)
         write_series(folder, AFFINE, SHAPE, series="1.2.3", seed=time, change=change)
-    with pytest.raises(SourceError, match="10 stacks of one slice each, told apart by FrameOf"):
+    assert read.open(tmp_path / "s").time_points == 2
+
+
+@pytest.mark.parametrize("indices", [[0, 1, 2.3, 3, 4, 5.6], [0, 1]])
+def test_slices_of_a_frame_of_reference_each_at_irregular_places_are_refused(
+    tmp_path: Path, indices: list[float]
+) -> None:
+    write_series(tmp_path / "s", AFFINE, SHAPE, indices=indices, change=new_reference)
+    with pytest.raises(SourceError, match="stacks of one slice each, told apart by FrameOfRef"):
         read.open(tmp_path / "s")
+
+
+def test_stacks_of_two_frames_of_reference_stay_apart(tmp_path: Path) -> None:
+    def change(ds: pydicom.Dataset) -> None:
+        ds.FrameOfReferenceUID = f"1.2.{ds.InstanceNumber % 2 + 1}"
+
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=change)
+    assert len(read.list_series(tmp_path / "s")) == 2

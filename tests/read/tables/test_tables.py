@@ -67,10 +67,142 @@ def test_what_spreadsheets_and_pandas_write(tmp_path: Path) -> None:
     assert b.texts == ("T cell", "B")
 
 
-@pytest.mark.parametrize("ending", ["", ".0", ".", "e0"])
+def numbers(tmp_path: Path, text: str, name: str = "t.csv") -> dict[str, list[float]]:
+    """Return the columns of numbers of a table of text."""
+    table = read_table(csv(tmp_path, text, name), "", (), "cells")
+    return {c.name: c.numbers.tolist() for c in table.columns if c.numbers is not None}
+
+
+def notes(tmp_path: Path, text: str) -> str:
+    return " ".join(read_table(csv(tmp_path, text), "", (), "cells").notes)
+
+
+ERRORS = [
+    "#DIV/0!",
+    "#N/A",
+    "-",
+    "n.d.",
+    "Inf",
+    "-inf",
+    "NaN",
+    "",
+    " ",
+    "#NUM!",
+    "\u2013",
+    "1.#INF",
+]
+
+
+@pytest.mark.parametrize("word", [*ERRORS, "failed", "out of range"])
+def test_words_among_numbers_are_missing_values_and_are_quoted(tmp_path: Path, word: str) -> None:
+    rows = [f"{label},{label / 2}" for label in range(1, 20)]
+    text = "\n".join(["label,area", f"20,{word}", *rows])
+    (area,) = numbers(tmp_path, text).values()
+    assert np.isnan(area[0])
+    assert area[1:] == [label / 2 for label in range(1, 20)]
+    quoted = repr(word.strip()) if word.strip() else "empty"
+    assert f"1 cell in columns of numbers taken for missing values: area: {quoted} (1)" in notes(
+        tmp_path, text
+    )
+
+
+def test_a_column_with_many_words_holds_categories(tmp_path: Path) -> None:
+    cells = ["1", "2", "tumour", "stroma", "3", "tumour", "tumour"]
+    text = "label,zone\n" + "".join(f"{i},{cell}\n" for i, cell in enumerate(cells, start=1))
+    (zone,) = read_table(csv(tmp_path, text), "", (), "cells").columns
+    assert (zone.texts, notes(tmp_path, text)) == (tuple(cells), "")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("label;a\n1;99.250,00\n2;5,5\n", [99250, 5.5]),  # German
+        ("label;a\n1;1.234.567\n2;0,5\n", [1234567, 0.5]),
+        ("label;a\n1;99\u202f250,5\n2;5\n", [99250.5, 5]),  # French
+        ("label,a\n1,99'250.5\n2,5\n", [99250.5, 5]),  # Swiss
+        ('label,a\n1,"99,250.5"\n2,5\n', [99250.5, 5]),  # English
+        ('label,a\n1,"0,125"\n2,"1,5"\n', [0.125, 1.5]),
+        ("label\ta\n1\t0,125\n2\t-1,5e-3\n", [0.125, -0.0015]),
+        ("label;a\n1;1.234\n2;5.5\n", [1.234, 5.5]),  # pandas with sep=";"
+        ("label;a\n1;\u22121,5\n2;+2,5\n", [-1.5, 2.5]),
+    ],
+)
+def test_decimal_marks_and_marks_between_thousands(
+    tmp_path: Path, text: str, expected: list[float]
+) -> None:
+    assert numbers(tmp_path, text) == {"a": expected}
+
+
+@pytest.mark.parametrize("cell", ["99.250,5", "99\u202f250,5", "99'250,5"])
+def test_marks_between_thousands_are_noted(tmp_path: Path, cell: str) -> None:
+    told = notes(tmp_path, f"label;a;b\n1;{cell};1,5\n2;5,5;2\n")
+    assert f"marks between thousands are left out: {cell} is 99250.5" in told
+    assert "thousands" not in notes(tmp_path, "label;a\n1;0,125\n2;12,5\n3;5\n")
+    assert "thousands" not in notes(tmp_path, "label,a,b\n1,0.125,7\n2,12.5,100\n")
+
+
+def test_a_mark_that_other_cells_do_not_explain_is_noted(tmp_path: Path) -> None:
+    text = "label;count;area\n1;1.234;0,5\n2;5.678;1,5\n"
+    assert numbers(tmp_path, text)["count"] == [1234, 5678]
+    assert "'count': not stated, a comma (1.234 is 1234) is assumed, as in other" in notes(
+        tmp_path, text
+    )
+    text = 'label,count\n1,"1,234"\n2,"5,678"\n'
+    assert numbers(tmp_path, text)["count"] == [1234, 5678]
+    assert "a point (1,234 is 1234) is assumed, as no other cell" in notes(tmp_path, text)
+    assert notes(tmp_path, "label;word;a\n1;x, y;1.234\n2;z;5.678\n") == ""
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig", "cp1252"])
+def test_encodings_of_spreadsheets(tmp_path: Path, encoding: str) -> None:
+    text = "label\tvolume (\u00b5m\u00b3)\tkind\r\n1\t2,5\tgr\u00fcn\r\n"
+    (tmp_path / "t.csv").write_bytes(text.encode(encoding))
+    table = read_table(str(tmp_path / "t.csv"), "", (), "cells")
+    volume, kind = table.columns
+    assert (volume.name, kind.texts) == ("volume (\u00b5m\u00b3)", ("gr\u00fcn",))
+    assert any("Windows-1252 is assumed" in note for note in table.notes) == (encoding == "cp1252")
+
+
+@pytest.mark.parametrize(
+    ("before", "told"),
+    [
+        ("\nVolume\n====================\n", "in line 4"),  # Imaris
+        ("sep=;\n", ""),
+        ("# written on a Monday\n\n", "in line 3"),
+        ("Image;Cells;Cells;Cells\n", "in line 2"),  # CellProfiler
+        ("Pixel size;0.25\nDate;1.5.2024\n", "in line 3"),
+    ],
+)
+def test_lines_before_the_header_are_left_out(tmp_path: Path, before: str, told: str) -> None:
+    text = before + "Volume;Unit;ID;\n0.5;um^3;3;\n1.5;um^3;4;\n;;;\n"
+    table = read_table(csv(tmp_path, text), "", (), "cells")
+    assert (table.key, table.labels.tolist()) == ("ID", [3, 4])
+    assert [column.name for column in table.columns] == ["Volume", "Unit"]
+    assert (told in " ".join(table.notes)) if told else not table.notes
+
+
+def test_names_that_occur_twice_get_their_group(tmp_path: Path) -> None:
+    text = "Image,Cells,Nuclei\nObjectNumber,Area,Area\n1,2,3\n"
+    assert numbers(tmp_path, text) == {"Cells Area": [2], "Nuclei Area": [3]}
+
+
+def test_a_table_of_imagej_is_joined_by_its_nameless_column(tmp_path: Path) -> None:
+    place = csv(tmp_path, " ,Label,Mean\n1,cells.tif:1,5.5\n2,cells.tif:2,6\n")
+    assert "--table-key 'column 1' takes the first column" in refusal(place)
+    table = read_table(place, "column 1", (), "cells")
+    assert (table.labels.tolist(), [c.name for c in table.columns]) == ([1, 2], ["Label", "Mean"])
+
+
+def test_a_row_of_data_is_never_taken_for_the_header(tmp_path: Path) -> None:
+    assert "no column of the objects' numbers: found a, b" in refusal(
+        csv(tmp_path, "a,b\n1,2\nid,label\n")
+    )
+
+
+@pytest.mark.parametrize("ending", ["", ".0", ".", "e0", ",0"])
 def test_64_bits(tmp_path: Path, ending: str) -> None:
     """Programs write whole numbers as real ones too; a double would round these."""
-    text = f"label,a\n{2**63 + 1}{ending},1\n{2**53 + 1}{ending},2\n"
+    text = f"label;a\n{2**63 + 1}{ending};1\n{2**53 + 1}{ending};2\n"
     table = read_table(csv(tmp_path, text), "", (), "cells")
     assert table.labels.tolist() == [2**63 + 1, 2**53 + 1]
 

@@ -85,14 +85,21 @@ export class ClipMark {
       if (mesh !== undefined) mesh.visible = true;
     }
     this.arm.visible = plane !== null;
-    this.rim.visible = this.sheet.visible = plane !== null;
+    this.rim.visible = plane !== null;
+    this.sheet.visible = this.isSheetShown;
     if (plane !== null) this.showPlane(plane, shown);
+  }
+
+  /** The sheet shows where a plane goes that is dragged; at rest it would lie behind what is cut. */
+  private get isSheetShown(): boolean {
+    return this.rim.visible && this.meant?.startsWith("plane") === true;
   }
 
   /** Which handle is pointed at, or held; whether it is another than before. */
   mean(id: HandleId | null): boolean {
     if (id === this.meant) return false;
     this.meant = id;
+    this.sheet.visible = this.isSheetShown;
     for (const [each, { material }] of this.handles) {
       material.color.setHex(each === id ? BRIGHT : each.startsWith("plane") ? PLANE : ACCENT);
     }
@@ -111,7 +118,8 @@ export class ClipMark {
     const corners = planeSection(plane, shown);
     write(this.rim.geometry, corners);
     this.sheet.geometry.setDrawRange(0, 3 * Math.max(0, corners.length - 2));
-    this.rim.visible = this.sheet.visible = corners.length > 0;
+    this.rim.visible = corners.length > 0;
+    this.sheet.visible = this.isSheetShown;
     const middle = this.handles.get("plane-middle");
     const tip = this.handles.get("plane-tip");
     if (middle === undefined || tip === undefined) return;

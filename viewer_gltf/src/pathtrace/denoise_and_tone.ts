@@ -30,6 +30,9 @@ export type Marched = Readonly<{
   scale: number;
 }>;
 
+/** The marched picture in place of a traced one, and the samples that every pixel of that has. */
+export type StandIn = Marched & Readonly<{ rounds: number }>;
+
 export class DenoiseAndTone {
   /** Encoded, premultiplied. */
   readonly picture = byteTarget();
@@ -71,6 +74,7 @@ export class DenoiseAndTone {
     uTone: { value: new Vector3(0, 1, 0) },
     uGuide: nothing(),
     uMarched: nothing(),
+    uRounds: { value: 0 },
     uMarchedPart: { value: new Vector4() },
   });
 
@@ -126,7 +130,7 @@ export class DenoiseAndTone {
   /**
    * Make the picture of what was developed, as these eyes see it; if that differs.
    *
-   * @param standIn what is shown where pixels have few samples
+   * @param standIn what is shown while pixels have few samples
    */
   show(
     renderer: WebGLRenderer,
@@ -134,7 +138,7 @@ export class DenoiseAndTone {
     views: readonly TraceView[],
     settings: TraceSettings,
     isOther: boolean,
-    standIn: Marched | null = null,
+    standIn: StandIn | null = null,
   ): void {
     const { began, showPass, scale } = this;
     if (began.length !== views.length) return;
@@ -151,6 +155,7 @@ export class DenoiseAndTone {
       uniforms.uTone.value.set(settings.hue / 360, settings.saturation, settings.lightness);
     }
     uniforms.uGuide.value = this.mean.textures[1];
+    uniforms.uRounds.value = standIn?.rounds ?? 0;
     uniforms.uMarched.value = standIn?.picture ?? null;
     drawEyes(renderer, showPass.scene, eyes, this.picture, scale, (eye, part) => {
       showPass.uPart.value.copy(part);

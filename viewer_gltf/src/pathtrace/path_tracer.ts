@@ -74,8 +74,6 @@ export type Gathering = Readonly<{
 
 /** Samples with which nothing stands in for any pixel: see tone_map.frag.glsl. */
 const STOOD_IN = 5;
-/** Parts of a sample that are shown as they come. */
-const SHOWN_PARTS = 8;
 
 export class Tracer {
   /** Samples of a pixel since the picture began anew; tiles that rest have fewer. */
@@ -259,10 +257,9 @@ export class Tracer {
     const { denoiseAndTone } = this;
     if (standIn === null || this.samples >= STOOD_IN) this.isStoodIn = false;
     else if (!denoiseAndTone.isOf(begins)) this.isStoodIn = true;
-    // a part of the pixels alone is not shown, unless something stands in for the others: until all have
-    // their turn, the picture before stays
-    const shares = this.isStoodIn ? SHOWN_PARTS : 1;
-    const isRound = Math.floor(shares * this.samples) > Math.floor(shares * started);
+    // A part of the pixels alone is not shown: until all have their turn, the picture before stays, or
+    // the marched one that stands in.
+    const isRound = Math.floor(this.samples) > Math.floor(started);
     const isAny = this.isStoodIn || this.samples >= 1;
     const isOther = isAny && (isRound || settings !== this.shownWith);
     if (isOther) {
@@ -270,7 +267,8 @@ export class Tracer {
       denoiseAndTone.denoise(renderer, eyes, gathered, samples, begins, scale, settings);
       this.shownWith = settings;
     }
-    const marched = this.isStoodIn ? standIn : null;
+    const rounds = Math.floor(this.samples);
+    const marched = this.isStoodIn && standIn !== null ? { ...standIn, rounds } : null;
     denoiseAndTone.show(renderer, eyes, views, settings, isOther, marched);
   }
 

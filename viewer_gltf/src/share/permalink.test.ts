@@ -232,6 +232,18 @@ describe("a link to a view", () => {
     expect(state).toEqual(opening);
   });
 
+  it("says nothing of the cut that the bundle opens with, and says where it was closed", () => {
+    const plain = sampleManifest(2);
+    const cut = { normal: [1, 0, 0] as [number, number, number], offset_um: 3 };
+    const start = initialState({ ...plain, specimen: { ...plain.specimen, cut } });
+    expect(writeLink(start, start, null)).toBe("#v=1");
+    const closed = reduce(start, { type: "set-clip", clip: { box: null, plane: null } });
+    const link = writeLink(closed, start, null);
+    expect(link).toBe("#v=1&cut=none");
+    const { actions } = readLink(link, start, SPECIMEN_BOX);
+    expect(after(start, actions).clip.plane).toBeNull();
+  });
+
   it("keeps cuts and points within the specimen", () => {
     const state = opened("#v=1&box=-900,-900,-900,900,900,900&cut=0,0,1,9999&points=7e5,0,-7e5");
     expect(state.clip.box).toEqual(SPECIMEN_BOX);

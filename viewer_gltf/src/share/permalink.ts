@@ -7,8 +7,8 @@
  * different, each with c(olour, sRGB) o(pacity) w(indow, low_high) s(hapes of a transfer function,
  * name_shapes: see shapes_link.ts) t(ransfer function) n(o volume).
  * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
- * corner), cut (a plane's normal and offset), points (um), measures (see measurements_link.ts), views
- * (kept ones, as eye), objects (of label maps: see objects/linked.ts), tool, dwell, quality, light (see
+ * corner), cut (a plane's normal and offset; none: the opening cut is closed), points (um), measures (see
+ * measurements_link.ts), views (kept ones, as eye), objects (of label maps: see objects/linked.ts), tool, dwell, quality, light (see
  * path_trace_link.ts), lamps (shown or not), eye and pose.
  * An address is somebody else's text: whatever it holds, the actions are ones that a user could
  * have taken; an unreadable part is reported and left out.
@@ -35,6 +35,7 @@ import { readLight, writeLight } from "./path_trace_link";
 import { readShapes, writeShapes } from "./shapes_link";
 
 const VERSION = "1";
+const UNCUT = "none"; // in place of a plane: the cut that the specimen opens with is closed
 /** Longest link, characters: seventy channels that all look different take less. */
 const LONGEST = 8000;
 const WORDS: SwitchWords = ["off", "on"];
@@ -99,7 +100,10 @@ function linkOf(
   if (state.isolated !== null) parts.only = encodeURIComponent(state.isolated);
   const { box, plane } = state.clip;
   if (box !== null) parts.box = written([...box.min, ...box.max]);
-  if (plane !== null) parts.cut = written([...plane.normal, plane.offset_um]);
+  if (plane !== null && plane !== start.clip.plane) {
+    parts.cut = written([...plane.normal, plane.offset_um]);
+  }
+  if (plane === null && start.clip.plane !== null) parts.cut = UNCUT;
   const [list, newest] = linkedMeasurements(state);
   if (list !== "") parts.measures = list;
   const views = state.keptViews.flatMap(({ position, target }) => [...position, ...target]);
@@ -309,7 +313,8 @@ class LinkReader {
       if (read === null) this.unread.push("box");
       else clip.box = read;
     }
-    if (cut !== undefined) {
+    if (cut === UNCUT) clip.plane = null;
+    else if (cut !== undefined) {
       const [x, y, z, offset_um] = readNumbers(cut, 4) ?? [0, 0, 0, 0];
       const length = Math.hypot(x, y, z);
       if (!(length > 0.5)) this.unread.push("cut");

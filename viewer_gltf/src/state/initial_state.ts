@@ -1,5 +1,6 @@
 /** The state in which a bundle opens. Pure. */
 import type { Manifest } from "../bundle/generated/bundle";
+import type { ClipPlane } from "../math/clip";
 import { START_CHANNEL } from "./parameters/channel";
 import { START_LIGHT } from "./parameters/light";
 import { START_SLICES } from "./parameters/slices";
@@ -32,7 +33,9 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
   const asStaged = new Set(staged.slice(0, VOLUME_TILES_AT_START));
   // label maps alone, where there are any: their closed objects would hide an image, or lie in it
   const maps = manifest.channels.filter(({ objects }) => objects !== undefined);
-  const opened = (maps.length > 0 ? maps : manifest.channels).slice(0, MAX_CHANNELS);
+  const opening = manifest.channels.filter(({ opens }) => opens !== false);
+  const images = opening.length > 0 ? opening : manifest.channels;
+  const opened = (maps.length > 0 ? maps : images).slice(0, MAX_CHANNELS);
   const shown = new Set(opened.map(({ id }) => id));
   return {
     ...START_VOLUMES,
@@ -67,7 +70,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     mode: startMode(manifest, canTrace, staged.length > 0),
     selected: null,
     isolated: null,
-    clip: { box: null, plane: null },
+    clip: { box: null, plane: openingPlane(manifest) },
     measured: [],
     measuredAs: "distance",
     measurements: [],
@@ -82,6 +85,13 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
         : [],
     mendable: [],
   };
+}
+
+/** The plane that the stage cuts the specimen open by. */
+function openingPlane({ specimen: { cut } }: Manifest): ClipPlane | null {
+  if (cut === undefined) return null;
+  const [x, y, z] = cut.normal;
+  return { normal: [x, y, z], offset_um: cut.offset_um };
 }
 
 /** Scans of bodies open by paths of light; an artist's choice goes before the disc. */

@@ -96,6 +96,19 @@ describe("the viewer's state", () => {
     expect(looks(state, "c5", "r0_c2", near("r0_c2"))).toBe("surface");
   });
 
+  it("opens cut where the stage cuts it, and with the channels that the stage opens", () => {
+    const plain = sampleManifest(4);
+    expect(initialState(plain).clip.plane).toBeNull();
+    const cut = { normal: [1, 0, 0] as [number, number, number], offset_um: 7 };
+    const channels = plain.channels.map((one, i) => ({ ...one, opens: i > 1 }));
+    const state = initialState({ ...plain, channels, specimen: { ...plain.specimen, cut } });
+    expect(state.clip.plane).toEqual(cut);
+    expect(state.channels.filter((c) => c.shown).map((c) => c.id)).toEqual(["c2", "c3"]);
+    const none = plain.channels.map((one) => ({ ...one, opens: false }));
+    const all = initialState({ ...plain, channels: none });
+    expect(all.channels.every((c) => c.shown)).toBe(true);
+  });
+
   it("draws an unsure surface from afar as it does a clear one", () => {
     const clear = sampleManifest(1);
     const [first] = clear.channels;

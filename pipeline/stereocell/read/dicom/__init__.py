@@ -23,22 +23,27 @@ from stereocell.read.acquired import Acquired, turned_places
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.beside import or_one_of
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.dicom.frame import Frame
-from stereocell.read.dicom.header import SEGMENTATION, NoPlaneError, is_dicom, read_frames
+from stereocell.read.dicom.frame import Frame, NoPlaneError
+from stereocell.read.dicom.header import SEGMENTATION, is_dicom, read_frames
 from stereocell.read.dicom.label_stack import stack_labels
 from stereocell.read.dicom.pixels import decode, dtype_of
+from stereocell.read.dicom.scale_notes import reaches_air, scale_notes
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels
-from stereocell.read.dicom.series import Stack, find_stacks
+from stereocell.read.dicom.series import Stack, find_stacks, is_other_kind
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
+from stereocell.read.series import counted
 from stereocell.read.spacing import Grid
+from stereocell.read.statements import omission
 from stereocell.read.whole_array import WholeArray
 from stereocell.storage.first_bytes import identify
 from stereocell.storage.location import Location, first_bytes, is_own
 
 _INSTEAD = "expected the image that it was drawn on"
+_MOST_KINDS = 4  # most kinds of images that notes name
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
@@ -76,7 +81,8 @@ def read_image(location: Location, *, series: int = 0) -> Image:
             raise _no_labels(stack, len(found.stacks), location.shown, stack.problem)
     if stack.layout is None:
         raise SourceError(
-            f"{location.shown}: {stack.problem}; expected parallel slices of one volume"
+            f"{location.shown}: {stack.problem}; expected parallel slices of one volume "
+            "(`--series list` shows what is there)"
         )
     _require_parts(stack, location.shown)
     layout, dtype = stack.layout, dtype_of([f for frames in stack.times for f in frames])
@@ -86,6 +92,11 @@ def read_image(location: Location, *, series: int = 0) -> Image:
     voxels = WholeArray((len(stack.times), z, y, x), dtype, load)
     read = {frame.file for frames in stack.times for frame in frames}
     modality = stack.first.modality
+    frames = [frame for frames in stack.times for frame in frames]
+    is_hounsfield = modality != "CT" or reaches_air(
+        frames, lambda: _lowest(stack, found.paths, dtype, location.shown)
+    )
+    values = scale_notes(frames, is_hounsfield=is_hounsfield)
     return Image(
         arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
         grids=(Grid((z, y, x), canonical.spacing_um),),
@@ -94,13 +105,25 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         images=1,
         title=modality or UNKNOWN,
         modality=modality,
+        has_hounsfield_units=is_hounsfield,
         placement=canonical.placement,
         has_sides=not stack.first.is_quadruped,  # its axes are left, dorsal and cranial
         labels=_labels(stack, len(found.stacks)),
         acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
-        notes=(*_choice(found, stack, series), *stack.notes, *_left_out(found.left_out)),
+        notes=(
+            *_choice(found, stack, series),
+            *stack.notes,
+            *values,
+            *_left_out(found.left_out),
+        ),
         files=tuple(str(found.paths[index]) for index in sorted(read)),
     )
+
+
+def _lowest(stack: Stack, paths: Sequence[Path], dtype: np.dtype[Any], shown: str) -> float:
+    """Return the lowest grey value of the slice in the middle."""
+    frames = stack.times[0]
+    return float(decode([frames[len(frames) // 2]], paths, dtype, shown).min())
 
 
 def _require_parts(stack: Stack, shown: str) -> None:
@@ -206,6 +229,7 @@ def _find(location: Location) -> Found:
         left_out["not DICOM"] = len(files) - len(paths)
     frames: dict[bytes, Frame] = {}
     copies: list[tuple[Frame, Frame]] = []
+    ways: list[str] = []
     for index, path in enumerate(paths):
         try:
             for frame in read_frames(path, index):
@@ -215,6 +239,7 @@ def _find(location: Location) -> Found:
                     copies.append((earlier, frame))
         except NoPlaneError as error:
             left_out[str(error)] += 1
+            ways.append(error.way_out)
     compare = partial(_are_equal, paths, location.shown)
     for earlier, frame in copies:  # one image stored twice; with other pixels it is another image
         if earlier.position == frame.position and compare(earlier, frame):
@@ -236,7 +261,7 @@ def _find(location: Location) -> Found:
             f"{location.shown}: no DICOM image with a place in the patient: found "
             f"{many}{held or 'an empty folder'}; expected slices of MR, CT or the like"
             f"{'' if paths else ', or a volume of another format'}"
-            f"{or_one_of(root, 'dicom')}"
+            f"{or_one_of(root, 'dicom')}{in_words(ways)}"
         )
     every = tuple(frames.values())
     return Found(tuple(paths), every, find_stacks(every, compare), left_out)
@@ -311,14 +336,28 @@ def _acquired(
 
 
 def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
+    """Return what is built of several stacks, and which other kinds the same series holds."""
     if len(found.stacks) == 1:
         return ()
     number = found.stacks.index(stack) + 1
-    why = "the largest" if series == 0 else "asked for"
-    return (
-        f"{len(found.stacks)} series or orientations; building --series {number}, {why}: "
-        f"{stack.label}",
+    most = max(other.voxels * len(other.times) for other in found.stacks)
+    why = "the largest" if stack.voxels * len(stack.times) == most else "the first image of all"
+    choice = (
+        f"{len(found.stacks)} series or orientations; building --series {number}, "
+        f"{'asked for' if series else why}: {stack.label}"
     )
+    kinds = [
+        omission(
+            f"{counted(other.frames, 'image')} of the same series "
+            f"({', '.join(other.words) or 'plain'})",
+            "they are of another kind",
+            f"--series {place} builds them" if other.layout is not None else other.problem,
+        )
+        for place, other in enumerate(found.stacks, start=1)
+        if is_other_kind(other, stack)
+    ]
+    more = (f"{len(kinds) - _MOST_KINDS} more kinds of images are in `--series list`",)
+    return (choice, *kinds[:_MOST_KINDS], *(more if len(kinds) > _MOST_KINDS else ()))
 
 
 def _left_out(reasons: Counter[str]) -> tuple[str, ...]:

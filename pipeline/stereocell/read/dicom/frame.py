@@ -2,9 +2,21 @@
 
 from dataclasses import dataclass
 
+from stereocell.read.dicom.frame_kind import FrameKind
 from stereocell.read.dicom.segmentation import Segmentation
+from stereocell.read.dicom.stated import Stated
+from stereocell.read.dicom.value_scale import ValueScale
 
 Vector = tuple[float, float, float]
+
+
+class NoPlaneError(Exception):
+    """A file holds no usable plane; the text gives the reason without the file's values.
+
+    way_out  what the file is, and what to name or to export instead; empty: nothing is known
+    """
+
+    way_out = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +65,9 @@ class Frame:
     is_quadruped       the axes of the place are those of an animal on four legs
     parts              of an image that is stored in several files: a digest of its UID, and the
                        number of files; 0: it is stored in one file, or the number isn't stated
+    kind               magnitude, projection, echo and the like; of a segmentation nothing
+    stated             values that repeat the geometry
+    scale              what is stated about the values
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
@@ -78,3 +93,6 @@ class Frame:
     segmentation: Segmentation | None = None
     is_quadruped: bool = False
     parts: tuple[bytes, int] = (b"", 0)
+    kind: FrameKind = FrameKind()  # noqa: RUF009  (frozen)
+    stated: Stated = Stated()  # noqa: RUF009  (frozen)
+    scale: ValueScale = ValueScale()  # noqa: RUF009  (frozen)

@@ -14,9 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.read.dicom.frame import Frame, Vector
+from stereocell.read.dicom.split_kinds import split_kinds
+from stereocell.read.plane_stack import SAME_PLACE, NoStackError, lay_out
 
 PARALLEL = 2e-3  # rad: planes that differ more in orientation belong to different stacks
 ALIKE = 1e-3  # share of the pixel spacing: half a pixel over 512 pixels
+_LEAST_JOINED = 3  # fewest slices of different frames of reference that show a regular stack
 _SAME_WAY = np.cos(np.radians(5.0))  # cosine; stacks whose normals are closer can interleave
 
 # attributes that separate stacks: field of Frame, name in the standard
@@ -36,6 +39,9 @@ class Group:
 
     def __init__(self, first: Frame) -> None:
         self.frames = [first]
+        self.words: tuple[str, ...] = ()  # of the properties that separate it from other groups
+        self.order: tuple[int, ...] = ()  # sorts it among those
+        self.notes: tuple[str, ...] = ()
         self._directions = _directions(first)
         self._spacing = np.array(first.spacing)
         self._is_exact = True  # all frames state the same: no mean, which rounds
@@ -135,15 +141,96 @@ def find_groups(frames: Iterable[Frame]) -> list[Group]:
     """Return the frames by stack."""
     groups: dict[tuple[object, ...], list[Group]] = {}
     for frame in frames:
-        alike = groups.setdefault(tuple(getattr(frame, name) for name, _ in _STATED), [])
+        alike = groups.setdefault(_key(frame), [])
         group = next((group for group in alike if group.takes(frame)), None)
         if group is None:
             alike.append(Group(frame))
         else:
             group.add(frame)
-    found = [group for alike in groups.values() for group in alike]
+    whole = _join_references([group for alike in groups.values() for group in alike])
+    found = [part for group in whole for part in _parts(group)]
     for group in found:
         group.straighten()
+    return found
+
+
+def _key(frame: Frame) -> tuple[object, ...]:
+    return (*(getattr(frame, name) for name, _ in _STATED), frame.kind.part, frame.kind.role)
+
+
+def _group(frames: Iterable[Frame]) -> Group:
+    """Return a group of frames that match."""
+    first, *others = frames
+    group = Group(first)
+    for frame in others:
+        group.add(frame)
+    return group
+
+
+def _join_references(groups: list[Group]) -> list[Group]:
+    """Join slices of which each has a frame of reference of its own, as after de-identification.
+
+    They are one stack where all else is equal and their positions are regular.
+    """
+    alike: dict[tuple[object, ...], list[list[Group]]] = {}
+    for group in groups:
+        first = replace(group.frames[0], reference=b"")
+        families = alike.setdefault(_key(first), [])
+        family = next((f for f in families if f[0].takes(first)), None)
+        if family is None:
+            families.append([group])
+        else:
+            family.append(group)
+    return [one for families in alike.values() for family in families for one in _joined(family)]
+
+
+def _joined(family: list[Group]) -> list[Group]:
+    if len(family) < _LEAST_JOINED or not all(_is_one_place(group) for group in family):
+        return family
+    joined = _group([frame for group in family for frame in group.frames])
+    normal = _axes(joined)[0]
+    rising = sorted(joined.frames, key=lambda f: float(normal @ f.position))
+    near = SAME_PLACE * min(joined.spacing)
+    places = [rising[0].position]
+    for frame in rising:
+        if np.linalg.norm(np.subtract(frame.position, places[-1])) > near:
+            places.append(frame.position)
+    try:
+        layout = lay_out(
+            places,
+            joined.along_row,
+            along_column=joined.along_column,
+            pixel_spacing_mm=joined.spacing,
+            plane_shape=(rising[0].rows, rising[0].columns),
+        )
+    except NoStackError:
+        return family
+    if not layout.is_even:
+        return family
+    joined.notes = (
+        f"each of {len(family)} slices has a FrameOfReferenceUID of its own, as after "
+        "de-identification: joined, since series, orientation and spacings are the same and the "
+        "positions are regular",
+    )
+    return [joined]
+
+
+def _is_one_place(group: Group) -> bool:
+    first, *others = group.frames
+    near = SAME_PLACE * min(group.spacing)
+    return all(np.linalg.norm(np.subtract(f.position, first.position)) <= near for f in others)
+
+
+def _parts(group: Group) -> list[Group]:
+    """Return the group, or one for each kind of frame in it."""
+    parts = split_kinds(group.frames, _axes(group)[0], SAME_PLACE * min(group.spacing))
+    if len(parts) == 1:
+        return [group]
+    found = []
+    for part in parts:
+        small = _group(part.frames)
+        small.words, small.order, small.notes = part.words, part.order, group.notes
+        found.append(small)
     return found
 
 
@@ -155,6 +242,7 @@ def describe_neighbours(group: Group, groups: Sequence[Group]) -> tuple[str, ...
         other
         for other in groups
         if other is not group
+        and group.differences(other)  # other kinds of frames are listed apart
         and other.frames[0].series == group.frames[0].series
         and group.interleaves(other)
     ]

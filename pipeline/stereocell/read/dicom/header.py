@@ -16,29 +16,32 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pydicom
-from pydicom.uid import UID, DeflatedExplicitVRLittleEndian
+from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
-from stereocell.read.dicom.frame import Encoding, Frame, Vector
+from stereocell.read.dicom.encoding import encoding_of
+from stereocell.read.dicom.frame import Frame, NoPlaneError, Vector
+from stereocell.read.dicom.frame_kind import KIND_TAGS, FrameKind, kind_of
 from stereocell.read.dicom.frame_offsets import (
     frame_offsets,
     has_offsets,
-    is_dose,
     place_first,
 )
+from stereocell.read.dicom.header_values import find_value, first_item
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.segmentation import (
-    FRACTIONAL,
     LABELMAP,
     Segmentation,
     segmentation_of,
 )
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.dicom.stated import STATED_TAGS, count_frames, stated_of
 from stereocell.read.dicom.stored_values import PLUGINS, is_compressed
+from stereocell.read.dicom.value_scale import SCALE_TAGS, ValueScale, scale_of
+from stereocell.read.dicom.ways_out import class_name, way_out
 
 _TAGS: list[Any] = [
     "SOPClassUID",
-    "ImageType",
     "Modality",
     "SeriesInstanceUID",
     "SOPInstanceUID",
@@ -70,22 +73,19 @@ _TAGS: list[Any] = [
     "MaximumFractionalValue",
     "DetectorInformationSequence",
     "SliceVector",
-    "SpacingBetweenSlices",
-    "SliceThickness",
     "GridFrameOffsetVector",
     "DoseGridScaling",
     "SharedFunctionalGroupsSequence",
     "PerFrameFunctionalGroupsSequence",
+    *KIND_TAGS,
+    *STATED_TAGS,
+    *SCALE_TAGS,
 ]
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _NO_PLACE = "without a place in the patient"
 _NO_SPACING = "without a PixelSpacing above 0"
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
-
-
-class NoPlaneError(Exception):
-    """A file holds no usable plane; the text gives the reason without the file's values."""
 
 
 def is_dicom(path: Path) -> bool:
@@ -130,13 +130,18 @@ def read_frames(path: Path, file: int) -> list[Frame]:
             try:
                 return _frames(header, opened, path, file, segmentation)
             except NoPlaneError as error:
-                if segmentation is None and str(error) == _NO_PLACE:
-                    raise NoPlaneError(f"{_NO_PLACE}{_kind(header)}") from None
-                if segmentation is None:
-                    raise
-                raise NoPlaneError(f"{SEGMENTATION} of {segmentation.words}, {error}") from None
+                raise _explained(error, header, segmentation) from None
     except DICOM_FAULTS:
         raise NoPlaneError("with a damaged header") from None
+
+
+def _explained(error: NoPlaneError, header: Any, segmentation: Segmentation | None) -> NoPlaneError:
+    """Return the error with the kind of the file, and a way out."""
+    if segmentation is not None:
+        return NoPlaneError(f"{SEGMENTATION} of {segmentation.words}, {error}")
+    found = NoPlaneError(f"{_NO_PLACE}{_kind(header)}") if str(error) == _NO_PLACE else error
+    found.way_out = way_out(header, kind_of(header, ()), str(found))
+    return found
 
 
 def _refuse_deflated(path: Path) -> None:
@@ -156,14 +161,18 @@ def _frames(
     grey = ["MONOCHROME1", "MONOCHROME2"]
     if segmentation is not None and segmentation.kind == LABELMAP:
         grey.append("PALETTE COLOR")  # of numbers
-    kind = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
-    if int(header.get("SamplesPerPixel") or 1) != 1 or kind not in grey:
+    colours = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
+    if int(header.get("SamplesPerPixel") or 1) != 1 or colours not in grey:
         raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
     if "ModalityLUTSequence" in header:
         raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
-    count = int(header.get("NumberOfFrames") or 1)
+    shared = first_item(header.get("SharedFunctionalGroupsSequence"))
+    own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     is_mask = segmentation is not None
-    is_float = _check_pixels(header, opened, size, rows * columns * count, is_mask=is_mask)
+    is_float, held = _check_pixels(header, opened, size, rows * columns, is_mask=is_mask)
+    count, count_notes = count_frames(int(header.get("NumberOfFrames") or 1), len(own), held)
+    if held is not None and held < count:
+        raise NoPlaneError("cut short")
     place_first(header)
     uids = "SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID", "ConcatenationUID"
     series, instance, reference, whole = (
@@ -174,8 +183,6 @@ def _frames(
         instance = f"{file}".encode()
     modality = str(header.get("Modality", "")).strip()
     is_quadruped = str(header.get("AnatomicalOrientationType", "")).strip() == "QUADRUPED"
-    shared = _first(header.get("SharedFunctionalGroupsSequence"))
-    own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     offsets = None
     if (own or count > 1) and len(own) != count:
         if has_offsets(header):
@@ -184,11 +191,13 @@ def _frames(
         if offsets is None:
             raise NoPlaneError(f"of several frames without a place for each{_kind(header)}")
     frames = []
-    padding = _padding(header)
     for index in range(count):
         groups = [own[index] if own else None, shared]
-        stack = _found({}, groups, "FrameContentSequence", "StackID")
-        segment = _found({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
+        stack = find_value({}, groups, "FrameContentSequence", "StackID")
+        segment = find_value({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
+        kind = FrameKind() if is_mask else kind_of(header, groups)
+        stated = stated_of(header, groups, count_notes)
+        scale = ValueScale() if is_mask else scale_of(header, groups)
         directions, spacing = _axes(header, groups)
         mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
         if offsets is not None:
@@ -208,13 +217,16 @@ def _frames(
                 tile.position,
                 *directions,
                 spacing,
-                _encoding(header, groups, kind == "MONOCHROME1", is_float, padding),
+                encoding_of(header, groups, colours == "MONOCHROME1", is_float, scale),
                 number,
                 tile.corner,
                 int(segment or 0) if is_mask else 0,
                 segmentation,
                 is_quadruped,
                 (whole, parts),
+                kind,
+                stated,
+                scale,
             )
             for number, tile in enumerate(mosaic.tiles)
         ]
@@ -230,7 +242,7 @@ def _mosaic(
     spacing: tuple[float, float],
 ) -> Mosaic:
     """Return the slices of an image of pixels (rows, columns): most hold one."""
-    stated = _found(header, groups, "PlanePositionSequence", "ImagePositionPatient")
+    stated = find_value(header, groups, "PlanePositionSequence", "ImagePositionPatient")
     position = None if stated is None else _vector(stated)
     try:
         found = find_mosaic(
@@ -261,38 +273,22 @@ def _vector(values: Any) -> Vector:
 
 def _kind(header: Any) -> str:
     """Return the kind of a file without pixels, in the standard's words: " (...)", or nothing."""
-    kind = UID(str(header.get("SOPClassUID", "")))
-    return f" ({kind.name})" if kind.name != kind else ""  # the name of a private UID is the UID
+    name = class_name(header)
+    return f" ({name})" if name else ""
 
 
-def _padding(header: Any) -> tuple[int, int] | None:
-    """Return the lowest and highest padding value, encoded as the pixels are; None: none named.
+def _check_pixels(
+    header: Any, opened: BinaryIO, size: int, pixels: int, *, is_mask: bool
+) -> tuple[bool, int | None]:
+    """Return whether the pixels are floats, and how many whole frames there are.
 
-    References: DICOM PS3.3 C.7.5.1.1.2.
-    """
-    ends = []
-    for key in ("PixelPaddingValue", "PixelPaddingRangeLimit"):
-        value = header.get(key)
-        if isinstance(value, bytes) and len(value) == 2:  # where the VR is unknown
-            little = header.original_encoding[1]
-            value = int.from_bytes(value, "little" if little else "big")
-        if isinstance(value, int):
-            ends.append(value)
-        elif not ends:
-            return None
-    if header.get("PixelRepresentation"):  # the VR may have given another sign
-        ends = [((end + 0x8000) & 0xFFFF) - 0x8000 for end in ends]
-    else:
-        ends = [end & 0xFFFF for end in ends]
-    return min(ends), max(ends)
-
-
-def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int, *, is_mask: bool) -> bool:
-    """Return whether the pixels are floats. Raises NoPlaneError where they are cut short.
-
-    opened  stands at the element of the pixels: tag, (VR, 2 bytes,) length
-    size    of the file in bytes
+    opened   stands at the element of the pixels: tag, (VR, 2 bytes,) length
+    size     of the file in bytes
+    pixels   of a frame
     is_mask  a pixel may be one bit
+
+    The number of compressed frames is None: it takes a decoder. Raises NoPlaneError where the
+    pixels can't be read.
     """
     implicit, little = header.original_encoding
     order = "<" if little else ">"
@@ -307,29 +303,9 @@ def _check_pixels(header: Any, opened: BinaryIO, size: int, count: int, *, is_ma
     if is_compressed(syntax):
         if syntax not in PLUGINS:
             raise NoPlaneError("compressed in a way that is not read")
-        return is_float
+        return is_float, None
     begin = opened.tell() - (4 if implicit else 0)
-    if min(length, size - begin) < (count * bits + 7) // 8:
-        raise NoPlaneError("cut short")
-    return is_float
-
-
-def _first(sequence: Any) -> Any:
-    return sequence[0] if sequence else None
-
-
-def _found(header: Any, groups: Sequence[Any], sequence: str, key: str) -> Any:
-    """Return a value from the frame's group, the shared one, or the header itself; None: nowhere.
-
-    An enhanced image states these in functional groups.
-
-    References: DICOM PS3.3 C.7.6.16 (Multi-frame Functional Groups module).
-    """
-    for group in groups:
-        item = None if group is None else _first(group.get(sequence))
-        if item is not None and item.get(key) is not None:
-            return item[key].value
-    return header.get(key)
+    return is_float, 8 * min(length, size - begin) // (bits * pixels)
 
 
 def _numbers(value: Any, count: int, lacking: str = _NO_PLACE) -> tuple[float, ...]:
@@ -344,8 +320,8 @@ def _numbers(value: Any, count: int, lacking: str = _NO_PLACE) -> tuple[float, .
 
 def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tuple[float, float]]:
     """Return unit vectors along a row and along a column, and mm between (rows, columns)."""
-    orientation = _found(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
-    spacing = _found(header, groups, "PixelMeasuresSequence", "PixelSpacing")
+    orientation = find_value(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
+    spacing = find_value(header, groups, "PixelMeasuresSequence", "PixelSpacing")
     cosines = np.array(_numbers(orientation, 6)).reshape(2, 3)
     lengths = np.linalg.norm(cosines, axis=1)
     is_frame = np.allclose(lengths, 1, atol=0.01) and abs(cosines[0] @ cosines[1]) < 0.01
@@ -359,31 +335,3 @@ def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tu
         raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
     along_row, along_column = ((a, b, c) for a, b, c in (cosines / lengths[:, None]).tolist())
     return (along_row, along_column), (between[0], between[1])
-
-
-def _encoding(
-    header: Any,
-    groups: Sequence[Any],
-    is_inverted: bool,
-    is_float: bool,
-    padding: tuple[int, int] | None,
-) -> Encoding:
-    sequence = "PixelValueTransformationSequence"
-    slope = _found(header, groups, sequence, "RescaleSlope")
-    intercept = _found(header, groups, sequence, "RescaleIntercept")
-    if slope is None and is_dose(header):
-        slope = header.get("DoseGridScaling")
-    if header.get("SegmentationType") == FRACTIONAL:
-        slope = 1 / float(header.get("MaximumFractionalValue") or 255)
-    slope, intercept = (1.0 if slope is None else float(slope)), float(intercept or 0.0)
-    if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:
-        raise NoPlaneError("of values that no rescale slope gives")
-    allocated = int(header.get("BitsAllocated") or 0)
-    if is_float:
-        return Encoding(allocated, 0, 0, True, False, slope, intercept)
-    bits = int(header.get("BitsStored") or allocated)
-    high_bit = int(header["HighBit"].value if "HighBit" in header else bits - 1)
-    if not 1 <= bits <= high_bit + 1 <= allocated:
-        raise NoPlaneError(f"of {bits} bits up to bit {high_bit} of {allocated}")
-    signed = bool(header.get("PixelRepresentation") or 0)
-    return Encoding(allocated, bits, high_bit, signed, is_inverted, slope, intercept, padding)

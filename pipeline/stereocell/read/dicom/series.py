@@ -1,20 +1,26 @@
 """Sort DICOM frames into stacks, each a volume, and label each without its description.
 
-A stack has one series, one frame of reference, one StackID, one size of pixels and planes and one
-orientation (read/dicom/group_frames.py): a localizer of three orientations makes three stacks. Of
-frames at one place the first by instance number is taken. Where every place holds the same number
-of frames, and they differ, they are time points (or echoes, or b-values) in the order of instance
-numbers.
+A stack has one series, one frame of reference, one StackID, one size of pixels and planes, one
+orientation (read/dicom/group_frames.py) and one kind of frame (read/dicom/split_kinds.py): a
+localizer of three orientations makes three stacks, magnitude and phase make two. Several frames at
+each place are points in time (read/dicom/points_in_time.py); a point that lacks slices is a stack
+of its own. Of other frames at one place the first by instance number is taken.
+
+Series are in the order of their best stacks, images before phases, projections and localizers, and
+so are the stacks of a series.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stereocell.read.anatomical_axes import plane_name
+from stereocell.read.dicom.contradictions import geometry_notes
 from stereocell.read.dicom.frame import Frame
+from stereocell.read.dicom.frame_kind import LOCALIZER
 from stereocell.read.dicom.group_frames import Group, describe_neighbours, find_groups
+from stereocell.read.dicom.points_in_time import AreEqual, Points, find_points
 from stereocell.read.plane_stack import (
     SAME_PLACE,
     NoStackError,
@@ -22,28 +28,44 @@ from stereocell.read.plane_stack import (
     lay_out,
     normal_of,
 )
+from stereocell.read.statements import omission
 
-AreEqual = Callable[[Frame, Frame], bool]
+_LAST = 6  # rank of a stack that lacks slices of a point in time
+_SIDE = 2  # from this rank on a series is no image, and follows the others however large it is
 
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """Frames of one orientation.
+    """Frames of one orientation and kind.
 
     times    for each time point the frames along the normal; each point has the same number
     layout   the planes' grid; None: they make no volume, and `problem` gives the reason
     notes    changes and omissions, a sentence each
+    words    what separates it from other stacks of the series, such as `magnitude`
+    order    sorts it among those
     """
 
     times: tuple[tuple[Frame, ...], ...]
     layout: StackLayout | None
     problem: str
     notes: tuple[str, ...]
+    words: tuple[str, ...] = ()
+    order: tuple[int, ...] = ()
 
     @property
     def first(self) -> Frame:
         """The first frame of the first time point."""
         return self.times[0][0]
+
+    @property
+    def frames(self) -> int:
+        """The number of frames."""
+        return sum(map(len, self.times))
+
+    @property
+    def rank(self) -> int:
+        """Lower ranks are shown first."""
+        return self.order[0] if self.order else 0
 
     @property
     def voxels(self) -> int:
@@ -54,11 +76,12 @@ class Stack:
 
     @property
     def label(self) -> str:
-        """Modality, orientation, size and spacing, without any description from the file."""
+        """Modality, kind, orientation, size and spacing, without any description from the file."""
         frame = self.first
         normal = normal_of(frame.along_row, frame.along_column)
         segment = f", segment {frame.segment}" if frame.segment else ""
-        name = f"{frame.modality or 'DICOM'}{segment}, {plane_name(normal)}"
+        kind = "".join(f", {word}" for word in self.words)
+        name = f"{frame.modality or 'DICOM'}{segment}{kind}, {plane_name(normal)}"
         planes = len(self.times[0]) if self.layout is None else self.layout.shape[0]
         size = f"{planes} x {frame.rows} x {frame.columns}"
         if self.layout is None:
@@ -69,69 +92,115 @@ class Stack:
 
 
 def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ...]:
-    """Return all stacks: volumes before others, images before segments, the largest first.
+    """Return all stacks: volumes before others, images before segments, the largest series first.
 
     are_equal  compares the pixels of two frames; it is called only for frames at one place
     """
     groups = find_groups(frames)
-    stacks = [_stack(group, are_equal, describe_neighbours(group, groups)) for group in groups]
-    stacks = _explain_single(stacks, groups)
-    return tuple(
-        sorted(
-            stacks,
-            key=lambda s: (
-                s.layout is None,
-                s.first.segmentation is not None,
-                -s.voxels * len(s.times),
-                s.first.file,
-                s.first.index,
-            ),
-        )
-    )
+    stacks = [
+        stack
+        for group in groups
+        for stack in _stacks(group, are_equal, describe_neighbours(group, groups))
+    ]
+    return _sorted(_explain_single(stacks, groups))
+
+
+def is_other_kind(other: Stack, stack: Stack) -> bool:
+    """Return whether a stack has whole images of another kind from the same series."""
+    is_same_series = other.first.series == stack.first.series and other is not stack
+    return is_same_series and other.words != stack.words and _LAST not in (other.rank, stack.rank)
+
+
+def _sorted(stacks: Sequence[Stack]) -> tuple[Stack, ...]:
+    def own(stack: Stack) -> tuple[object, ...]:
+        return (stack.rank, -stack.voxels, stack.order, stack.first.file, stack.first.index)
+
+    best: dict[bytes, Stack] = {}
+    for stack in sorted(stacks, key=lambda s: (s.layout is None, own(s))):
+        best.setdefault(stack.first.series, stack)
+
+    def key(stack: Stack) -> tuple[object, ...]:
+        leader = best[stack.first.series]
+        side = leader.rank if leader.rank >= _SIDE else 0
+        total = -leader.voxels * len(leader.times)
+        place = (side, total, leader.first.file, leader.first.index)
+        return (stack.layout is None, stack.first.segmentation is not None, place, own(stack))
+
+    return tuple(sorted(stacks, key=key))
 
 
 def _explain_single(stacks: list[Stack], groups: list[Group]) -> list[Stack]:
     """Where each of several stacks is one slice, name the attributes that separate them."""
-    if len(stacks) < 2 or any(len(stack.times[0]) > 1 for stack in stacks):
+    slices = [stack for stack in stacks if stack.first.kind.role != LOCALIZER]
+    if len(slices) < 2 or any(len(stack.times[0]) > 1 for stack in slices):
         return stacks
     apart = sorted({word for group in groups[1:] for word in group.differences(groups[0])})
-    problem = f"found {len(stacks)} stacks of one slice each, told apart by {', '.join(apart)}"
-    return [replace(stack, problem=problem) for stack in stacks]
+    problem = f"found {len(slices)} stacks of one slice each, told apart by {', '.join(apart)}"
+    return [replace(stack, problem=problem) if stack in slices else stack for stack in stacks]
 
 
-def _stack(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> Stack:
-    places = _places(group)
-    counts = {len(place) for place in places}
-    notes = list(neighbours)
+def _stacks(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> list[Stack]:
+    """Return the stack of a group, and one for each point in time that lacks slices."""
+    normal = normal_of(group.along_row, group.along_column)
+    near = SAME_PLACE * min(group.spacing)
+    points = find_points(_places(group), normal, near, are_equal)
+    kind = group.frames[0].kind
+    words = (*kind.words, *group.words)
+    notes = [*group.notes, *neighbours]
     slices = 1 + max(frame.tile for frame in group.frames)
     if slices > 1:
         notes.append(f"mosaics of {slices} slices in one image: taken apart")
-    extra = len(group.frames) - len(places)
-    times = 1
-    if extra:
-        pairs = ((place[0], other) for place in places for other in place[1:])
-        differ = any(not are_equal(a, b) for a, b in pairs)  # stops at the first pair that differs
-        if counts == {max(counts)} and differ:
-            times = max(counts)
-        else:
-            what = "not all with the same pixels as" if differ else "with the same pixels as"
-            notes.append(
-                f"{extra} duplicate slices, {what} the one that is taken: the first by instance "
-                "number"
-            )
-    by_time = tuple(tuple(place[time] for place in places) for time in range(times))
-    first = by_time[0][0]
+    notes += _time_notes(points)
+    stacks = [_stack(points.whole, group, notes, words, (kind.rank, *group.order))]
+    for place, point in enumerate(points.incomplete):
+        rest = f"incomplete point in time {len(points.whole) + place + 1}"
+        order = (_LAST, *group.order, place)
+        stacks.append(_stack((point,), group, [], (*words, rest), order))
+    return stacks
+
+
+def _stack(
+    times: tuple[tuple[Frame, ...], ...],
+    group: Group,
+    notes: Sequence[str],
+    words: tuple[str, ...],
+    order: tuple[int, ...],
+) -> Stack:
+    first = times[0][0]
+    if first.modality == "CT" and first.kind.role == LOCALIZER:
+        problem = "localizers (scouts) of a CT are projections through the body, and no slices"
+        return Stack(times, None, problem, tuple(notes), words, order)
     try:
         layout = lay_out(
-            [frame.position for frame in by_time[0]],
+            [frame.position for frame in times[0]],
             group.along_row,
             along_column=group.along_column,
             pixel_spacing_mm=group.spacing,
             plane_shape=(first.rows, first.columns),
         )
     except NoStackError as error:
-        return Stack(by_time, None, str(error), tuple(notes))
-    return Stack(by_time, layout, "", (*notes, *layout.notes))
+        return Stack(times, None, str(error), tuple(notes), words, order)
+    stated = geometry_notes(times[0], layout)
+    found = (*notes, *layout.notes, *stated)
+    return Stack(times, layout, "", found, words, order)
+
+
+def _time_notes(points: Points) -> list[str]:
+    """Return what is said of frames that are in no whole point in time."""
+    if points.duplicates:
+        what = "not all with the same pixels as" if points.differ else "with the same pixels as"
+        return [
+            f"{points.duplicates} duplicate slices, {what} the one that is taken: the first by "
+            "instance number"
+        ]
+    if not points.incomplete:
+        return []
+    total, places = len(points.whole) + len(points.incomplete), len(points.whole[0])
+    counts = ", ".join(str(len(point)) for point in points.incomplete[:4])
+    more = ", ..." if len(points.incomplete) > 4 else ""
+    found = f"{len(points.incomplete)} of {total} points in time ({points.attribute})"
+    reason = f"slices are missing ({counts}{more} of {places} are there)"
+    return [omission(found, reason, "each is a series of `--series list`")]
 
 
 def _places(group: Group) -> list[list[Frame]]:

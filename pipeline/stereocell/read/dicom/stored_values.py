@@ -65,7 +65,21 @@ def open_pixels(path: Path) -> tuple[Any, str]:
         )
         dataset.file_meta = pydicom.dataset.FileMetaDataset()
         dataset.file_meta.TransferSyntaxUID = syntax
-    return dataset, PLUGINS[syntax] if is_compressed(syntax) else ""
+    if is_compressed(syntax):
+        return dataset, PLUGINS[syntax]
+    _count_held(dataset)
+    return dataset, ""
+
+
+def _count_held(dataset: Any) -> None:
+    """Lower a NumberOfFrames that promises more frames than there are pixels; pydicom refuses it.
+
+    The header was compared with the pixels before (header.py).
+    """
+    bits = int(dataset.Rows) * int(dataset.Columns) * int(dataset.BitsAllocated)
+    held = 8 * len(dataset.get("PixelData") or b"") // bits
+    if 0 < held < int(dataset.get("NumberOfFrames") or 1):
+        dataset.NumberOfFrames = held
 
 
 def stored_values(dataset: Any, plugin: str, indices: Sequence[int]) -> Iterator[NDArray[Any]]:

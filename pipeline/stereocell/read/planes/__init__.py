@@ -1,4 +1,4 @@
-"""A folder of images: numbered planes of TIFF, PNG or JPEG, or a stack of TIFF for each channel.
+"""A folder of images: planes of TIFF, PNG, JPEG or BMP, or a stack of TIFF for each channel.
 
 The names say which plane, channel and time a file holds: read/planes/names.py guesses, or
 `--pattern` tells (read/planes/pattern.py). Wells, sites and series part the files into volumes of
@@ -26,6 +26,7 @@ from stereocell.read.planes.listing import list_images, of_one_kind
 from stereocell.read.planes.names import guess, in_natural_order, template_of
 from stereocell.read.planes.pattern import read_by_pattern
 from stereocell.read.planes.place import Place
+from stereocell.read.planes.scan_log import find_log, with_log
 from stereocell.read.planes.volume import Volume, groups_of, volume_of
 from stereocell.read.spacing import PartialTriple, grid_of
 from stereocell.read.tiff import read_image as read_tiff
@@ -163,6 +164,7 @@ def _of_planes(location: Location, volume: Volume, first: Head, notes: list[str]
                 f"{volume.files[0, 0, 0].path!r:.100}"
             )
     rows, columns, samples = first.shape
+    notes += filter(None, sorted({head.note for head in heads.values()}))
     names, colors = _channels(volume)
     if samples > 1:
         if len(volume.channels) > 1:
@@ -178,10 +180,13 @@ def _of_planes(location: Location, volume: Volume, first: Head, notes: list[str]
     stepped = (
         z if z is not None else _step([heads[0, 0, n].z_um for n in range(len(volume.planes))])
     )
+    log = find_log(location.source, volume.files[0, 0, 0].path)
+    numbers = volume.planes
+    spacing, told = with_log((stepped, y, x), log, numbers[1] - numbers[0] if numbers[1:] else 1)
     image = _image(
-        VoxelArray(array, _AXES), (stepped, y, x), names, colors, [_read_as(volume), *notes]
+        VoxelArray(array, _AXES), spacing, names, colors, [_read_as(volume), *notes, *told]
     )
-    return replace(image, files=_files(location, volume))
+    return replace(image, files=(*_files(location, volume), *([log.path] if log else [])))
 
 
 def _load(

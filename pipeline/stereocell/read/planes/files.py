@@ -16,6 +16,7 @@ from tifffile import TiffFile
 from stereocell.model.errors import SourceError
 from stereocell.read.spacing import PartialTriple
 from stereocell.read.tiff.open_file import open_tiff, require_pages
+from stereocell.read.tiff.orientation import turn_by, turn_of, turned_pixels
 from stereocell.read.tiff.stated import stated_by
 from stereocell.storage.first_bytes import HEAD_BYTES, describe
 from stereocell.storage.library_errors import collected_log, one_line
@@ -24,10 +25,12 @@ from stereocell.storage.location import Location
 TIFF = (".tif", ".tiff", ".stk", ".lsm")
 PNG = (".png",)
 JPEG = (".jpg", ".jpeg")
+BMP = (".bmp",)
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _TAIL = 1024  # bytes in which a PNG ends; some programs add a few of their own
 _PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; 3: a palette
-_JPEG_SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
+_EXIF_ORIENTATION = 274  # of TIFF and EXIF alike
+_SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +41,7 @@ class Head:
     pages    more than one: the file is a stack, or no plane
     spacing_um  (z, y, x), um, as far as it is stated
     z_um     where the plane lies along z, um; None: not stated
+    note     how the pixels are turned, for the user; empty: they are not
     """
 
     shape: tuple[int, int, int]
@@ -45,6 +49,7 @@ class Head:
     pages: int = 1
     spacing_um: PartialTriple = (None, None, None)
     z_um: float | None = None
+    note: str = ""
 
     @property
     def words(self) -> str:
@@ -69,7 +74,7 @@ def read_plane(path: str, named: str) -> NDArray[Any]:
 
 def _kind(path: str) -> str:
     lower = path.lower()
-    return "tiff" if lower.endswith(TIFF) else "png" if lower.endswith(PNG) else "jpeg"
+    return next(kind for kind, endings in _ENDINGS.items() if lower.endswith(endings))
 
 
 def _open(path: str, stack: ExitStack) -> TiffFile:
@@ -91,12 +96,17 @@ def _tiff_head(path: str, named: str) -> Head:
             pages = images if isinstance(images, int) else 1
         plane = (tiff.metaseries_metadata or {}).get("PlaneInfo", {}) if tiff.is_metaseries else {}
         z_um = plane.get("z-position")
+        turn, notes = turn_of(page)
+        sizes, spacing = (0, page.imagelength, page.imagewidth), stated_by(tiff).spacing_um
+        _, rows, columns = (sizes[axis] for axis in turn.order)
+        z, y, x = (spacing[axis] for axis in turn.order)
         return Head(
-            (page.imagelength, page.imagewidth, page.samplesperpixel),
+            (rows, columns, page.samplesperpixel),
             np.dtype(page.dtype),
             pages,
-            stated_by(tiff).spacing_um,
+            (z, y, x),
             float(z_um) if isinstance(z_um, int | float) else None,
+            "".join(notes),
         )
 
 
@@ -105,7 +115,8 @@ def _tiff_plane(path: str, named: str) -> NDArray[Any]:
         page = _open(path, stack).pages.first
         pixels = page.asarray()
         is_planar = page.samplesperpixel > 1 and page.planarconfig == 2
-        return np.moveaxis(pixels, 0, -1) if is_planar else pixels
+        pixels = np.moveaxis(pixels, 0, -1) if is_planar else pixels
+        return turned_pixels(pixels, turn_of(page)[0])
 
 
 def _png_head(path: str, named: str) -> Head:
@@ -143,20 +154,34 @@ def _png_plane(path: str, named: str) -> NDArray[Any]:
 
 def _jpeg_head(path: str, named: str) -> Head:
     _begin(path, named, b"\xff\xd8", "JPEG")
+    return _pillow_head(path, named)
+
+
+def _bmp_head(path: str, named: str) -> Head:
+    _begin(path, named, b"BM", "BMP")
+    return _pillow_head(path, named)
+
+
+def _pillow_head(path: str, named: str) -> Head:
+    """Return what a file says of itself that pillow decodes; a palette of greys is grey to it."""
     try:
         with Pillow.open(path) as image:
-            columns, rows = image.size
+            turn, notes = turn_by(image.getexif().get(_EXIF_ORIENTATION, 1))
+            sizes = (0, *image.size[::-1])
+            _, rows, columns = (sizes[axis] for axis in turn.order)
             mode = image.mode
     except Pillow.DecompressionBombError as error:
         raise SourceError(f"{named}: {error!s:.100}, expected a smaller image") from error
-    if mode not in _JPEG_SAMPLES:
+    if mode not in _SAMPLES:
         raise SourceError(f"{named}: found pixels of kind {mode}, expected grey or RGB")
-    return Head((rows, columns, _JPEG_SAMPLES[mode]), np.dtype(np.uint8))
+    shape = (rows, columns, _SAMPLES[mode])
+    return Head(shape, np.dtype(np.uint8), note="".join(notes))
 
 
-def _jpeg_plane(path: str, named: str) -> NDArray[Any]:
+def _pillow_plane(path: str, named: str) -> NDArray[Any]:
     with Pillow.open(path) as image:
-        return np.asarray(image)
+        turn, _ = turn_by(image.getexif().get(_EXIF_ORIENTATION, 1))
+        return turned_pixels(np.asarray(image), turn)
 
 
 def _begin(path: str, named: str, magic: bytes, title: str) -> bytes:
@@ -176,8 +201,10 @@ class _Format:
 _FORMATS = {
     "tiff": _Format(_tiff_head, _tiff_plane),
     "png": _Format(_png_head, _png_plane),
-    "jpeg": _Format(_jpeg_head, _jpeg_plane),
+    "jpeg": _Format(_jpeg_head, _pillow_plane),
+    "bmp": _Format(_bmp_head, _pillow_plane),
 }
+_ENDINGS = {"tiff": TIFF, "png": PNG, "jpeg": JPEG, "bmp": BMP}
 
 
 def join(folder: str, path: str) -> str:

@@ -2,10 +2,10 @@
 
 import os
 
-from stereocell.read.planes.files import JPEG, PNG, TIFF, join
+from stereocell.read.planes.files import BMP, JPEG, PNG, TIFF, join
 from stereocell.storage.location import Location, require_own
 
-_KINDS = {"TIFF": TIFF, "PNG": PNG, "JPEG": JPEG}
+_KINDS = {"TIFF": TIFF, "PNG": PNG, "JPEG": JPEG, "BMP": BMP}
 
 
 def list_images(location: Location) -> list[str]:
@@ -15,7 +15,7 @@ def list_images(location: Location) -> list[str]:
     for at, folders, names in os.walk(root):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in names:
-            if name.lower().endswith(TIFF + PNG + JPEG) and not name.startswith("."):
+            if name.lower().endswith(TIFF + PNG + JPEG + BMP) and not name.startswith("."):
                 found.append(os.path.relpath(os.path.join(at, name), root).replace(os.sep, "/"))
     for path in found:
         named = f"{location.shown}: {path!r:.200}"

@@ -4,6 +4,7 @@ import os
 
 from stereocell.model.errors import SourceError
 from stereocell.read.file_kind import require_kind
+from stereocell.read.foreign_files import foreign_words
 from stereocell.read.tables.delimited import read_delimited
 from stereocell.read.tables.parquet import read_parquet
 from stereocell.read.tables.table import KEYS, Table, TableColumn
@@ -11,6 +12,9 @@ from stereocell.storage.file_states import unchanged_while_read
 from stereocell.storage.first_bytes import identify, pointer_words
 from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location, first_bytes
+
+_TEXTS = (".csv", ".tsv", ".txt")
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")  # which begin a text of Excel
 
 __all__ = ["KEYS", "Table", "TableColumn", "read_table"]
 
@@ -35,9 +39,9 @@ def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Ta
 
 def _read(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:
     name = location.parts[-1].lower() if location.parts else ""
-    if name.endswith((".csv", ".tsv", ".txt", ".parquet", ".h5ad")) and location.is_local:
+    if name.endswith((*_TEXTS, ".parquet", ".h5ad")) and location.is_local:
         _require_sound(location, name)
-    if name.endswith((".csv", ".tsv", ".txt")):
+    if name.endswith(_TEXTS):
         return read_delimited(location, key, wanted)
     if name.endswith((".parquet", ".h5ad")) and not location.is_local:
         raise SourceError(f"{location.shown}: is not on this machine, expected a file that is")
@@ -50,9 +54,11 @@ def _read(location: Location, key: str, wanted: tuple[str, ...], labels: str) ->
         return read_h5ad(location, key, wanted, labels)
     if any(part.endswith(".zarr") for part in location.parts):
         return read_anndata_zarr(location, key, wanted, labels)
+    words = foreign_words(name)
+    found = f": found {words}" if words else ""
     raise SourceError(
-        f"{location.shown}: unknown kind of table, expected .csv, .tsv, .parquet, .h5ad, or a "
-        "table in a .zarr"
+        f"{location.shown}: unknown kind of table{found}, expected .csv, .tsv, .parquet, .h5ad, "
+        "or a table in a .zarr"
     )
 
 
@@ -66,6 +72,9 @@ def _require_sound(location: Location, name: str) -> None:
     head = first_bytes(path)
     if words := pointer_words(head):
         raise SourceError(f"{location.shown}: found {words}, expected a table")
+    content = identify(head)
+    if name.endswith(_TEXTS) and content.is_known and b"\0" in head and head[:2] not in _UTF16:
+        raise SourceError(f"{location.shown}: found {content.words}, expected a table of text")
     if name.endswith(".parquet") and head and not head.startswith(b"PAR1"):
         raise SourceError(f"{location.shown}: found {identify(head).words}, expected Parquet")
     if name.endswith(".h5ad"):

@@ -17,6 +17,11 @@ MAX_NAMES = 100_000  # columns of a file
 MAX_ROWS = 1 << 24
 _LONGEST = 200  # characters of a category
 _SHOWN = 8  # names that a message lists
+# words for a missing value, in small letters; pandas takes the same
+MISSING = (
+    *("", "na", "nan", "n/a", "null", "none", "<na>", "-nan"),
+    *("#n/a", "#n/a n/a", "#na", "-1.#ind", "-1.#qnan", "1.#ind", "1.#qnan"),
+)
 _MAX_DIGITS = 20  # highest power of ten: numbers of 64 bits have up to 20 digits
 
 
@@ -35,13 +40,21 @@ class TableColumn:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """`shown`: the file, for messages. `labels`: uint64 (n,), each once. `left_out`: columns."""
+    """A table with a row an object.
+
+    shown     the file, for messages
+    key       the column of the objects' numbers
+    labels    uint64 (n,), each once
+    left_out  number of columns that are not read
+    notes     on how the cells were read, a sentence each
+    """
 
     shown: str
     key: str
     labels: NDArray[np.uint64]
     columns: tuple[TableColumn, ...]
     left_out: int = 0
+    notes: tuple[str, ...] = ()
 
 
 def choose_key(where: str, names: Sequence[str], key: str) -> str:
@@ -74,9 +87,12 @@ def choose_columns(
 
 
 def keys_of(
-    where: str, key: str, values: NDArray[np.float64] | Sequence[str]
+    where: str, key: str, values: NDArray[np.float64] | Sequence[str], hint: str = ""
 ) -> NDArray[np.uint64]:
-    """Return the objects' numbers of all rows. Raises SourceError for a fraction, or one twice."""
+    """Return the objects' numbers of all rows. Raises SourceError for a fraction, or one twice.
+
+    hint  the end of the message about a value that is no number of an object
+    """
     found: list[int] = []
     for row, value in enumerate(values):
         try:
@@ -86,7 +102,7 @@ def keys_of(
         if not 0 < number < 1 << 64:
             raise SourceError(
                 f"{where}: {key}, row {row + 1}: found {value!s:.40}, expected a number of an "
-                "object: a whole number above 0"
+                f"object: a whole number above 0{hint}"
             )
         found.append(number)
     labels = np.array(found, np.uint64)
@@ -112,22 +128,6 @@ def named(names: Sequence[str]) -> list[str]:
     return [clean(name) or f"column {place}" for place, name in enumerate(names, start=1)]
 
 
-def as_column(name: str, texts: Sequence[str], *, point: str = ".") -> TableColumn:
-    """Return a column of texts, as numbers where all that are there are numbers.
-
-    point  what stands before a number's fraction
-    """
-    numbers = np.full(len(texts), np.nan)
-    for row, text in enumerate(texts):
-        if text.strip().lower() in _MISSING:
-            continue
-        try:
-            numbers[row] = float(text.replace(point, "."))
-        except ValueError:
-            return TableColumn(name, None, tuple(map(word_of, texts)))
-    return TableColumn(name, numbers, None)
-
-
 def listed(values: Sequence[object]) -> str:
     """Return the first few of a list, and that there are more."""
     return ", ".join(map(str, values[:5])) + ", ..." * (len(values) > 5)
@@ -141,7 +141,7 @@ def shown(names: Sequence[str]) -> str:
 
 def word_of(text: str) -> str:
     """Return a category's name as it is shown; empty: missing."""
-    return "" if text.strip().lower() in _MISSING else clean(text[:_LONGEST])
+    return "" if text.strip().lower() in MISSING else clean(text[:_LONGEST])
 
 
 def clean(name: str) -> str:
@@ -168,6 +168,3 @@ def _whole(value: float) -> int:
     if value != value // 1:
         raise ValueError
     return int(value)
-
-
-_MISSING = ("", "na", "nan", "n/a", "null", "none", "<na>")

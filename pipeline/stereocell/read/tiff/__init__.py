@@ -15,6 +15,7 @@ from tifffile import TiffFile
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
 from stereocell.read.image import Image
+from stereocell.read.series import Candidate, candidate, choose, lines
 from stereocell.read.tiff.companion import (
     Described,
     companion_at,
@@ -22,6 +23,7 @@ from stereocell.read.tiff.companion import (
     first_of_set,
     is_companion,
 )
+from stereocell.read.tiff.modulo import listed, split
 from stereocell.read.tiff.ome import read_ome
 from stereocell.read.tiff.ome_set import settle_files
 from stereocell.read.tiff.open_file import open_tiff, refuse_short
@@ -35,14 +37,47 @@ _BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's words
 _HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
 
 
-def read_image(location: Location, axes: str = "") -> Image:
+def read_image(location: Location, axes: str = "", series: int = 0) -> Image:
     """Return the first image of the file.
 
-    axes  of those longer than 1, slowest first, as `zcyx`; empty: the file's own
+    axes    of those longer than 1, slowest first, as `zcyx`; empty: the file's own
+    series  of the images that lie along a further axis of OME-XML (modulo.py); 0: the first
 
     Raises SourceError where the file can't be read as an image, UsageError where it has another
-    number of axes.
+    number of axes or no such image.
     """
+    image, root = _read(location, axes)
+    try:
+        if root is None:
+            choose(location.shown, [_whole(image)], series or 1)
+            return image
+        return split(location.shown, image, root, series)
+    except BaseException:
+        if image.close is not None:
+            image.close()
+        raise
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each image along a further axis. Raises SourceError."""
+    image, root = _read(location, "")
+    if image.close is not None:
+        image.close()
+    return lines([_whole(image)] if root is None else listed(image, root))
+
+
+def _whole(image: Image) -> Candidate:
+    finest = image.arrays[0]
+    return candidate(
+        finest.shape,
+        channels=finest.size("c"),
+        times=finest.size("t"),
+        spacing_um=image.grids[0].spacing_um,
+    )
+
+
+def _read(location: Location, axes: str) -> tuple[Image, ElementTree.Element | None]:
+    """Return the image as it is stored, and the root of its OME-XML; None: it has none."""
     given = location.source if is_companion(location) else ""
     if given:
         location = first_of_set(location)
@@ -56,7 +91,7 @@ def read_image(location: Location, axes: str = "") -> Image:
             if not given and not _is_ome(text):
                 image = read_plain(location, tiff, stack, axes)
                 _require_pages_read(location, tiff, log)
-                return _with_note(location, image)
+                return _with_note(location, image), None
             described = _described(location, tiff, text, given)
             root, text, beside = described.root, described.text, described.path
             is_changed, notes = settle_files(location, root, is_companion=bool(beside))
@@ -66,7 +101,7 @@ def read_image(location: Location, axes: str = "") -> Image:
                 tiff = open_tiff(location, stack, omexml=text)
             image = read_ome(location, tiff, stack, root=root, text=text, log=log, axes=axes)
             files = (*image.files, *([beside] if beside else []))
-            return replace(image, files=files, notes=(*notes, *image.notes))
+            return replace(image, files=files, notes=(*notes, *image.notes)), root
     except BaseException:
         stack.close()
         raise

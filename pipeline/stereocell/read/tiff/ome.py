@@ -31,7 +31,9 @@ from stereocell.read.tiff.arrays import (
     with_given_axes,
 )
 from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
+from stereocell.read.tiff.ome_planes import settle_depth
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
+from stereocell.read.tiff.orientation import turn_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -77,8 +79,19 @@ def read_ome(
     if axes:
         arrays = with_given_axes(where, arrays, axes)
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
-    notes = (*image.notes, *_undescribed(tiff), *note_absent(pages))
+    image, depth_notes = _with_depth(image, root)
+    _, turn_notes = turn_of(series.keyframe, is_applied=False)
+    described = (*depth_notes, *turn_notes)
+    notes = (*image.notes, *described, *_undescribed(tiff), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
+
+
+def _with_depth(image: Image, root: ElementTree.Element) -> tuple[Image, tuple[str, ...]]:
+    """Return the image with the depth of its voxels by the most trusted field, and notes."""
+    finest = image.grids[0]
+    z, y, x = finest.spacing_um or finest.partial_um
+    depth, notes = settle_depth(root, z)
+    return replace(image, grids=(grid_of(finest.shape, (depth, y, x)), *image.grids[1:])), notes
 
 
 def _require_planes(

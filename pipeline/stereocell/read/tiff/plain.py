@@ -32,7 +32,10 @@ from stereocell.read.tiff.open_file import (
     refuse_short,
     require_series,
 )
-from stereocell.read.tiff.stated import stated_by
+from stereocell.read.tiff.orientation import turn_of
+from stereocell.read.tiff.stated import Stated, stated_by
+from stereocell.read.turn import turned_image
+from stereocell.read.value_scale import ScaledArray, ValueScale
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -87,9 +90,12 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
             f"{where}: found {count} channels and {arrays[0].size('z')} planes at each of "
             f"{arrays[0].size('t')} times, expected at most {MAX_CHANNELS} and {MAX_PLANES}"
         )
+    arrays, more = _calibrated(arrays, stated)
+    notes += more
     unstated = (None,) * count
     shape = arrays[0].shape
-    return Image(
+    turn, turn_notes = turn_of(page)
+    image = Image(
         tuple(arrays),
         (
             grid_of(shape, stated.spacing_um, stated.hint),
@@ -99,8 +105,20 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         colors or (*stated.colors, *unstated)[:count],
         1,
         stack.close,
-        notes=tuple(notes),
+        notes=(*notes, *turn_notes),
         files=files,
+    )
+    return turned_image(image, turn)
+
+
+def _calibrated(arrays: list[VoxelArray], stated: Stated) -> tuple[list[VoxelArray], list[str]]:
+    """Return arrays of the values that ImageJ shows, and notes."""
+    if stated.calibration is None:
+        return arrays, list(stated.notes)
+    intercept, slope = stated.calibration
+    scale = ValueScale(slope=slope, intercept=intercept)
+    return [VoxelArray(ScaledArray(level.array, scale), level.axes) for level in arrays], list(
+        stated.notes
     )
 
 

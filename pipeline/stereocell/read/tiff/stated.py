@@ -22,6 +22,7 @@ from stereocell.read.stated_numbers import number_of
 _CENTIMETRE = 3  # TIFF tag ResolutionUnit
 _ESCAPED = re.compile(r"\\u([0-9A-Fa-f]{4})")
 _MAX_NAME = 60  # characters; longer texts are no names of channels
+_STRAIGHT, _UNCALIBRATED = 0, (20, 21)  # kinds of ImageJ's functions, as `cf` has them
 _NOTHING: PartialTriple = (None, None, None)
 
 
@@ -32,12 +33,16 @@ class Stated:
     spacing_um  (z, y, x), um
     names       of channels, maybe fewer than there are; `colors` the same, linear RGB
     hint        where a missing spacing may come from
+    calibration  intercept and slope from stored numbers to values; None: none
+    notes       sentences for the user
     """
 
     spacing_um: PartialTriple = _NOTHING
     names: tuple[str | None, ...] = ()
     colors: tuple[Color | None, ...] = ()
     hint: str = ""
+    calibration: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
 
 
 def stated_by(tiff: TiffFile) -> Stated:
@@ -65,7 +70,33 @@ def _imagej(tiff: TiffFile) -> Stated:
     hint = "ImageJ leaves out a depth of 1" if "spacing" not in meta else ""
     luts = meta.get("LUTs")
     colors = tuple(_lut_color(lut) for lut in luts) if isinstance(luts, list) else ()
-    return Stated((z, y, x), _imagej_names(meta), colors, hint)
+    calibration, notes = _imagej_calibration(meta)
+    notes += _label_notes(meta)
+    return Stated((z, y, x), _imagej_names(meta), colors, hint, calibration, notes)
+
+
+def _imagej_calibration(
+    meta: Mapping[str, Any],
+) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
+    """Return intercept and slope of ImageJ's values, and notes. `cf` is the kind of function."""
+    if (kind := meta.get("cf")) is None or kind in _UNCALIBRATED:
+        return None, ()
+    factors = [_times(1.0, meta.get(name)) for name in ("c0", "c1")]
+    intercept, slope = factors
+    unit = _name(meta.get("vunit", "")) or "values"
+    if kind != _STRAIGHT or intercept is None or not slope:
+        note = (
+            f"values: ImageJ's calibration ({unit}) is no straight line: the voxels are read as "
+            "they are stored"
+        )
+        return None, (note,)
+    if (intercept, slope) == (0.0, 1.0):
+        return None, ()
+    note = (
+        f"values: ImageJ's calibration {intercept:g} + {slope:g} * stored number ({unit}) is "
+        "applied"
+    )
+    return (intercept, slope), (note,)
 
 
 def _imagej_names(meta: Mapping[str, Any]) -> tuple[str | None, ...]:
@@ -84,6 +115,28 @@ def _imagej_names(meta: Mapping[str, Any]) -> tuple[str | None, ...]:
         return ()
     names = [_name(next(iter(names))) for names in shared]
     return tuple(names) if len(set(names)) == channels else ()
+
+
+def _label_notes(meta: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a note where Bio-Formats' labels name channels or times that the header lacks."""
+    labels = meta.get("Labels")
+    if not isinstance(labels, list) or not labels:
+        return ()
+    told = []
+    for letter, key, noun in (("c", "channels", "channels"), ("t", "frames", "points in time")):
+        found = [re.match(rf"(?:.*\s)?{letter}:(\d+)/(\d+)\b", str(text)) for text in labels]
+        if not all(found):
+            continue
+        numbers = {int(one[1]) for one in found if one is not None}
+        if len(numbers) > 1 and meta.get(key, 1) == 1:
+            told.append(f"{len(numbers)} {noun}")
+    if not told:
+        return ()
+    return (
+        f"the labels of the slices name {' and '.join(told)}, which the header of ImageJ counts "
+        "as slices: they are read as slices (Image > Hyperstacks > Stack to Hyperstack in ImageJ "
+        "corrects the file)",
+    )
 
 
 def _lut_color(lut: Any) -> Color | None:

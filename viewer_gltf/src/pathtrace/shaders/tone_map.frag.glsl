@@ -1,5 +1,6 @@
 // The traced picture as it is laid over the scene: exposed, sharpened, toned, encoded. Where a pixel has
-// few samples yet, the marched picture of the same view stands in.
+// few samples yet, the marched picture of the same view stands in. It gives way everywhere at once: tiles
+// have their samples in turn, and a picture of both would be a mosaic of two lights.
 precision highp float;
 
 uniform sampler2D uColor;  // linear, premultiplied
@@ -10,6 +11,7 @@ uniform vec3 uTone;  // turns of hue, factor to saturation, added lightness
 uniform vec4 uPart;  // the eye's
 uniform sampler2D uGuide;  // samples
 uniform sampler2D uMarched;  // linear, premultiplied
+uniform float uRounds;  // samples that every pixel has
 uniform vec4 uMarchedPart;  // the eye's; no width: nothing stands in
 
 out vec4 oColor;  // encoded, premultiplied
@@ -51,6 +53,6 @@ vec4 traced() {
 void main() {
   oColor = traced();
   if (uMarchedPart.z <= 0.0) return;
-  float samples = texelFetch(uGuide, ivec2(gl_FragCoord.xy), 0).y;
+  float samples = min(texelFetch(uGuide, ivec2(gl_FragCoord.xy), 0).y, uRounds);
   oColor = mix(standIn(), oColor, smoothstep(0.0, SHOWN, samples));
 }

@@ -1,0 +1,82 @@
+"""The colour that fluorescence is shown in: by its wavelength, or by the dye in a channel's name.
+
+Bands of the spectrum have one colour each, in the order that the eye sees them, and light enough to
+be shaded. Emission maxima of dyes are those that their makers and FPbase publish, rounded.
+"""
+
+import re
+
+from stereocell.model.color import linear_color
+
+Color = tuple[float, float, float]
+
+# Upper end of a band, nm, and its colour. Far red and infrared light, which no eye sees, is pink.
+_BANDS = (
+    (435.0, 0x8F6CF2),
+    (480.0, 0x4F70F5),
+    (505.0, 0x5CD6E8),
+    (545.0, 0x66D96C),
+    (575.0, 0xF0CD3C),
+    (600.0, 0xF29A45),
+    (645.0, 0xEE5548),
+    (720.0, 0xE864B4),
+    (2000.0, 0xB08CA8),
+)
+_SHORTEST_NM = 300.0  # shorter numbers are no emission of a dye: they are left out
+
+# Emission maximum, nm, by a pattern of the name in lower case with single spaces
+_DYES = tuple(
+    (re.compile(rf"(?<![a-z])(?:{pattern})(?![a-z0-9]|\.[0-9])"), nm)
+    for pattern, nm in {
+        r"dapi": 461,
+        r"hoechst ?(?:33258|33342|34580)?": 461,
+        r"[em]?bfp2?": 448,
+        r"(?:alexa ?(?:fluor)?|af|a) ?350": 442,
+        r"(?:alexa ?(?:fluor)?|af|a) ?405": 421,
+        r"m?cerulean3?|[em]?cfp|m?turquoise2?": 475,
+        r"(?:alexa ?(?:fluor)?|af|a) ?488": 519,
+        r"(?:e|em|sf|t|z|m)?gfp|m?neongreen|m?clover": 510,
+        r"fitc|fluorescein|fam|cy ?2|calcein|sytox green|atto ?488|oregon green": 520,
+        r"gcamp[0-9a-z]*": 512,
+        r"[em]?yfp|m?venus|m?citrine": 528,
+        r"(?:alexa ?(?:fluor)?|af|a) ?532": 554,
+        r"(?:alexa ?(?:fluor)?|af|a) ?(?:546|555)": 567,
+        r"cy ?3|tritc|rhodamine|tmr|atto ?550|(?:m|m?k)orange2?": 570,
+        r"tdtomato|dsred2?|tagrfp|m?rfp": 583,
+        r"(?:alexa ?(?:fluor)?|af|a) ?(?:568|594)|texas red|cy ?3\.5|atto ?594": 610,
+        r"m?cherry2?|mscarlet[0-9i]*|mruby[0-9]?|propidium iodide": 610,
+        r"(?:alexa ?(?:fluor)?|af|a) ?(?:633|635|647|660)|cy ?5|apc|draq ?5|to ?pro ?3": 667,
+        r"atto ?(?:633|647n?)|sir(?: ?(?:dna|actin|tubulin))?|mplum|mkate2?": 665,
+        r"(?:alexa ?(?:fluor)?|af|a) ?(?:680|700)|cy ?5\.5": 700,
+        r"(?:alexa ?(?:fluor)?|af|a) ?(?:750|790)|cy ?7|indocyanine green|icg": 780,
+    }.items()
+)
+
+
+def color_of_wavelength(nm: float) -> Color | None:
+    """Return the colour, linear RGB, of light of a wavelength; None for no wavelength of a dye."""
+    if not _SHORTEST_NM <= nm <= _BANDS[-1][0]:
+        return None
+    code = next(code for end, code in _BANDS if nm <= end)
+    return linear_color((code >> 16, code >> 8 & 255, code & 255))
+
+
+def emission_of(name: str) -> float | None:
+    """Return the emission maximum, nm, of the dye that a channel's name holds; None: of none."""
+    plain = " ".join(re.sub(r"[^a-z0-9.]+", " ", name.lower()).split())
+    return next((float(nm) for pattern, nm in _DYES if pattern.search(plain)), None)
+
+
+def color_of_name(name: str) -> Color | None:
+    """Return the colour, linear RGB, of the dye that a channel's name holds; None: of none."""
+    nm = emission_of(name)
+    return None if nm is None else color_of_wavelength(nm)
+
+
+def color_of_light(nm: float | str | None, dye: str = "") -> Color | None:
+    """Return the colour, linear RGB, of a stated wavelength in nm, or else of a stated dye."""
+    try:
+        found = None if nm is None else color_of_wavelength(float(nm))
+    except ValueError:
+        found = None
+    return color_of_name(dye) if found is None else found

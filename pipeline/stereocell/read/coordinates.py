@@ -1,0 +1,49 @@
+"""Positions of voxels along one axis, as files state them: step, direction, and how even it is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_EVEN = 0.02  # largest difference between two steps and their mean, as a share of the mean
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The steps along an axis.
+
+    mean           signed, in the positions' unit; negative: the positions descend
+    least, largest sizes of the steps, 0 or more
+    """
+
+    mean: float
+    least: float
+    largest: float
+
+    @property
+    def is_even(self) -> bool:
+        """Whether all steps are as long, but for rounding."""
+        mean = abs(self.mean)
+        return max(self.largest - mean, mean - self.least) <= _EVEN * mean
+
+
+def steps_of(positions: NDArray[np.float64] | Sequence[float], count: int) -> Steps | None:
+    """Return the steps between the positions of `count` voxels.
+
+    positions  one for each voxel, or the first two alone, as EMD has it for even steps
+
+    None: there are no such positions, or they neither rise nor fall throughout.
+
+    >>> steps_of([3.0, 2.0, 0.0], 3)
+    Steps(mean=-1.5, least=1.0, largest=2.0)
+    """
+    found = np.asarray(positions, np.float64).ravel()
+    if count < 2 or len(found) not in (2, count) or not np.isfinite(found).all():
+        return None
+    steps = np.diff(found)
+    if not ((steps > 0).all() or (steps < 0).all()):
+        return None
+    sizes = np.abs(steps)
+    mean = float((found[-1] - found[0]) / (len(found) - 1))
+    return Steps(mean, float(sizes.min()), float(sizes.max()))

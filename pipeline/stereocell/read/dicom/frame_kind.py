@@ -1,0 +1,280 @@
+"""The kind of a DICOM frame: the part of a complex signal, the derivation, the contrast.
+
+One series may hold the magnitude and the phase of the same slices, projections of them, or several
+echoes. The kind tells them apart (read/dicom/split_kinds.py). Words for the user come from the
+tables here and never from the file, whose texts may identify a patient.
+
+References: DICOM PS3.3 C.7.6.1.1.2 (Image Type), C.8.3.1.1.1 (MR), C.8.13.3.1 (Complex Image
+Component), C.8.16.2.1.3 (Volume Based Calculation Technique), C.8.15.3 (CT).
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from stereocell.read.dicom.header_values import (
+    find_number,
+    find_text,
+    find_value,
+    private_number,
+    private_tags,
+)
+from stereocell.read.dicom.silence_logs import DICOM_FAULTS
+
+MAGNITUDE, PHASE, REAL, IMAGINARY = "magnitude", "phase", "real part", "imaginary part"
+LOCALIZER = "localizer"
+# words of ImageType and of ComplexImageComponent -> part of the complex signal, of MR
+_COMPONENTS = {
+    **dict.fromkeys(("M", "MAGNITUDE", "MODULUS"), MAGNITUDE),
+    **dict.fromkeys(("P", "PHASE", "PHASE MAP", "VELOCITY MAP"), PHASE),
+    **dict.fromkeys(("R", "REAL"), REAL),
+    **dict.fromkeys(("I", "IMAGINARY"), IMAGINARY),
+}
+_PHILIPS = re.compile(r"([MPRI])_[A-Z0-9]+")  # as `M_FFE`, `R_IR`
+_GE = (MAGNITUDE, PHASE, REAL, IMAGINARY)  # by the number in GE's private element
+# roles, each with its rank: an image (0) is shown first, a screen save last
+_RANKS = {
+    "": 0,
+    "reformatted": 1,
+    "subtraction": 1,
+    "trace of diffusion": 1,
+    "parametric map": 2,
+    "projection": 3,
+    "maximum intensity projection": 3,
+    "minimum intensity projection": 3,
+    "average of a slab": 3,
+    LOCALIZER: 4,
+    "rendering": 5,
+    "screen save": 5,
+    "dose or protocol sheet": 5,
+}
+_PART_RANK = 2  # rank of a phase, a real or an imaginary part
+# patterns of words of ImageType -> role, the first that matches
+_ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
+    (re.compile(pattern), role)
+    for pattern, role in (
+        (r"LOCALIZER|SCOUT|TOPOGRAM|SURVEY", LOCALIZER),
+        (r"(.* )?(PROT|DOSE|DOSE[ _]?(INFO|REPORT)|CSA REPORT|PROTOCOL)", "dose or protocol sheet"),
+        (r"SCREEN ?SAVE|SCREENSHOT|SCREEN ?CAPTURE", "screen save"),
+        (r"(.* )?(VRT|SSD|3D RENDERING|VOLUME_RENDER|SURFACE_RENDER|RENDERED)", "rendering"),
+        (r"(.* )?(MINIP|MIN_IP|MIN IP)|MINIMUM", "minimum intensity projection"),
+        (r"(.*[ _])?(MIP|MAX_IP)( .*|_.*)?|MAXIMUM", "maximum intensity projection"),
+        (r"PROJECTION( IMAGE)?", "projection"),
+        (r"(.* )?(MPR|CURVED_MPR|REFORMATTED|CSAPARALLEL|CPR)( .*)?", "reformatted"),
+        (r"AVERAGE|AVE|MEAN", "average of a slab"),
+        (r"(PHASE |MODULUS )?SUBTRACT(ION)?", "subtraction"),
+        (r"TRACE.*|ISOTROPIC", "trace of diffusion"),
+        (
+            r"ADC.*|EADC|FA|DIFFUSION MAP|(T1|T2|T2\*|T2STAR|R2|R2\*|DENSITY) MAP|[TR][12]_?MAP"
+            r"|CBF|CBV|RCBF|RCBV|MTT|TTP|TMAX|PERFUSION MAP|STD_DEVIATION|EFF_ATOMIC_NUM"
+            r"|ELECTRON_DENSITY|MAT_(SPECIFIC|REMOVED|FRACTIONAL|VALUE_BASED)",
+            "parametric map",
+        ),
+    )
+)
+# words of ImageType that name a contrast
+_CONTRASTS = {
+    **dict.fromkeys(("W", "WATER"), "water"),
+    **dict.fromkeys(("F", "FAT"), "fat"),
+    **dict.fromkeys(("IN_PHASE", "INPHASE", "IP"), "in phase"),
+    **dict.fromkeys(("OUT_PHASE", "OPP_PHASE", "OPPOSED_PHASE", "OP"), "opposed phase"),
+    **dict.fromkeys(("UNI",), "uniform"),
+    "INV1": "first inversion",
+    "INV2": "second inversion",
+    "VMI": "virtual monoenergetic",
+}
+_FRAME_TYPES = (
+    "MRImageFrameTypeSequence",
+    "CTImageFrameTypeSequence",
+    "PETFrameTypeSequence",
+    "XRay3DFrameTypeSequence",
+)
+_GE_PART = (0x0043, 0x2F, "GEMS_PARM", "SS")
+# private b-values: group, element, creator, VR
+_B_VALUES = (
+    (0x0019, 0x0C, "SIEMENS MR HEADER", "IS"),
+    (0x0043, 0x39, "GEMS_PARM", "IS"),
+    (0x2001, 0x03, "PHILIPS IMAGING", "FL"),
+    (0x0065, 0x09, "IMAGE PRIVATE HEADER", "FD"),
+)
+_GE_B_STEP = 1_000_000_000  # GE adds a multiple of it to some b-values
+KIND_TAGS: list[Any] = [
+    "ImageType",
+    "ComplexImageComponent",
+    "VolumeBasedCalculationTechnique",
+    "ConvolutionKernel",
+    "KVP",
+    "MonoenergeticEnergyEquivalent",
+    "ContrastBolusAgent",
+    "ContrastBolusAgentSequence",
+    "DiffusionBValue",
+    "EchoTime",
+    "EchoNumbers",
+    "InversionTime",
+    "FlipAngle",
+    "AcquisitionNumber",
+    "TemporalPositionIdentifier",
+    "NominalPercentageOfCardiacPhase",
+    "TriggerTime",
+    *(tag for group, element, *_ in (_GE_PART, *_B_VALUES) for tag in private_tags(group, element)),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class FrameKind:
+    """The properties of a frame by which one series falls apart; None and empty: not stated.
+
+    part             of a complex signal: a name above
+    role             a key of _RANKS; empty: an image as it was acquired
+    contrast_words   contrasts that ImageType names, for the user
+    image_type       ImageType, compared and never shown
+    kernel           ConvolutionKernel, shown only in the form of a maker's code
+    has_agent        a contrast agent is stated
+    energy_kev       of a virtual monoenergetic image
+    echo_time, inversion_time, trigger_time  ms
+    temporal, cardiac, acquisition  number of the point in time, of the cardiac phase (%), of the
+                     acquisition
+    """
+
+    part: str = ""
+    role: str = ""
+    contrast_words: str = ""
+    image_type: tuple[str, ...] = ()
+    kernel: str = ""
+    has_agent: bool = False
+    kvp: float | None = None
+    energy_kev: float | None = None
+    b_value: float | None = None
+    echo_time: float | None = None
+    echo_number: float | None = None
+    inversion_time: float | None = None
+    flip_angle: float | None = None
+    acquisition: float | None = None
+    temporal: float | None = None
+    cardiac: float | None = None
+    trigger_time: float | None = None
+
+    @property
+    def rank(self) -> int:
+        """Lower ranks are shown first: images and magnitudes have 0."""
+        part = _PART_RANK if self.part in (PHASE, REAL, IMAGINARY) else 0
+        return max(part, _RANKS[self.role], int(self.image_type[:1] == ("DERIVED",)))
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The part and the role for the user; a plain image has none."""
+        return tuple(word for word in (self.part, self.role) if word)
+
+
+def kind_of(header: Any, groups: Sequence[Any]) -> FrameKind:
+    """Return the kind of a frame.
+
+    groups  the frame's functional groups and the shared ones, each a dataset or None
+    """
+    words = _image_type(header, groups)
+    is_mr = str(header.get("Modality", "")).strip() == "MR"
+
+    def number(sequence: str, key: str) -> float | None:
+        return find_number(header, groups, sequence, key)
+
+    kernel = find_text(header, groups, "CTReconstructionSequence", "ConvolutionKernel")
+    cardiac = "CardiacSynchronizationSequence"
+    return FrameKind(
+        part=_part(header, groups, words) if is_mr else "",
+        role=_role(header, groups, words),
+        contrast_words=", ".join(dict.fromkeys(_CONTRASTS[w] for w in words if w in _CONTRASTS)),
+        image_type=words,
+        kernel=kernel,
+        has_agent=bool(_has_agent(header, groups)),
+        kvp=number("CTXRayDetailsSequence", "KVP"),
+        energy_kev=number("MultienergyCTCharacteristicsSequence", "MonoenergeticEnergyEquivalent"),
+        b_value=_b_value(header, groups) if is_mr else None,
+        echo_time=_first_of(
+            number("MREchoSequence", "EffectiveEchoTime"), number("MREchoSequence", "EchoTime")
+        ),
+        echo_number=number("MREchoSequence", "EchoNumbers"),
+        inversion_time=_first_of(
+            number("MRModifierSequence", "InversionTimes"), number("", "InversionTime")
+        ),
+        flip_angle=number("MRTimingAndRelatedParametersSequence", "FlipAngle"),
+        acquisition=_first_of(
+            number("FrameContentSequence", "FrameAcquisitionNumber"),
+            number("", "AcquisitionNumber"),
+        ),
+        temporal=_first_of(
+            number("FrameContentSequence", "TemporalPositionIndex"),
+            number("", "TemporalPositionIdentifier"),
+        ),
+        cardiac=number(cardiac, "NominalPercentageOfCardiacPhase"),
+        trigger_time=_first_of(
+            number(cardiac, "NominalCardiacTriggerDelayTime"), number("", "TriggerTime")
+        ),
+    )
+
+
+def _first_of(*values: float | None) -> float | None:
+    return next((value for value in values if value is not None), None)
+
+
+def _image_type(header: Any, groups: Sequence[Any]) -> tuple[str, ...]:
+    """Return the words of the frame's type, in capitals."""
+    found: Any = None
+    try:
+        for sequence in _FRAME_TYPES:
+            found = found or find_value({}, groups, sequence, "FrameType")
+        found = found or header.get("ImageType") or ()
+        words = (found,) if isinstance(found, str) else tuple(found)
+        return tuple(str(word).strip().upper() for word in words)
+    except DICOM_FAULTS:
+        return ()
+
+
+def _part(header: Any, groups: Sequence[Any], words: Sequence[str]) -> str:
+    """Return the part of the complex signal: by the standard's attribute, ImageType, GE's own."""
+    stated = [
+        find_text(header, groups, sequence, "ComplexImageComponent").upper()
+        for sequence in ("MRImageFrameTypeSequence", "")
+    ]
+    for word in (*stated, *words[2:]):
+        if word in _COMPONENTS:
+            return _COMPONENTS[word]
+    for word in words[2:]:
+        philips = _PHILIPS.fullmatch(word)
+        if philips:
+            return _COMPONENTS[philips[1]]
+    code = private_number(header, *_GE_PART)
+    return _GE[int(code)] if code is not None and code in range(len(_GE)) else ""
+
+
+def _role(header: Any, groups: Sequence[Any], words: Sequence[str]) -> str:
+    stated = [
+        find_text(header, groups, sequence, "VolumeBasedCalculationTechnique").upper()
+        for sequence in (*_FRAME_TYPES, "")
+    ]
+    for pattern, role in _ROLES:
+        if any(pattern.fullmatch(word) for word in (*stated, *words[2:])):
+            return role
+    return ""
+
+
+def _has_agent(header: Any, groups: Sequence[Any]) -> bool:
+    """Return whether a contrast agent is stated, whose name is a text that is never shown."""
+    try:
+        usage = find_value(
+            {}, groups, "ContrastBolusUsageSequence", "ContrastBolusAgentAdministered"
+        )
+        if usage is not None:
+            return str(usage).strip().upper() == "YES"
+        agent = str(header.get("ContrastBolusAgent") or "").strip().upper()
+        return bool(agent) and agent not in ("NONE", "NO", "WITHOUT", "N/A")
+    except DICOM_FAULTS:
+        return False
+
+
+def _b_value(header: Any, groups: Sequence[Any]) -> float | None:
+    found = find_number(header, groups, "MRDiffusionSequence", "DiffusionBValue")
+    for private in _B_VALUES:
+        if found is None:
+            found = private_number(header, *private)
+    return None if found is None else found % _GE_B_STEP

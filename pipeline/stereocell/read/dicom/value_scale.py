@@ -1,0 +1,76 @@
+"""The scale of a DICOM frame's values, as its header states it.
+
+Stored values become grey values by RescaleSlope and RescaleIntercept. Without them a linear
+RealWorldValueMapping is used, and without that the stored values are.
+
+References: DICOM PS3.3 C.11.1 (Modality LUT), C.7.6.16.2.11 (Real World Value Mapping), C.8.9.1.1.3
+(Units of PET).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from stereocell.read.dicom.header_values import (
+    find_number,
+    find_text,
+    first_item,
+    private_number,
+    private_tags,
+)
+from stereocell.read.dicom.silence_logs import DICOM_FAULTS
+
+_RESCALE = "PixelValueTransformationSequence"
+_MAPPING = "RealWorldValueMappingSequence"
+HOUNSFIELD = "HU"
+_UNITS = tuple("CNTS CPS PROPCNTS PROPCPS BQML GML CM2ML 1CM PCNT NONE".split())  # of PET
+_TYPES = (HOUNSFIELD, "US", "OD", "PCT", "MGML", "HU_MOD", "Z_EFF", "ED", "EDW")  # RescaleType
+_PHILIPS = (0x2005, 0x0E, "PHILIPS MR IMAGING DD 001", "FL")  # the scale slope
+SCALE_TAGS: list[Any] = ["RescaleType", "Units", _MAPPING, *private_tags(*_PHILIPS[:2])]
+
+
+@dataclass(frozen=True, slots=True)
+class ValueScale:
+    """What a header states about a frame's values.
+
+    has_rescale  RescaleSlope and RescaleIntercept are stated
+    kind         RescaleType, one of the standard's terms; empty: another, or none
+    units        of PET, one of the standard's terms; empty: another, or none
+    real_world   slope and intercept of the only RealWorldValueMapping; None: there is none
+    philips      Philips's scale slope
+    """
+
+    has_rescale: bool = True
+    kind: str = ""
+    units: str = ""
+    real_world: tuple[float, float] | None = None
+    philips: float | None = None
+
+
+def scale_of(header: Any, groups: Sequence[Any]) -> ValueScale:
+    """Return what a frame's header and functional groups state."""
+    slope = find_number(header, groups, _RESCALE, "RescaleSlope")
+    intercept = find_number(header, groups, _RESCALE, "RescaleIntercept")
+    kind = find_text(header, groups, _RESCALE, "RescaleType").upper()
+    units = find_text(header, groups, "", "Units").upper()
+    return ValueScale(
+        has_rescale=slope is not None or intercept is not None,
+        kind=kind if kind in _TYPES else "",
+        units=units if units in _UNITS else "",
+        real_world=_real_world(header, groups),
+        philips=private_number(header, *_PHILIPS),
+    )
+
+
+def _real_world(header: Any, groups: Sequence[Any]) -> tuple[float, float] | None:
+    try:
+        for group in (*groups, header):
+            mappings = None if group is None else group.get(_MAPPING)
+            if not mappings or len(mappings) > 1:  # several are for different ranges of values
+                continue
+            slope = find_number(first_item(mappings), (), "", "RealWorldValueSlope")
+            intercept = find_number(first_item(mappings), (), "", "RealWorldValueIntercept")
+            return (slope, intercept or 0.0) if slope else None
+    except DICOM_FAULTS:
+        pass
+    return None

@@ -1,0 +1,77 @@
+"""Formats that are not read, by the endings of their names, with a way to a format that is.
+
+The first bytes of many formats (storage/first_bytes.py) name them. The formats here share their
+first bytes with others, or begin with anything.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from stereocell.storage.first_bytes import BIOFORMATS
+
+_AS_CSV = "save it as CSV UTF-8"
+_HEADER = (
+    "write a header of MetaImage beside it, NAME.mhd, with the lines NDims = 3, DimSize = X Y Z, "
+    "ElementSpacing = X Y Z (mm), ElementType = MET_USHORT, ElementDataFile = {name}"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Foreign:
+    """A format that is not read.
+
+    endings  in small letters
+    title    with an article
+    remedy   the way to a format that is read
+    is_other whether its files begin as those of a format that is read, and mean something else
+    """
+
+    endings: tuple[str, ...]
+    title: str
+    remedy: str
+    is_other: bool = False
+
+
+FOREIGN = (
+    Foreign((".oib", ".oif"), "an image of Olympus FluoView", BIOFORMATS),
+    Foreign((".vsi",), "an overview of Olympus VSI, whose voxels are in the folder beside it",
+            BIOFORMATS, is_other=True),
+    Foreign((".zvi",), "an image of Zeiss AxioVision", BIOFORMATS),
+    Foreign((".sld", ".sldy"), "an image of SlideBook", BIOFORMATS),
+    Foreign((".dv", ".r3d"), "an image of DeltaVision", BIOFORMATS),
+    Foreign((".ids",), "the voxels of an ICS image", BIOFORMATS),
+    Foreign((".spe",), "an image of Princeton Instruments", BIOFORMATS),
+    Foreign((".mnc",), "a MINC file", "mnc2nii makes NIfTI of it", is_other=True),
+    Foreign((".mat",), "a MATLAB file before 7.3", "save it in MATLAB with -v7.3"),
+    Foreign((".vti",), "a VTK file", "ParaView saves it as Meta Image (.mhd)"),
+    Foreign((".xlsx", ".xls", ".ods", ".numbers"), "a workbook of a spreadsheet", _AS_CSV),
+    Foreign((".rds", ".rdata", ".sav", ".feather", ".jmp"), "a table of a statistics program",
+            _AS_CSV),
+    Foreign((".pt", ".pth", ".ckpt"), "a file of PyTorch",
+            "tifffile.imwrite makes a TIFF of its array"),
+)  # fmt: skip
+_VOXELS = (".raw", ".vol", ".bin", ".dat")
+_SIDECARS = (".vgi", ".info", ".vol.info", ".raw.info")  # VGStudio, PyHST
+
+
+def foreign_words(name: str, *, only_other: bool = False) -> str:
+    """Return what a file is by its name, with the way out; empty: its ending says nothing.
+
+    only_other  whether only formats count that begin as another one that is read
+    """
+    lower = name.lower()
+    for one in FOREIGN:
+        if lower.endswith(one.endings) and (one.is_other or not only_other):
+            return f"{one.title} ({one.remedy})"
+    return ""
+
+
+def bare_voxels_words(path: Path) -> str:
+    """Return what a file of voxels without a header is, with the way out; empty: it is none."""
+    if path.suffix.lower() not in _VOXELS:
+        return ""
+    names = [path.name + ending for ending in _SIDECARS]
+    names += [path.with_suffix(ending).name for ending in _SIDECARS]
+    beside = next((name for name in names if path.with_name(name).is_file()), "")
+    described = f", described by {beside!r:.100}" if beside else ", if it is a volume"
+    return f"voxels without a header{described} ({_HEADER.format(name=path.name)})"

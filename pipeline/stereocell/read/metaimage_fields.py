@@ -1,0 +1,192 @@
+"""The fields of a MetaImage header that are read, under all their names, and what they contradict.
+
+A place, a matrix, a size and the byte order each have synonyms. Where several are there, the one is
+taken that ITK takes, which SimpleITK's reading of such files showed.
+
+References: https://itk.org/Wiki/ITK/MetaIO/Documentation
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import nibabel
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.statements import Statement, Subject, Trust, settle
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location
+
+NAME = "MetaImage"
+_MAX_HEADER = 1 << 16  # bytes
+# field -> its names, the one that ITK prefers first
+_NAMES = {
+    "Offset": ("Origin", "Position", "Offset"),
+    "TransformMatrix": ("TransformMatrix", "Rotation", "Orientation"),
+    "ElementSpacing": ("ElementSpacing", "ElementSize"),
+    "BinaryDataByteOrderMSB": ("BinaryDataByteOrderMSB", "ElementByteOrderMSB"),
+}
+_FIELD_OF = {name: field for field, names in _NAMES.items() for name in names}
+_READ = {
+    *_FIELD_OF, "NDims", "DimSize", "ElementType", "ElementNumberOfChannels", "BinaryData",
+    "CompressedData", "HeaderSize", "ElementDataFile", "DistanceUnits", "AnatomicalOrientation",
+    "ElementToIntensityFunctionSlope", "ElementToIntensityFunctionOffset", "Modality",
+}  # fmt: skip
+_UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0}
+_MODALITIES = {"MET_MOD_CT": "CT", "MET_MOD_MR": "MR", "MET_MOD_NM": "NM", "MET_MOD_US": "US"}
+_OPPOSITE = dict(zip("RLAPIS", "LRPASI", strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """The header of a file.
+
+    fields  text by the field's usual name
+    end     length of the header in bytes
+    notes   contradictions between its fields
+    """
+
+    fields: dict[str, str]
+    end: int
+    notes: tuple[str, ...]
+
+
+def read_header(location: Location) -> Header:
+    """Return the header of a file. Raises SourceError where it has no end."""
+    with one_line(location.shown, f"a {NAME} file"), open(location.path, "rb") as file:
+        content = file.read(_MAX_HEADER)
+    stated: dict[str, str] = {}
+    end = 0
+    for line in content.splitlines(keepends=True):
+        end += len(line)
+        key, mark, value = line.decode("latin-1").partition("=")
+        if not mark:
+            break
+        name = key.strip()
+        if name in _READ and name not in stated:
+            stated[name] = value.strip()
+        if name == "ElementDataFile":
+            fields = {name: text for name, text in stated.items() if name not in _FIELD_OF}
+            return Header(fields, end, _settle_names(stated, fields))
+    raise SourceError(
+        f"{location.shown}: header: no ElementDataFile in {len(content)} bytes, "
+        f"expected {NAME} (.mha, .mhd)"
+    )
+
+
+def _settle_names(stated: dict[str, str], fields: dict[str, str]) -> tuple[str, ...]:
+    """Add the fields that have several names to `fields`; return a note for each contradiction."""
+    notes: list[str] = []
+    for field, names in _NAMES.items():
+        statements = [
+            Statement(_value(stated[name]), name, Trust.STATED if not rank else Trust.REPEATED)
+            for rank, name in enumerate(names)
+            if name in stated
+        ]
+        if statements:
+            settled = settle(Subject(f"field {field}"), statements)
+            fields[field] = stated[settled.chosen.place]
+            notes += settled.notes
+    return tuple(notes)
+
+
+def _value(text: str) -> float | str | tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split())
+    except ValueError:
+        return text.strip().lower()[:1]  # of a flag, as ITK reads it
+
+
+def require_dimensions(where: str, fields: dict[str, str], count: int) -> None:
+    """Raise SourceError where NDims is another number than that of the sizes."""
+    stated = integers(where, fields, "NDims")
+    if stated and stated[0] != count:
+        raise SourceError(
+            f"{where}: NDims: found {stated[0]}, but DimSize has {count} numbers "
+            f"({fields['DimSize']:.60}), expected as many: correct the header"
+        )
+
+
+def unit_mm(fields: dict[str, str]) -> tuple[float, tuple[str, ...]]:
+    """Return mm for each unit of lengths, and a note on a unit that is not known."""
+    text = fields.get("DistanceUnits", "mm").strip().lower()
+    if text in _UNITS_MM:
+        return _UNITS_MM[text], ()
+    reason = f"since DistanceUnits {text!r:.20} is none of mm, um and cm"
+    subject = Subject("unit of length", remedy="--spacing-um z,y,x replaces it")
+    return 1.0, settle(subject, [Statement("mm", reason, Trust.ASSUMED)]).notes
+
+
+def side_notes(fields: dict[str, str], axes: NDArray[np.float64]) -> tuple[str, ...]:
+    """Compare AnatomicalOrientation with the directions of the axes.
+
+    axes  (3, 3): a column in LPS for each stored axis
+
+    Its letters are the sides at which the axes begin; ITK writes them and does not read them.
+    """
+    letters = fields.get("AnatomicalOrientation", "").strip().upper()
+    is_stated = len(letters) == 3 and set(letters) <= set(_OPPOSITE)
+    if "TransformMatrix" not in fields:
+        said = f", where AnatomicalOrientation states {letters}" if is_stated else ""
+        return (
+            f"no TransformMatrix: which side is left is a guess, x to the patient's left{said}",
+        )
+    affine = np.eye(4)
+    affine[:3, :3] = np.diag([-1.0, -1.0, 1.0]) @ axes
+    if not is_stated or not np.isfinite(axes).all() or abs(np.linalg.det(axes)) < 1e-3:
+        return ()
+    orientations: Any = nibabel.orientations
+    ends = orientations.aff2axcodes(affine)
+    begins = tuple(_OPPOSITE[str(end)] for end in ends)
+    statements = [
+        Statement(begins, "TransformMatrix"),
+        Statement(tuple(letters), "AnatomicalOrientation", Trust.REPEATED),
+    ]
+    return settle(Subject("sides at which the stored axes begin"), statements).notes
+
+
+def value_notes(where: str, fields: dict[str, str]) -> tuple[str, ...]:
+    """Return a note where the header states a scale of values, which ITK does not apply."""
+    names = ("ElementToIntensityFunctionSlope", "ElementToIntensityFunctionOffset")
+    slope, offset = (
+        (numbers(where, fields, name, 1) or [default])[0]
+        for name, default in zip(names, (1.0, 0.0), strict=True)
+    )
+    if (slope, offset) == (1.0, 0.0):
+        return ()
+    return (
+        f"values: {names[0]} {slope:g} and {names[1]} {offset:g} are not applied, as in ITK: read "
+        "as stored",
+    )
+
+
+def modality_of(fields: dict[str, str]) -> str:
+    """Return DICOM's code of the modality that the header states; empty: none."""
+    return _MODALITIES.get(fields.get("Modality", "").strip(), "")
+
+
+def integers(where: str, fields: dict[str, str], name: str) -> list[int]:
+    """Return a field's whole numbers; none: the field isn't there. Raises SourceError."""
+    values = numbers(where, fields, name) or []
+    if not all(value.is_integer() and abs(value) < 1 << 40 for value in values):
+        raise SourceError(f"{where}: {name}: found {fields[name]:.60}, expected whole numbers")
+    return [int(value) for value in values]
+
+
+def numbers(
+    where: str, fields: dict[str, str], name: str, count: int | None = None
+) -> list[float] | None:
+    """Return a field's numbers; None: the field isn't there. Raises SourceError."""
+    if name not in fields:
+        return None
+    try:
+        values = [float(part) for part in fields[name].split()]
+    except ValueError:
+        values = []
+    if not values or (count is not None and len(values) != count) or not np.isfinite(values).all():
+        raise SourceError(
+            f"{where}: {name}: found {fields[name]!r:.60}, expected "
+            f"{count if count is not None else 'some'} numbers"
+        )
+    return values

@@ -1,0 +1,213 @@
+"""Read cells of text as numbers, in the convention of the program that wrote the table.
+
+A table has one decimal mark, a point or a comma. The other one may stand between groups of three
+digits, as spaces and apostrophes may. `1.234` and `1,234` fit both conventions, so other cells of
+the column decide, then other columns, then the mark between cells. A column holds numbers if nearly
+all of its cells do: a few words among them are missing values, and are quoted in a note.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.read.statements import Statement, Subject, Trust, settle
+from stereocell.read.tables.table import MISSING, TableColumn, word_of
+
+POINT, COMMA = ".", ","
+_MOST_WORDS = 5  # different words that may stand among numbers; error values don't count
+_MOST_SHARE = 0.25  # of the cells with something in them, that may be such words
+_SHOWN = 4  # words, or columns, that a note lists
+_EXPONENT = r"([eE][+-]?[0-9]+)?"
+_PLAIN = {
+    mark: re.compile(rf"[+-]?([0-9]+{re.escape(mark)}?[0-9]*|{re.escape(mark)}[0-9]+){_EXPONENT}")
+    for mark in (POINT, COMMA)
+}
+_GROUPED = {
+    mark: re.compile(
+        rf"[+-]?[1-9][0-9]{{0,2}}({re.escape(other)}[0-9]{{3}})+({re.escape(mark)}[0-9]*)?"
+    )
+    for mark, other in ((POINT, COMMA), (COMMA, POINT))
+}
+_EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")  # a number by both conventions
+_SPACES = "\u00a0\u2009\u202f '\u2019"
+_SPACED = re.compile(rf"(?<=[0-9])[{_SPACES}](?=[0-9]{{3}}(?![0-9]))")
+# words of spreadsheets and measuring programs that stand for no number, in small letters
+_NO_NUMBER = re.compile(
+    r"#.*|[-+]?1\.#.*|-+|\.+|\?+|[\u2013\u2014]|[+-]?inf(inity)?|[+-]nan|n\.?d\.?"
+)
+_NAMES = {POINT: "point", COMMA: "comma"}
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """The columns of a table of text, and notes on how its cells were read."""
+
+    columns: tuple[TableColumn, ...]
+    notes: tuple[str, ...]
+
+
+def read_columns(named: Mapping[str, Sequence[str]], separator: str) -> Reading:
+    """Return columns of text as numbers where they are numbers.
+
+    named      the cells of each column
+    separator  the mark between cells
+    """
+    columns, missing, notes, grouped = [], {}, [], ""
+    conventions = _conventions(named, separator)
+    for name, texts in named.items():
+        mark, note = conventions[name]
+        numbers, words = _numbers(texts, mark)
+        if _are_numbers(numbers, words):
+            columns.append(TableColumn(name, numbers, None))
+            missing[name] = words
+            notes += [note] if note else []
+            grouped = grouped or _grouped_note(texts, mark)
+        else:
+            columns.append(TableColumn(name, None, tuple(map(word_of, texts))))
+    notes += [grouped] if grouped else []
+    return Reading(tuple(columns), (*_missing_notes(missing), *notes))
+
+
+def decimal_mark(texts: Sequence[str], separator: str) -> str:
+    """Return the mark before the fractions of one column."""
+    return _conventions({"": texts}, separator)[""][0]
+
+
+def _conventions(named: Mapping[str, Sequence[str]], separator: str) -> dict[str, tuple[str, str]]:
+    """Return each column's decimal mark, and a note where another one would fit its cells too."""
+    if not any(COMMA in "\n".join(texts) for texts in named.values()):
+        return dict.fromkeys(named, (POINT, ""))
+    found = {name: _marks_of(texts) for name, texts in named.items()}
+    of_table = Counter(next(iter(marks)) for marks, _ in found.values() if len(marks) == 1)
+    conventions = {}
+    for name, (marks, example) in found.items():
+        mark = next(iter(marks)) if marks else ""
+        note = ""
+        if not mark and of_table and example:
+            mark = of_table.most_common(1)[0][0]
+            reason = "as in other columns of the table"
+        elif not mark and example:
+            mark = POINT if separator == COMMA or POINT in example else COMMA
+            reason = "as no other cell tells them apart"
+        if not marks and example and not mark == POINT in example:
+            note = _ambiguous(name, example, mark, reason)
+        conventions[name] = mark or POINT, note
+    return conventions
+
+
+def _marks_of(texts: Sequence[str]) -> tuple[set[str], str]:
+    """Return the decimal marks that a column's cells show, and a cell that fits both marks."""
+    marks, example = set(), ""
+    for text in texts:
+        if COMMA not in text and POINT not in text:
+            continue
+        text = _SPACED.sub("", text.strip())
+        if _EITHER.fullmatch(text):
+            example = text if not example or (COMMA in text) > (COMMA in example) else example
+            continue
+        for mark in (POINT, COMMA):
+            if _PLAIN[mark].fullmatch(text) or _GROUPED[mark].fullmatch(text):
+                marks.add(mark)
+    return marks, example
+
+
+def _ambiguous(name: str, example: str, mark: str, reason: str) -> str:
+    value = float(_plain(example, mark))
+    subject = Subject(
+        f"decimal mark of column {name!r:.60}", remedy="write numbers without marks for thousands"
+    )
+    shown = f"a {_NAMES[mark]} ({example} is {value:.10g})"
+    return settle(subject, [Statement(shown, reason, Trust.ASSUMED)]).notes[0]
+
+
+def _grouped_note(texts: Sequence[str], mark: str) -> str:
+    """Return the note on marks between thousands in a column of numbers; empty: it has none."""
+    joined = "\n".join(texts)
+    if not any(one in joined for one in (*_SPACES, COMMA if mark == POINT else POINT)):
+        return ""
+    for text in map(str.strip, texts):
+        if _SPACED.search(text) or _GROUPED[mark].fullmatch(_SPACED.sub("", text)):
+            value = _value(text, mark)
+            if isfinite(value):
+                return f"marks between thousands are left out: {text} is {value:.10g}"
+    return ""
+
+
+def _numbers(texts: Sequence[str], mark: str) -> tuple[NDArray[np.float64], Counter[str]]:
+    """Return numbers, NaN where there is none, and the cells without one, as they are written."""
+    numbers = np.full(len(texts), np.nan)
+    words: Counter[str] = Counter()
+    for row, text in enumerate(texts):
+        value = _value(text, mark)
+        if isfinite(value):
+            numbers[row] = value
+        else:
+            words[text.strip()] += 1
+    return numbers, words
+
+
+def _value(text: str, mark: str) -> float:
+    """Return a cell's number; NaN: it holds none."""
+    try:
+        if mark == POINT and "_" not in text:  # float also takes an underscore between digits
+            return float(text)
+    except ValueError:
+        pass
+    try:
+        return float(_plain(text, mark))
+    except ValueError:
+        return float("nan")
+
+
+def _plain(text: str, mark: str) -> str:
+    """Return a number's text with a decimal point and nothing between thousands.
+
+    Raises ValueError where it is no number.
+    """
+    text = _SPACED.sub("", text.strip().replace("\u2212", "-"))
+    if _GROUPED[mark].fullmatch(text):
+        text = text.replace(COMMA if mark == POINT else POINT, "")
+    if not _PLAIN[mark].fullmatch(text):
+        raise ValueError
+    return text.replace(mark, POINT)
+
+
+def _are_numbers(numbers: NDArray[np.float64], words: Counter[str]) -> bool:
+    """Return whether a column holds numbers, with missing ones among them."""
+    others = {word: times for word, times in words.items() if not _means_missing(word)}
+    if not others:
+        has_errors = any(word.lower() not in MISSING for word in words)
+        return not has_errors or bool(np.isfinite(numbers).any())
+    filled = len(numbers) - sum(words[word] for word in words if word.lower() in MISSING)
+    is_few = len(others) <= _MOST_WORDS and sum(others.values()) <= _MOST_SHARE * filled
+    return is_few and bool(np.isfinite(numbers).any())
+
+
+def _means_missing(word: str) -> bool:
+    lower = word.lower()
+    return lower in MISSING or _NO_NUMBER.fullmatch(lower) is not None
+
+
+def _missing_notes(missing: Mapping[str, Counter[str]]) -> Iterator[str]:
+    """Yield one note on all cells among numbers that hold none."""
+    found = {name: words for name, words in missing.items() if words}
+    if not found:
+        return
+    parts = []
+    for name, words in list(found.items())[:_SHOWN]:
+        kinds = [
+            f"{f'{word!r:.40}' if word else 'empty'} ({times:,})"
+            for word, times in words.most_common(_SHOWN)
+        ]
+        more = len(words) - len(kinds)
+        parts.append(f"{name:.60}: {', '.join(kinds)}{f' and {more} other words' * bool(more)}")
+    more = len(found) - len(parts)
+    parts += [f"and {more} more columns"] * bool(more)
+    total = sum(words.total() for words in found.values())
+    noun = "cells" if total > 1 else "cell"
+    yield f"{total:,} {noun} in columns of numbers taken for missing values: {'; '.join(parts)}"

@@ -1,0 +1,235 @@
+"""Values that an array stores packed: scale, offset, sign and fill values of the CF conventions.
+
+netCDF, xarray and many writers of HDF5 and Zarr store whole numbers and state beside them how they
+become measured values: `scale_factor * stored + add_offset`. `_FillValue`, `missing_value` and
+`valid_range` name stored values that stand for no measurement; those are read as NaN, which
+read/unmeasured.py replaces by the smallest finite value. `_Unsigned` states the sign of integers
+whose type has the other one.
+
+References: CF conventions 1.11, sections 2.5.1 and 8.1; NetCDF Users Guide, attribute conventions.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.dataset import StoredArray
+from stereocell.read.rescale import dtype_for, rescale
+from stereocell.read.stated_numbers import number_of, numbers_of
+
+_FILLS = ("_FillValue", "missing_value")
+ATTRIBUTES = (
+    *("scale_factor", "add_offset", "_Unsigned"),
+    *(*_FILLS, "valid_range", "valid_min", "valid_max"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ValueScale:
+    """How stored numbers become values.
+
+    signed    the stored integers' sign where it is another one than that of their type
+    missing   stored values that stand for no measurement
+    low, high  range of the stored values that are measurements
+    notes     a sentence for each attribute that is followed, or can't be
+    """
+
+    slope: float = 1.0
+    intercept: float = 0.0
+    signed: bool | None = None
+    missing: tuple[float, ...] = ()
+    low: float = -np.inf
+    high: float = np.inf
+    notes: tuple[str, ...] = ()
+
+    @property
+    def has_gaps(self) -> bool:
+        """Whether some stored values stand for no measurement."""
+        return bool(self.missing) or self.low > -np.inf or self.high < np.inf
+
+
+def scaled(
+    where: str, array: StoredArray, attributes: Mapping[str, Any]
+) -> tuple[StoredArray, tuple[str, ...]]:
+    """Return the array's values as its attributes define them, and notes.
+
+    attributes  those of ATTRIBUTES that are there, None for others
+
+    Raises SourceError where a stated factor is no finite number.
+    """
+    scale = scale_of(where, np.dtype(array.dtype), attributes)
+    is_plain = (scale.slope, scale.intercept) == (1.0, 0.0) and scale.signed is None
+    if is_plain and not scale.has_gaps:
+        return array, scale.notes
+    return ScaledArray(array, scale), scale.notes
+
+
+def scale_of(where: str, stored: np.dtype[Any], attributes: Mapping[str, Any]) -> ValueScale:
+    """Return how the values of an array with these attributes are stored."""
+    slope, intercept = (
+        _factor(where, name, attributes.get(name), default)
+        for name, default in (("scale_factor", 1.0), ("add_offset", 0.0))
+    )
+    notes = []
+    if (slope, intercept) != (1.0, 0.0):
+        notes.append(
+            f"values: scale_factor {slope:g} and add_offset {intercept:g} are applied to the "
+            f"stored {stored.name}"
+        )
+    scale = replace(_sign(stored, attributes, notes), slope=slope, intercept=intercept)
+    scale = _gaps(stored, scale, attributes, notes)
+    return replace(scale, notes=tuple(notes))
+
+
+def _factor(where: str, name: str, value: Any, default: float) -> float:
+    if value is None:
+        return default
+    found = numbers_of(np.ravel(value))
+    if len(found) != 1 or not np.isfinite(found[0]) or (name == "scale_factor" and not found[0]):
+        raise SourceError(
+            f"{where}: {name}: found {str(value)!r:.40}, expected one finite number other than "
+            "0: correct the attribute, or remove it to read the voxels as they are stored"
+        )
+    return found[0]
+
+
+def _sign(stored: np.dtype[Any], attributes: Mapping[str, Any], notes: list[str]) -> ValueScale:
+    """Return a scale with the sign of the integers, by `_Unsigned`."""
+    said = str(attributes.get("_Unsigned", "")).strip().lower()
+    other = {"i": "true", "u": "false"}.get(stored.kind)
+    if said != other or stored.itemsize > 4:
+        return ValueScale()
+    notes.append(f"_Unsigned = {said!r}: the stored {stored.name} are read with the other sign")
+    return ValueScale(signed=stored.kind == "u")
+
+
+def _gaps(
+    stored: np.dtype[Any], scale: ValueScale, attributes: Mapping[str, Any], notes: list[str]
+) -> ValueScale:
+    """Return a scale with the stored values that are no measurements."""
+    if stored.kind == "b":
+        return scale
+    fills: dict[str, tuple[float, ...]] = {}
+    for name in _FILLS:
+        found = _stored_values(stored, scale, attributes.get(name))
+        if found := tuple(value for value in found if np.isfinite(value)):
+            fills[name] = found
+    missing = tuple(dict.fromkeys(value for values in fills.values() for value in values))
+    if stored.kind in "iu" and scale.slope > 0 and missing == (_least(stored, scale),) == (0.0,):
+        missing, fills = (), {}  # 0 of unsigned numbers is the smallest value anyway
+    low, high = _range(stored, scale, attributes)
+    shown = [f"{name} {', '.join(f'{v:g}' for v in values)}" for name, values in fills.items()]
+    if low > -np.inf or high < np.inf:
+        ends = [f"below {low:g}"] * (low > -np.inf) + [f"above {high:g}"] * (high < np.inf)
+        shown.append(f"stored values {' and '.join(ends)}, by the valid range")
+    if shown:
+        notes.append(
+            f"values: voxels of {', or of '.join(shown)} are no measurements: read as the smallest "
+            "measured value"
+        )
+    return replace(scale, missing=missing, low=low, high=high)
+
+
+def _range(
+    stored: np.dtype[Any], scale: ValueScale, attributes: Mapping[str, Any]
+) -> tuple[float, float]:
+    """Return the stated range of measured values where it excludes numbers of the dtype."""
+    both, low, high = (
+        _limits(stored, scale, attributes.get(name))
+        for name in ("valid_range", "valid_min", "valid_max")
+    )
+    low, high = (both[:1], both[1:]) if len(both) == 2 else (low, high)
+    found = [
+        ends[0] if len(ends) == 1 and np.isfinite(ends[0]) else default
+        for ends, default in ((low, -np.inf), (high, np.inf))
+    ]
+    if found[0] >= found[1]:
+        return -np.inf, np.inf
+    if stored.kind in "iu":
+        limits = np.iinfo(_resigned(stored, scale))
+        found[0] = found[0] if found[0] > limits.min else -np.inf
+        found[1] = found[1] if found[1] < limits.max else np.inf
+    return found[0], found[1]
+
+
+def _limits(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float, ...]:
+    """Return the ends of a range as stored values.
+
+    The NetCDF Users Guide: a range of real numbers beside stored integers is of measured values.
+    """
+    found = _stored_values(stored, scale, value)
+    is_measured = stored.kind in "iu" and np.asarray(value).dtype.kind == "f"
+    if not is_measured or (scale.slope, scale.intercept) == (1.0, 0.0):
+        return found
+    ends = [(number - scale.intercept) / scale.slope for number in found]
+    return tuple(sorted(ends))
+
+
+def _stored_values(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float, ...]:
+    """Return an attribute's numbers in the sign of the voxels; empty: it states none."""
+    if value is None or isinstance(value, str | bytes):
+        return ()
+    numbers = np.ravel(np.asarray(value))
+    if scale.signed is not None and numbers.dtype == stored:
+        numbers = numbers.view(_resigned(stored, scale))
+    try:
+        return tuple(number_of(number) for number in numbers)
+    except (TypeError, ValueError):
+        return ()
+
+
+def _least(stored: np.dtype[Any], scale: ValueScale) -> float:
+    return float(np.iinfo(_resigned(stored, scale)).min)
+
+
+def _resigned(stored: np.dtype[Any], scale: ValueScale) -> np.dtype[Any]:
+    """Return the dtype of the stored bits with the sign that the file states."""
+    if scale.signed is None:
+        return stored
+    return np.dtype(f"{stored.byteorder}{'i' if scale.signed else 'u'}{stored.itemsize}")
+
+
+class ScaledArray:
+    """An array whose values follow from stored numbers by a ValueScale."""
+
+    def __init__(self, array: StoredArray, scale: ValueScale) -> None:
+        self.shape, self.chunks = tuple(array.shape), tuple(array.chunks)
+        self._array, self._scale = array, scale
+        self._stored = _resigned(np.dtype(array.dtype), scale)
+        is_float = self._stored.kind == "f"  # such a fill value was rounded as the voxels were
+        kind = self._stored.type if is_float else float
+        self._missing = [kind(value) for value in scale.missing]
+        self.dtype = self._values_dtype()
+
+    @property
+    def stored(self) -> StoredArray:
+        """The array as it is stored."""
+        return self._array
+
+    def _values_dtype(self) -> np.dtype[Any]:
+        scale, stored = self._scale, self._stored
+        if scale.has_gaps or stored.kind not in "iu":
+            return np.dtype(np.float64 if stored.itemsize > 4 else np.float32)
+        if (scale.slope, scale.intercept) == (1.0, 0.0):
+            return stored
+        limits = np.iinfo(stored)
+        return dtype_for([(float(limits.min), float(limits.max), scale.slope, scale.intercept)])
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        scale = self._scale
+        stored = np.asarray(self._array[key])
+        if stored.dtype != self._stored:
+            stored = stored.view(self._stored)
+        if stored.dtype.kind == "b":
+            stored = stored.astype(np.uint8)
+        values = rescale(stored, scale.slope, scale.intercept, self.dtype)
+        if not scale.has_gaps:
+            return values
+        is_gap = (stored < scale.low) | (stored > scale.high)
+        for missing in self._missing:
+            is_gap |= stored == missing
+        return np.where(is_gap, values.dtype.type(np.nan), values)

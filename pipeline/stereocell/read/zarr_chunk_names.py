@@ -1,0 +1,106 @@
+"""The names of a Zarr array's chunks, where the files are not named as the metadata state.
+
+A copy through another program or an edited `.zarray` leaves chunks `0.0.0` behind metadata that
+state `0/0/0`, or the reverse. Zarr then reads each chunk as absent, and the volume as empty. Both
+separators of both encodings are looked for, and a chunk without a file of the stated name is read
+from a file of the other name. On this machine the folder is listed when it is opened; at an address
+the other names are tried when a chunk is absent, which costs no request before.
+
+References: Zarr 3 specification, section on chunk key encodings; Zarr 2, `dimension_separator`
+"""
+
+import os
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import zarr
+from zarr.core.chunk_key_encodings import (
+    ChunkKeyEncoding,
+    DefaultChunkKeyEncoding,
+    V2ChunkKeyEncoding,
+)
+
+from stereocell.storage.location import Location
+
+_ENCODINGS: tuple[ChunkKeyEncoding, ...] = (
+    V2ChunkKeyEncoding("/"),
+    V2ChunkKeyEncoding("."),
+    DefaultChunkKeyEncoding("/"),
+    DefaultChunkKeyEncoding("."),
+)
+_KEY = re.compile(r"c?[./]?(\d+(?:[./]\d+)*)")  # name of a chunk below its array
+_MOST_LISTED = 100_000  # most entries of an array's folder that are looked at
+
+
+@dataclass(frozen=True, slots=True)
+class OtherNames:
+    """The names that the files of an array have, beside those that its metadata state.
+
+    array   path of the array below the source; empty: the source itself
+    stated  the name of the first chunk by the metadata
+    found   the encoding by which files are named
+    """
+
+    array: str
+    stated: str
+    found: ChunkKeyEncoding
+
+    def key_of(self, key: str) -> str | None:
+        """Return the name that the chunk of a stated name has; None: no chunk has this name."""
+        prefix = f"{self.array}/" if self.array else ""
+        match = _KEY.fullmatch(key.removeprefix(prefix)) if key.startswith(prefix) else None
+        if match is None:
+            return None
+        place = tuple(int(number) for number in re.split(r"[./]", match[1]))
+        return prefix + self.found.encode_chunk_key(place)
+
+    def note(self, dimensions: int) -> str:
+        """Return the sentence for the user."""
+        first = self.found.encode_chunk_key((0,) * dimensions)
+        level = f" of level {self.array!r:.60}" if self.array else ""
+        return (
+            f"chunks{level}: the metadata name them as {self.stated}, the files are named as "
+            f"{first}: the files are read"
+        )
+
+
+def possible_names(array: "zarr.Array[Any]") -> tuple[OtherNames, ...]:
+    """Return the names that chunks may have beside those that the metadata state."""
+    count = len(array.shape)
+    if count < 2:
+        return ()
+    first = array.metadata.encode_chunk_key((0,) * count)
+    others = (one for one in _ENCODINGS if _form(one, count) != first)
+    return tuple(OtherNames(array.path, first, one) for one in others)
+
+
+def names_on_disk(location: Location, array: "zarr.Array[Any]") -> OtherNames | None:
+    """Return the names by which chunks lie that the metadata name otherwise; None: there are none.
+
+    The array is on this machine, in a folder that can be listed.
+    """
+    forms, count = _listed(location, array), len(array.shape)
+    return next((one for one in possible_names(array) if _form(one.found, count) in forms), None)
+
+
+def _form(encoding: ChunkKeyEncoding, dimensions: int) -> str:
+    """Return the name that identifies an encoding."""
+    return encoding.encode_chunk_key((0,) * dimensions)
+
+
+def _listed(location: Location, array: "zarr.Array[Any]") -> set[str]:
+    """Return the forms of the names in an array's folder on this machine."""
+    folder, count = f"{location.source}/{array.path}".rstrip("/"), len(array.shape)
+    dotted = re.compile(rf"(c\.)?\d+(\.\d+){{{count - 1}}}")
+    forms: set[str] = set()
+    try:
+        with os.scandir(folder) as entries:
+            for _, entry in zip(range(_MOST_LISTED), entries, strict=False):
+                if dotted.fullmatch(entry.name):
+                    forms.add(".".join(["c"] * entry.name.startswith("c") + ["0"] * count))
+                elif entry.is_dir() and (entry.name == "c" or entry.name.isdecimal()):
+                    forms.add("/".join(["c"] * (entry.name == "c") + ["0"] * count))
+    except OSError:  # the reader reports it
+        return set()
+    return forms

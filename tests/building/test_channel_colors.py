@@ -1,0 +1,125 @@
+"""The colours of channels: stated, of a dye or a wavelength, of a modality, and never two alike."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from skimage.color import deltaE_ciede2000, rgb2hsv, rgb2lab
+
+from stereocell.building.channel_colors import AMBER, WARM_GREY, choose_colors
+from stereocell.building.channels import FLESH, PALETTE
+from stereocell.model.color import lab_of_linear, linear_color_of_lab, to_srgb8
+from stereocell.model.emission_color import color_of_light, color_of_name, emission_of
+
+Color = tuple[float, float, float]
+
+
+def _hue_deg(color: Color) -> float:
+    return 360 * float(rgb2hsv(to_srgb8(np.array([color], np.float32)))[0, 0])
+
+
+@pytest.mark.parametrize(
+    ("name", "nm"),
+    [
+        ("DAPI", 461),
+        ("Hoechst 33342", 461),
+        ("nuclei_Hoechst", 461),
+        ("EGFP", 510),
+        ("Alexa Fluor 488", 519),
+        ("CD3 (AF488)", 519),
+        ("AlexaFluor647", 667),
+        ("FITC", 520),
+        ("Cy3", 570),
+        ("Cy 3.5", 610),
+        ("Cy5", 667),
+        ("Cy5.5", 700),
+        ("mCherry-H2B", 610),
+        ("tdTomato", 583),
+        ("TRITC", 570),
+    ],
+)
+def test_a_name_holds_a_dye(name: str, nm: float) -> None:
+    assert emission_of(name) == nm
+
+
+@pytest.mark.parametrize(
+    "name", ["", "Channel0", "CD31", "MART1", "Ki67", "afferent", "cyclin", "A4"]
+)
+def test_other_names_hold_none(name: str) -> None:
+    assert emission_of(name) is None
+    assert color_of_name(name) is None
+
+
+@pytest.mark.parametrize(
+    ("nm", "low_deg", "high_deg"),
+    [
+        *[(420, 240, 275), (461, 215, 245), (495, 170, 200), (519, 100, 140)],
+        *[(560, 45, 60), (590, 20, 40), (620, 0, 10), (670, 305, 335)],
+    ],
+)
+def test_a_wavelength_has_the_colour_that_the_eye_sees(
+    nm: float, low_deg: float, high_deg: float
+) -> None:
+    color = color_of_light(nm)
+    assert color is not None
+    assert low_deg <= _hue_deg(color) <= high_deg
+    assert min(color) > 0.01  # no pure primary, which a screen can't shade
+
+
+def test_no_wavelength_is_none_and_a_dye_stands_in_for_it() -> None:
+    assert color_of_light(None) is None
+    assert color_of_light("0") is None
+    assert color_of_light("of the laser", "GFP") == color_of_light(510)
+
+
+def test_lab_of_a_colour_leads_back_to_it() -> None:
+    color = linear_color_of_lab((62.0, 20.0, -31.0))
+    np.testing.assert_allclose(lab_of_linear(np.array([color]))[0], (62, 20, -31), atol=1e-3)
+
+
+def _chosen(
+    names: list[str],
+    stated: list[Color | None] | None = None,
+    modality: str = "",
+    alone: bool = False,
+) -> list[Color]:
+    colors = stated or [None] * len(names)
+    return choose_colors(list(zip(names, colors, strict=True)), modality=modality, is_alone=alone)
+
+
+def test_what_nothing_names_has_the_colours_that_all_eyes_tell_apart() -> None:
+    assert _chosen(["a", "b", "c"]) == list(PALETTE[:3])
+
+
+def test_scans_are_no_blue_nuclei() -> None:
+    assert _chosen(["MR"], modality="MR") == [FLESH]
+    assert _chosen(["CT"], modality="CT") == [FLESH]
+    assert _chosen(["PT"], modality="PT") == [AMBER]
+    assert _chosen(["Channel0"], alone=True) == [WARM_GREY]
+    assert _chosen(["DAPI"], alone=True) == [color_of_light(461)]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["GFP", "Alexa 488", "FITC"],
+        ["DAPI", "Hoechst", "CD31"],
+        ["Cy5", "AF647", "AF680", "Cy7"],
+        ["DAPI", "GFP", "Cy3", "Cy5"],
+        ["mCherry", "tdTomato", "Cy3", "PALETTE"],
+    ],
+)
+def test_channels_of_like_dyes_can_be_told_apart(names: list[str]) -> None:
+    colors = _chosen(names)
+    assert colors[0] == color_of_name(names[0])
+    lab = rgb2lab(to_srgb8(np.array(colors, np.float32)))
+    pairs = combinations(range(len(colors)), 2)
+    assert min(float(deltaE_ciede2000(lab[a], lab[b])) for a, b in pairs) > 8
+
+
+def test_a_stated_colour_is_kept_unless_an_earlier_channel_has_it() -> None:
+    green: Color = (0.0, 1.0, 0.0)
+    first, second = _chosen(["a", "b"], [green, (0.02, 0.98, 0.02)])
+    assert first == green
+    assert second == PALETTE[1]
+    assert _chosen(["a"], [green], modality="MR") == [green]

@@ -1,0 +1,83 @@
+"""A table that a CT's surface leaves out is left out of its volume and the stage's voxels."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.unit_files import load_measured, load_volume
+from stereocell.cli.__main__ import main
+from stereocell.model.tile_content import APRON
+from support import nifti_files
+from support.validators import make_assets
+
+SHAPE, SPACING_MM = (36, 56, 64), 3.0  # slices, rows, columns
+PRESET = ("--preset", "ct-bone")
+AIR, FLESH, BONE, TABLE = -1000, 40, 700, 900
+
+
+def _parts() -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return where body, bone and table of a chest are."""
+    middle = [(n - 1) / 2 for n in SHAPE]
+    _, y, x = ((g - m) * SPACING_MM for g, m in zip(np.indices(SHAPE), middle, strict=True))
+    body = ((y + 12) / 50) ** 2 + (x / 72) ** 2 < 1
+    bone = np.hypot(y - 10, x) < 12
+    table = (y > 45) & (y < 55) & (abs(x) < 85)
+    return body, bone, table
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    body, bone, table = _parts()
+    hu = np.select([bone, body, table], [BONE, FLESH, TABLE], AIR).astype(np.int16)
+    hu += np.random.default_rng(0).integers(-12, 13, SHAPE).astype(np.int16)
+    affine = np.diag([SPACING_MM, SPACING_MM, SPACING_MM, 1.0])
+    place = tmp_path_factory.mktemp("chest") / "chest.nii.gz"
+    return nifti_files.write(place, affine, hu.transpose(2, 1, 0))
+
+
+def _voxels(out: Path) -> tuple[NDArray[np.uint8], NDArray[np.int16]]:
+    """Return the unit's volume and its voxels as measured, without their apron."""
+    folder = OutFolder(out)
+    (name, key), *_ = folder.index().items()
+    tile, channel = name.split("/")
+    unit = folder.unit_dir(tile, channel, key)
+    measured = load_measured(unit)
+    assert measured is not None
+    inner = slice(APRON, -APRON)
+    return load_volume(unit)[inner, inner, inner], measured[inner, inner, inner]
+
+
+def _shares(voxels: NDArray[np.int16], value: int) -> float:
+    return float(np.mean(abs(voxels - value) < 40))
+
+
+@pytest.mark.slow
+def test_a_table_is_left_out_of_the_volume_and_a_deep_check_agrees(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    without, with_table = tmp_path / "without", tmp_path / "with"
+    assert make_assets(source, without, "1x1", "--workers", "0", plan=PRESET) == 0
+    said = capsys.readouterr().err
+    assert "a table or holder is left out: " in said
+    assert "--keep-holder builds it" in said
+    assert "unsure" not in said
+    keep = (*PRESET, "--keep-holder")
+    assert main(["plan", str(source), "-o", str(with_table), "--grid", "1x1", *keep]) == 0
+    assert main(["units", str(with_table), "--workers", "0"]) == 0
+    eight_bit, measured = _voxels(without)
+    eight_bit_kept, measured_kept = _voxels(with_table)
+    assert _shares(measured_kept, TABLE) > 0.03
+    assert _shares(measured, TABLE) < 0.0005
+    # all else is as measured
+    same = measured == measured_kept
+    assert np.mean(same) > 0.9
+    assert (measured[~same] <= AIR).all()
+    assert (eight_bit[same] == eight_bit_kept[same]).all()
+    assert _shares(measured, BONE) == pytest.approx(_shares(measured_kept, BONE), abs=1e-4)
+    assert main(["check", str(without), "--deep", "--workers", "0"]) == 0
+    (channel,) = OutFolder(without).survey().values()
+    look = channel["appearance"]
+    assert (look["surface"], look["surface_reason"], look["function"]) == ("clear", "", "bone")

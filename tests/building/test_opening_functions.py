@@ -1,0 +1,110 @@
+"""The transfer function that a channel opens with fits the channel's surface."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stereocell.building.channels import Channel, has_brain
+from stereocell.building.settings import load, preset_names
+from stereocell.isosurface.options import parse_level
+from stereocell.model.channel import Appearance, SurfaceLevel
+from stereocell.transfer.channel_statistics import find_statistics, make_appearance
+from stereocell.transfer.opacity import evaluate
+from stereocell.transfer.windows import parse_window
+from support.plans import plan_of
+
+
+def _body_in_hounsfield_units(rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return air, fat, soft tissue and bone, with the voxels between air and skin."""
+    parts = [(-1000, 60_000), (-100, 10_000), (40, 30_000), (700, 5_000)]
+    tissue = [rng.normal(hu, 15, count) for hu, count in parts]
+    return np.concatenate([*tissue, rng.uniform(-1000, 40, 4_000)])
+
+
+def _magnitudes(rng: np.random.Generator) -> NDArray[np.float64]:
+    return np.concatenate([rng.rayleigh(12, 60_000), rng.normal(220, 30, 40_000)])
+
+
+def _light(rng: np.random.Generator) -> NDArray[np.float64]:
+    return np.concatenate([rng.poisson(100, 90_000), rng.normal(900, 120, 10_000)])
+
+
+# voxels, the level of their surface where a preset states none, and that of their background
+CASES: dict[str, tuple[Callable[[np.random.Generator], NDArray[np.float64]], float, float]] = {
+    "CT": (_body_in_hounsfield_units, -300.0, -1000.0),
+    "MR": (_magnitudes, 90.0, 15.0),
+    "": (_light, 450.0, 100.0),
+}
+MOST_BELOW_HU = 60.0  # that a CT's opacity begins below its surface
+
+
+def _opened(preset: str) -> tuple[Appearance, float]:
+    """Return how a channel of a preset's kind is drawn, and the level of its background."""
+    settings = load(preset, None, flags={})
+    make, level, background = CASES[settings.plan.modality]
+    if "*" in settings.iso_values:
+        level = parse_level("iso-value", settings.iso_values["*"])[0]
+    window = None
+    if "*" in settings.windows:
+        window = parse_window("window", settings.windows["*"])
+    statistics = find_statistics(make(np.random.default_rng(0)), settings.window, window=window)
+    appearance = make_appearance(
+        "Channel",
+        (1, 1, 1),
+        statistics=statistics,
+        level=SurfaceLevel(level, None, 1.0),
+        confidence=1.0,
+        doubt="",
+        modality=settings.plan.modality,
+    )
+    return appearance, background
+
+
+def _foot(appearance: Appearance) -> float:
+    """Return the value from which the chosen function shows anything, in voxel values."""
+    opacity = evaluate(appearance.transfer_functions[appearance.function], size=4096)
+    low, high = appearance.window
+    return low + float(np.flatnonzero(opacity > 0)[0]) / 4095 * (high - low)
+
+
+@pytest.mark.parametrize("preset", preset_names())
+def test_a_preset_opens_with_a_function_whose_foot_lies_at_the_surface(preset: str) -> None:
+    appearance, background = _opened(preset)
+    assert appearance.iso_value is not None
+    lowest = (background + appearance.iso_value) / 2
+    if preset.startswith("ct"):
+        lowest = appearance.iso_value - MOST_BELOW_HU
+    assert lowest <= _foot(appearance) <= appearance.iso_value
+
+
+def test_a_surface_of_bone_opens_with_the_function_of_bone() -> None:
+    assert _opened("ct-bone")[0].function == "bone"
+    assert _opened("ct")[0].function == "default"
+    assert _opened("mri")[0].function == "default"
+
+
+def test_a_ct_is_solid_just_inside_its_skin() -> None:
+    appearance, _ = _opened("ct")
+    opacity = evaluate(appearance.transfer_functions["default"])
+    low, high = appearance.window
+    at = {hu: float(opacity[round(255 * (hu - low) / (high - low))]) for hu in (-700, -345, -100)}
+    assert at[-700] == at[-345] == 0
+    assert at[-100] > 0.4
+
+
+def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
+    plain = replace(plan_of(), modality="MR")
+    assert plain.opens_cut
+    assert not replace(plain, modality="CT").opens_cut
+    assert not plan_of().opens_cut
+    head = [
+        Channel(index, name, (1, 1, 1), source="classes.ome.zarr")
+        for index, name in enumerate(("CSF", "grey matter", "white matter"))
+    ]
+    assert not replace(plain, channels=(*plain.channels, *head)).opens_cut
+    assert replace(plain, channels=(*plain.channels, *head[:2])).opens_cut
+    # a channel of the input may have such a name
+    assert not has_brain([replace(one, source="") for one in head])

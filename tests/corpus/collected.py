@@ -1,0 +1,74 @@
+"""Small volumes of sources that no constant was chosen on; their truth is another method's.
+
+They lie in the folder `level_corpus` of STEREOCELL_DATA, one NPZ each: `voxels` (z, y, x), `truth`
+(bool; empty: nobody marked it), `spacing_um`. The README there names licences and truths.
+"""
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus.case import Case, Group, Kind, Mask
+
+# name, source, modality, how the truth was found, which surface it is of
+_TABLE: tuple[tuple[str, str, Kind, Group, int], ...] = (
+    ("ct_trunk", "TotalSegmentator", "CT", "outlined", 0),
+    ("ct_trunk_bone", "TotalSegmentator", "CT", "labelled", 1),
+    ("ct_chest", "TotalSegmentator", "CT", "outlined", 0),
+    ("mr_trunk", "TotalSegmentator", "MR", "outlined", 0),
+    ("mra_aorta", "VMTK", "MR", "labelled", 0),
+    ("monkey_brain", "NiiVue", "MR", "labelled", 0),
+    ("mr_t1", "NiiVue images", "MR", "outlined", 0),
+    ("mr_pd", "NiiVue images", "MR", "outlined", 0),
+    ("iguana_body", "NiiVue images", "microscopy", "outlined", 0),
+    ("iguana_bone", "NiiVue images", "microscopy", "outlined", 1),
+    ("cta_head", "NiiVue images", "microscopy", "looked at", 0),
+    ("mra_head", "NiiVue images", "MR", "looked at", 0),
+    ("mr_gd_thick", "PyRadiomics", "MR", "outlined", 0),
+    ("mr_teaching", "NEUBIAS", "MR", "outlined", 0),
+    ("nuclei_teaching", "NEUBIAS", "microscopy", "outlined", 0),
+    ("chromosomes", "NEUBIAS", "microscopy", "outlined", 0),
+    ("nucleus", "NEUBIAS", "microscopy", "outlined", 0),
+    ("mitotic_plate", "NEUBIAS", "microscopy", "outlined", 0),
+    ("dna_confocal", "NEUBIAS", "microscopy", "outlined", 0),
+    ("golgi", "NEUBIAS", "microscopy", "outlined", 0),
+    ("dna_widefield", "NEUBIAS", "microscopy", "looked at", 0),
+    ("nuclear_envelopes", "NEUBIAS", "microscopy", "looked at", 0),
+    ("nuclei_cleared_brain", "CellSeg3D", "microscopy", "outlined", 0),
+    ("ct_stent", "imageio", "microscopy", "outlined", 0),
+)
+
+
+def collected_cases(folder: Path) -> Iterator[Case]:
+    """Yield the volumes that the folder has; `missing` names the others."""
+    for name, source, kind, group, rung in _TABLE:
+        path = folder / f"{name}.npz"
+        if not path.is_file():
+            continue
+        with np.load(path) as file:
+            z, y, x = (float(side) for side in file["spacing_um"])
+        yield Case(
+            name.replace("_", " "),
+            group,
+            (z, y, x),
+            partial(_load, path),
+            kind=kind,
+            held_out=True,
+            rung=rung,
+            source=source,
+        )
+
+
+def missing(folder: Path) -> list[str]:
+    """Return the names of the volumes that the folder lacks."""
+    return [name for name, *_ in _TABLE if not (folder / f"{name}.npz").is_file()]
+
+
+def _load(path: Path) -> tuple[NDArray[Any], Mask | None]:
+    with np.load(path) as file:
+        voxels, truth = file["voxels"], file["truth"]
+    return voxels, truth if truth.size else None

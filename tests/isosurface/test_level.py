@@ -1,0 +1,71 @@
+"""Which levels of a ladder may have a surface: clear ones, and an outer one that nearly is."""
+
+from dataclasses import replace
+from math import inf
+
+import pytest
+
+from corpus.real import real_cases
+from corpus.sight import look_at
+from stereocell.isosurface.level import Level, shown_of
+
+# contrast five times the noise, slopes of a blur of 2.5 voxels, in no valley
+CLEAR = Level(
+    value=100.0,
+    inside=150.0,
+    outside=50.0,
+    snr=5.0,
+    sharpness=0.16,
+    separation=0.75,
+    dip=1.0,
+    stability=0.9,
+    share=0.3,
+    rise=3.0,
+    stands_out=3.0,
+)
+SPECKS = replace(CLEAR, value=900.0, share=0.002)
+CORES = replace(CLEAR, value=300.0, share=0.1)
+
+
+@pytest.mark.parametrize(
+    "short", [{"separation": 0.67}, {"separation": 0.69, "sharpness": 0.035}, {"snr": 2.5}]
+)
+def test_a_level_that_falls_short_by_a_little_goes_before_specks(short: dict[str, float]) -> None:
+    outer = replace(CLEAR, **short)
+    assert not outer.is_clear
+    assert shown_of([outer, SPECKS]) == (outer, SPECKS)
+
+
+def test_a_level_that_falls_short_by_a_little_goes_before_one_that_no_window_shows() -> None:
+    outer = replace(CLEAR, separation=0.67)
+    assert shown_of([outer, CORES], highest=400.0) == (CORES,)
+    assert shown_of([outer, CORES], highest=250.0) == (outer, CORES)
+
+
+def test_a_valley_that_falls_short_by_a_little_goes_before_any_other() -> None:
+    outer = replace(CLEAR, snr=2.5, dip=0.5)
+    assert shown_of([outer, CORES]) == (outer, CORES)
+
+
+def test_levels_that_fall_short_by_much_are_passed_over() -> None:
+    # a normal distribution has .64 of its variance between the halves
+    for short in ({"separation": 0.64}, {"snr": 2.0}, {"rise": 1.0}):
+        assert shown_of([replace(CLEAR, **short), SPECKS]) == (SPECKS,)
+
+
+def test_where_nothing_is_clear_nothing_is_shown() -> None:
+    assert shown_of([replace(CLEAR, separation=0.67)], highest=inf) == ()
+
+
+TRUNK = next((case for case in real_cases() if case.name == "mr trunk"), None)
+
+
+@pytest.mark.skipif(TRUNK is None, reason="needs level_corpus/mr_trunk.npz in STEREOCELL_DATA")
+def test_a_coarse_mr_of_a_trunk_keeps_its_skin() -> None:
+    """Air and tissue differ by 2.5 times the noise; the next level would keep fat alone."""
+    assert TRUNK is not None
+    sight = look_at(TRUNK)
+    outer = sight.found.shown()[0]
+    assert outer not in sight.found.clear
+    inside = sight.values > outer.value
+    assert 2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()) > 0.95

@@ -1,0 +1,385 @@
+"""A series that holds several kinds of frames falls apart into one volume for each kind."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pydicom
+import pytest
+
+from stereocell import read
+from stereocell.model.errors import SourceError, UsageError
+from support.dicom_reading import whole
+from support.dicom_series import grid, write_enhanced, write_series
+
+SHAPE = (10, 12, 14)
+AFFINE = grid(shape=SHAPE, spacing=(3.0, 2.0, 2.2))
+Change = Callable[[pydicom.Dataset], None]
+
+
+def setting(**values: object) -> Change:
+    def change(ds: pydicom.Dataset) -> None:
+        for name, value in values.items():
+            setattr(ds, name, value)
+
+    return change
+
+
+def image_type(*words: str) -> Change:
+    return setting(ImageType=["ORIGINAL", "PRIMARY", *words])
+
+
+def private(group: int, creator: str, element: int, vr: str, value: Any) -> Change:
+    def change(ds: pydicom.Dataset) -> None:
+        ds.private_block(group, creator, create=True).add_new(element, vr, value)
+
+    return change
+
+
+def write_kind(
+    folder: Path,
+    add: float,
+    change: Change,
+    *,
+    indices: Iterable[float] = range(10),
+    modality: str = "MR",
+    first_number: int = 1,
+) -> None:
+    """Write slices of series 1.2.3 whose values are the scene's, and `add`."""
+
+    def changed(ds: pydicom.Dataset) -> None:
+        ds.InstanceNumber += first_number - 1
+        change(ds)
+
+    write_series(
+        folder / f"{add:g}",
+        AFFINE,
+        SHAPE,
+        indices=indices,
+        series="1.2.3",
+        intercept=add,
+        change=changed,
+        modality=modality,
+    )
+
+
+def added(folder: Path, series: int = 0, time: int = 0) -> float:
+    """Return the constant that the read volume has above the scene, which is 0 at its edge."""
+    return float(whole(read.open(folder, series=series, time=time)).min())
+
+
+PARTS: dict[str, tuple[Change, Change]] = {
+    "Siemens": (image_type("P", "ND"), image_type("M", "ND")),
+    "Philips": (image_type("PHASE MAP", "P", "FFE"), image_type("M_FFE", "M", "FFE")),
+    "Philips's prefix": (image_type("P_SE", "SE"), image_type("M_SE", "SE")),
+    "the standard": (
+        setting(ComplexImageComponent="PHASE"),
+        setting(ComplexImageComponent="MAGNITUDE"),
+    ),
+    "GE": (
+        private(0x43, "GEMS_PARM_01", 0x2F, "SS", 1),
+        private(0x43, "GEMS_PARM_01", 0x2F, "SS", 0),
+    ),
+    "GE of unknown VR": (
+        private(0x43, "GEMS_PARM_01", 0x2F, "UN", b"\1\0"),
+        private(0x43, "GEMS_PARM_01", 0x2F, "UN", b"\0\0"),
+    ),
+}
+
+
+@pytest.mark.parametrize("maker", PARTS)
+def test_magnitude_is_built_and_phase_is_a_series_of_its_own(tmp_path: Path, maker: str) -> None:
+    phase, magnitude = PARTS[maker]
+    write_kind(tmp_path, 100, phase)
+    write_kind(tmp_path, 300, magnitude, first_number=20)
+    first, second = read.list_series(tmp_path)
+    assert "MR, magnitude, axial, 10 x 12 x 14" in first
+    assert "MR, phase, axial, 10 x 12 x 14" in second
+    dataset = read.open(tmp_path)
+    assert (dataset.time_points, added(tmp_path), added(tmp_path, 2)) == (1, 300, 100)
+    note = "10 images of the same series (phase), because they are of another kind; --series 2"
+    assert any(note in one for one in dataset.notes)
+
+
+def test_real_and_imaginary_parts_follow_the_magnitude(tmp_path: Path) -> None:
+    for add, word in ((10, "I"), (20, "R"), (30, "M"), (40, "P")):
+        write_kind(tmp_path, add, image_type(word), first_number=add)
+    lines = read.list_series(tmp_path)
+    assert "magnitude" in lines[0]
+    assert sorted(line.split(", ")[1] for line in lines[1:]) == [
+        "imaginary part", "phase", "real part"
+    ]  # fmt: skip
+
+
+def test_a_phase_series_of_its_own_follows_a_smaller_magnitude_series(tmp_path: Path) -> None:
+    write_series(tmp_path / "p", AFFINE, SHAPE, series="1.2.4", change=image_type("P"))
+    small = grid(shape=(6, 12, 14))
+    write_series(tmp_path / "m", small, (6, 12, 14), series="1.2.5", change=image_type("M"))
+    assert "magnitude, axial, 6 x" in read.list_series(tmp_path)[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "role"),
+    [
+        (("AXIAL", "MIP"), "maximum intensity projection"),
+        (("AXIAL", "CT_SOM5 MIP"), "maximum intensity projection"),
+        (("MIN_IP",), "minimum intensity projection"),
+        (("PROJECTION IMAGE",), "projection"),
+        (("MPR",), "reformatted"),
+        (("REFORMATTED", "AVERAGE"), "reformatted"),
+        (("ADC",), "parametric map"),
+        (("SCREEN SAVE",), "screen save"),
+    ],
+)
+@pytest.mark.parametrize("indices", [[0.5, 3.5, 6.5], range(10)])
+def test_derived_images_are_no_slices_of_the_originals(
+    tmp_path: Path, words: tuple[str, ...], role: str, indices: Iterable[float]
+) -> None:
+    write_kind(tmp_path, 100, setting(ImageType=["ORIGINAL", "PRIMARY", "AXIAL"]))
+    derived = setting(ImageType=["DERIVED", "SECONDARY", *words])
+    write_kind(tmp_path, 900, derived, indices=indices, first_number=50)
+    dataset = read.open(tmp_path)
+    assert dataset.levels[0].shape == (12, 10, 14)
+    assert added(tmp_path) == 100
+    assert any(f"({role}), because" in note for note in dataset.notes)
+    assert not any("uneven" in note for note in dataset.notes)
+
+
+def test_derived_images_without_a_word_for_it_are_told_apart_by_their_origin(
+    tmp_path: Path,
+) -> None:
+    write_kind(tmp_path, 900, setting(ImageType=["DERIVED", "SECONDARY", "XYZ"]))
+    write_kind(tmp_path, 100, setting(ImageType=["ORIGINAL", "PRIMARY", "XYZ"]), first_number=50)
+    assert added(tmp_path) == 100
+    assert "XYZ" not in "".join((*read.list_series(tmp_path), *read.open(tmp_path).notes))
+
+
+PROPERTIES: dict[str, tuple[Change, Change, str]] = {
+    "kernel": (setting(ConvolutionKernel="B30f"), setting(ConvolutionKernel="B70f"), "kernel B70f"),
+    "energy": (setting(KVP=80), setting(KVP=140), "140 kV"),
+    "monoenergetic": (
+        setting(MonoenergeticEnergyEquivalent=40.0),
+        setting(MonoenergeticEnergyEquivalent=70.0),
+        "70 keV",
+    ),
+    "contrast": (setting(), setting(ContrastBolusAgent="Jane's"), "with contrast agent"),
+    "b-value": (setting(DiffusionBValue=0.0), setting(DiffusionBValue=800.0), "b 800 s/mm2"),
+    "b-value of Siemens": (
+        private(0x19, "SIEMENS MR HEADER", 0x0C, "IS", "0"),
+        private(0x19, "SIEMENS MR HEADER", 0x0C, "IS", "800"),
+        "b 800 s/mm2",
+    ),
+    "b-value of GE": (
+        private(0x43, "GEMS_PARM_01", 0x39, "IS", [0, 1, 0, 0]),
+        private(0x43, "GEMS_PARM_01", 0x39, "IS", [1000000800, 1, 0, 0]),
+        "b 800 s/mm2",
+    ),
+    "b-value of Philips": (
+        private(0x2001, "Philips Imaging DD 001", 0x03, "FL", 0.0),
+        private(0x2001, "Philips Imaging DD 001", 0x03, "FL", 800.0),
+        "b 800 s/mm2",
+    ),
+    "echo time": (setting(EchoTime=4.92), setting(EchoTime=7.38), "echo time 7.38 ms"),
+    "echo number": (setting(EchoNumbers=1), setting(EchoNumbers=2), "echo 2"),
+    "inversion time": (setting(InversionTime=700), setting(InversionTime=2500), "2500 ms"),
+    "flip angle": (setting(FlipAngle=5), setting(FlipAngle=26), "flip angle 26 degrees"),
+    "Dixon": (image_type("M", "WATER"), image_type("M", "FAT"), "fat"),
+}
+
+
+@pytest.mark.parametrize("name", PROPERTIES)
+@pytest.mark.parametrize("shift", [0.0, 0.5])
+def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
+    tmp_path: Path, name: str, shift: float
+) -> None:
+    modality = "CT" if name in ("kernel", "energy", "monoenergetic", "contrast") else "MR"
+    first, second, words = PROPERTIES[name]
+    write_kind(tmp_path, 100, first, modality=modality)
+    indices = [index + shift for index in range(10 - (shift > 0))]
+    write_kind(tmp_path, 300, second, indices=indices, modality=modality, first_number=30)
+    lines = read.list_series(tmp_path)
+    assert len(lines) == 2
+    assert sum(words in line for line in lines) == 1
+    number = 1 + next(i for i, line in enumerate(lines) if words in line)
+    assert added(tmp_path, number) == 300
+    assert added(tmp_path, 3 - number) == 100
+    assert read.open(tmp_path).levels[0].spacing_um[1] == pytest.approx(3000)
+    assert "Jane" not in "".join((*lines, *read.open(tmp_path).notes))
+
+
+@pytest.mark.parametrize("told", [setting(AcquisitionNumber=2), setting()])
+def test_acquisitions_between_each_other_are_two_series(tmp_path: Path, told: Change) -> None:
+    write_kind(tmp_path, 100, setting(AcquisitionNumber=1) if told.__closure__ else setting())
+    write_kind(tmp_path, 300, told, indices=[k + 0.5 for k in range(9)], first_number=30)
+    assert len(read.list_series(tmp_path)) == 2
+    assert (added(tmp_path), added(tmp_path, 2)) == (100, 300)
+
+
+@pytest.mark.parametrize("number", ["AcquisitionNumber", "InstanceNumber"])
+def test_interleaved_acquisitions_of_thin_slices_are_one_volume(
+    tmp_path: Path, number: str
+) -> None:
+    for start in (0, 1):
+        change = setting(SliceThickness=3.0, AcquisitionNumber=start + 1)
+        if number == "InstanceNumber":
+            change = setting(SliceThickness=3.0)
+        write_kind(tmp_path / f"{start}", 0, change, indices=range(start, 10, 2),
+                   first_number=1 + 20 * start)  # fmt: skip
+    assert read.open(tmp_path).levels[0].shape == (12, 10, 14)
+
+
+def test_acquisitions_above_each_other_are_one_volume(tmp_path: Path) -> None:
+    def change(ds: pydicom.Dataset) -> None:
+        ds.AcquisitionNumber = 1 + (ds.InstanceNumber > 5)
+        ds.ConvolutionKernel = "H31s" if ds.InstanceNumber > 5 else "H60s"
+
+    write_kind(tmp_path, 0, change, modality="CT")
+    assert read.open(tmp_path).levels[0].shape == (12, 10, 14)
+
+
+def test_an_acquisition_for_each_slice_is_one_volume(tmp_path: Path) -> None:
+    write_kind(tmp_path, 0, lambda ds: setattr(ds, "AcquisitionNumber", ds.InstanceNumber))
+    assert len(read.list_series(tmp_path)) == 1
+
+
+def test_a_kernel_that_is_free_text_is_counted_and_not_shown(tmp_path: Path) -> None:
+    write_kind(tmp_path, 100, setting(ConvolutionKernel="JANE DOE"))
+    write_kind(tmp_path, 300, setting(ConvolutionKernel="JOHN DOE"), first_number=30)
+    first, second = read.list_series(tmp_path)
+    assert "kernel no. 1" in first
+    assert "kernel no. 2" in second
+    assert "DOE" not in first + second
+
+
+PHASES: dict[str, Callable[[int], Change]] = {
+    "TemporalPositionIdentifier": lambda time: setting(TemporalPositionIdentifier=time + 1),
+    "NominalPercentageOfCardiacPhase": lambda t: setting(NominalPercentageOfCardiacPhase=10.0 * t),
+    "TriggerTime": lambda time: setting(TriggerTime=25.0 * time),
+    "AcquisitionNumber": lambda time: setting(AcquisitionNumber=time + 1),
+    "InstanceNumber": lambda time: setting(),
+}
+
+
+@pytest.mark.parametrize("name", PHASES)
+@pytest.mark.parametrize("rest", [range(8), range(3, 10)])
+def test_an_incomplete_last_point_in_time_is_told_and_whole_ones_are_kept(
+    tmp_path: Path, name: str, rest: range
+) -> None:
+    for time, indices in enumerate((range(10), range(10), rest)):
+        write_kind(tmp_path, 100 * (time + 1), PHASES[name](time), indices=indices,
+                   first_number=1 + 10 * time)  # fmt: skip
+    dataset = read.open(tmp_path)
+    assert dataset.time_points == 2
+    assert [added(tmp_path, time=time) for time in (0, 1)] == [100, 200]
+    note = f"1 of 3 points in time ({name}), because slices are missing ({len(rest)} of 10 are"
+    assert any(note in one for one in dataset.notes)
+    assert "incomplete point in time 3" in read.list_series(tmp_path)[1]
+    assert added(tmp_path, series=2) == 300
+    with pytest.raises(UsageError, match="--time: found 2, expected 0 to 1"):
+        read.open(tmp_path, time=2)
+
+
+def test_a_phase_of_contrast_that_covers_a_part_is_a_series_of_its_own(tmp_path: Path) -> None:
+    write_kind(tmp_path, 100, setting(AcquisitionNumber=1), modality="CT")
+    write_kind(tmp_path, 400, setting(AcquisitionNumber=2), indices=range(5, 10), modality="CT",
+               first_number=30)  # fmt: skip
+    assert (added(tmp_path), added(tmp_path, series=2)) == (100, 400)
+
+
+def test_points_in_time_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    for time in (1, 0):
+        change = setting(TemporalPositionIdentifier=time + 1)
+        write_kind(tmp_path, 100 * (time + 1), change, first_number=50 - 20 * time)
+    assert [added(tmp_path, time=time) for time in (0, 1)] == [100, 200]
+
+
+def enhanced_kinds(path: Path, describe: Callable[[pydicom.Dataset, int], None]) -> Path:
+    """Write an enhanced MR image of two frames at each place; the second ones are 50 brighter."""
+    ds = pydicom.dcmread(write_enhanced(path, AFFINE, SHAPE))
+    groups = []
+    for kind in (1, 0):
+        for group in ds.PerFrameFunctionalGroupsSequence:
+            copy = pydicom.Dataset.from_json(group.to_json())
+            copy.PixelValueTransformationSequence[0].RescaleIntercept += 50 * kind
+            describe(copy, kind)
+            groups.append(copy)
+    ds.PerFrameFunctionalGroupsSequence = groups
+    ds.NumberOfFrames, ds.PixelData = 20, ds.PixelData * 2
+    ds.save_as(path)
+    return path
+
+
+def item(**values: object) -> list[pydicom.Dataset]:
+    found = pydicom.Dataset()
+    setting(**values)(found)
+    return [found]
+
+
+ENHANCED: dict[str, tuple[Callable[[pydicom.Dataset, int], None], str]] = {
+    "phase": (
+        lambda group, kind: setting(
+            MRImageFrameTypeSequence=item(
+                FrameType=["ORIGINAL", "PRIMARY", "VOLUME", "NONE"],
+                ComplexImageComponent=("MAGNITUDE", "PHASE")[kind],
+            )
+        )(group),
+        "phase",
+    ),
+    "projection": (
+        lambda group, kind: setting(
+            MRImageFrameTypeSequence=item(VolumeBasedCalculationTechnique=("NONE", "MAX_IP")[kind])
+        )(group),
+        "maximum intensity projection",
+    ),
+    "echo": (
+        lambda group, kind: setting(MREchoSequence=item(EffectiveEchoTime=(5.0, 9.0)[kind]))(group),
+        "echo time 9 ms",
+    ),
+    "b-value": (
+        lambda group, kind: setting(MRDiffusionSequence=item(DiffusionBValue=(0.0, 9e2)[kind]))(
+            group
+        ),
+        "b 900 s/mm2",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ENHANCED)
+def test_frames_of_an_enhanced_image_fall_apart_by_kind(tmp_path: Path, name: str) -> None:
+    describe, words = ENHANCED[name]
+    path = enhanced_kinds(tmp_path / "e.dcm", describe)
+    lines = read.list_series(path)
+    assert len(lines) == 2
+    assert words in lines[1]
+    difference = whole(read.open(path, series=2)) - whole(read.open(path))
+    assert np.array_equal(np.unique(difference), [50])
+
+
+def test_points_in_time_of_an_enhanced_image_are_in_the_order_of_their_indices(
+    tmp_path: Path,
+) -> None:
+    def describe(group: pydicom.Dataset, kind: int) -> None:
+        group.FrameContentSequence[0].TemporalPositionIndex = kind + 1
+
+    path = enhanced_kinds(tmp_path / "e.dcm", describe)
+    difference = whole(read.open(path, time=1)) - whole(read.open(path))
+    assert np.array_equal(np.unique(difference), [50])
+
+
+def test_scouts_of_a_ct_are_no_volume(tmp_path: Path) -> None:
+    """Even two in the same direction, which lie one behind the other."""
+    scout = setting(ImageType=["ORIGINAL", "PRIMARY", "LOCALIZER"])
+    write_kind(tmp_path, 0, scout, indices=[0, 5], modality="CT")
+    with pytest.raises(SourceError, match=r"localizers \(scouts\) of a CT are projections"):
+        read.open(tmp_path)
+
+
+def test_a_localizer_of_mr_follows_the_other_series(tmp_path: Path) -> None:
+    """It has more voxels, and is a volume by itself."""
+    write_series(tmp_path / "l", AFFINE, SHAPE, series="1.2.4", change=image_type("LOCALIZER"))
+    small = grid("coronal", shape=(5, 12, 14))
+    write_series(tmp_path / "m", small, (5, 12, 14), series="1.2.5", change=image_type("M"))
+    first, second = read.list_series(tmp_path)
+    assert "magnitude, coronal, 5 x" in first
+    assert "localizer, axial, 10 x" in second

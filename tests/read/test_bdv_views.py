@@ -1,0 +1,204 @@
+"""Tiles, angles and registrations of BigDataViewer, in HDF5 by h5py and in N5 by tensorstore."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from stereocell import read
+from stereocell.building import input_files
+from stereocell.cli.__main__ import main
+from stereocell.model.errors import UsageError
+from stereocell.read import list_series
+from support.array_files import write_n5
+from support.phantoms import f_phantom
+
+BODY = f_phantom()
+PLAIN = "0.2 0 0 0 0 0.2 0 0 0 0 0.5 0"
+
+
+def write(
+    folder: Path,
+    setups: list[dict[str, Any]],
+    *,
+    size: str = "0.2 0.2 0.5",
+    unit: str = "micrometer",
+    kind: str = "hdf5",
+) -> Path:
+    """Write a container and its XML; a setup has `body`, `affines` and attributes."""
+    folder.mkdir(exist_ok=True)
+    name = "a.h5" if kind == "hdf5" else "a.n5"
+    views, placed = "", ""
+    for number, setup in enumerate(setups):
+        x, y, z = setup["body"].shape[::-1]
+        attributes = "".join(f"<{key}>{setup[key]}</{key}>" for key in ATTRIBUTES if key in setup)
+        views += (
+            f"<ViewSetup><id>{number}</id><name>{setup.get('name', '')}</name><size>{x} {y} {z}"
+            f"</size><voxelSize><unit>{unit}</unit><size>{size}</size></voxelSize><attributes>"
+            f"{attributes}</attributes></ViewSetup>"
+        )
+        affines = "".join(
+            f'<ViewTransform type="affine"><affine>{text}</affine></ViewTransform>'
+            for text in setup.get("affines", [])
+        )
+        placed += f'<ViewRegistration timepoint="0" setup="{number}">{affines}</ViewRegistration>'
+        if kind == "n5":
+            write_n5(folder / name / f"setup{number}" / "timepoint0" / "s0", setup["body"])
+            (folder / name / f"setup{number}" / "attributes.json").write_text("{}")
+    if kind == "hdf5":
+        with h5py.File(folder / name, "w") as file:
+            for number, setup in enumerate(setups):
+                file[f"t00000/s{number:02d}/0/cells"] = setup["body"].astype(np.int16)
+                file[f"s{number:02d}/resolutions"] = [[1.0, 1.0, 1.0]]
+    path = folder / "a.xml"
+    path.write_text(
+        '<SpimData version="0.2"><SequenceDescription><ImageLoader format="bdv">'
+        f'<file type="relative">{name}</file></ImageLoader><ViewSetups>{views}</ViewSetups>'
+        '<Timepoints type="range"><first>0</first><last>0</last></Timepoints>'
+        f"</SequenceDescription><ViewRegistrations>{placed}</ViewRegistrations></SpimData>"
+    )
+    return path
+
+
+ATTRIBUTES = ("channel", "tile", "angle", "illumination")
+
+
+def voxels_of(dataset: Any, channel: int = 0) -> Any:
+    return dataset.read(channel, dataset.levels[0].box).voxels
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "n5"])
+@pytest.mark.parametrize("attribute", ["tile", "angle", "illumination"])
+def test_views_are_images_of_their_own(tmp_path: Path, kind: str, attribute: str) -> None:
+    setups = [
+        {"body": BODY + 100 * view + channel, "channel": channel, attribute: view}
+        for view in (0, 1)
+        for channel in (0, 1)
+    ]
+    path = write(tmp_path, setups, kind=kind)
+    listed = list_series(path)
+    assert len(listed) == 2
+    assert f"{attribute} 1, 16 x 48 x 36 voxels, 2 channels" in listed[1]
+    first, second = read.open(path), read.open(path, series=2)
+    assert len(first.channels) == len(second.channels) == 2
+    np.testing.assert_array_equal(voxels_of(first, 1), BODY + 1)
+    np.testing.assert_array_equal(voxels_of(second, 1), BODY + 101)
+    assert any("2 images; building --series 1" in note for note in first.notes)
+    assert not any("images" in note for note in second.notes)
+    with pytest.raises(UsageError, match="--series: found 3, expected 1 to 2"):
+        read.open(path, series=3)
+
+
+def test_a_container_named_by_itself_is_read_by_the_views_of_its_xml(tmp_path: Path) -> None:
+    write(tmp_path, [{"body": BODY, "tile": 0}, {"body": BODY + 1, "tile": 1}])
+    dataset = read.open(tmp_path / "a.h5")
+    assert len(dataset.channels) == 1
+    assert "--series needs the name of the XML" in dataset.notes[0]
+
+
+def test_tiles_of_different_size_are_read_one_by_one(tmp_path: Path) -> None:
+    path = write(tmp_path, [{"body": BODY[:8], "tile": 0}, {"body": BODY, "tile": 1}])
+    np.testing.assert_array_equal(voxels_of(read.open(path)), BODY)
+    np.testing.assert_array_equal(voxels_of(read.open(path, series=1)), BODY[:8])
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "n5"])
+def test_a_spacing_that_stands_in_the_registration_alone_is_read(tmp_path: Path, kind: str) -> None:
+    path = write(
+        tmp_path, [{"body": BODY, "affines": ["1 0 0 0 0 1 0 0 0 0 2.4 0"]}], size="1 1 1",
+        kind=kind,
+    )  # fmt: skip
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == (2.4, 1.0, 1.0)
+    assert "voxel spacing along z: the registration states 2.4 um" in dataset.notes[0]
+
+
+@pytest.mark.parametrize(
+    "affines",
+    [
+        [PLAIN],
+        ["1 0 0 0 0 1 0 0 0 0 2.5 0"],  # a world of voxels, as BigStitcher has it
+        ["1 0 0 7 0 1 0 8 0 0 1 9", PLAIN],
+        ["1 0 0 0 0 1 0 0 0 0 1 0"],  # the identity: not registered
+        [],
+    ],
+)
+def test_registrations_that_agree_with_the_voxel_size_need_no_note(
+    tmp_path: Path, affines: list[str]
+) -> None:
+    dataset = read.open(write(tmp_path, [{"body": BODY, "affines": affines}]))
+    assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.2)
+    np.testing.assert_array_equal(voxels_of(dataset), BODY)
+    assert dataset.notes == ()
+
+
+def test_transforms_compose_with_the_first_one_applied_last(tmp_path: Path) -> None:
+    """Voxels are doubled along z, then z becomes x and x the reverse of z."""
+    affines = ["0 0 1 0 0 1 0 0 -1 0 0 40", "0.2 0 0 0 0 0.2 0 0 0 0 1 0"]
+    dataset = read.open(write(tmp_path, [{"body": BODY, "affines": affines}]))
+    assert dataset.levels[0].spacing_um == (0.2, 0.2, 1.0)
+    np.testing.assert_array_equal(voxels_of(dataset), BODY.transpose(2, 1, 0)[::-1])
+    assert any("the registration is applied" in note for note in dataset.notes)
+    assert dataset.slice_axis(0) == 2
+
+
+def test_a_mirror_is_applied(tmp_path: Path) -> None:
+    affine = "-0.2 0 0 7 0 0.2 0 0 0 0 0.5 0"
+    dataset = read.open(write(tmp_path, [{"body": BODY, "affines": [affine]}]))
+    np.testing.assert_array_equal(voxels_of(dataset), BODY[:, :, ::-1])
+    assert "stored axes z, y, -x" in dataset.notes[0]
+
+
+def test_a_rotation_or_a_shear_is_not_applied_and_noted(tmp_path: Path) -> None:
+    turn = "0.1732 -0.1 0 0 0.1 0.1732 0 0 0 0 0.5 0"
+    dataset = read.open(write(tmp_path / "a", [{"body": BODY, "affines": [turn]}]))
+    np.testing.assert_array_equal(voxels_of(dataset), BODY)
+    assert "turns the view by 30 degrees" in dataset.notes[0]
+    shear = "0.2 0 0.25 0 0 0.2 0 0 0 0 0.433 0"
+    sheared = read.open(write(tmp_path / "b", [{"body": BODY, "affines": [shear]}]))
+    np.testing.assert_array_equal(voxels_of(sheared), BODY)
+    assert "shears the view by 30 degrees" in sheared.notes[0]
+    mirrored = "-0.1732 -0.1 0 0 -0.1 0.1732 0 0 0 0 0.5 0"
+    other = read.open(write(tmp_path / "c", [{"body": BODY, "affines": [mirrored]}]))
+    np.testing.assert_array_equal(voxels_of(other), BODY[:, :, ::-1])
+
+
+def test_channels_that_are_registered_apart_are_noted(tmp_path: Path) -> None:
+    setups = [
+        {"body": BODY, "channel": 0, "affines": [PLAIN]},
+        {"body": BODY, "channel": 1, "affines": ["0.2 0 0 0.6 0 0.2 0 0 0 0 0.5 0"]},
+    ]
+    dataset = read.open(write(tmp_path, setups))
+    assert len(dataset.channels) == 2
+    assert any("differ by up to 3 voxels" in note for note in dataset.notes)
+
+
+def test_a_registration_without_a_unit_is_a_hint(tmp_path: Path) -> None:
+    path = write(tmp_path, [{"body": BODY, "affines": [PLAIN]}], size="1 1 1", unit="pixel")
+    with pytest.raises(Exception, match=r"the registration has 0.5,0.2,0.2 \(z,y,x\) without one"):
+        read.open(path)
+
+
+def test_the_xml_that_is_named_counts_among_several(tmp_path: Path) -> None:
+    path = write(tmp_path, [{"body": BODY, "affines": [PLAIN]}])
+    other = tmp_path / "z.xml"
+    other.write_text(path.read_text().replace("0 0 0 0 0.5 0", "0 0 0 0 -0.5 0"))
+    np.testing.assert_array_equal(voxels_of(read.open(other)), BODY[::-1])
+    np.testing.assert_array_equal(voxels_of(read.open(path)), BODY)
+
+
+def test_lost_blocks_of_a_view_are_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    setups = [{"body": BODY + channel, "channel": channel} for channel in (0, 1)]
+    path = write(tmp_path / "a", [one | {"affines": [PLAIN]} for one in setups], kind="n5")
+    (tmp_path / "a" / "a.n5" / "setup1" / "timepoint0" / "s0" / "0" / "0" / "0").unlink()
+    for source in (path, tmp_path / "a" / "a.n5"):
+        input_files.forget()
+        capsys.readouterr()
+        assert main(["plan", str(source), "-o", str(tmp_path / "o"), "--as", "intensity"]) == 0
+        assert "1 of 48 blocks of level 0" in capsys.readouterr().err
+        shutil.rmtree(tmp_path / "o")

@@ -1,0 +1,39 @@
+"""The heat map of a tracer: from dark red to the channel's colour, from the organs' level on."""
+
+import numpy as np
+
+from stereocell.model.channel import SurfaceLevel
+from stereocell.transfer.channel_statistics import find_statistics, make_appearance
+from stereocell.transfer.heat import heat_shapes
+from stereocell.transfer.options import WindowOptions
+from stereocell.transfer.shapes2d import evaluate2d, find_fault
+
+
+def test_more_of_a_tracer_is_lighter_and_denser_at_every_gradient() -> None:
+    shapes = heat_shapes(0.2)
+    assert not any(find_fault(shape) for shape in shapes)
+    table = evaluate2d(shapes).astype(float) / 255
+    assert (table[:, : int(0.2 * 255) - 1, 3] == 0).all()
+    inside = table[:, int(0.28 * 255) :]
+    assert (inside[..., 3] > 0.03).all()
+    light = inside[0] @ (0.2126, 0.7152, 0.0722, 0.0)
+    places = np.linspace(0, len(light) - 1, 8).astype(int)
+    assert (np.diff(light[places]) > 0).all()
+    np.testing.assert_allclose(inside[0], inside[-1])
+
+
+def test_a_pet_opens_with_its_heat_map_at_the_level_of_its_organs() -> None:
+    rng = np.random.default_rng(0)
+    voxels = np.concatenate([rng.gamma(1.2, 150, 90_000), rng.normal(4000, 500, 5_000)])
+    statistics = find_statistics(voxels, WindowOptions())
+    appearance = make_appearance(
+        "PT", (1, 1, 1), statistics=statistics, level=SurfaceLevel(1500.0, None, 1.0),
+        confidence=1.0, doubt="", modality="PT",
+    )  # fmt: skip
+    assert appearance.function == "heat"
+    shapes = appearance.transfer_2d.functions["heat"]
+    assert appearance.iso_normalized is not None
+    assert abs(shapes[0].values[0] - appearance.iso_normalized) < 1e-6
+    # where gradients are not known the same values show
+    points = dict(appearance.transfer_functions["heat"])
+    assert max(points.values()) > 0.4

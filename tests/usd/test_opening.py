@@ -1,0 +1,47 @@
+"""How a specimen opens, written into a stage and read back: cut, and with which channels."""
+
+from pathlib import Path
+
+import pytest
+from pxr import Gf, Usd
+
+from stereocell.model.channel import Appearance
+from stereocell.model.errors import StageError
+from stereocell.usd.layer import OPENING_CUT, ROOT
+from stereocell.usd.read_appearances import read_appearances
+from stereocell.usd.read_stage import open_stage, opening_cut_of
+from stereocell.usd.write_stage import TileExtent, write_stage
+
+FUNCTIONS = dict.fromkeys(("default", "bone"), ((0.0, 0.0), (1.0, 0.5)))
+
+
+def _written(folder: Path, *, opens_cut: bool) -> Usd.Stage:
+    looks = [
+        Appearance("Skin", (1, 1, 1), (0, 1), None, 0.0, "none", FUNCTIONS, opens=False),
+        Appearance("Bone", (1, 1, 1), (0, 1), None, 0.0, "none", FUNCTIONS, function="bone"),
+    ]
+    # corners (z, y, x) of the voxels' centres, um: the drawn box is half a voxel wider
+    tile = TileExtent("r0_c0", (0.0, 0.0, 100.0), (30.0, 20.0, 120.0), (2.0, 2.0, 2.0))
+    write_stage(folder, "Head", appearances=looks, tiles=[tile], provenance={}, opens_cut=opens_cut)
+    return open_stage(folder / "stage.usda")
+
+
+def test_a_specimen_opens_cut_through_its_middle_or_whole(tmp_path: Path) -> None:
+    assert opening_cut_of(_written(tmp_path / "whole", opens_cut=False)) is None
+    assert opening_cut_of(_written(tmp_path / "cut", opens_cut=True)) == ((1, 0, 0), 110)
+
+
+def test_an_edited_cut_is_taken_over_and_one_without_direction_is_refused(tmp_path: Path) -> None:
+    stage = _written(tmp_path, opens_cut=True)
+    attribute = stage.GetPrimAtPath(ROOT).GetAttribute(OPENING_CUT)
+    attribute.Set(Gf.Vec4d(0, 0, -2, 6))
+    assert opening_cut_of(stage) == ((0, 0, -1), 3)
+    attribute.Set(Gf.Vec4d(0, 0, 0, 6))
+    with pytest.raises(StageError, match=r"openingCut: .*expected a plane"):
+        opening_cut_of(stage)
+
+
+def test_channels_open_shown_or_not_and_with_their_own_function(tmp_path: Path) -> None:
+    skin, bone = read_appearances(_written(tmp_path, opens_cut=False))
+    assert (skin.opens, skin.chosen) == (False, "default")
+    assert (bone.opens, bone.chosen) == (True, "bone")
