@@ -35,6 +35,8 @@ SETTINGS = """
 scope = "tile"
 [surface]
 smoothing_um = 0.5
+# the scene's sizes count on fragments and gaps being smoothed by the Gaussian alone
+max_shift = 0.0
 alpha_um = 3.0
 min_diagonal_um = 10.0
 max_cavity_um = 12.0

@@ -87,12 +87,13 @@ def test_even_volume_stays_and_the_argument_too() -> None:
     np.testing.assert_array_equal(noise, before)
 
 
-def test_voxel_depends_on_its_neighbours_alone() -> None:
+@pytest.mark.parametrize("max_shift", [None, 500.0])
+def test_voxel_depends_on_its_neighbours_alone(max_shift: float | None) -> None:
     """Bit by bit: neighbouring tiles read windows that begin and end elsewhere."""
     voxels = np.random.default_rng(0).integers(0, 60_000, (20, 40, 50)).astype(np.uint16)
     spacing = (0.28, 0.14, 0.14)
-    whole = denoise(Volume(voxels, spacing), 0.2)
-    part = denoise(Volume(voxels[3:17, 5:33, 7:48], spacing), 0.2)
+    whole = denoise(Volume(voxels, spacing), 0.2, max_shift)
+    part = denoise(Volume(voxels[3:17, 5:33, 7:48], spacing), 0.2, max_shift)
     np.testing.assert_array_equal(part[4:-4, 8:-8, 8:-8], whole[7:13, 13:25, 15:40])
 
 
