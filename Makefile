@@ -264,6 +264,7 @@ test-built: test-bundles browser
 	  STEREOCELL_REAL_BUNDLE="$$out/brain-cells/bundle" \
 	  STEREOCELL_HEAD_BUNDLE="$$out/mri/bundle" \
 	  STEREOCELL_F_BUNDLES="$$out/f/of-f.ome.tif/bundle:$$out/f/of-f.ome.zarr/bundle:$$out/f/of-f.nii.gz/bundle:$$out/f/of-dicom/bundle" \
+	  STEREOCELL_FORM_BUNDLES="$$out/forms/fluorescence/bundle:$$out/forms/ct/bundle:$$out/forms/mr/bundle" \
 	  STEREOCELL_EDIT_BUNDLES="$$out/edit/before:$$out/edit/built/bundle" \
 	  npm exec --silent -- vitest run --project built
 

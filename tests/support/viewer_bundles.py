@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from stereocell.cli.__main__ import main
+from support import form_scenes
 from support.exhaustive import IS_EXHAUSTIVE
 from support.phantoms import write_f_everywhere
 from support.stage_edits import write_layer, write_volume
@@ -68,6 +69,13 @@ def make_edited(folder: Path) -> None:
     run("bundle", folder / "built", "--stage", folder / "my_edit.usda", *ALONE)
 
 
+def make_forms(folder: Path) -> None:
+    """A scene each of fluorescence, CT and MR, drawn in every form."""
+    shutil.rmtree(folder, ignore_errors=True)
+    for name, file in form_scenes.write(folder / "sources").items():
+        make(file, folder / name, "1x1", "--preset", form_scenes.PRESETS[name])
+
+
 if __name__ == "__main__":
     place = Path(sys.argv[1])
     (place / "samples").mkdir(parents=True, exist_ok=True)
@@ -76,3 +84,4 @@ if __name__ == "__main__":
     make_brain_cells(place, *sys.argv[2:])
     make_letters(place / "f")
     make_edited(place / "edit")
+    make_forms(place / "forms")
