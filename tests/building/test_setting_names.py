@@ -70,7 +70,7 @@ def test_python_reads_settings(
 def test_who_opens_a_volume_reads_arguments(source: Path) -> None:
     with pytest.raises(stereocell.StereoCellError) as caught:
         stereocell.open_volume(source, series=2)
-    assert f"{source}: series 2: found TIFF" in str(caught.value)
+    assert f"{source}: series: found 2, expected" in str(caught.value)
     assert "--" not in str(caught.value)
 
 
