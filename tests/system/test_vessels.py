@@ -82,9 +82,9 @@ def _kept(
 ) -> tuple[float, float]:
     """Return the share of the tree's centre lines and of all voxels within the largest solid."""
     spacing = (500.0, 500.0, 500.0)
-    field = denoise(Volume(voxels, spacing), spacing[0])
     level = found.appearance.level
     assert level is not None
+    field = denoise(Volume(voxels, spacing), spacing[0], level.max_shift)
     under = 0.0 if level.background is None else float(level.background.values.mean())
     labels, _ = ndimage.label(field - under > level.iso, np.ones((3, 3, 3)))
     largest = 1 + int(np.bincount(labels.ravel())[1:].argmax())
@@ -100,7 +100,7 @@ def test_thin_branches_stay_on_the_tree(
     before, _ = _kept(voxels, centres, _built(voxels, tmp_path, "none"))
     assert vessels.appearance.surface == "clear"
     assert kept > 0.9
-    assert before < 0.8
+    assert before < kept - 0.03
     assert inside < 0.1
 
 
