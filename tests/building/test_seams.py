@@ -35,7 +35,7 @@ SETTINGS = """
 scope = "tile"
 [surface]
 smoothing_um = 0.5
-# the scene's sizes count on fragments and gaps being smoothed by the Gaussian alone
+# The gaps are so wide that alpha closes them only once the Gaussian has narrowed them.
 max_shift = 0.0
 alpha_um = 3.0
 min_diagonal_um = 10.0

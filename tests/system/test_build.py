@@ -179,9 +179,9 @@ def test_given_iso_value_is_used_in_voxels_as_they_are(tmp_path: Path) -> None:
     iso = channel["iso"]["r0_c0"]
     assert iso["value"] == 400
     assert iso["background"] == 0
-    # it is rated as any level is, and its alternatives are known
-    assert 0.3 < iso["confidence"] < 1
-    assert channel["appearance"]["iso_confidence"] == pytest.approx(iso["confidence"], abs=0.01)
+    # A level that the user gives is not rated, and its alternatives are known.
+    assert iso["confidence"] is None
+    assert channel["appearance"]["surface"] == "clear"
     assert channel["ladder"]
 
 

@@ -19,6 +19,7 @@ _AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MAX_HU = -1000.0, 150.0, 0.02, 4000.0
 _SOFT_HU, _SOFT_SHARE = 40.0, 0.02  # soft tissue, and the least share of voxels within AIR_SPREAD
 LEVELS_HU = {"ct": -300.0, "ct-bone": 300.0}  # of the presets
 WINDOW_HU = (-1024.0, 2000.0)  # window of the presets
+_LIKE_HU = "values like Hounsfield units"
 _OFFSET = 1024.0  # that scanners add to store Hounsfield units without a sign; some programs: 1000
 _PLANES = 8  # in the middle, that are looked at
 
@@ -48,14 +49,10 @@ class CtEvidence:
 
 def find_ct_evidence(dataset: Dataset) -> CtEvidence:
     """Return what the values in the middle of the first channel say about CT."""
-    depth, height, width = dataset.levels[0].shape
-    first = max(0, (depth - _PLANES) // 2)
-    # planes through the whole: corners alone may be padding, and the middle all body
-    middle = Box((first, 0, 0), (min(depth, first + _PLANES), height, width))
-    voxels = dataset.read(0, middle).voxels
+    voxels = _read_middle(dataset)
     least = float(np.min(voxels))
     if dataset.dtype.kind != "u" and _has_air(voxels, 0.0):
-        return CtEvidence(True, "values like Hounsfield units", least=least)
+        return CtEvidence(True, _LIKE_HU, least=least)
     if _is_shifted(voxels, _OFFSET):
         low, high = (value + _OFFSET for value in WINDOW_HU)
         skin, bone = (
@@ -81,18 +78,25 @@ def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:
     known = dataset.modality or stated
     if known or len(dataset.channels) != 1 or dataset.dtype.kind == "u":
         return known, ""
-    evidence = find_ct_evidence(dataset)
-    if not evidence.is_hounsfield:
+    if not _has_air(_read_middle(dataset), 0.0):
         return "", ""
-    return "CT", f"{evidence.words}: taken for CT (--modality GM: it is a microscope's)"
+    return "CT", f"{_LIKE_HU}: taken for CT (--modality GM: it is a microscope's)"
+
+
+def _read_middle(dataset: Dataset) -> NDArray[Any]:
+    """Return planes of the first channel: corners alone may be padding, and the middle all body."""
+    depth, height, width = dataset.levels[0].shape
+    first = max(0, (depth - _PLANES) // 2)
+    middle = Box((first, 0, 0), (min(depth, first + _PLANES), height, width))
+    return dataset.read(0, middle).voxels
 
 
 def _halfway(voxels: NDArray[Any]) -> float:
     """Return the value half-way between the means of Otsu's two classes."""
     from skimage.filters import threshold_otsu  # slow to import, and few sources need it
 
-    is_dark = voxels <= threshold_otsu(voxels)
-    values = voxels.astype(np.float64)
+    values = voxels.astype(np.float64)  # float32 has too few steps for the bins of a narrow range
+    is_dark = values <= threshold_otsu(values)
     return float(values[is_dark].mean() + values[~is_dark].mean()) / 2.0
 
 
