@@ -8,6 +8,7 @@ import pytest
 import zarr
 
 from stereocell import read
+from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.read.level_spacing import settle_levels
 from stereocell.read.spacing import Grid
@@ -91,6 +92,35 @@ def test_dimensions_that_agree_or_have_other_names_need_no_choice(
 def test_other_letters_of_dimensions_are_noted(tmp_path: Path) -> None:
     path = rename(write_ome_zarr(tmp_path / "a.zarr", [BODY]), list("tyx"), "0.5")
     assert "axes: `axes` of the image states z, y, x" in read.open(path).notes[0]
+
+
+def test_axes_are_compared_with_names_in_words_too(tmp_path: Path) -> None:
+    path = rename(write_ome_zarr(tmp_path / "a.zarr", [BODY]), ["column", "row", "plane"], "0.5")
+    with pytest.raises(SourceError, match="x, y, z in the names of the array's dimensions"):
+        read.open(path)
+
+
+def test_axes_of_each_level_are_compared_with_the_names_of_its_dimensions(tmp_path: Path) -> None:
+    path = write_ome_zarr(tmp_path / "a.zarr", [BODY, HALF], version="0.5")
+    level = zarr.create_array(
+        path / "1", shape=HALF.shape, dtype="u2", dimension_names=list("xyz"), overwrite=True
+    )
+    level[...] = HALF
+    with pytest.raises(SourceError, match="x, y, z in the names of the array's dimensions"):
+        read.open(path)
+
+
+@pytest.mark.parametrize("version", ["0.4", "0.5"])
+def test_the_one_image_of_a_container_is_planned_with_all_its_chunks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], version: str
+) -> None:
+    zarr_format: Any = 2 if version == "0.4" else 3
+    root = zarr.open_group(tmp_path / "c.zarr", mode="w", zarr_format=zarr_format)
+    layout = {"bioformats2raw.layout": 3}
+    root.attrs.update(layout if version == "0.4" else {"ome": layout})
+    write_ome_zarr(tmp_path / "c.zarr" / "0", [BODY], version=version)
+    assert main(["plan", str(tmp_path / "c.zarr"), "-o", str(tmp_path / "out")]) == 0
+    assert "not stored" not in capsys.readouterr().err
 
 
 def container(tmp_path: Path, physical: str, **options: Any) -> Path:

@@ -125,10 +125,10 @@ def test_part_that_somebody_else_wrote_stays_without_force(
     assert main([phase, str(out), *flags]) == 1
     line = _line(capfd)
     assert own.name in line or "is no bundle" in line
-    assert own.read_text() == WORK
+    assert own.read_text("utf-8") == WORK
     if phase != "tissue":
         assert main([phase, str(out), *flags, "--force"]) == 0
-        assert phase == "stage" or not own.exists() or own.read_text() != WORK
+        assert phase == "stage" or not own.exists() or own.read_text("utf-8") != WORK
 
 
 def test_layer_that_was_edited_in_place_is_not_written_anew_without_force(
@@ -244,7 +244,8 @@ def test_rebuild_is_refused_before_its_first_phase_writes(
     builds: Path, out: Path, capfd: pytest.CaptureFixture[str], name: str
 ) -> None:
     own = out / name
-    own.write_text((own.read_text() if own.exists() else "") + "\n# mine\n")
+    there = own.read_text("utf-8") if own.exists() else ""
+    own.write_text(f"{there}\n# mine\n", "utf-8")
     before = digests_of(out)
     assert main(_rebuild(builds, out)) == 1
     assert "--force replaces it" in _line(capfd)

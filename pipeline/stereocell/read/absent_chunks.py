@@ -67,11 +67,17 @@ def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
     sizes, noun = (stored.shards, "shard") if stored.shards else (stored.chunks, "chunk")
     if _number(sizes, spans) > _MOST_COUNTED:
         return None
-    others, names = stored.store.other_names, stored.store.members or states.names()
+    others, members = stored.store.other_names, stored.store.members
+    names = members or states.names()
+    # The one image of a container is a group of its own below the source that was listed.
+    below = stored.store.source.removeprefix(states.location.source).strip("/")
+    outside = f"{below}/" if below and members is None else ""
 
     def is_present(place: tuple[int, ...]) -> bool:
         key = f"{stored.path}/{stored.metadata.encode_chunk_key(place)}".lstrip("/")
-        return key in names or (others is not None and others.key_of(key) in names)
+        if outside + key in names:
+            return True
+        return others is not None and outside + others.key_of(key) in names
 
     is_listed = stored.store.is_local and _number(stored.chunks, spans) <= _MOST_COUNTED
     if stored.shards and is_listed:  # at an address each index is a request

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 from stereocell.model.axes import AXES
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
-from stereocell.read.array_axes import given_axes
+from stereocell.read.array_axes import axis_of, given_axes
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Grid, PartialTriple
 from stereocell.read.statements import Statement, Subject, Trust, settle
@@ -29,10 +29,10 @@ _MAX_BYTES = 64 << 20
 
 
 def dimension_names(array: Any) -> tuple[str, ...]:
-    """Return the names of an array's dimensions, lower case; empty: not stated, or not letters."""
+    """Return the names of an array's dimensions, as letters; empty: not stated, or no axes."""
     named = getattr(array.metadata, "dimension_names", None)
     named = named or array.attrs.get("_ARRAY_DIMENSIONS", ())
-    listed = tuple(str(name).lower() for name in named) if isinstance(named, list | tuple) else ()
+    listed = tuple(axis_of(str(name)) for name in named) if isinstance(named, list | tuple) else ()
     return listed if listed and set(listed) <= set(AXES) else ()
 
 

@@ -163,6 +163,8 @@ def _levels(
                 f"expected {dimensions} as `axes`{way}"
             )
     names, notes = settled_axes(where, arrays[0], image.names, axes)
+    for array in arrays[1:]:
+        settled_axes(where, array, image.names, axes)
     attributes = value_attributes(arrays[0])
     valued = [with_values(where, VoxelArray(array, names), attributes) for array in arrays]
     levels = tuple(level for level, _ in valued)

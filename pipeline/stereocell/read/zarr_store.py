@@ -80,6 +80,11 @@ class GuardedStore(WrapperStore[Store]):
         return type(self)(store, self._location, self._chunks)
 
     @property
+    def source(self) -> str:
+        """The path or address of the group."""
+        return self._location.source
+
+    @property
     def is_local(self) -> bool:
         """Whether the files are on this machine."""
         return self._location.is_local

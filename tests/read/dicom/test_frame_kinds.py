@@ -108,9 +108,14 @@ def test_real_and_imaginary_parts_follow_the_magnitude(tmp_path: Path) -> None:
         write_kind(tmp_path, add, image_type(word), first_number=add)
     lines = read.list_series(tmp_path)
     assert "magnitude" in lines[0]
-    assert sorted(line.split(", ")[1] for line in lines[1:]) == [
-        "imaginary part", "phase", "real part"
-    ]  # fmt: skip
+    assert lines[1].split(", ")[1] == "real part"
+    assert sorted(line.split(", ")[1] for line in lines[2:]) == ["imaginary part", "phase"]
+
+
+def test_without_a_magnitude_the_real_part_is_built(tmp_path: Path) -> None:
+    for add, word in ((10, "I"), (20, "R")):
+        write_kind(tmp_path, add, image_type(word), first_number=add)
+    assert added(tmp_path) == 20
 
 
 def test_a_phase_series_of_its_own_follows_a_smaller_magnitude_series(tmp_path: Path) -> None:

@@ -49,7 +49,8 @@ _RANKS = {
     "screen save": 5,
     "dose or protocol sheet": 5,
 }
-_PART_RANK = 2  # rank of a phase, a real or an imaginary part
+# ranks of the parts of a complex image; a magnitude has 0
+_PART_RANKS = {REAL: 2, IMAGINARY: 3, PHASE: 3}
 # patterns of words of ImageType -> role, the first that matches
 _ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), role)
@@ -158,8 +159,11 @@ class FrameKind:
     @property
     def rank(self) -> int:
         """Lower ranks are shown first: images and magnitudes have 0."""
-        part = _PART_RANK if self.part in (PHASE, REAL, IMAGINARY) else 0
-        return max(part, _RANKS[self.role], int(self.image_type[:1] == ("DERIVED",)))
+        return max(
+            _PART_RANKS.get(self.part, 0),
+            _RANKS[self.role],
+            int(self.image_type[:1] == ("DERIVED",)),
+        )
 
     @property
     def words(self) -> tuple[str, ...]:
