@@ -101,7 +101,8 @@ def test_axes_are_compared_with_names_in_words_too(tmp_path: Path) -> None:
 
 
 def test_axes_of_each_level_are_compared_with_the_names_of_its_dimensions(tmp_path: Path) -> None:
-    path = write_ome_zarr(tmp_path / "a.zarr", [BODY, HALF], version="0.5")
+    scales = [UM, {axis: 2 * step for axis, step in UM.items()}]
+    path = write_ome_zarr(tmp_path / "a.zarr", [BODY, HALF], version="0.5", scales=scales)
     level = zarr.create_array(
         path / "1", shape=HALF.shape, dtype="u2", dimension_names=list("xyz"), overwrite=True
     )
