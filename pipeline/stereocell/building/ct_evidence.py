@@ -26,7 +26,7 @@ _PLANES = 8  # in the middle, that are looked at
 
 @dataclass(frozen=True, slots=True)
 class CtEvidence:
-    """What the values of a volume say about CT.
+    """The evidence in the values of a volume that it is a CT.
 
     is_hounsfield  whether they are Hounsfield units
     words          what they look like, for the plan

@@ -79,7 +79,7 @@ def _choose(axis: str, stated: list[Statement], notes: list[str]) -> float | Non
 
 
 class _Positions:
-    """What a dataset of positions along an axis of `count` voxels states.
+    """The statements of a dataset that holds the positions along an axis of `count` voxels.
 
     descend     whether they descend
     statements  the voxel spacing, um

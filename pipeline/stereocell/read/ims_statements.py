@@ -1,4 +1,4 @@
-"""What `/DataSetInfo/Image` of an Imaris file states about the voxel spacing, compared.
+"""Compare the statements on the voxel spacing in `/DataSetInfo/Image` of an Imaris file.
 
 Imaris divides the extents by the size. The microscope's own spacing is in `RecordingEntry...`, in
 um; it differs where a user has corrected the extents, or where a converter has set one alone.

@@ -1,4 +1,4 @@
-"""What a header of MRC states about voxel spacing and the sign of bytes, compared.
+"""Compare the statements of an MRC header on the voxel spacing and on the sign of bytes.
 
 The spacing is the cell's length by the sampling of the cell (`mx`, `my`, `mz`). Some writers leave
 another sampling behind, such as that of the stack that a part was cut out of, so the spacing by the

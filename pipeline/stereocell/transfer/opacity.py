@@ -15,8 +15,8 @@ NAMES = ("default", "soft", "sharp", "surface")
 THRESHOLD = "threshold"  # name of the function of channels that have a threshold
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
-# Share of the window by which a body's opacity begins below its surface: 36 HU of a CT's. The edge
-# of a body crosses it within a voxel, and a step would be jagged.
+# Share of the window between the start of a body's opacity and its surface: 36 HU by the presets
+# of CT. Values rise by more within a voxel of the edge, and a step of the opacity would be jagged.
 BELOW_BODY = 0.012
 SOLID_BODY = 0.06  # share of the window above the surface in which a body becomes opaque: 180 HU
 NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them

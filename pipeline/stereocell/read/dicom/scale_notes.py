@@ -1,4 +1,4 @@
-"""What a user should know about the values of DICOM: scales that differ, units, Hounsfield units.
+"""Notes for the user on the values of DICOM: scales that differ, units, Hounsfield units.
 
 A CT is in Hounsfield units where its rescale reaches far below water, as air is. Where the headers
 leave it open the values decide.

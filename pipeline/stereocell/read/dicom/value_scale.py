@@ -32,7 +32,7 @@ SCALE_TAGS: list[Any] = ["RescaleType", "Units", _MAPPING, *private_tags(*_PHILI
 
 @dataclass(frozen=True, slots=True)
 class ValueScale:
-    """What a header states about a frame's values.
+    """The statements of a header on the values of a frame.
 
     has_rescale  RescaleSlope and RescaleIntercept are stated
     kind         RescaleType, one of the standard's terms; empty: another, or none
