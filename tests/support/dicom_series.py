@@ -27,6 +27,7 @@ from pydicom.uid import (
 )
 
 Affine = NDArray[np.float64]
+Change = Callable[[pydicom.Dataset], None]
 # Bright bodies: centre in LPS mm, width (sigma) mm, height. No mirroring or turn keeps them.
 BODIES = (
     ((9.0, -13.0, 7.0), 5.0, 1000.0),  # in front, to the left, above the middle
@@ -45,6 +46,16 @@ def scene(lps_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         squared = ((lps_mm - np.array(centre)) ** 2).sum(axis=-1)
         total += height * np.exp(-squared / (2 * sigma**2))
     return total
+
+
+def setting(**values: object) -> Change:
+    """Return a change of a header that sets elements by their keywords."""
+
+    def change(ds: pydicom.Dataset) -> None:
+        for name, value in values.items():
+            setattr(ds, name, value)
+
+    return change
 
 
 def turn(axis: Sequence[float], degrees: float) -> NDArray[np.float64]:

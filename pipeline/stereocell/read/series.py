@@ -70,6 +70,11 @@ def read_chosen(
         raise
 
 
+def numbers_of(count: int) -> str:
+    """Return the values that `--series` takes for a source of `count` images, for messages."""
+    return "1, the only one" if count == 1 else f"1 to {count}"
+
+
 def choose(where: str, candidates: Sequence[Candidate], series: int) -> tuple[int, tuple[str, ...]]:
     """Return the index of an image, and notes. `series` counts from 1; 0: the largest volume.
 
@@ -78,7 +83,8 @@ def choose(where: str, candidates: Sequence[Candidate], series: int) -> tuple[in
     count = len(candidates)
     if series > count:
         raise UsageError(
-            f"{where}: --series: found {series}, expected 1 to {count} (`--series list` shows them)"
+            f"{where}: --series: found {series}, expected {numbers_of(count)} "
+            "(`--series list` shows them)"
         )
     if series:
         return series - 1, ()

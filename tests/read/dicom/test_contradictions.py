@@ -4,24 +4,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pydicom
 import pytest
 
 from stereocell import read
 from support.dicom_reading import error
-from support.dicom_series import grid, tilted, write_series
+from support.dicom_series import Change, grid, setting, tilted, write_series
 
 SHAPE = (10, 12, 14)
 AFFINE = grid(shape=SHAPE, spacing=(2.5, 2.0, 2.2))
-Change = Callable[[pydicom.Dataset], None]
-
-
-def setting(**values: object) -> Change:
-    def change(ds: pydicom.Dataset) -> None:
-        for name, value in values.items():
-            setattr(ds, name, value)
-
-    return change
 
 
 def by_number(name: str, value: Callable[[int], object]) -> Change:

@@ -12,19 +12,10 @@ import SimpleITK
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from support.dicom_reading import whole
-from support.dicom_series import grid, write_enhanced, write_series
+from support.dicom_series import Change, grid, setting, write_enhanced, write_series
 
 SHAPE = (10, 12, 14)
 AFFINE = grid(shape=SHAPE, spacing=(3.0, 2.0, 2.2))
-Change = Callable[[pydicom.Dataset], None]
-
-
-def setting(**values: object) -> Change:
-    def change(ds: pydicom.Dataset) -> None:
-        for name, value in values.items():
-            setattr(ds, name, value)
-
-    return change
 
 
 def image_type(*words: str) -> Change:

@@ -1,6 +1,5 @@
 """Values of DICOM are on the scale that the headers state, and what they leave open is said."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +13,10 @@ from stereocell.building.preset_choice import choose_preset
 from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
 from support.dicom_reading import whole
-from support.dicom_series import grid, write_series
+from support.dicom_series import Change, grid, setting, write_series
 
 SHAPE = (6, 12, 14)
 AFFINE = grid(shape=SHAPE, spacing=(5.0, 4.0, 4.0))
-Change = Callable[[pydicom.Dataset], None]
-
-
-def setting(**values: object) -> Change:
-    def change(ds: pydicom.Dataset) -> None:
-        for name, value in values.items():
-            setattr(ds, name, value)
-
-    return change
 
 
 def opened(folder: Path, change: Change = lambda ds: None, **options: Any) -> read.Dataset:
