@@ -35,7 +35,7 @@ from stereocell.read.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
-from stereocell.read.series import counted
+from stereocell.read.series import counted, numbers_of
 from stereocell.read.spacing import Grid
 from stereocell.read.statements import omission
 from stereocell.read.whole_array import WholeArray
@@ -70,7 +70,7 @@ def read_image(location: Location, *, series: int = 0) -> Image:
     found = _find(location)
     if series > len(found.stacks):
         raise UsageError(
-            f"{location.shown}: --series: found {series}, expected 1 to {len(found.stacks)} "
+            f"{location.shown}: --series: found {series}, expected {numbers_of(len(found.stacks))} "
             "(`--series list` shows them)"
         )
     stack = found.stacks[max(series, 1) - 1]
