@@ -47,7 +47,7 @@ def main(source: Path) -> int:
                 return status
         # trees go elsewhere than OUT/bricks, so that they are built anew
         library = BrickLibrary(out / "bundle", Path(folder) / "bricks")
-        manifest = json.loads((out / "bundle" / "manifest.json").read_text())
+        manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
         channel = manifest["channels"][0]
         volume = max(
             (v for v in library.volumes().values() if v.channel == channel["id"]),

@@ -121,7 +121,7 @@ class Meter:
 
 def _memory_mb() -> tuple[float, float]:
     """Return what the process holds, and the most that it held."""
-    lines = Path("/proc/self/status").read_text().splitlines()
+    lines = Path("/proc/self/status").read_text("utf-8").splitlines()
     said = dict(line.split(":", 1) for line in lines)
     return int(said["VmRSS"].split()[0]) / 1024, int(said["VmHWM"].split()[0]) / 1024
 

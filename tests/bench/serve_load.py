@@ -121,7 +121,7 @@ async def look(stream, view: int, rng: random.Random, hashes: list[bytes], total
 
 
 def memory_mb(pid: int, name: str) -> float:
-    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+    for line in Path(f"/proc/{pid}/status").read_text("utf-8").splitlines():
         if line.startswith(name + ":"):
             return int(line.split()[1]) / 1024
     return float("nan")

@@ -441,7 +441,7 @@ def run_forked(step, arguments):
 def main():
     for line in sys.stdin:
         asked = json.loads(line)
-        code = run_forked(asked["step"], json.loads(Path(asked["arguments"]).read_text()))
+        code = run_forked(asked["step"], json.loads(Path(asked["arguments"]).read_text("utf-8")))
         print(code, file=ANSWERS, flush=True)
 
 

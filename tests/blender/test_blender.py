@@ -78,7 +78,7 @@ def test_objects_are_coloured_hidden_and_renamed_up_to_the_bundle(
     cells: tuple[Path, Path], tmp_path: Path
 ) -> None:
     out, table = cells
-    by_label = {row["CellID"]: row for row in csv.DictReader(table.read_text().splitlines())}
+    by_label = {row["CellID"]: row for row in csv.DictReader(table.read_text("utf-8").splitlines())}
     kinds = sorted({row["cell_type"] for row in by_label.values()})
     stage, overlay = out / "stage/stage.usda", tmp_path / "edit.usda"
     found = run(
@@ -133,7 +133,7 @@ def test_objects_have_their_columns_and_classes(cells: tuple[Path, Path], tmp_pa
     out, table = cells
     found = run("objects", tmp_path, stage=out / "stage/stage.usda", lod="lod1")
     mesh = found[leaf("r0_c0", "cells")]
-    rows = list(csv.DictReader(table.read_text().splitlines()))
+    rows = list(csv.DictReader(table.read_text("utf-8").splitlines()))
     stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
     labels = stage.GetPrimAtPath(leaf("r0_c0", "cells")).GetAttribute("stereocell:objectLabels")
     numbers = [int(label) for label in labels.Get()]
@@ -145,7 +145,7 @@ def test_objects_have_their_columns_and_classes(cells: tuple[Path, Path], tmp_pa
         assert mesh["columns"]["CD3"][face] == pytest.approx(float(row["CD3"]), rel=1e-4)
         assert kinds[int(mesh["columns"]["cell_type"][face])] == row["cell_type"]
         assert to_identifier(row["cell_type"]) in mesh["classes"][face]
-    content = json.loads((out / "bundle/channels/cells/objects.json").read_text())
+    content = json.loads((out / "bundle/channels/cells/objects.json").read_text("utf-8"))
     (entry,) = (one for one in content["columns"] if one["id"] == "cell_type")
     for name, color in zip(entry["categories"], entry["colors"], strict=True):
         (found_color,) = (

@@ -51,7 +51,7 @@ def _distance_to_ellipsoids(
 def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
     source = tmp_path / "block.ome.zarr"
     write_cycif(source, grid=(2, 1), tile_size=(64, 160, 160), seed=5, brightness_spread=0.0)
-    truth = json.loads((tmp_path / "block.truth.json").read_text())
+    truth = json.loads((tmp_path / "block.truth.json").read_text("utf-8"))
     out_folder, meshes = _units(
         source, tmp_path / "out", "Hoechst", channels=["Hoechst"], tile_size=[64, 160, 160]
     )

@@ -50,7 +50,7 @@ def test_a_background_that_is_not_0_is_named_and_left_out_on_request(
     told = planned(tmp_path, voxels, capsys, "--background", background)
     assert "3 objects" in told
     assert "background;" not in told
-    assert json.loads((tmp_path / "o/plan.json").read_text())["labels"][0]["background"]
+    assert json.loads((tmp_path / "o/plan.json").read_text("utf-8"))["labels"][0]["background"]
 
 
 def test_a_background_of_0_is_not_mentioned(
@@ -58,7 +58,9 @@ def test_a_background_of_0_is_not_mentioned(
 ) -> None:
     voxels = numbered(background=0)
     assert "background" not in planned(tmp_path, voxels, capsys)
-    assert "background" not in json.loads((tmp_path / "o/plan.json").read_text())["labels"][0]
+    assert (
+        "background" not in json.loads((tmp_path / "o/plan.json").read_text("utf-8"))["labels"][0]
+    )
     # a number that no voxel has, as another type's largest one
     assert "3 objects" in planned(tmp_path, voxels, capsys, "--background", 70000)
 

@@ -103,6 +103,6 @@ def test_light_sheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Path) -> 
     assert channel.appearance.surface == "clear"
     (tile,) = channel.iso.values()
     path = out / tile.files["components"]
-    components = json.loads(path.read_text())["components"]
+    components = json.loads(path.read_text("utf-8"))["components"]
     assert components["count"] > 60
     assert components["largest"] < 0.5 * components["voxels"]

@@ -60,7 +60,7 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def out(sample: Path) -> Path:
     """Two tiles, one image channel, and a table with errors of three kinds."""
     table = table_beside(sample)
-    lines = table.read_text().splitlines()
+    lines = table.read_text("utf-8").splitlines()
     lines = [lines[0], *lines[2:], "9999,T cell" + ",1" * 12, "8888,B cell" + ",2" * 12]
     lines[3] = lines[3].replace(lines[3].split(",")[2], "nan")
     table.write_text("\n".join(lines) + "\n")
@@ -79,7 +79,7 @@ def said(capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def objects_of(out: Path) -> dict:
-    return json.loads((out / "bundle/channels/cells/objects.json").read_text())
+    return json.loads((out / "bundle/channels/cells/objects.json").read_text("utf-8"))
 
 
 def column_of(out: Path, column_id: str) -> np.ndarray:
@@ -168,7 +168,7 @@ def test_classes_of_other_names_reach_the_bundle(out: Path, tmp_path: Path) -> N
     kinds.SetCustomDataByKey("categories", Vt.StringArray(names))
     layer.Save()
     write_bundle(out / "stage/names.usda", tmp_path / "bundle", None, run=Engine(0).run)
-    content = json.loads((tmp_path / "bundle/channels/cells/objects.json").read_text())
+    content = json.loads((tmp_path / "bundle/channels/cells/objects.json").read_text("utf-8"))
     (column,) = (one for one in content["columns"] if one["id"] == "cell_type")
     assert column["categories"] == names
     assert len(column["colors"]) == len(names)
@@ -177,7 +177,7 @@ def test_classes_of_other_names_reach_the_bundle(out: Path, tmp_path: Path) -> N
 def test_every_level_of_a_file_names_its_cells(out: Path) -> None:
     content = objects_of(out)
     boxes = np.fromfile(out / "bundle" / content["boxes"]["path"], "<f4").reshape(-1, 6)
-    manifest = json.loads((out / "bundle/manifest.json").read_text())
+    manifest = json.loads((out / "bundle/manifest.json").read_text("utf-8"))
     (channel,) = (one for one in manifest["channels"] if one["id"] == "cells")
     farthest = 2 * channel["distances"][-1]["largest_um"]
     for tile, rows in content["tiles"].items():
@@ -302,7 +302,7 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
     assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
     assert "organs: objects larger than a tile and half around it, 40 x 80 x 80 um" in said(capsys)
     folder = out / "bundle/channels/organs"
-    content = json.loads((folder / "objects.json").read_text())
+    content = json.loads((folder / "objects.json").read_text("utf-8"))
     assert content["count"] == 2
     labels_there = np.fromfile(out / "bundle" / content["labels"]["path"], "<u4").tolist()
     row = labels_there.index(5)
@@ -431,7 +431,7 @@ def test_of_two_label_maps_the_first_one_has_the_table(
     out, flags = tmp_path / "small", (*flags, *more, "--color-by", "score", "--grid", "2x1")
     build(sample, out, *flags)
     assert objects_of(out)["default"] == "score"
-    again_there = json.loads((out / "bundle/channels/again/objects.json").read_text())
+    again_there = json.loads((out / "bundle/channels/again/objects.json").read_text("utf-8"))
     assert again_there["default"] != "score"
     said(capsys)
     told = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
@@ -502,7 +502,7 @@ def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> 
     path = write_segmentation(tmp_path, "BINARY", voxels, omit_empty=omit_empty)
     out = tmp_path / "out"
     build(tmp_path / "images", out, "--labels", f"organs={path}")
-    content = json.loads((out / "bundle/channels/organs/objects.json").read_text())
+    content = json.loads((out / "bundle/channels/organs/objects.json").read_text("utf-8"))
     by_id = {one["id"]: one for one in content["columns"]}
 
     def exact(column_id: str) -> np.ndarray:
@@ -529,7 +529,7 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     build(source, out, "--labels", "cells=.", "--spacing-um", "1,0.5,0.5", "--grid", "2x1")
     count = len(labels_of(out))
     assert run("report", out) == 0
-    page = (out / "report/index.html").read_text()
+    page = (out / "report/index.html").read_text("utf-8")
     assert f"cells: {count} objects</h3>" in page
     said(capsys)
     assert run("check", out, "--deep", "--workers", 0) == 0
@@ -596,7 +596,7 @@ def test_levels_that_stop_early_are_told_of(
     assert wanted in told
     assert "lod2 has" not in told
     assert run("report", tmp_path / "out") == 0
-    assert wanted in (tmp_path / "out/report/index.html").read_text()
+    assert wanted in (tmp_path / "out/report/index.html").read_text("utf-8")
 
 
 @pytest.mark.slow

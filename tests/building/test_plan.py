@@ -21,7 +21,7 @@ from support.sealed_files import seal
 def test_plan_survives_its_file_and_passes_its_schema() -> None:
     plan = plan_of({"grid": "5x2"}, iso_values={"CD3ε": 700.0})
     content = json.loads(json.dumps(to_json(plan)))
-    schema = json.loads(find_asset("schemas/plan.schema.json").read_text())
+    schema = json.loads(find_asset("schemas/plan.schema.json").read_text("utf-8"))
     jsonschema.validate(seal(content), schema)
     assert from_json(content) == plan
     assert len(plan.tiles) == 10

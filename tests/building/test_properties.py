@@ -41,7 +41,7 @@ FEW = settings(
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 MANY = settings(FEW, max_examples=60)
-PLAN_SCHEMA = Draft202012Validator(json.loads(schema_path("plan.schema.json").read_text()))
+PLAN_SCHEMA = Draft202012Validator(json.loads(schema_path("plan.schema.json").read_text("utf-8")))
 
 lengths = st.integers(2, 90)
 shapes = st.tuples(st.integers(2, 40), lengths, lengths)

@@ -81,7 +81,7 @@ def _stated(out: Path, channel: str) -> dict[str, Any]:
     stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
     prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel}")
     name = prim.GetAttribute("stereocell:levelFile").Get()
-    content: dict[str, Any] = json.loads((out / "stage" / "looks" / name).read_text())
+    content: dict[str, Any] = json.loads((out / "stage" / "looks" / name).read_text("utf-8"))
     assert content["iso"] == pytest.approx(prim.GetAttribute("stereocell:levelIso").Get())
     return content
 
@@ -155,7 +155,7 @@ def test_scikit_image_finds_the_surface_where_the_stage_says(out: Path, channel:
 @pytest.mark.slow
 def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> None:
     stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
-    manifest = json.loads((out / "bundle" / "manifest.json").read_text())
+    manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
     remarks = {r.title: r.lines for r in find_remarks(gather(OutFolder(out)))}
     reasons: dict[str, list[str]] = {}
     for channel in manifest["channels"]:
@@ -212,7 +212,9 @@ def test_a_given_level_that_parts_nothing_has_no_surface_and_says_why(
 ) -> None:
     flags = ["--grid", "2x1", "--channels", "even", f"--iso-value=even={given}"]
     assert main(["build", str(source), "-o", str(tmp_path / "out"), *flags, "--workers", "0"]) == 0
-    (channel,) = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text())["channels"]
+    (channel,) = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text("utf-8"))[
+        "channels"
+    ]
     assert channel["surface"] == "none"
     assert channel["surface_reason"] == f"no surface: all voxels lie {side} the level {given}"
     assert channel["tileset"] is None
@@ -262,7 +264,7 @@ def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
     told = capsys.readouterr().err
     assert "half-way; 0% of it is left by a median of 3 x 3 voxels and a Gaussian of 1 um" in told
     assert "no surface: all voxels lie below the level 127.5" in told
-    (channel,) = json.loads((out / "bundle" / "manifest.json").read_text())["channels"]
+    (channel,) = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))["channels"]
     assert channel["surface"] == "none"
 
 
@@ -285,7 +287,7 @@ def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: 
     flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
     surfaces = ["--surfaces", "even=outer,800"]
     assert main(["build", str(source), *flags, *surfaces]) == 0
-    manifest = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text())
+    manifest = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text("utf-8"))
     outer, inner = manifest["channels"]
     assert (outer["name"], inner["name"]) == ("even outer", "even 800")
     assert outer["level"]["iso"] < inner["level"]["iso"] == 800
@@ -293,7 +295,7 @@ def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: 
     assert outer["color"] != inner["color"]
     # the voxels are shown once: the second is a surface within the first one's volume
     shown = [
-        json.loads((tmp_path / "out" / "bundle" / channel["volumes"]["path"]).read_text())
+        json.loads((tmp_path / "out" / "bundle" / channel["volumes"]["path"]).read_text("utf-8"))
         for channel in (outer, inner)
     ]
     assert [len(one["volumes"]) for one in shown] == [1, 0]

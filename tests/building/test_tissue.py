@@ -108,14 +108,14 @@ def test_the_record_fits_its_schema_and_names_nobody(planned: Path) -> None:
             content = file.read_bytes()
             assert PATIENT.encode() not in content
             assert str(planned).encode() not in content
-    provenance = json.loads((planned / "provenance.json").read_text())
+    provenance = json.loads((planned / "provenance.json").read_text("utf-8"))
     assert set(provenance["added_channels"]) == set(HEAD)
 
 
 def test_the_plan_with_classes_survives_its_file_and_passes_its_schema(planned: Path) -> None:
     plan = add(planned, "--classes", "3").plan()
     content = json.loads(json.dumps(to_json(plan)))
-    schema = json.loads(find_asset("schemas/plan.schema.json").read_text())
+    schema = json.loads(find_asset("schemas/plan.schema.json").read_text("utf-8"))
     jsonschema.validate(seal(content), schema)
     assert from_json(content) == plan
 
@@ -127,7 +127,7 @@ def test_a_copy_reads_its_own_classes_wherever_it_lies(planned: Path, tmp_path: 
     for before, after in zip(here.channels[1:], there.channels[1:], strict=True):
         voxels = tmp_path.resolve() / "moved" / "tissue" / "classes.ome.zarr"
         assert (Path(after.source), after.fingerprint) == (voxels, before.fingerprint)
-    assert str(planned.resolve()) not in copy.plan_file.read_text()
+    assert str(planned.resolve()) not in copy.plan_file.read_text("utf-8")
     assert copy.save_plan(there) is False
 
 
@@ -192,6 +192,6 @@ def test_a_build_gains_the_classes_and_keeps_what_was_built(planned: Path, tmp_p
         assert found["window"] == [0, 255]
         assert found["iso_value"] == pytest.approx(127.5)
         assert found["iso_normalized"] == pytest.approx(0.5)
-    page = (out / "report" / "index.html").read_text()
+    page = (out / "report" / "index.html").read_text("utf-8")
     assert "Tissue classes" in page
     assert all(name in page for name in HEAD)

@@ -122,7 +122,7 @@ def undisturbed(built: Path) -> Path:
 def copy(out: Path, to: Path, source: Path | None = None) -> Path:
     """Copy a build, and say so in its plan."""
     shutil.copytree(out, to)
-    text = (to / "plan.json").read_text().replace(f'"{out}', f'"{to}')
+    text = (to / "plan.json").read_text("utf-8").replace(f'"{out}', f'"{to}')
     if source is not None:
         shutil.copy(out.parent / "f.ome.tif", source)
         text = text.replace(f'"{out.parent / "f.ome.tif"}"', f'"{source}"')
@@ -418,7 +418,9 @@ def test_a_class_named_as_a_channel_leaves_the_earlier_ones(
     assert tissue(out, "--model", str(model)) == 1
     assert f"has a channel '{CHANNEL}' of its own" in only_line(capfd)
     assert digests(out) == before
-    assert json.loads((out / "tissue" / "tissue.json").read_text())["settings"]["classes"] == 2
+    assert (
+        json.loads((out / "tissue" / "tissue.json").read_text("utf-8"))["settings"]["classes"] == 2
+    )
 
 
 @pytest.mark.parametrize("checked", ["by the command", "by the plan"])

@@ -68,10 +68,10 @@ def test_manifest_that_was_changed_is_read_by_no_command(
     file = bundle / "manifest.json"
     words = "damaged or changed by hand"
     if seal == "changed":
-        file.write_text(file.read_text().replace('"modality": ""', '"modality": "CT"'))
+        file.write_text(file.read_text("utf-8").replace('"modality": ""', '"modality": "CT"'))
     else:
         words = "has no hash of its content"
-        file.write_text(file.read_text().replace('"sha256": "', '"sha255": "'))
+        file.write_text(file.read_text("utf-8").replace('"sha256": "', '"sha255": "'))
     for read in (
         lambda: NotebookBundle(bundle),
         lambda: BrickLibrary(bundle, tmp_path / "bricks").volumes(),

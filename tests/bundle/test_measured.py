@@ -86,7 +86,7 @@ def test_8_bits_leave_the_measured_voxels_out_and_the_log_says_their_size(
     assert volumes(edited) != volumes(bundle_over(built, tmp_path / "of_16"))
     build(source, tmp_path / "whole")
     told = capsys.readouterr().err
-    records = [json.loads(path.read_text()) for path in built.glob("units/*/stage.json")]
+    records = [json.loads(path.read_text("utf-8")) for path in built.glob("units/*/stage.json")]
     assert len(records) == 2
     measured = sum(record["measured_bytes"] for record in records)
     large, bare = (

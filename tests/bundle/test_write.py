@@ -38,7 +38,7 @@ def bundle(stage, tmp_path_factory):
 
 
 def schema(name):
-    return Draft202012Validator(json.loads(schema_path(name).read_text()))
+    return Draft202012Validator(json.loads(schema_path(name).read_text("utf-8")))
 
 
 def test_manifest_and_volume_lists_fit_their_schemas(bundle):
@@ -261,7 +261,7 @@ def test_viewer_is_copied_and_listed(stage, tmp_path):
     (tmp_path / "dist" / "index.html").write_text("<!doctype html>")
     (tmp_path / "dist" / "assets" / "main.js").write_text("start()")
     write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", run=Engine(0).run)
-    assert (tmp_path / "bundle" / "assets" / "main.js").read_text() == "start()"
+    assert (tmp_path / "bundle" / "assets" / "main.js").read_text("utf-8") == "start()"
     assert {"index.html", "assets/main.js"} <= load(tmp_path / "bundle" / "files.json").keys()
 
 
@@ -297,4 +297,4 @@ def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path
     assert files(tmp_path / "again") == files(bundle)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"first", "again", "parts", "secret.txt"}
-    assert (tmp_path / "secret.txt").read_text() == "private"
+    assert (tmp_path / "secret.txt").read_text("utf-8") == "private"

@@ -48,8 +48,8 @@ def table(*columns, labels=None, rows=None, **rest):
 def written(tmp_path, given):
     ref, files = write_objects(tmp_path, FOLDER, given)
     assert ref.path == f"{FOLDER}/objects.json"
-    content = json.loads((tmp_path / ref.path).read_text())
-    schema = json.loads(find_asset("schemas/objects.schema.json").read_text())
+    content = json.loads((tmp_path / ref.path).read_text("utf-8"))
+    schema = json.loads(find_asset("schemas/objects.schema.json").read_text("utf-8"))
     jsonschema.validate(content, schema)
     assert {f.path for f in files} == {
         p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*") if p.is_file()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "architecture.md").read_text()
+PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
 PYTHON = ROOT / "pipeline" / "stereocell"
 VIEWER = ROOT / "viewer_gltf" / "src"
 PYTHON_LAYERS, VIEWER_LAYERS, WAY = re.findall(r"^```\n(.*?)^```", PAGE, re.M | re.S)
@@ -25,13 +25,13 @@ def table(title: str) -> list[str]:
 
 
 def test_python_s_layers_are_those_that_lint_holds() -> None:
-    tool = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    tool = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]
     (layers,) = [c["layers"] for c in tool["contracts"] if c["type"] == "layers"]
     assert names(PYTHON_LAYERS) == layers
 
 
 def test_the_viewer_s_layers_are_those_that_lint_holds() -> None:
-    code = (ROOT / "viewer_gltf" / "scripts" / "layers.ts").read_text()
+    code = (ROOT / "viewer_gltf" / "scripts" / "layers.ts").read_text("utf-8")
     layers = re.findall(r'^  "(\w+)",$', code, re.M)
     assert names(VIEWER_LAYERS) == layers[::-1]
 

@@ -68,7 +68,9 @@ SMALLER = {
 
 def blocks(page: Path, language: str = r"\w*") -> list[str]:
     """Return what stands in the page's fences."""
-    return re.findall(rf"^ *```{language}\n(.*?)^ *```", page.read_text(), re.DOTALL | re.MULTILINE)
+    return re.findall(
+        rf"^ *```{language}\n(.*?)^ *```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE
+    )
 
 
 def commands(page: Path, program: str) -> Iterator[str]:
@@ -173,7 +175,7 @@ def test_commands_run(
 
 def _runs_the_workflow(folder: Path) -> None:
     """The example for CI, its last step in a shell as a runner starts it."""
-    workflow = yaml.safe_load((DOCS / "examples" / "check-bundle.yml").read_text())
+    workflow = yaml.safe_load((DOCS / "examples" / "check-bundle.yml").read_text("utf-8"))
     job = workflow["jobs"]["check"]
     *_, install, check = job["steps"]
     assert (
@@ -196,7 +198,7 @@ def _runs_the_workflow(folder: Path) -> None:
 def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() -> None:
     used = set()
     for page in PAGES:
-        spans = re.findall(r"`(?:\.venv/bin/)?(stereocell [a-z]+ [^`]+)`", page.read_text())
+        spans = re.findall(r"`(?:\.venv/bin/)?(stereocell [a-z]+ [^`]+)`", page.read_text("utf-8"))
         for command in [*commands(page, "stereocell"), *spans]:
             if "..." not in command:
                 parse(" ".join(command.split()))
@@ -274,7 +276,7 @@ def test_the_reader_that_is_shown_reads(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_functions_that_are_named_exist() -> None:
-    text = (DOCS / "python.md").read_text()
+    text = (DOCS / "python.md").read_text("utf-8")
     named = re.findall(r"`([a-z][\w.]*)\.(\w+)`", text.partition("| step |")[2])
     assert len(named) > 12
     for module, function in named:
@@ -284,14 +286,14 @@ def test_functions_that_are_named_exist() -> None:
 def test_files_that_are_named_exist() -> None:
     path = re.compile(r"`((?:tests|schemas|usd_assets|pipeline|viewer_gltf)/[\w/.]+)`")
     for page in PAGES:
-        for name in path.findall(page.read_text()):
+        for name in path.findall(page.read_text("utf-8")):
             assert (ROOT / name).exists(), f"{page.name}: {name}"
 
 
 def test_links_lead_somewhere(reference: Any) -> None:
     made = {DOCS / path for path in [*reference.pages(), "notebook.md"]}
     for page in PAGES:
-        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
+        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text("utf-8")):
             if "://" not in target:
                 path = (page.parent / target.strip()).resolve()
                 assert path.exists() or path in made, f"{page.name}: {target}"

@@ -24,7 +24,7 @@ SHOWN = ROOT / "docs" / "jupyter.ipynb"
 
 def test_the_notebook_is_stored_without_outputs() -> None:
     """So that a diff of it reads, and what is shown is what this version does."""
-    cells = json.loads(NOTEBOOK.read_text())["cells"]
+    cells = json.loads(NOTEBOOK.read_text("utf-8"))["cells"]
     code = [cell for cell in cells if cell["cell_type"] == "code"]
     assert len(code) > 6
     assert all(not cell["outputs"] and cell["execution_count"] is None for cell in code)
@@ -45,7 +45,7 @@ def pictures(notebook: Any) -> list[NDArray[np.uint8]]:
 
 
 def test_the_viewer_s_notebook_is_stored_with_its_pictures_and_no_more() -> None:
-    text = SHOWN.read_text()
+    text = SHOWN.read_text("utf-8")
     notebook = json.loads(text)
     assert [picture.std() > 10 for picture in pictures(notebook)] == [True, True]
     assert all(cell["execution_count"] for cell in notebook["cells"] if cell["cell_type"] == "code")
@@ -64,7 +64,7 @@ def test_the_viewer_s_notebook_gives_what_it_is_stored_with(tmp_path: Path) -> N
     command = [sys.executable, str(ROOT / "docs" / "run_jupyter.py"), str(again)]
     answer = subprocess.run(command, env=quiet, capture_output=True, text=True)
     assert answer.returncode == 0, answer.stderr
-    stored, run = json.loads(SHOWN.read_text()), json.loads(again.read_text())
+    stored, run = json.loads(SHOWN.read_text("utf-8")), json.loads(again.read_text("utf-8"))
     for before, after in zip(pictures(stored), pictures(run), strict=True):
         assert before.shape == after.shape
         assert np.abs(before.astype(int) - after).mean() < 2  # of 255: processors round differently
@@ -83,7 +83,7 @@ def test_the_site_builds_strictly_and_has_the_notebook_s_pictures(tmp_path: Path
     answer = subprocess.run(command, cwd=ROOT, env=quiet, capture_output=True, text=True)
     assert answer.returncode == 0, answer.stderr
 
-    page = (site / "notebook.html").read_text()
+    page = (site / "notebook.html").read_text("utf-8")
     pictures = re.findall(r'src="(notebook-\d+\.png)"', page)
     assert len(pictures) == 5
     assert all((site / name).stat().st_size > 5000 for name in pictures)
@@ -92,6 +92,8 @@ def test_the_site_builds_strictly_and_has_the_notebook_s_pictures(tmp_path: Path
     confidence = re.search(r"confidence (\d\.\d+)", page)
     assert confidence
     assert float(confidence[1]) > 0.8
-    assert "distance_um" in (site / "formats" / "units.html").read_text()
+    assert "distance_um" in (site / "formats" / "units.html").read_text("utf-8")
     for file in site.rglob("*.html"):  # nothing is fetched from elsewhere
-        assert not re.findall(r'<(?:script|img|link)[^>]+(?:src|href)="?https?:', file.read_text())
+        assert not re.findall(
+            r'<(?:script|img|link)[^>]+(?:src|href)="?https?:', file.read_text("utf-8")
+        )

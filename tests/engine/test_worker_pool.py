@@ -41,7 +41,7 @@ def test_a_task_whose_worker_was_killed_runs_again_with_nothing_beside_it(
 ) -> None:
     tasks = [(str(n), (tmp_path, n)) for n in range(6)]
     assert engine.run("once", die_beside_others, tasks) == list(range(6))
-    assert (tmp_path / "died").read_text() == "3"
+    assert (tmp_path / "died").read_text("utf-8") == "3"
 
 
 def test_an_error_that_cannot_be_pickled_is_reported_by_its_name_and_text(engine: Engine) -> None:

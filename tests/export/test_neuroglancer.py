@@ -41,7 +41,7 @@ def folder(sphere_stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 def read_meshes(folder: Path, segment: int) -> list[tuple[NDArray[np.float64], NDArray[Any]]]:
     """Return each level's vertices in nm and its triangles, by the format's own words."""
-    info = json.loads((folder / "info").read_text())
+    info = json.loads((folder / "info").read_text("utf-8"))
     assert info["@type"] == "neuroglancer_multilod_draco"
     most = (1 << info["vertex_quantization_bits"]) - 1
     data = (folder / f"{segment}.index").read_bytes()
@@ -105,7 +105,9 @@ def test_meshes_of_all_levels_lie_on_the_image(folder: Path) -> None:
         np.testing.assert_allclose(away, spheres.RADIUS * 1e3, atol=1)
         a, b, c = (vertices - center)[faces].transpose(1, 0, 2)
         assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0  # turned outwards
-    names = json.loads((folder / "mesh" / "segment_properties" / "info").read_text())["inline"]
+    names = json.loads((folder / "mesh" / "segment_properties" / "info").read_text("utf-8"))[
+        "inline"
+    ]
     assert names["ids"] == ["1"]
     assert names["properties"] == [{"id": "label", "type": "label", "values": ["CD31"]}]
 

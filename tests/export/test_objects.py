@@ -104,7 +104,7 @@ def test_ply_has_their_colours_and_stl_is_one_solid(stage: Path, tmp_path: Path)
 
 def test_neuroglancer_has_them_by_label(stage: Path, tmp_path: Path) -> None:
     export_stage(stage, tmp_path / "o.precomputed", options=ExportOptions())
-    info = json.loads((tmp_path / "o.precomputed/cells/segment_properties/info").read_text())
+    info = json.loads((tmp_path / "o.precomputed/cells/segment_properties/info").read_text("utf-8"))
     named = dict(zip(info["inline"]["ids"], info["inline"]["properties"][0]["values"], strict=True))
     assert named == {str(label): name for label, name in zip(LABELS, NAMES, strict=True)}
     assert not (tmp_path / "o.precomputed/image").exists()

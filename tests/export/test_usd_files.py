@@ -56,7 +56,7 @@ def test_a_flattened_stage_names_its_files_from_where_it_lies(
     layers, assets, lost = UsdUtils.ComputeAllDependencies(str(tmp_path / "s.usda"))
     assert (len(layers), lost) == (1, [])
     assert assets
-    assert str(sphere_stage.parent) not in (tmp_path / "s.usda").read_text()
+    assert str(sphere_stage.parent) not in (tmp_path / "s.usda").read_text("utf-8")
 
 
 def test_files_on_another_drive_are_named_from_its_root(

@@ -215,7 +215,7 @@ def test_unity_gets_one_channel_upright_with_its_ini(sphere_stage: Path, tmp_pat
         export_stage(sphere_stage, tmp_path / "s.raw", options=ExportOptions(unity=True))
     options = ExportOptions(unity=True, channels=("CD31",))
     export_stage(sphere_stage, tmp_path / "s.raw", options=options)
-    ini = dict(line.split(":") for line in (tmp_path / "s.raw.ini").read_text().split())
+    ini = dict(line.split(":") for line in (tmp_path / "s.raw.ini").read_text("utf-8").split())
     assert ini == {
         "dimx": "40", "dimy": "20", "dimz": "9", "skip": "0", "format": "uint8",
         "endianness": "LittleEndian",

@@ -70,7 +70,7 @@ def test_a_failure_half_way_leaves_the_older_file(
     with pytest.raises(OutputError, match=r"s\.raw: can't be written: No space left"):
         export_stage(sphere_stage, tmp_path / "s.raw", options=ExportOptions())
     assert [one.name for one in tmp_path.iterdir()] == ["s.raw"]
-    assert (tmp_path / "s.raw").read_text() == "old"
+    assert (tmp_path / "s.raw").read_text("utf-8") == "old"
 
 
 def test_no_part_of_a_build_and_no_edit_is_written_over(
@@ -84,7 +84,7 @@ def test_no_part_of_a_build_and_no_edit_is_written_over(
         assert main(["export", str(out), str(file)]) == 2
         assert "a part of the build lies there" in capsys.readouterr().err
     assert main(["export", str(out), str(edit), "--stage", str(edit)]) == 2
-    assert edit.read_text().startswith("#usda 1.0\n(subLayers")
+    assert edit.read_text("utf-8").startswith("#usda 1.0\n(subLayers")
     assert main(["export", str(out), str(out / "s.glb"), "--json"]) == 0
     told = capsys.readouterr()
     lines = json.loads(told.out)["lines"]

@@ -33,7 +33,7 @@ from stereocell.storage.assets import schema_path
 from support.server.brick_bundles import phantom
 
 SOURCE = bytes(range(16))
-SCHEMA = json.loads(schema_path("brick_stream.schema.json").read_text())
+SCHEMA = json.loads(schema_path("brick_stream.schema.json").read_text("utf-8"))
 
 # 20 x 3 x 2 texels, threshold 40; the first 15 along x are 200, the last 5 are 7: a root of level
 # 1, a leaf, and an empty node, as texel 15, its apron, is 7 too. Root texels along x: seven of 200,

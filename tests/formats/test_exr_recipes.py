@@ -148,7 +148,7 @@ def test_voxels_lie_where_the_recipe_says(atlas: Atlas) -> None:
 
 
 def test_the_recipe_names_the_numbers_by_which_it_was_followed() -> None:
-    recipe = (ROOT / "docs" / "unity-unreal.md").read_text()
+    recipe = (ROOT / "docs" / "unity-unreal.md").read_text("utf-8")
     formulas = [
         "x = low.x + (i - 1) sx      y = high.y - (j - 1) sy      z = low.z + (k - 1) sz",
         "u = (i + 0.5) / nx      v = 1 - (j + 0.5) / ny      w = (k + 0.5) / D",

@@ -95,7 +95,7 @@ def manifest(rng, tiles, files):
 
 def test_manifest_of_70_channels_fits_its_schema(manifest, tiles):
     content = json.loads(manifest)
-    schema = json.loads(schema_path("bundle.schema.json").read_text())
+    schema = json.loads(schema_path("bundle.schema.json").read_text("utf-8"))
     Draft202012Validator(schema).validate(content)
     assert (len(content["tiles"]), len(content["channels"])) == (len(tiles), CHANNELS)
 

@@ -107,7 +107,7 @@ def test_missing_external_tileset_is_found_once(bundle):
 @pytest.mark.parametrize("uri", ["finer.json", "../tileset.json"])
 def test_tilesets_that_lead_back_to_themselves_are_refused(bundle, uri):
     path = bundle / FINER
-    path.write_text(path.read_text().replace("lod1.glb", uri))
+    path.write_text(path.read_text("utf-8").replace("lod1.glb", uri))
     assert f"{FINER}: {uri} is a tileset that was named before" in found(bundle).detail
 
 
@@ -115,7 +115,7 @@ def test_tilesets_that_lead_back_to_themselves_are_refused(bundle, uri):
 def test_what_lies_outside_the_bundle_is_not_opened(bundle, uri):
     (bundle.parent / "secret.json").write_text("no JSON")
     path = bundle / FINER
-    path.write_text(path.read_text().replace("lod1.glb", uri))
+    path.write_text(path.read_text("utf-8").replace("lod1.glb", uri))
     detail = found(bundle).detail
     assert f"{FINER}: {uri} is outside the bundle" in detail
     assert "no JSON" not in detail
@@ -137,7 +137,7 @@ def test_a_tileset_that_links_to_itself_is_none(bundle):
 )
 def test_what_no_tileset_says_is_one_line(bundle, before, after, message):
     path = bundle / FINER
-    path.write_text(path.read_text().replace(before, after))
+    path.write_text(path.read_text("utf-8").replace(before, after))
     detail = found(bundle).detail
     assert message in detail
     assert "\n" not in detail

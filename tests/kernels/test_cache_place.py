@@ -66,6 +66,6 @@ def test_folder_follows_a_module_and_the_kernels_it_imports(
 
     before = folders()
     changed = tmp_path / "half_edges.py"
-    changed.write_text(changed.read_text() + "# another\n")
+    changed.write_text(changed.read_text("utf-8") + "# another\n")
     after = folders()
     assert {name for name in before if before[name] != after[name]} == {"half_edges", "collapse"}

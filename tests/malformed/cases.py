@@ -67,7 +67,7 @@ def copied(base: Path, folder: Path, name: str) -> Path:
 
 def edit_json(file: Path, change: Change) -> None:
     """Change the content of a JSON file; `change` may return another one."""
-    content = json.loads(file.read_text())
+    content = json.loads(file.read_text("utf-8"))
     changed = change(content)
     file.write_text(json.dumps(content if changed is None else changed))
 

@@ -146,7 +146,7 @@ def _in_fork(source: Path, answer: Path) -> dict[str, Any]:
         time.sleep(0.003)
     if status:
         return {"fault": f"ended by signal {status & 127}"}
-    found: dict[str, Any] = json.loads(answer.read_text())
+    found: dict[str, Any] = json.loads(answer.read_text("utf-8"))
     said = noise.read_text(errors="replace")
     if said and "fault" not in found:
         return {"fault": f"noise: {said[:300]}"}

@@ -142,7 +142,7 @@ def _excess(pid: int, seconds: float) -> str:
     if seconds > WALL_S:
         return f"hang: not done after {WALL_S:g} s"
     with contextlib.suppress(OSError):
-        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+        pages = int(Path(f"/proc/{pid}/statm").read_text("utf-8").split()[1])
         if pages * resource.getpagesize() > 1.5e6 * PEAK_MB:
             return f"memory: over {1.5 * PEAK_MB:g} MB"
     return ""
@@ -319,7 +319,7 @@ def _find_remains(place: Path, before: Listing, code: int) -> str:
 def _outcome(case: Case, folder: Path, status: int, used: Any, why: str, seconds: float) -> Outcome:
     peak = used.ru_maxrss / 1000
     try:
-        result = json.loads((folder / "result.json").read_text())
+        result = json.loads((folder / "result.json").read_text("utf-8"))
     except (OSError, ValueError):
         result = {"code": -1, "fault": f"ended by signal {status & 127}", "line": ""}
     fault = why or result["fault"]

@@ -408,7 +408,7 @@ def _chunks() -> Iterator[Case]:
 
 
 def _v2_bomb(path: Path) -> None:
-    content = json.loads((path / "0/.zarray").read_text())
+    content = json.loads((path / "0/.zarray").read_text("utf-8"))
     content["compressor"] = {"id": "zlib", "level": 1}
     (path / "0/.zarray").write_text(json.dumps(content))
     for file in (path / "0").rglob("*"):

@@ -69,8 +69,8 @@ def pictures(folder: Path, about: dict[str, Any]) -> np.ndarray:
 
 def written(source: Path, out: Path, *flags: str) -> tuple[dict[str, Any], np.ndarray]:
     assert main(["slices", str(source), "-o", str(out), *flags]) == 0
-    about = json.loads((out / "slices.json").read_text())
-    schema = json.loads(schema_path("slices.schema.json").read_text())
+    about = json.loads((out / "slices.json").read_text("utf-8"))
+    schema = json.loads(schema_path("slices.schema.json").read_text("utf-8"))
     assert list(Draft202012Validator(schema).iter_errors(about)) == []
     return about, pictures(out, about)
 
@@ -278,7 +278,7 @@ def test_lengths_of_surfaces_do_not_matter(tmp_path: Path) -> None:
     source, out = str(tmp_path / "s"), tmp_path / "out"
     assert main(["plan", source, "-o", str(tmp_path / "plan"), "--preset", "mri"]) == 2
     assert main(["slices", source, "-o", str(out), "--preset", "mri"]) == 0
-    about = json.loads((out / "slices.json").read_text())
+    about = json.loads((out / "slices.json").read_text("utf-8"))
     dataset = read.open(source)
     voxels = dataset.read(0, dataset.levels[0].box).voxels
     assert about["window"] == pytest.approx(np.percentile(voxels, (1.0, 99.8)))

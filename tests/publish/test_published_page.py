@@ -100,9 +100,9 @@ def test_file_that_is_spoilt_on_its_way_is_put_there_again(
 def _raise_bounds(place: Path) -> None:
     """Change one digit of a number, which the schema of the manifest can't tell."""
     file = place / "manifest.json"
-    text = file.read_text()
+    text = file.read_text("utf-8")
     file.write_text(text.replace('"max": [\n    1', '"max": [\n    9'))
-    assert file.read_text() != text
+    assert file.read_text("utf-8") != text
 
 
 def test_manifest_that_was_edited_is_named_wherever_the_bundle_lies(
@@ -123,7 +123,7 @@ def test_manifest_of_an_earlier_version_or_of_another_list_is_not_published(
     bundle: Path, out: Path, run: Run, tmp_path: Path
 ) -> None:
     file = bundle / "manifest.json"
-    content = json.loads(file.read_text())
+    content = json.loads(file.read_text("utf-8"))
     del content["sha256"]
     file.write_text(json.dumps(content))
     assert "manifest.json: has no hash of its content" in run(bundle, tmp_path / "site")[2]

@@ -45,7 +45,7 @@ def refusal(source: str | Path, **options: Any) -> str:
 
 def edit(file: Path, change: Callable[[Any], None]) -> None:
     """Change a JSON file in place."""
-    content = json.loads(file.read_text())
+    content = json.loads(file.read_text("utf-8"))
     change(content)
     file.write_text(json.dumps(content))
 

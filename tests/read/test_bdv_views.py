@@ -185,7 +185,7 @@ def test_a_registration_without_a_unit_is_a_hint(tmp_path: Path) -> None:
 def test_the_xml_that_is_named_counts_among_several(tmp_path: Path) -> None:
     path = write(tmp_path, [{"body": BODY, "affines": [PLAIN]}])
     other = tmp_path / "z.xml"
-    other.write_text(path.read_text().replace("0 0 0 0 0.5 0", "0 0 0 0 -0.5 0"))
+    other.write_text(path.read_text("utf-8").replace("0 0 0 0 0.5 0", "0 0 0 0 -0.5 0"))
     np.testing.assert_array_equal(voxels_of(read.open(other)), BODY[::-1])
     np.testing.assert_array_equal(voxels_of(read.open(path)), BODY)
 

@@ -221,7 +221,7 @@ def test_fields_out_of_order_are_named(
 ) -> None:
     path = write(tmp_path / "a.n5", **NM)
     about = path / "attributes.json"
-    fields = json.loads(about.read_text()) | {field: value}
+    fields = json.loads(about.read_text("utf-8")) | {field: value}
     if field == "dimensions" and len(value) == 2:
         fields["blockSize"] = [16, 12]
     about.write_text(json.dumps(fields))

@@ -196,8 +196,8 @@ def test_a_window_out_of_range_is_a_bug(fixture: str, request: pytest.FixtureReq
 @pytest.mark.parametrize("path", ["0", "0/"])
 def test_absent_chunks_are_the_fill_value(tiny_zarr_05: Path, path: str) -> None:
     metadata = tiny_zarr_05 / "zarr.json"
-    metadata.write_text(metadata.read_text().replace('"path": "0"', f'"path": "{path}"'))
-    assert f'"path": "{path}"' in metadata.read_text()
+    metadata.write_text(metadata.read_text("utf-8").replace('"path": "0"', f'"path": "{path}"'))
+    assert f'"path": "{path}"' in metadata.read_text("utf-8")
     (tiny_zarr_05 / "0/c/0/0/0/0").unlink()
     volume = read.open(tiny_zarr_05).read(0, Box((0, 0, 0), (2, 16, 17)))
     assert not volume.voxels[:, :, :16].any()

@@ -177,7 +177,7 @@ def test_a_level_out_of_an_address_is_refused(
 
 def with_level(source: Path, path: str) -> Path:
     """Change the path of a group's first level."""
-    content = json.loads((source / "zarr.json").read_text())
+    content = json.loads((source / "zarr.json").read_text("utf-8"))
     content["attributes"]["ome"]["multiscales"][0]["datasets"][0]["path"] = path
     (source / "zarr.json").write_text(json.dumps(content))
     return source

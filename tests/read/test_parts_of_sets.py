@@ -244,7 +244,7 @@ def describe(folder: Path, container: str, setups: int, times: str) -> None:
     """Write the XML of a container, with its setups and time points."""
     write_bdv_xml(folder, container, "nm")
     file = folder / "b.xml"
-    text = file.read_text()
+    text = file.read_text("utf-8")
     end = text.index("</ViewSetups>")
     more = "".join(
         f"<ViewSetup><id>{i}</id><name>s{i}</name></ViewSetup>" for i in range(2, setups)

@@ -266,6 +266,6 @@ def test_a_plain_tiff_is_one_series(tmp_path: Path) -> None:
     tifffile.imwrite(path, BODY, imagej=True, resolution=(4.0, 5.0),
                      metadata={"axes": "ZYX", "spacing": 0.5, "unit": "um"})  # fmt: skip
     assert len(list_series(path)) == 1
-    with pytest.raises(UsageError, match="--series: found 2, expected 1 to 1"):
+    with pytest.raises(UsageError, match="--series: found 2, expected 1, the only one"):
         read.open(path, series=2)
     np.testing.assert_array_equal(voxels_of(path, series=1), BODY)

@@ -37,7 +37,7 @@ def write(path: Path, version: Any, lies: dict[str, str], says: dict[str, str]) 
     )  # fmt: skip
     array[:] = BODY
     file = path / "0" / (".zarray" if version == 2 else "zarr.json")
-    about = json.loads(file.read_text())
+    about = json.loads(file.read_text("utf-8"))
     if version == 2:
         about["dimension_separator"] = says["separator"]
     else:

@@ -47,7 +47,7 @@ def labelled(path: Path, version: str, dtype: Any = np.int32) -> Path:
         if objects:
             label["properties"] = [{"label-value": n} for n in range(objects)]
         file = path / "labels" / name / (".zattrs" if version == "0.4" else "zarr.json")
-        content = json.loads(file.read_text())
+        content = json.loads(file.read_text("utf-8"))
         (content if version == "0.4" else content["attributes"]["ome"])["image-label"] = label
         file.write_text(json.dumps(content))
     return path

@@ -279,7 +279,7 @@ class _Page(HTMLParser):
 
 def _write(out: Path) -> tuple[str, _Page]:
     write_report(out)
-    html = OutFolder(out).report_file.read_text()
+    html = OutFolder(out).report_file.read_text("utf-8")
     return html, _Page(html)
 
 

@@ -38,7 +38,7 @@ def cycif(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def truth_of(path: Path) -> Any:
     name = path.name.removesuffix(".ome.zarr") + ".truth.json"
-    return json.loads((path.parent / name).read_text())
+    return json.loads((path.parent / name).read_text("utf-8"))
 
 
 @pytest.mark.slow
@@ -322,7 +322,7 @@ def test_brain_cells_is_a_small_real_stack_with_its_licence(tmp_path: Path) -> N
     write_brain_cells(path)
     write_brain_cells(path)  # again: nothing to do
     assert path.stat().st_size <= 2_000_000
-    assert "BSD 3-Clause" in (tmp_path / "brain.LICENSE").read_text()
+    assert "BSD 3-Clause" in (tmp_path / "brain.LICENSE").read_text("utf-8")
     dataset = read.open(path)
     assert [channel.name for channel in dataset.channels] == ["Cells", "Autofluorescence"]
     assert all(channel.color is not None for channel in dataset.channels)
@@ -337,7 +337,7 @@ def test_brain_cells_overwrites_nothing(tmp_path: Path) -> None:
     path.write_text("mine")
     with pytest.raises(OutputError, match="expected nothing or this very sample"):
         write_brain_cells(path)
-    assert path.read_text() == "mine"
+    assert path.read_text("utf-8") == "mine"
     with pytest.raises(UsageError, match=r"NAME\.ome\.tif"):
         write_brain_cells(tmp_path / "brain.ome.zarr")
 

@@ -43,7 +43,7 @@ def test_a_tree_is_that_of_the_bundles_volume(out):
     expected = build(VOLUME, file.table.threshold)
     for name in expected.nodes.dtype.names:
         np.testing.assert_array_equal(file.table.nodes[name], expected.nodes[name])
-    entry = json.loads((out / "bundle/channels/CD31/volumes.json").read_text())["volumes"][0]
+    entry = json.loads((out / "bundle/channels/CD31/volumes.json").read_text("utf-8"))["volumes"][0]
     assert file.volume.source == entry["file"]["sha256"]
     assert file.table.source.hex() == entry["file"]["sha256"][:32]
 

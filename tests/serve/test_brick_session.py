@@ -457,7 +457,7 @@ def test_what_the_server_says_fits_the_schema(port):
 
     from stereocell.storage.assets import schema_path
 
-    schema = json.loads(schema_path("brick_stream.schema.json").read_text())
+    schema = json.loads(schema_path("brick_stream.schema.json").read_text("utf-8"))
     validator = Draft202012Validator({"$defs": schema["$defs"], **schema["$defs"]["ServerMessage"]})
     with talk(port) as t:
         t.open()

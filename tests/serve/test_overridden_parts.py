@@ -114,7 +114,9 @@ def test_nothing_that_is_built_on_is_left_out() -> None:
 
 
 def test_both_are_held_below_the_next_version() -> None:
-    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))[
+        "project"
+    ]
     wanted = {one.name: one.specifier for one in map(Requirement, project["dependencies"])}
     for name, next_one in (("uvicorn", "0.55.0"), ("websockets", "18.0")):
         assert wanted[name].contains(version(name)), name

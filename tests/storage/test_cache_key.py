@@ -77,9 +77,9 @@ def changed(
 ) -> set[str]:
     """The makers whose key follows a change of one file; `before` are the keys without it."""
     path = checkout / file
-    content = path.read_text()
+    content = path.read_text("utf-8")
     path.write_text(change(content))
-    assert path.read_text() != content
+    assert path.read_text("utf-8") != content
     after = keys(checkout)
     path.write_text(content)
     return {maker for maker in MAKERS if before[maker] != after[maker]}
@@ -198,7 +198,7 @@ def test_texts_count_where_a_result_may_hold_them(
 def test_comments_and_docstrings_change_no_key(copy: Path, before: dict[str, str]) -> None:
     """In all modules at once: a comment above, one in each body, another docstring."""
     for file in (copy / PACKAGE).rglob("*.py"):
-        text = file.read_text()
+        text = file.read_text("utf-8")
         if text.startswith('"""'):
             text = '"""Another' + text[3:]
         text = re.sub(r'^( +)"""(?=\w)', r'\1# a comment\n\1"""Another ', text, flags=re.MULTILINE)

@@ -58,7 +58,7 @@ def test_each_fault_of_a_sealed_record_has_one_line_for_both_kinds(
     assert fault() == " is missing"
     digest = write(file)
     require(file)
-    sealed = file.read_text()
+    sealed = file.read_text("utf-8")
     assert digest in sealed
     other = digest[:20] + ("0" if digest[20] != "0" else "1") + digest[21:]
     file.write_text(sealed.replace(digest, other))

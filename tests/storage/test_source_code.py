@@ -50,7 +50,7 @@ def test_what_is_kept_and_broken_is_found_anew(tmp_path: Path, text: str) -> Non
     (place,) = tmp_path.glob("sources-*.json")
     place.write_text(text)
     assert read(tmp_path, "x = 1") == expected
-    assert len(json.loads(place.read_text())) == 1
+    assert len(json.loads(place.read_text("utf-8"))) == 1
 
 
 def test_where_nothing_can_be_kept_each_command_finds_it(tmp_path: Path) -> None:

@@ -138,7 +138,7 @@ def write_n5(
     stored = tensorstore.open(spec, create=True).result()
     stored.write(voxels.transpose()).result()
     about = path / "attributes.json"
-    about.write_text(json.dumps(json.loads(about.read_text()) | attributes))
+    about.write_text(json.dumps(json.loads(about.read_text("utf-8")) | attributes))
     return path
 
 

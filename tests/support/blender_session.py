@@ -53,9 +53,9 @@ def run(step: str, folder: Path, **arguments: Any) -> Any:
         blender.cache_clear()  # the next step has another one
         pytest.fail(f"{step}: no end after 300 s")
     code = process.stdout.readline().strip()
-    said = Path(f"{result}.txt").read_text()
+    said = Path(f"{result}.txt").read_text("utf-8")
     assert code == "0", said[-3000:]
-    found = json.loads(result.read_text())
+    found = json.loads(result.read_text("utf-8"))
     # Blender prints the report of an operator like this
     told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", said, re.MULTILINE)
     return {**found, "told": told} if step.startswith("edit") else found

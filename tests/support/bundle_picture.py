@@ -37,13 +37,15 @@ def read_table(file: Path, row: int) -> NDArray[np.float64]:
 
 def read_blocks(bundle: Path, names: list[str]) -> list[Block]:
     """Return all tiles of these channels at their finest level."""
-    manifest = json.loads((bundle / "manifest.json").read_text())
+    manifest = json.loads((bundle / "manifest.json").read_text("utf-8"))
     channels = [next(c for c in manifest["channels"] if c["id"] == name) for name in names]
     tables, tiles = [], []
     for channel in channels:
         row = channel["transfer_functions"].index(channel["transfer_function"])
         tables.append(read_table(bundle / channel["lut"]["path"], row))
-        tiles.append(json.loads((bundle / channel["volumes"]["path"]).read_text())["volumes"])
+        tiles.append(
+            json.loads((bundle / channel["volumes"]["path"]).read_text("utf-8"))["volumes"]
+        )
     blocks = []
     for parts in zip(*tiles, strict=True):
         voxels = []

@@ -24,7 +24,7 @@ def write_tiles(folder, tiles=TILES):
 
 
 def load(path):
-    return json.loads(path.read_text())
+    return json.loads(path.read_text("utf-8"))
 
 
 def channel(bundle, name="CD31"):

@@ -32,7 +32,7 @@ from stereocell.usd.read_appearances import read_appearances
 
 def peak_kib():
     status = Path("/proc/self/status")
-    found = status.is_file() and re.search(r"VmHWM:\\s+(\\d+) kB", status.read_text())
+    found = status.is_file() and re.search(r"VmHWM:\\s+(\\d+) kB", status.read_text("utf-8"))
     return int(found[1]) if found else None
 
 before, start = peak_kib(), time.perf_counter()

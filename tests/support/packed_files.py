@@ -174,7 +174,9 @@ def n5_of(folder: Path, compression: dict[str, Any], pack: Callable[[bytes], byt
     """Write N5 whose blocks, behind their headers, are packed by a function."""
     stream = n5(folder, {"type": "raw"})
     about = stream.source / "attributes.json"
-    about.write_text(json.dumps(json.loads(about.read_text()) | {"compression": compression}))
+    about.write_text(
+        json.dumps(json.loads(about.read_text("utf-8")) | {"compression": compression})
+    )
     for file in stream.source.glob("*/*/*"):
         content = file.read_bytes()
         file.write_bytes(content[:16] + pack(content[16:]))

@@ -10,7 +10,7 @@ def find_layers() -> dict[str, str]:
     """Return each printed layer by its page and line; every block in `usda` is one."""
     found = {}
     for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
-        text = page.read_text()
+        text = page.read_text("utf-8")
         for block in re.finditer(r"^ *```usda\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE):
             line = text.count("\n", 0, block.start()) + 2
             found[f"{page.relative_to(ROOT)}:{line}"] = block[1]

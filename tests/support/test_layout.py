@@ -108,7 +108,9 @@ def test_an_import_of_a_test_is_seen(module: str, expected: bool) -> None:
 
 @pytest.mark.slow
 def test_no_test_imports_another_and_nothing_shared_imports_a_test() -> None:
-    modules = {file: file.read_text() for file in TESTS.rglob("*.py") if ".venv" not in file.parts}
+    modules = {
+        file: file.read_text("utf-8") for file in TESTS.rglob("*.py") if ".venv" not in file.parts
+    }
     assert len(modules) > 100
     found = [
         f"{file.relative_to(ROOT)} imports {name}"
@@ -126,7 +128,7 @@ def test_no_browser_test_imports_another() -> None:
     found = [
         f"{file.relative_to(ROOT)} imports {name}"
         for file in modules
-        for name in address.findall(file.read_text())
+        for name in address.findall(file.read_text("utf-8"))
     ]
     assert found == []
 

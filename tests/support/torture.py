@@ -218,7 +218,7 @@ class Torture:
             last = now
             time.sleep(0.01)
         if build.returncode:
-            raise TortureError(f"the undisturbed build failed: {self._said.read_text()}")
+            raise TortureError(f"the undisturbed build failed: {self._said.read_text('utf-8')}")
         digests = of_assets(self.place.digests())
         self.place.clear()
         return digests, seconds
@@ -261,7 +261,7 @@ class Torture:
 
     def _require_ended(self, build: subprocess.Popen[bytes]) -> None:
         if build.returncode:
-            said = self._said.read_text()
+            said = self._said.read_text("utf-8")
             raise TortureError(f"the build that went on ended with {build.returncode}: {said}")
         self._require_whole()
 

@@ -37,7 +37,7 @@ def chromium() -> str | None:
 
 def program() -> str:
     """Return the shader's HLSL, without Unity's own pragmas."""
-    (found,) = re.findall(r"CGPROGRAM\n(.*?)ENDCG", SHADER.read_text(), re.DOTALL)
+    (found,) = re.findall(r"CGPROGRAM\n(.*?)ENDCG", SHADER.read_text("utf-8"), re.DOTALL)
     return re.sub(r"^ *#pragma.*\n", "", found, flags=re.MULTILINE)
 
 
@@ -142,7 +142,7 @@ def draw(
         )
     path = chromium()
     assert path is not None
-    script = (TESTS / "picture.mjs").read_text()
+    script = (TESTS / "picture.mjs").read_text("utf-8")
     done = subprocess.run(
         ["node", "--input-type=module", "-e", script, "--", path],
         input=json.dumps(asked).encode(),

@@ -238,7 +238,7 @@ def test_all_zero_volume_builds_without_a_surface(tmp_path: Path) -> None:
     zeros = np.zeros((4, 24, 24), np.uint16)
     source = phantoms.write_ome_tiff(tmp_path / "zero.ome.tif", zeros)
     assert main(["build", str(source), "-o", str(tmp_path / "out"), "--workers", "0"]) == 0
-    manifest = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text())
+    manifest = json.loads((tmp_path / "out" / "bundle" / "manifest.json").read_text("utf-8"))
     assert manifest["channels"][0]["tileset"] is None
 
 
@@ -260,9 +260,9 @@ def test_nan_outside_the_field_of_view_is_built_as_the_darkest(
             name == "gaps"
         )
     levels = [
-        json.loads((tmp_path / name / "bundle" / "manifest.json").read_text())["channels"][0][
-            "level"
-        ]
+        json.loads((tmp_path / name / "bundle" / "manifest.json").read_text("utf-8"))["channels"][
+            0
+        ]["level"]
         for name in ("gaps", "none")
     ]
     assert levels[0] == levels[1]
@@ -292,7 +292,7 @@ def test_out_that_is_a_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixtu
     out.write_text("in the way")
     assert main(["plan", str(_source(tmp_path)), "-o", str(out)]) == 1
     assert str(out) in _one_line(capsys)
-    assert out.read_text() == "in the way"
+    assert out.read_text("utf-8") == "in the way"
 
 
 def test_read_only_out_is_named(
@@ -350,13 +350,13 @@ def test_iso_value_must_be_finite(
 def test_readme_s_edit_layer_recolours_the_bundle(built: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(built, out)
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
     layer = readme.split("```usda\n")[1].split("```")[0]
     layer = layer.replace("out/mine", str(out)).replace("CD31", "F_x20_body")
     (tmp_path / "edited.usda").write_text(layer)
     edited = ["--stage", str(tmp_path / "edited.usda")]
     assert main(["bundle", str(out), "--workers", "0", *edited]) == 0
-    manifest = json.loads((out / "bundle" / "manifest.json").read_text())
+    manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
     assert manifest["channels"][0]["color"] == pytest.approx([1, 0.1, 0.1])
 
 

@@ -110,7 +110,7 @@ def test_printed_settings_are_to_be_edited_and_left_ones_to_be_copied(
     printed = capsys.readouterr().out
     assert printed.startswith("# StereoCell settings. Every key may be left out")
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
-    left = (tmp_path / "out" / "stereocell.toml").read_text()
+    left = (tmp_path / "out" / "stereocell.toml").read_text("utf-8")
     assert left.startswith("# The settings that this build used")
     assert tomllib.loads(left).keys() == tomllib.loads(printed).keys()
 

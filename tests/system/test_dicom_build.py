@@ -141,7 +141,7 @@ def test_the_preset_s_modality_holds_where_the_input_says_none(
 ) -> None:
     source = write(tmp_path / "s")
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", "mri"]) == 0
-    plan = json.loads((tmp_path / "out" / "plan.json").read_text())
+    plan = json.loads((tmp_path / "out" / "plan.json").read_text("utf-8"))
     assert plan["modality"] == modality
     assert plan["channels"][0]["color"] == list(FLESH)
 

@@ -228,7 +228,7 @@ def test_no_identity_of_a_segmentation_is_in_what_is_made_of_its_objects(
     source = str(folder)
     for phase in (["plan", source, "--labels", "."], ["units"], ["stage"], ["bundle"]):
         assert main([*phase, "-o", str(out)] if phase[0] == "plan" else [*phase, str(out)]) == 0
-    table = (out / "bundle/channels/labels/objects.json").read_text()
+    table = (out / "bundle/channels/labels/objects.json").read_text("utf-8")
     assert "Segment 2" in table
     told = capfd.readouterr()
     texts = {"stdout": told.out, "stderr": told.err, "log": caplog.text}

@@ -148,7 +148,7 @@ def test_each_damaged_file_is_named(out: Path) -> None:
 
 def _change_a_digit(file: Path) -> None:
     """Turn one digit of a JSON file's first broken number into another; size and time stay."""
-    status, text = file.stat(), file.read_text()
+    status, text = file.stat(), file.read_text("utf-8")
     place = next(re.finditer(r"[1-9]\d*\.\d", text)).start()
     digit = "2" if text[place] == "1" else "1"
     file.write_text(text[:place] + digit + text[place + 1 :])

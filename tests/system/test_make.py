@@ -81,7 +81,7 @@ def make(checkout: Path) -> Make:
 def calls(checkout: Path) -> list[list[str]]:
     """Return the words of each call of FAKE since the last time."""
     file = checkout / "calls"
-    text = file.read_text() if file.exists() else ""
+    text = file.read_text("utf-8") if file.exists() else ""
     file.unlink(missing_ok=True)
     return [call.split("\0")[:-1] for call in text.split("\1")[:-1]]
 
@@ -234,7 +234,7 @@ def test_programs_and_folders_have_names_too(checkout: Path, make: Make) -> None
     show.write_text('#!/bin/sh\nprintf %s "$STEREOCELL_DATA-$CHROMIUM" > shown\n')
     show.chmod(0o755)
     make("check", RUN="./show", STEREOCELL_DATA=name, CHROMIUM="$(HOME)")
-    assert (checkout / "shown").read_text() == f"{name}-$(HOME)"
+    assert (checkout / "shown").read_text("utf-8") == f"{name}-$(HOME)"
     assert not (checkout / "pwned").exists()
 
 

@@ -31,6 +31,6 @@ def test_each_ends_in_a_sound_result_or_one_clear_line(
         [*command, "--json", str(answer)], capture_output=True, text=True, timeout=900, check=False
     )
     assert answer.exists(), run.stdout + run.stderr
-    faults = json.loads(answer.read_text())
+    faults = json.loads(answer.read_text("utf-8"))
     assert len(faults) == count > 10
     assert {name: fault for name, fault in faults.items() if fault} == {}

@@ -30,7 +30,7 @@ def test_notes_of_the_reader_are_printed_and_kept(
     assert main(["build", _unitless(tmp_path / "ball.nii"), "-o", str(out)]) == 0
     assert _NOTE in " ".join(capsys.readouterr().err.split())
     for name in ("plan.json", "provenance.json"):
-        assert _NOTE in json.loads((out / name).read_text())["notes"]
+        assert _NOTE in json.loads((out / name).read_text("utf-8"))["notes"]
     assert _NOTE in (out / "report" / "index.html").read_text("utf-8")
     stage = (out / "stage" / "stage.usda").read_text("utf-8")
     assert _NOTE not in stage

@@ -87,14 +87,14 @@ def test_settings_of_a_person_in_out_are_not_replaced(
     file = out / "stereocell.toml"
     own = "[plan]\nlevel = 0\n"
     if is_edit:
-        own = file.read_text().replace("smoothing_um = ", "smoothing_um = 1")
+        own = file.read_text("utf-8").replace("smoothing_um = ", "smoothing_um = 1")
     file.write_text(own)
     plan = ["plan", str(builds / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
     assert main(plan) == 1
     line = _line(capfd)
     assert f"{file}: was written or changed by hand" in line
     assert "give it by --config, or --force replaces it" in line
-    assert file.read_text() == own
+    assert file.read_text("utf-8") == own
     assert main([*plan, "--force"]) == 0
     assert file.read_bytes() == (builds / "f" / "stereocell.toml").read_bytes()
 

@@ -185,7 +185,7 @@ def test_bundle_that_lost_its_manifest_is_made_anew_and_files_of_others_stay(
     own.write_text("years of work")
     assert main(["bundle", str(out)]) == 1
     assert "found something else (thesis.tex), and no manifest.json: " in capfd.readouterr().err
-    assert own.read_text() == "years of work"
+    assert own.read_text("utf-8") == "years of work"
     own.unlink()
     assert main(["bundle", str(out)]) == 0
     bundles = [digests_of(place / "bundle") for place in (out, built)]

@@ -155,7 +155,7 @@ def test_damaged_json_is_made_again_by_a_build_and_named_by_the_phase(
             assert f"run `stereocell units {out}`" in line
             assert "Traceback" not in line
     _go_on(out)
-    assert json.loads(file.read_text()) != json.loads("{}")
+    assert json.loads(file.read_text("utf-8")) != json.loads("{}")
     assert _same(out, built)
 
 
@@ -194,7 +194,7 @@ def test_an_artist_s_edit_in_place_stays_and_reaches_the_bundle(out: Path) -> No
     edited = looks.read_bytes()
     _go_on(out)
     assert looks.read_bytes() == edited
-    manifest = json.loads((out / "bundle" / "manifest.json").read_text())
+    manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
     assert manifest["channels"][0]["color"] == [1, 0, 0]
 
 
@@ -203,7 +203,7 @@ def test_report_says_on_what_the_seconds_of_a_partial_run_were_spent(out: Path) 
     only = "/".join(UNIT)
     assert main(["units", str(out), "--workers", "0", "--only", only]) == 0
     assert main(["report", str(out)]) == 0
-    assert "units (1 of 4 units)" in (out / "report" / "index.html").read_text()
+    assert "units (1 of 4 units)" in (out / "report" / "index.html").read_text("utf-8")
 
 
 def test_source_that_was_replaced_since_the_plan_is_refused(

@@ -136,8 +136,8 @@ def test_whole_build_of_an_earlier_version_goes_on_after_the_remedy(
         del content["sha256"]
         (out / name).write_text(json.dumps(content))
     for name in (SETTINGS, "report/index.html"):
-        lines = (out / name).read_text().splitlines(keepends=True)
-        (out / name).write_text("".join(lines[:-1]))
+        lines = (out / name).read_bytes().splitlines(keepends=True)
+        (out / name).write_bytes(b"".join(lines[:-1]))
     (out / "units" / "plan.key").write_text("0123abcd")
     assert "is of an earlier version" in _faults(out)
     build = ["build", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
@@ -173,9 +173,9 @@ def test_shown_hashes_differ_even_if_only_the_last_digit_of_the_seal_was_changed
     out: Path, name: str
 ) -> None:
     file = out / name
-    seal = re.findall(r"[0-9a-f]{64}", file.read_text())[-1]
+    seal = re.findall(r"[0-9a-f]{64}", file.read_text("utf-8"))[-1]
     changed = seal[:-1] + ("0" if seal[-1] != "0" else "1")
-    file.write_text(file.read_text().replace(seal, changed))
+    file.write_text(file.read_text("utf-8").replace(seal, changed))
     told = _faults(out)
     assert f"its content has SHA-256 {seal}, expected {changed}: run `stereocell units" in told or (
         f"its content has SHA-256 {seal}, expected {changed}: remove it and run" in told
@@ -215,7 +215,7 @@ def test_document_that_no_command_could_read_is_not_written(
     file.write_text("as it was")
     with pytest.raises(OutputError, match="not written, because no command could read it"):
         write(file, {"of": "another kind"})
-    assert file.read_text() == "as it was"
+    assert file.read_text("utf-8") == "as it was"
     assert list(tmp_path.iterdir()) == [file]
 
 

@@ -186,7 +186,7 @@ def test_report_tells_what_is_painted_how_dense_texels_are_and_how_like_levels_l
     built: Path,
 ) -> None:
     assert main(["report", str(built)]) == 0
-    page = (built / "report/index.html").read_text()
+    page = (built / "report/index.html").read_text("utf-8")
     section = page[page.index('id="maps"') : page.index('id="volumes"')]
     rows = re.findall(r"<tr>(.*?)</tr>", section, re.DOTALL)
     cells = [[re.sub(r"<.*?>", "", cell) for cell in re.findall(r"<td.*?</td>", r)] for r in rows]

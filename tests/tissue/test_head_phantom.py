@@ -232,7 +232,7 @@ def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
     capsys.readouterr()
     assert main(["sample", "mri", str(mine)]) == 1
     assert "expected nothing or this very sample" in capsys.readouterr().err
-    assert mine.read_text() == "mine"
+    assert mine.read_text("utf-8") == "mine"
     assert main(["sample", "mri", str(tmp_path / "x"), "--seed", "-1"]) == 2
     assert "--seed: found -1" in capsys.readouterr().err
 

@@ -339,7 +339,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def manifest(bundle: Path) -> dict[str, object]:
-    content = json.loads((bundle / "manifest.json").read_text())
+    content = json.loads((bundle / "manifest.json").read_text("utf-8"))
     (channel,) = content["channels"]
     assert isinstance(channel, dict)
     return channel

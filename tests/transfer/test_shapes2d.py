@@ -309,7 +309,9 @@ def picture(bundle: Path) -> NDArray[np.uint8]:
 
 
 def test_the_bundle_has_the_shapes_and_its_files_fit_their_schema(bundle: Path) -> None:
-    schema = Draft202012Validator(json.loads(schema_path("transfer2d.schema.json").read_text()))
+    schema = Draft202012Validator(
+        json.loads(schema_path("transfer2d.schema.json").read_text("utf-8"))
+    )
     for name in ("CD31", "Hoechst 33342"):
         schema.validate(functions(bundle, name))
     assert channel(bundle)["transfer_functions_2d"]["names"] == [NAME]

@@ -19,7 +19,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def over(stage_path: Path, tmp_path: Path) -> Path:
-    layers = re.findall(r"```usda\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    layers = re.findall(r"```usda\n(.*?)```", DOCS.read_text("utf-8"), re.DOTALL)
     (layer,) = (layer for layer in layers if "ND_volume" in layer)
     path = tmp_path / "volume.usda"
     named = layer.replace("CD31", F_ID).replace("out/mine/stage/stage.usda", str(stage_path))

@@ -311,12 +311,12 @@ def test_the_generated_schema_is_what_usd_makes_of_its_source(
     monkeypatch.setenv("USD_DISABLE_PRIM_DEFINITIONS_FOR_USDGENSCHEMA", "true")
     runpy.run_module("pxr.Usd.usdGenSchema", run_name="__main__")
     capfd.readouterr()  # it reports what it wrote
-    made = (tmp_path / "generatedSchema.usda").read_text()
-    assert made == (folder / "generatedSchema.usda").read_text()
+    made = (tmp_path / "generatedSchema.usda").read_text("utf-8")
+    assert made == (folder / "generatedSchema.usda").read_text("utf-8")
 
 
 def test_the_json_twin_of_the_schema_has_the_same_attributes() -> None:
-    twin = json.loads(assets.schema_path("channel.schema.json").read_text())
+    twin = json.loads(assets.schema_path("channel.schema.json").read_text("utf-8"))
     source = Sdf.Layer.FindOrOpen(str(assets.find_asset("schemas/usd/schema.usda")))
     attributes = source.GetPrimAtPath("/StereoCellChannelAPI").attributes
     assert twin["title"] == "StereoCellChannelAPI"
@@ -335,14 +335,14 @@ def test_the_json_twin_of_the_schema_has_the_same_attributes() -> None:
 
 
 def test_numbers_of_2d_functions_have_an_attribute_each_and_its_default() -> None:
-    twin = json.loads(assets.schema_path("channel.schema.json").read_text())
+    twin = json.loads(assets.schema_path("channel.schema.json").read_text("utf-8"))
     for field, attribute in ATTRIBUTES.items():
         assert twin["properties"][attribute]["usdType"] == "float"
         assert twin["properties"][attribute]["default"] == getattr(TransferFunctions2d(), field)
 
 
 def test_a_channel_as_json_fits_the_twin_of_its_schema(stage_path: Path) -> None:
-    twin = json.loads(assets.schema_path("channel.schema.json").read_text())
+    twin = json.loads(assets.schema_path("channel.schema.json").read_text("utf-8"))
     stage = Usd.Stage.Open(str(stage_path))
     for channel in (F_ID, EMPTY_ID):
         prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel}")

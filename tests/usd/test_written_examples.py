@@ -13,7 +13,9 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 EXAMPLES = [
     pytest.param(text, id=f"{page.name}-{number}")
     for page in PAGES
-    for number, text in enumerate(re.findall(r"```usda\n(.*?)```", page.read_text(), re.DOTALL))
+    for number, text in enumerate(
+        re.findall(r"```usda\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+    )
 ]
 
 

@@ -152,14 +152,16 @@ def test_changed_byte_of_a_level_is_not_what_its_list_says(out):
 
 def test_surface_without_a_hash_is_found(out):
     path = out / "bundle" / "channels/CD31/tileset.json"
-    path.write_text(path.read_text().replace("sha-256-128", "md5", 1))
+    path.write_text(path.read_text("utf-8").replace("sha-256-128", "md5", 1))
     found = lines(out)
     assert "has no hash, expected extras.sha-256-128" in found["tilesets"].detail
 
 
 def test_level_without_a_hash_is_found(out):
     path = out / "bundle" / "channels/CD31/volumes.json"
-    path.write_text(re.sub(r'("length":\d+),"sha256":"\w+"', r"\1", path.read_text(), count=1))
+    path.write_text(
+        re.sub(r'("length":\d+),"sha256":"\w+"', r"\1", path.read_text("utf-8"), count=1)
+    )
     found = lines(out)
     assert "'sha256' is a required property" in found["volume lists"].detail
 
@@ -193,7 +195,7 @@ def test_broken_json_is_found(out):
 
 def test_level_that_lies_elsewhere_is_found(out):
     path = out / "bundle" / "channels/CD31/volumes.json"
-    text = path.read_text()
+    text = path.read_text("utf-8")
     offset = text.split('"offset":')[1].split(",")[0]
     path.write_text(text.replace(f'"offset":{offset}', f'"offset":{int(offset) + 1}', 1))
     found = lines(out)
@@ -202,7 +204,7 @@ def test_level_that_lies_elsewhere_is_found(out):
 
 def test_tileset_whose_errors_grow_is_found(out):
     path = out / "bundle" / "channels/CD31/tileset.json"
-    path.write_text(path.read_text().replace('"geometricError":0.0', '"geometricError":9.0'))
+    path.write_text(path.read_text("utf-8").replace('"geometricError":0.0', '"geometricError":9.0'))
     found = lines(out)
     assert "larger geometricError" in found["tilesets"].detail
 
@@ -353,7 +355,7 @@ def test_a_bundle_of_objects_passes(cells):
 
 def test_a_table_that_is_too_short_and_rows_that_are_not_there_are_named(cells):
     path = cells / "channels/cells/objects.json"
-    content = json.loads(path.read_text())
+    content = json.loads(path.read_text("utf-8"))
     content["columns"][0]["bytes"]["bytes"] -= 1
     content["tiles"]["r0_c1"]["more"] = [object_bundle.COUNT]
     path.write_text(json.dumps(content))
@@ -364,7 +366,7 @@ def test_a_table_that_is_too_short_and_rows_that_are_not_there_are_named(cells):
 
 def test_parts_of_a_column_that_are_others_than_stated_are_named(cells):
     path = cells / "channels/cells/objects.json"
-    content = json.loads(path.read_text())
+    content = json.loads(path.read_text("utf-8"))
     column = content["columns"][2]
     column["parts"] = [column["exact"]["sha256"]]  # of all its rows, which are few
     path.write_text(json.dumps(content))

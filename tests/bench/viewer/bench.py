@@ -203,7 +203,7 @@ def main(folder: Path) -> None:
     job.write_text(json.dumps({"rounds": ROUNDS, "runs": asked}))
     tsx = HERE / "node_modules" / ".bin" / "tsx"
     subprocess.run([tsx, HERE / "run.ts", job, folder], check=True)
-    measured: list[Timing] = json.loads((folder / "timings.json").read_text())
+    measured: list[Timing] = json.loads((folder / "timings.json").read_text("utf-8"))
     timings = {timing["name"]: timing for timing in measured}
     for line in HEAD:
         print(f"{line[0]:15} {'':32} {line[1]:12}", *(f"{text:>7}" for text in line[2:4]), end=" ")

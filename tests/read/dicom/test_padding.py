@@ -70,7 +70,7 @@ def test_the_window_of_padded_ct_is_that_of_what_was_measured(tmp_path: Path) ->
     # the preset of CT has a window of its own
     flags = ["-o", str(tmp_path / "out"), "--preset", "none"]
     assert main(["slices", str(folder), *flags]) == 0
-    low, high = json.loads((tmp_path / "out" / "slices.json").read_text())["window"]
+    low, high = json.loads((tmp_path / "out" / "slices.json").read_text("utf-8"))["window"]
     assert -1000 <= low < -900
     assert high < 500
 

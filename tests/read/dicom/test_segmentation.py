@@ -257,7 +257,7 @@ def test_free_text_names_segments_where_it_is_asked_for(tmp_path: Path) -> None:
         assert main(["plan", str(path), "-o", str(out), "--labels", ".", *flags]) == 0
         for phase in ("units", "stage", "bundle"):
             assert main([phase, str(out), "--workers", "0"]) == 0
-        objects = json.loads((out / "bundle/channels/labels/objects.json").read_text())
+        objects = json.loads((out / "bundle/channels/labels/objects.json").read_text("utf-8"))
         assert "secret" not in json.dumps(objects)
         names.append(objects["names"])
     assert names == [["Lung (segment 1)", "Lung (segment 2)"], ["node 1 [31m", "Lung (segment 2)"]]

@@ -101,7 +101,7 @@ def test_the_plan_of_a_ct_without_hounsfield_units_has_no_level_of_the_preset(
     out = tmp_path / "out"
     assert main(["plan", str(tmp_path / "s"), "-o", str(out), "--preset", "ct"]) == 0
     assert "states no Hounsfield units" in capfd.readouterr().err
-    assert "-300" not in (out / "plan.json").read_text()
+    assert "-300" not in (out / "plan.json").read_text("utf-8")
 
 
 def test_slopes_that_differ_are_said(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def write_out(folder: Path, volume: np.ndarray | None = None) -> Path:
 def replace_volume(bundle: Path, voxels: np.ndarray, channel="CD31", tile="r0_c0") -> None:
     """Put another volume in a bundle, as its volumes.json says it."""
     path = bundle / "channels" / channel / "volumes.json"
-    content = json.loads(path.read_text())
+    content = json.loads(path.read_text("utf-8"))
     (entry,) = (e for e in content["volumes"] if e["tile"] == tile)
     texture = encode_3d(mip_levels(voxels))
     (bundle / entry["file"]["path"]).write_bytes(texture.data)
@@ -65,7 +65,7 @@ def replace_volume(bundle: Path, voxels: np.ndarray, channel="CD31", tile="r0_c0
     ]
     path.write_text(json.dumps(content))
     manifest = bundle / "manifest.json"  # written anew, as a bundle's is
-    text = manifest.read_text()
+    text = manifest.read_text("utf-8")
     manifest.unlink()
     manifest.write_text(text)
 
@@ -75,7 +75,7 @@ def replace_transfer_functions(
 ) -> None:
     """Put other functions in a channel: opacities, (functions, 256) from 0 to 1; none is 2D."""
     manifest = bundle / "manifest.json"
-    content = json.loads(manifest.read_text())
+    content = json.loads(manifest.read_text("utf-8"))
     (entry,) = (c for c in content["channels"] if c["id"] == channel)
     table = np.full((*opacities.shape, 4), 255, dtype=np.uint8)
     table[..., 3] = np.rint(opacities * 255)

@@ -28,6 +28,7 @@ from stereocell.read.planes.pattern import read_by_pattern
 from stereocell.read.planes.place import Place
 from stereocell.read.planes.scan_log import find_log, with_log
 from stereocell.read.planes.volume import Volume, groups_of, volume_of
+from stereocell.read.series import numbers_of
 from stereocell.read.spacing import PartialTriple, grid_of
 from stereocell.read.tiff import read_image as read_tiff
 from stereocell.read.tiff.arrays import RGB_COLORS, RGB_NAMES
@@ -60,7 +61,7 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
     groups = groups_of(places)
     if series > len(groups):
         raise UsageError(
-            f"{where}: --series: found {series}, expected 1 to {len(groups)} "
+            f"{where}: --series: found {series}, expected {numbers_of(len(groups))} "
             "(`--series list` shows them)"
         )
     number = series or 1 + max(range(len(groups)), key=lambda index: len(groups[index]))
