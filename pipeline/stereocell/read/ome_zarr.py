@@ -34,6 +34,7 @@ from stereocell.read.ngff_statements import (
     settled_spacing,
 )
 from stereocell.read.spacing import Grid, Triple
+from stereocell.read.value_scale import ignored_note
 from stereocell.read.zarr_collections import (
     ZarrTree,
     describe_group,
@@ -130,7 +131,14 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
         placement=sided.placement,
         has_sides=sided.has_sides,
         acquired=sided.acquired,
-        notes=(*multiscale.notes, *notes, *more, *sided.notes, *notes_on_labels(tree)),
+        notes=(
+            *multiscale.notes,
+            *notes,
+            *more,
+            *sided.notes,
+            *filter(None, [ignored_note("the image's group", attributes)]),
+            *notes_on_labels(tree),
+        ),
         labels=labels_evidence(ome, location),
         objects=notes_of_ngff(ome.get("image-label")),
     )
