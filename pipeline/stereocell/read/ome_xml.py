@@ -8,7 +8,6 @@ References: https://docs.openmicroscopy.org/ome-model/latest/ome-xml/
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
 from xml.etree import ElementTree
 
 from stereocell.model.color import linear_color
@@ -74,9 +73,32 @@ def files_of(root: ElementTree.Element) -> Iterator[str]:
     return (uuid.get("FileName", "") for uuid in uuids_of(root) if uuid.get("FileName"))
 
 
-def pixels_of(root: ElementTree.Element, index: int = 0) -> ElementTree.Element | None:
-    """Return the Pixels of an image, the first by default; None: there are none."""
-    image = next(islice(_children(root, "Image"), index, None), None)
+def only_image(root: ElementTree.Element, index: int) -> ElementTree.Element:
+    """Return OME-XML of one image: a copy without the others and without their annotations.
+
+    The image at `index` is the first one of the copy. There is none where the index is too large.
+    """
+    images = list(_children(root, "Image"))
+    kept = images[index] if 0 <= index < len(images) else None
+    foreign = {name for image in images if image is not kept for name in _annotations_of(image)}
+    foreign -= _annotations_of(kept) if kept is not None else set()
+    found = ElementTree.Element(root.tag, root.attrib)
+    found.extend(child for child in root if child is kept or _local(child) != "Image")
+    for place, child in enumerate(found):
+        if _local(child) == "StructuredAnnotations":
+            own = ElementTree.Element(child.tag, child.attrib)
+            own.extend(one for one in child if one.get("ID") not in foreign)
+            found[place] = own
+    return found
+
+
+def _annotations_of(image: ElementTree.Element) -> set[str | None]:
+    return {one.get("ID") for one in image.iter() if _local(one) == "AnnotationRef"}
+
+
+def pixels_of(root: ElementTree.Element) -> ElementTree.Element | None:
+    """Return the Pixels of the first image; None: there are none."""
+    image = next(_children(root, "Image"), None)
     return None if image is None else next(_children(image, "Pixels"), None)
 
 
@@ -107,10 +129,7 @@ def modulos_of(root: ElementTree.Element) -> list[ElementTree.Element]:
     An annotation counts for all images where no image refers to it.
     """
     images = list(_children(root, "Image"))
-    refers = [
-        {one.get("ID") for one in image.iter() if _local(one) == "AnnotationRef"}
-        for image in images
-    ]
+    refers = [_annotations_of(image) for image in images]
     found = []
     for annotation in (one for one in root.iter() if _local(one) == "XMLAnnotation"):
         name = annotation.get("ID")

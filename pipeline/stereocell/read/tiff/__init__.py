@@ -15,7 +15,8 @@ from tifffile import TiffFile
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
 from stereocell.read.image import Image
-from stereocell.read.series import Candidate, candidate, choose, lines
+from stereocell.read.modulo import listed, split
+from stereocell.read.series import lines
 from stereocell.read.tiff.companion import (
     Described,
     companion_at,
@@ -23,7 +24,6 @@ from stereocell.read.tiff.companion import (
     first_of_set,
     is_companion,
 )
-from stereocell.read.tiff.modulo import listed, split
 from stereocell.read.tiff.ome import read_ome
 from stereocell.read.tiff.ome_set import settle_files
 from stereocell.read.tiff.open_file import open_tiff, refuse_short
@@ -48,9 +48,6 @@ def read_image(location: Location, axes: str = "", series: int = 0) -> Image:
     """
     image, root = _read(location, axes)
     try:
-        if root is None:
-            choose(location.shown, [_whole(image)], series or 1)
-            return image
         return split(location.shown, image, root, series)
     except BaseException:
         if image.close is not None:
@@ -63,17 +60,7 @@ def list_series(location: Location) -> tuple[str, ...]:
     image, root = _read(location, "")
     if image.close is not None:
         image.close()
-    return lines([_whole(image)] if root is None else listed(image, root))
-
-
-def _whole(image: Image) -> Candidate:
-    finest = image.arrays[0]
-    return candidate(
-        finest.shape,
-        channels=finest.size("c"),
-        times=finest.size("t"),
-        spacing_um=image.grids[0].spacing_um,
-    )
+    return lines(listed(image, root))
 
 
 def _read(location: Location, axes: str) -> tuple[Image, ElementTree.Element | None]:

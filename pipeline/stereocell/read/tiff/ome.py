@@ -22,8 +22,10 @@ from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.ome_depth import settle_depth
 from stereocell.read.ome_xml import OmeImage
 from stereocell.read.spacing import Grid, grid_of
+from stereocell.read.statements import Statement
 from stereocell.read.tiff.arrays import (
     array_of,
     require_depth,
@@ -31,7 +33,6 @@ from stereocell.read.tiff.arrays import (
     with_given_axes,
 )
 from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
-from stereocell.read.tiff.ome_planes import settle_depth
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.read.tiff.orientation import turn_of
 from stereocell.storage.library_errors import one_line
@@ -90,7 +91,8 @@ def _with_depth(image: Image, root: ElementTree.Element) -> tuple[Image, tuple[s
     """Return the image with the depth of its voxels by the most trusted field, and notes."""
     finest = image.grids[0]
     z, y, x = finest.spacing_um or finest.partial_um
-    depth, notes = settle_depth(root, z)
+    stated = [] if z is None else [Statement(z, "PhysicalSizeZ")]
+    depth, notes = settle_depth(root, stated)
     return replace(image, grids=(grid_of(finest.shape, (depth, y, x)), *image.grids[1:])), notes
 
 

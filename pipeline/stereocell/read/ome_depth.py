@@ -1,5 +1,6 @@
-"""The depth of OME-TIFF's voxels by the positions of the planes, compared with PhysicalSizeZ."""
+"""The depth of voxels by the positions of the planes in OME-XML, compared with its other fields."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from xml.etree import ElementTree
 
@@ -16,24 +17,28 @@ _SUBJECT = Subject(
 
 
 def settle_depth(
-    root: ElementTree.Element, stated_um: float | None
+    root: ElementTree.Element, stated: Sequence[Statement]
 ) -> tuple[float | None, tuple[str, ...]]:
-    """Return the depth of a voxel, um, and notes.
+    """Return the depth of a voxel, um, and notes; None: no field states one.
 
-    stated_um  PhysicalSizeZ; None: not stated
+    stated  the depth as other fields state it, in um, the most trusted first
     """
+    stated = [one for one in stated if isinstance(one.value, float | int) and one.value > 0]
+    settled = settle(_SUBJECT, stated) if stated else None
+    stated_um = None if settled is None else settled.number
+    own_notes = () if settled is None else settled.notes
     places, has_unit = _positions(root)
     numbers = sorted(places)
     if len(numbers) < 2:
-        return stated_um, ()
+        return stated_um, own_notes
     steps = [(places[b] - places[a]) / (b - a) for a, b in pairwise(numbers)]
     first, last = places[numbers[0]], places[numbers[-1]]
     mean = (last - first) / (numbers[-1] - numbers[0])
     if max(places.values()) == min(places.values()):
-        return stated_um, (_SAME,) * (len(numbers) > 2 and _times_rise(root))
+        return stated_um, (*own_notes, *(_SAME,) * (len(numbers) > 2 and _times_rise(root)))
     if min(steps) <= 0 <= max(steps):
         note = "the planes' PositionZ rises and falls: not compared with the voxel spacing"
-        return stated_um, (note,)
+        return stated_um, (*own_notes, note)
     notes = []
     if mean < 0:
         notes.append(
@@ -46,18 +51,17 @@ def settle_depth(
         notes.append(
             f"the planes' PositionZ is uneven: steps of {min(sizes):.4g} to {max(sizes):.4g} um"
         )
-    if not has_unit and (stated_um is None or stated_um <= 0):
+    if not has_unit and stated_um is None:
         return stated_um, ()
-    if stated_um is None or stated_um <= 0:
+    if stated_um is None:
         notes.append(f"voxel spacing along z: {step:.5g} um by the planes' PositionZ")
         return step, tuple(notes)
     is_near = 1 / _MOST_APART < step / stated_um < _MOST_APART
     trust = Trust.MEASURED if is_even and is_near and has_unit else Trust.REPEATED
     place = "PositionZ of the planes" + " (um are assumed)" * (not has_unit)
-    stated = Statement(stated_um, "PhysicalSizeZ")
-    settled = settle(_SUBJECT, [stated, Statement(step, place, trust)])
-    chosen = settled.number if settled.notes else stated_um
-    return chosen, (*notes, *settled.notes)
+    settled = settle(_SUBJECT, [*stated, Statement(step, place, trust)])
+    is_other = settled.chosen.place == place and settled.notes
+    return (step if is_other else stated_um), (*notes, *settled.notes)
 
 
 _SAME = (
