@@ -16,6 +16,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
 
+_HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
 _DEFAULT_UNIT = "\u00b5m"  # unit of PhysicalSizeX, Y and Z, where the file names none
 
 
@@ -31,6 +32,14 @@ class OmeImage:
     spacing_um: PartialTriple
     names: tuple[str | None, ...]
     colors: tuple[Color | None, ...]
+
+
+def is_ome(description: str) -> bool:
+    """Whether the description of a TIFF file is OME-XML, whole or not."""
+    text = description.strip("\ufeff\0 \t\r\n")
+    head = text[:_HEAD]
+    is_named = text.endswith("OME>") or "<OME" in head or "openmicroscopy.org" in head
+    return text.startswith("<") and is_named
 
 
 def parse(text: str, where: str) -> ElementTree.Element:

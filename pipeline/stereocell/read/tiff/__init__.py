@@ -34,7 +34,6 @@ from stereocell.storage.location import Location
 logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are raised here
 _OME_NAMES = (".ome.tif", ".ome.tiff", ".ome.tf2", ".ome.tf8", ".ome.btf")
 _BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's words
-_HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
 
 
 def read_image(location: Location, axes: str = "", series: int = 0) -> Image:
@@ -75,7 +74,7 @@ def _read(location: Location, axes: str) -> tuple[Image, ElementTree.Element | N
             tiff = open_tiff(location, stack)
             with one_line(where, "a TIFF file, whole"):
                 text = tiff.pages.first.description
-            if not given and not _is_ome(text):
+            if not given and not ome_xml.is_ome(text):
                 image = read_plain(location, tiff, stack, axes)
                 _require_pages_read(location, tiff, log)
                 return _with_note(location, image), None
@@ -115,13 +114,6 @@ def _require_pages_read(location: Location, tiff: TiffFile, log: Sequence[str]) 
         found = _BEYOND.search(message)
         if found:
             refuse_short(location.shown, tiff.filehandle.size, int(found[1]))
-
-
-def _is_ome(description: str) -> bool:
-    text = description.strip("\ufeff\0 \t\r\n")
-    head = text[:_HEAD]
-    is_named = text.endswith("OME>") or "<OME" in head or "openmicroscopy.org" in head
-    return text.startswith("<") and is_named
 
 
 def _with_note(location: Location, image: Image) -> Image:
