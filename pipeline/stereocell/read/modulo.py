@@ -10,7 +10,7 @@ of one stack are more alike.
 References: https://docs.openmicroscopy.org/ome-model/latest/developers/6d-7d-and-8d-storage.html
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -93,13 +93,12 @@ def split(where: str, image: Image, root: ElementTree.Element | None, series: in
 
     Raises UsageError where there is no such image.
     """
-    parts = [] if root is None else [one for one in modulos_of(root) if not _are_channels(one)]
-    listed = [one for one in parts if image.arrays[0].size(one.axis) % len(one.labels) == 0]
-    others = [one for one in parts if one not in listed]
+    listed = _parts_of(image, root)
     choices = candidates(image, listed)
     index, _ = choose(where, choices, series or 1)
     if root is None:
         return image
+    others = [one for one in modulos_of(root) if one not in listed and not _are_channels(one)]
     notes = [
         f"ModuloAlong{one.axis.upper()} states {one.counted}, by which "
         f"{image.arrays[0].size(one.axis)} planes along {one.axis} can't be divided: not split"
@@ -137,10 +136,21 @@ def candidates(image: Image, parts: Sequence[Modulo]) -> list[Candidate]:
 
 def listed(image: Image, root: ElementTree.Element | None) -> list[Candidate]:
     """Return the images of a file that `split` chooses from."""
-    parts = [] if root is None else [one for one in modulos_of(root) if not _are_channels(one)]
-    return candidates(
-        image, [one for one in parts if image.arrays[0].size(one.axis) % len(one.labels) == 0]
-    )
+    return candidates(image, _parts_of(image, root))
+
+
+def parts_along(root: ElementTree.Element, sizes: Mapping[str, int]) -> list[Modulo]:
+    """Return the further axes of the first image that separate images.
+
+    sizes  of the image along z, c and t
+    """
+    found = [one for one in modulos_of(root) if not _are_channels(one)]
+    return [one for one in found if sizes[one.axis] % len(one.labels) == 0]
+
+
+def _parts_of(image: Image, root: ElementTree.Element | None) -> list[Modulo]:
+    sizes = {axis: image.arrays[0].size(axis) for axis in "zct"}
+    return [] if root is None else parts_along(root, sizes)
 
 
 def _are_channels(one: Modulo) -> bool:

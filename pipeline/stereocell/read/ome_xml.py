@@ -82,6 +82,11 @@ def files_of(root: ElementTree.Element) -> Iterator[str]:
     return (uuid.get("FileName", "") for uuid in uuids_of(root) if uuid.get("FileName"))
 
 
+def count_images(root: ElementTree.Element) -> int:
+    """Return the number of images."""
+    return sum(1 for _ in _children(root, "Image"))
+
+
 def only_image(root: ElementTree.Element, index: int) -> ElementTree.Element:
     """Return OME-XML of one image: a copy without the others and without their annotations.
 

@@ -23,12 +23,13 @@ def settle_places(
     field     the name of the field that states the places
     has_unit  whether it is in a stated unit of length; else um are assumed
     """
-    stated = [one for one in stated if isinstance(one.value, float | int) and one.value > 0]
     settled = settle(_SUBJECT, stated) if stated else None
     stated_um, own = (None, ()) if settled is None else (settled.number, settled.notes)
     numbers = sorted(places)
     if len(numbers) < 2 or max(places.values()) == min(places.values()):
         return stated_um, own
+    if stated_um is not None and stated_um <= 0:
+        stated_um = None
     steps = [(places[b] - places[a]) / (b - a) for a, b in pairwise(numbers)]
     if min(steps) <= 0 <= max(steps):
         note = f"the planes' {field} rises and falls: not compared with the voxel spacing"

@@ -32,6 +32,7 @@ from stereocell.read.tiff.arrays import (
     samples_as_channels,
     with_given_axes,
 )
+from stereocell.read.tiff.ome_images import Chosen
 from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.read.tiff.orientation import turn_of
@@ -50,20 +51,20 @@ def read_ome(
     tiff: TiffFile,
     stack: ExitStack,
     *,
-    root: ElementTree.Element,
+    chosen: Chosen,
     text: str,
     log: Sequence[str],
     axes: str,
 ) -> Image:
-    """Return the first image of an open file.
+    """Return the chosen image of an open file.
 
-    root, text  the OME-XML, of the file or of the one beside it
-    log         grows by tifffile's messages
-    axes        of those longer than 1, slowest first; empty: as the OME-XML has them
+    text    the OME-XML with the chosen image alone, of the file or of the one beside it
+    log     grows by tifffile's messages
+    axes    of those longer than 1, slowest first; empty: as the OME-XML has them
 
     Raises SourceError where it can't be read as an image.
     """
-    where = location.shown
+    where, root = location.shown, chosen.root
     with one_line(where, "an OME-TIFF file, whole, with its OME-XML"):
         _check_claims(where, tiff, text)
         tiff.is_ome = True
@@ -83,7 +84,7 @@ def read_ome(
     image, depth_notes = _with_depth(image, root)
     _, turn_notes = turn_of(series.keyframe, is_applied=False)
     described = (*depth_notes, *turn_notes)
-    notes = (*image.notes, *described, *_undescribed(tiff), *note_absent(pages))
+    notes = (*image.notes, *described, *_undescribed(tiff, chosen.others), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
 
 
@@ -108,10 +109,14 @@ def _require_planes(
     require_alike(location, levels[0])
 
 
-def _undescribed(tiff: TiffFile) -> tuple[str, ...]:
-    """Return a note on pages of the files that belong to no image of the OME-XML."""
+def _undescribed(tiff: TiffFile, others: int) -> tuple[str, ...]:
+    """Return a note on pages of the files that belong to no image of the OME-XML.
+
+    others  planes of other images
+    """
     pages = [page for one in tiff.series for page in one.pages if page is not None]
-    described, total = len(pages), sum(len(file.pages) for file in {page.parent for page in pages})
+    described = len(pages) + others
+    total = sum(len(file.pages) for file in {page.parent for page in pages})
     if total <= described:
         return ()
     return (
@@ -163,7 +168,7 @@ def _image(
         ),
         names or (*first.names[:count], *unnamed),
         colors or (*first.colors[:count], *unnamed),
-        len(images),
+        1,
         stack.close,
         notes=notes,
     )
