@@ -69,7 +69,9 @@ class Reader:
 
 
 READERS = {
-    "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", has_axes=True, is_remote=True),
+    "ome-zarr": Reader(
+        "stereocell.read.ome_zarr", "OME-Zarr", has_series=True, has_axes=True, is_remote=True
+    ),
     "tiff": Reader("stereocell.read.tiff", "TIFF", has_series=True, has_axes=True, is_remote=True),
     "planes": Reader(
         "stereocell.read.planes",
