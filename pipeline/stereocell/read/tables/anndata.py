@@ -15,17 +15,18 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.stated_numbers import number_of
+from stereocell.read.tables.number_texts import read_stored_texts
 from stereocell.read.tables.table import (
     MAX_NAMES,
     MAX_ROWS,
     Table,
+    TableColumn,
     choose_columns,
     choose_key,
     clean,
     keys_of,
     named,
 )
-from stereocell.read.tables.typed_columns import StoredColumn, read_typed
 
 _ATTRIBUTES = "spatialdata_attrs"  # key in `uns`: the label map that the rows belong to
 _BLOCK = 1 << 22  # values of X that are read at a time
@@ -88,21 +89,24 @@ def read_anndata(root: Node, where: str, key: str, wanted: tuple[str, ...], labe
     places = [genes.index(name) for name in taken if name not in own]
     size = (len(keys), len(genes))
     numbers = _columns_of(matrix, where, size, places) if matrix is not None and places else None
-    columns: list[StoredColumn] = []
+    columns: dict[str, TableColumn] = {}
+    plain: dict[str, tuple[str, ...]] = {}
     for name in taken:
         if name in own:
             node = _found(obs, name)
             values = _series(node, f"{where}: obs/{clean(name):.60}")
             _require_rows(where, name, values, len(keys))
-            is_category = node.attribute("encoding-type") == "categorical"
-            columns.append(_column(clean(name) or "column", values, kept, is_category=is_category))
+            columns[name] = _column(clean(name) or "column", values, kept)
+            if columns[name].texts and node.attribute("encoding-type") != "categorical":
+                plain[columns[name].name] = columns[name].texts or ()
         elif numbers is not None:
             column = numbers[:, places.index(genes.index(name))]
-            columns.append(StoredColumn(name, column[kept], None))
-    reading = read_typed(columns)
+            columns[name] = TableColumn(name, column[kept], None)
+    reading = read_stored_texts(plain)
+    read_again = {column.name: column for column in reading.columns}
     held = [str(value) for value, keep in zip(keys, kept, strict=True) if keep]
-    labels_of_rows = keys_of(where, chosen, held)
-    return Table(where, chosen, labels_of_rows, reading.columns, left_out, reading.notes)
+    made = tuple(read_again.get(column.name, column) for column in columns.values())
+    return Table(where, chosen, keys_of(where, chosen, held), made, left_out, reading.notes)
 
 
 def _found(group: Node, name: str) -> Node:
@@ -162,15 +166,13 @@ def _require_rows(where: str, name: str, values: list[Any], rows: int) -> None:
         )
 
 
-def _column(
-    name: str, values: list[Any], kept: NDArray[np.bool_], *, is_category: bool
-) -> StoredColumn:
+def _column(name: str, values: list[Any], kept: NDArray[np.bool_]) -> TableColumn:
     values = [value for value, keep in zip(values, kept, strict=True) if keep]
     if all(value is None or isinstance(value, bool | int | float) for value in values):
         numbers = [np.nan if value is None else number_of(value) for value in values]
-        return StoredColumn(name, np.array(numbers, np.float64), None)
-    texts = ["" if value is None else str(value) for value in values]
-    return StoredColumn(name, None, texts, is_category)
+        return TableColumn(name, np.array(numbers, np.float64), None)
+    texts = ("" if value is None else clean(str(value)) for value in values)
+    return TableColumn(name, None, tuple(texts))
 
 
 def _columns_of(

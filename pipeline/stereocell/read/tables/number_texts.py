@@ -3,13 +3,12 @@
 A table has one decimal mark, a point or a comma. The other one may stand between groups of three
 digits, as spaces and apostrophes may. `1.234` and `1,234` fit both conventions, so other cells of
 the column decide, then other columns, then the mark between cells. A column holds numbers if nearly
-all of its cells do, or most of them with one word among the rest: such words are missing values,
-and are quoted in a note. Units behind the numbers (cell_units.py) are left out.
+all of its cells do: a few words among them are missing values, and are quoted in a note.
 """
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -17,19 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.read.statements import Statement, Subject, Trust, settle
-from stereocell.read.tables.cell_units import unit_of
-from stereocell.read.tables.missing_values import (
-    SHOWN,
-    means_missing,
-    missing_notes,
-    sentinel_notes,
-)
+from stereocell.read.tables.cell_units import without_unit
 from stereocell.read.tables.table import MISSING, TableColumn, word_of
 
 POINT, COMMA = ".", ","
+_SEMICOLON = ";"  # separates cells where a comma is the decimal mark
 _MOST_WORDS = 5  # different words that may stand among numbers; error values don't count
 _MOST_SHARE = 0.25  # of the cells with something in them, that may be such words
-_LEAST_NUMBERS = 6  # cells with a number, for a word that stands in more cells than that share
+_MOST_SHARE_OF_FRACTIONS = 0.5  # the same where a number has a fraction: categories have none
+_MIXED = 0.25  # share of numbers in a column of texts from which on a note counts them
+_SHOWN = 4  # words, or columns, that a note lists
 _EXPONENT = r"([eE][+-]?[0-9]+)?"
 _PLAIN = {
     mark: re.compile(rf"[+-]?([0-9]+{re.escape(mark)}?[0-9]*|{re.escape(mark)}[0-9]+){_EXPONENT}")
@@ -44,7 +40,12 @@ _GROUPED = {
 _EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")  # a number by both conventions
 _SPACES = "\u00a0\u2009\u202f '\u2019"
 _SPACED = re.compile(rf"(?<=[0-9])[{_SPACES}](?=[0-9]{{3}}(?![0-9]))")
+# words of spreadsheets and measuring programs that stand for no number, in small letters
+_NO_NUMBER = re.compile(
+    r"#.*|[-+]?1\.#.*|-+|\.+|\?+|[\u2013\u2014]|[+-]?inf(inity)?|[+-]nan|n\.?d\.?"
+)
 _NAMES = {POINT: "point", COMMA: "comma"}
+_MARKERS = (-999.0, -9999.0, -99999.0)  # numbers that programs write for a missing value
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,44 +60,45 @@ def read_columns(named: Mapping[str, Sequence[str]], separator: str) -> Reading:
     """Return columns of text as numbers where they are numbers.
 
     named      the cells of each column
-    separator  the mark between cells; empty: the table has cells of its own
+    separator  the mark between cells
     """
-    found = {name: unit_of(name, texts) for name, texts in named.items()}
-    units = {name: unit for name, (unit, _) in found.items() if unit is not None}
-    bare = {name: units[name].texts if name in units else named[name] for name in named}
-    columns, missing, notes, grouped = [], {}, [note for _, note in found.values() if note], ""
-    conventions = _conventions(bare, separator)
-    for name, texts in bare.items():
+    columns, missing, notes, grouped = [], {}, [], ""
+    bare = {name: without_unit(name, texts) for name, texts in named.items()}
+    notes += [note for _, note in bare.values() if note]
+    conventions = _conventions({name: texts for name, (texts, _) in bare.items()}, separator)
+    for name, (texts, _) in bare.items():
         mark, note = conventions[name]
         numbers, words = _numbers(texts, mark)
         if _are_numbers(numbers, words):
             columns.append(TableColumn(name, numbers, None))
             missing[name] = words
-            if mark == COMMA and not separator and not note:
-                note = f"decimal mark of column {name!r:.60}: a comma, as its cells show"
             notes += [note] if note else []
+            notes += _marker_notes(name, numbers)
             grouped = grouped or _grouped_note(texts, mark)
-            if name in units:
-                row = list(named[name]).index(units[name].example)
-                notes.append(units[name].note(name, float(numbers[row])))
         else:
             columns.append(TableColumn(name, None, tuple(map(word_of, named[name]))))
-            notes += _names_note(name, numbers, words)
+            notes += _mixed_notes(name, numbers, words)
     notes += [grouped] if grouped else []
-    return Reading(tuple(columns), (*missing_notes(missing), *sentinel_notes(columns), *notes))
+    return Reading(tuple(columns), (*_missing_notes(missing), *notes))
 
 
-def _names_note(name: str, numbers: NDArray[np.float64], words: Counter[str]) -> list[str]:
-    """Return a note on a column of names most of which look like numbers; none on others."""
-    filled = len(numbers) - sum(words[word] for word in words if word.lower() in MISSING)
-    count = int(np.isfinite(numbers).sum())
-    if count < filled / 2 or not count:
-        return []
-    listed = ", ".join(f"{word!r:.40}" for word, _ in words.most_common(SHOWN) if word)
-    return [
-        f"column {name!r:.60}: {count:,} of {filled:,} cells hold numbers, the others words "
-        f"({listed}): it is read as names of categories"
+def read_stored_texts(named: Mapping[str, Sequence[str]]) -> Reading:
+    """Return columns that a file with types of its own stores as texts, numbers where they are."""
+    reading = read_columns(named, "")
+    holds = [
+        column.numbers is not None and bool(np.isfinite(column.numbers).any())
+        for column in reading.columns
     ]
+    columns = [
+        column if is_number else TableColumn(column.name, None, tuple(map(word_of, texts)))
+        for column, is_number, texts in zip(reading.columns, holds, named.values(), strict=True)
+    ]
+    found = [
+        repr(one.name)[:60] for one, is_number in zip(columns, holds, strict=True) if is_number
+    ]
+    more = f" and {len(found) - _SHOWN} more" * (len(found) > _SHOWN)
+    notes = [f"numbers stored as texts are read as numbers: {', '.join(found[:_SHOWN])}{more}"]
+    return Reading(tuple(columns), (*notes * bool(found), *reading.notes))
 
 
 def decimal_mark(texts: Sequence[str], separator: str) -> str:
@@ -106,23 +108,23 @@ def decimal_mark(texts: Sequence[str], separator: str) -> str:
 
 def _conventions(named: Mapping[str, Sequence[str]], separator: str) -> dict[str, tuple[str, str]]:
     """Return each column's decimal mark, and a note where another one would fit its cells too."""
-    has_comma = any(COMMA in text for texts in named.values() for text in texts)
-    if not has_comma and separator in (COMMA, ""):
+    has_comma = any(COMMA in "\n".join(texts) for texts in named.values())
+    if not has_comma and separator != _SEMICOLON:
         return dict.fromkeys(named, (POINT, ""))
     found = {name: _marks_of(texts) for name, texts in named.items()}
     of_table = Counter(next(iter(marks)) for marks, _ in found.values() if len(marks) == 1)
     conventions = {}
     for name, (marks, example) in found.items():
         mark = next(iter(marks)) if marks else ""
-        note = ""
+        note, is_doubtful = "", False
         if not mark and of_table and example:
             mark = of_table.most_common(1)[0][0]
             reason = "as in other columns of the table"
         elif not mark and example:
             mark = POINT if separator == COMMA or POINT in example else COMMA
             reason = "as no other cell tells them apart"
-        is_unclear = separator == ";" and not of_table
-        if not marks and example and (is_unclear or not mark == POINT in example):
+            is_doubtful = separator == _SEMICOLON or mark not in example
+        if not marks and example and (is_doubtful or mark not in example):
             note = _ambiguous(name, example, mark, reason)
         conventions[name] = mark or POINT, note
     return conventions
@@ -168,10 +170,14 @@ def _grouped_note(texts: Sequence[str], mark: str) -> str:
 
 def _numbers(texts: Sequence[str], mark: str) -> tuple[NDArray[np.float64], Counter[str]]:
     """Return numbers, NaN where there is none, and the cells without one, as they are written."""
-    values = {text: _value(text, mark) for text in set(texts)}
-    numbers = np.fromiter((values[text] for text in texts), np.float64, len(texts))
-    numbers[~np.isfinite(numbers)] = np.nan
-    words = Counter(text.strip() for text in texts if not isfinite(values[text]))
+    numbers = np.full(len(texts), np.nan)
+    words: Counter[str] = Counter()
+    for row, text in enumerate(texts):
+        value = _value(text, mark)
+        if isfinite(value):
+            numbers[row] = value
+        else:
+            words[text.strip()] += 1
     return numbers, words
 
 
@@ -203,14 +209,62 @@ def _plain(text: str, mark: str) -> str:
 
 def _are_numbers(numbers: NDArray[np.float64], words: Counter[str]) -> bool:
     """Return whether a column holds numbers, with missing ones among them."""
-    others = {word: times for word, times in words.items() if not means_missing(word)}
+    others = {word: times for word, times in words.items() if not _means_missing(word)}
     if not others:
         has_errors = any(word.lower() not in MISSING for word in words)
         return not has_errors or bool(np.isfinite(numbers).any())
     filled = len(numbers) - sum(words[word] for word in words if word.lower() in MISSING)
-    is_few = len(others) <= _MOST_WORDS and sum(others.values()) <= _MOST_SHARE * filled
-    held = numbers[np.isfinite(numbers)]
-    # codes of categories repeat, measured values don't
-    is_measured = len(np.unique(held)) > len(held) / 2 >= filled / 4
-    is_one = len(others) == 1 and len(held) >= _LEAST_NUMBERS and is_measured
-    return (is_few or is_one) and len(held) > 0
+    finite = numbers[np.isfinite(numbers)]
+    most = _MOST_SHARE_OF_FRACTIONS if (finite % 1 != 0).any() else _MOST_SHARE
+    is_few = len(others) <= _MOST_WORDS and sum(others.values()) <= most * filled
+    return is_few and bool(len(finite))
+
+
+def _marker_notes(name: str, numbers: NDArray[np.float64]) -> Iterator[str]:
+    """Yield a note on a number that stands for missing values in many files."""
+    finite = numbers[np.isfinite(numbers)]
+    for marker in _MARKERS:
+        count = int((finite == marker).sum())
+        if count and finite.min() == marker and not ((finite < 0) & (finite > marker)).any():
+            cells = f"{count:,} cells" if count > 1 else "1 cell"
+            yield (
+                f"column {name!r:.60}: {marker:g} in {cells} is read as a number: empty the cells "
+                "if it means that a value is missing"
+            )
+
+
+def _mixed_notes(name: str, numbers: NDArray[np.float64], words: Counter[str]) -> Iterator[str]:
+    """Yield a note on a column of texts with many numbers among its cells."""
+    filled = len(numbers) - sum(words[word] for word in words if word.lower() in MISSING)
+    count = int(np.isfinite(numbers).sum())
+    if count and count >= _MIXED * filled:
+        word = next(word for word, _ in words.most_common() if word.lower() not in MISSING)
+        yield (
+            f"column {name!r:.60}: {count:,} of {filled:,} cells are numbers, others are words, as "
+            f"{word!r:.40}: read as texts"
+        )
+
+
+def _means_missing(word: str) -> bool:
+    lower = word.lower()
+    return lower in MISSING or _NO_NUMBER.fullmatch(lower) is not None
+
+
+def _missing_notes(missing: Mapping[str, Counter[str]]) -> Iterator[str]:
+    """Yield one note on all cells among numbers that hold none."""
+    found = {name: words for name, words in missing.items() if words}
+    if not found:
+        return
+    parts = []
+    for name, words in list(found.items())[:_SHOWN]:
+        kinds = [
+            f"{f'{word!r:.40}' if word else 'empty'} ({times:,})"
+            for word, times in words.most_common(_SHOWN)
+        ]
+        more = len(words) - len(kinds)
+        parts.append(f"{name:.60}: {', '.join(kinds)}{f' and {more} other words' * bool(more)}")
+    more = len(found) - len(parts)
+    parts += [f"and {more} more columns"] * bool(more)
+    total = sum(words.total() for words in found.values())
+    noun = "cells" if total > 1 else "cell"
+    yield f"{total:,} {noun} in columns of numbers taken for missing values: {'; '.join(parts)}"

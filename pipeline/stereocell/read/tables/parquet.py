@@ -16,17 +16,19 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read import extras
+from stereocell.read.tables.number_texts import read_stored_texts
 from stereocell.read.tables.table import (
     MAX_NAMES,
     MAX_ROWS,
     Table,
+    TableColumn,
     choose_columns,
     choose_key,
     clean,
     keys_of,
     require_once,
+    word_of,
 )
-from stereocell.read.tables.typed_columns import StoredColumn, read_typed
 from stereocell.storage.child_process import Bounds, run_in_child
 from stereocell.storage.library_errors import DamagedError, damage_words, one_line
 from stereocell.storage.location import Location
@@ -105,14 +107,17 @@ def _read(parquet: Any, source: BinaryIO, request: _Request) -> Table:
         keys += [str(value) for value in batch.column(chosen).to_pylist()]
         for name, found in parts.items():
             column = batch.column(name)
-            found.append(_numbers(column) if kinds[name] == _NUMBER else _texts(column))
+            found.append(_numbers(column) if kinds[name] == _NUMBER else _words(column))
     if len(keys) != rows:
         raise SourceError(f"{where}: found {len(keys)} rows, expected {rows} as it states")
-    types = {field.name: field.type for field in schema}
-    stored = [_column(name, types[name], found) for name, found in parts.items()]
-    reading = read_typed(stored)
+    columns = {name: _column(name, kinds[name], found) for name, found in parts.items()}
+    plain = {
+        name: columns[name].texts or () for name in taken if _is_plain_text(schema.field(name).type)
+    }
+    reading = read_stored_texts(plain)
+    columns |= dict(zip(plain, reading.columns, strict=True))
     labels = keys_of(where, chosen, keys)
-    return Table(where, chosen, labels, reading.columns, left_out, reading.notes)
+    return Table(where, chosen, labels, tuple(columns.values()), left_out, reading.notes)
 
 
 _NUMBER, _TEXT = "number", "text"
@@ -127,6 +132,12 @@ def _kind(type_: Any) -> str:
         return _NUMBER
     is_text = types.is_string(held) or types.is_large_string(held) or types.is_temporal(held)
     return _TEXT if is_text else ""
+
+
+def _is_plain_text(type_: Any) -> bool:
+    """Return whether a column holds texts that are neither categories nor times."""
+    types = import_module("pyarrow.types")
+    return bool(types.is_string(type_) or types.is_large_string(type_))
 
 
 def _require_small(stated: Any, request: _Request, names: set[str]) -> None:
@@ -148,17 +159,15 @@ def _numbers(column: Any) -> NDArray[np.float64]:
     return np.asarray(cast.to_numpy(zero_copy_only=False), np.float64)
 
 
-def _texts(column: Any) -> list[str]:
+def _words(column: Any) -> list[str]:
     """Return texts; empty: missing."""
     coded = column if hasattr(column, "dictionary") else column.cast("string").dictionary_encode()
-    texts = [str(text) for text in coded.dictionary.to_pylist()]
-    return ["" if code is None else texts[code] for code in coded.indices.to_pylist()]
+    words = [word_of(str(text)) for text in coded.dictionary.to_pylist()]
+    return ["" if code is None else words[code] for code in coded.indices.to_pylist()]
 
 
-def _column(name: str, type_: Any, parts: list[Any]) -> StoredColumn:
+def _column(name: str, kind: str, parts: list[Any]) -> TableColumn:
     shown = clean(name) or "column"
-    if _kind(type_) == _NUMBER:
-        return StoredColumn(shown, np.concatenate(parts or [np.zeros(0)]), None)
-    texts = [text for part in parts for text in part]
-    is_category = import_module("pyarrow.types").is_dictionary(type_)
-    return StoredColumn(shown, None, texts, is_category)
+    if kind == _NUMBER:
+        return TableColumn(shown, np.concatenate(parts or [np.zeros(0)]), None)
+    return TableColumn(shown, None, tuple(text for part in parts for text in part))

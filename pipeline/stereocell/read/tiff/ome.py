@@ -24,6 +24,7 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.ome_xml import OmeImage
 from stereocell.read.spacing import Grid, grid_of
+from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.read.tiff.arrays import (
     array_of,
     require_depth,
@@ -41,6 +42,8 @@ from stereocell.storage.location import Location
 _MAX_SIDE = 10_000_000  # voxels along an axis
 _MAX_LEVELS = 64  # of the pyramid
 _SUB_IFDS = 330  # TIFF tag SubIFDs: offsets of a page's coarser levels
+_VALUE_TYPE = Subject("type of the voxels")
+_NUMPY_NAMES = {"float": "float32", "double": "float64", "bit": "bool"}  # by OME-XML's names
 _CLAIM = re.compile(r"""\b(Size[XYZCT]|PlaneCount|IFD)\s*=\s*["']\s*(\d+)""")
 
 
@@ -81,7 +84,7 @@ def read_ome(
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
     image, depth_notes = _with_depth(image, root)
     _, turn_notes = turn_of(series.keyframe, is_applied=False)
-    described = (*depth_notes, *turn_notes)
+    described = (*depth_notes, *turn_notes, *_type_notes(root, series.keyframe))
     notes = (*image.notes, *described, *_undescribed(tiff), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
 
@@ -92,6 +95,17 @@ def _with_depth(image: Image, root: ElementTree.Element) -> tuple[Image, tuple[s
     z, y, x = finest.spacing_um or finest.partial_um
     depth, notes = settle_depth(root, z)
     return replace(image, grids=(grid_of(finest.shape, (depth, y, x)), *image.grids[1:])), notes
+
+
+def _type_notes(root: ElementTree.Element, page: TiffPage) -> tuple[str, ...]:
+    """Return a note where the OME-XML and the tags of the pages state different voxels."""
+    pixels = ome_xml.pixels_of(root)
+    name = "" if pixels is None else pixels.get("Type", "")
+    if not name or page.dtype is None:
+        return ()
+    tags = Statement(page.dtype.name, "the TIFF header")
+    xml = Statement(_NUMPY_NAMES.get(name, name), "Type of Pixels", Trust.REPEATED)
+    return settle(_VALUE_TYPE, [tags, xml]).notes
 
 
 def _require_planes(
