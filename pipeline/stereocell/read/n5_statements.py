@@ -6,8 +6,8 @@
 | `pixelResolution`, `resolution` with `units` | | fastest first |
 | `transform` of COSEM | slowest first | in this order |
 
-COSEM's stands on the dataset, or in the group's `multiscales`. Fields of the dataset go before
-those of the group around it.
+COSEM's stands on the dataset, or in the group's `multiscales`. Fields of the dataset go
+before those of the group around it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
