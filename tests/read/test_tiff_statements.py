@@ -117,6 +117,7 @@ def test_planes_of_a_folder_stand_as_their_orientation_states(
         ({"cf": 0, "c0": 0.0, "c1": 1.0, "vunit": "Gray Value"}, BODY, ""),
         ({"cf": 1, "c0": 0.0, "c1": 1.0, "c2": 2.0, "vunit": "OD"}, BODY, "no straight line"),
         ({"cf": 20}, BODY, ""),
+        ({"c0": -1024.0, "c1": 2.0}, BODY * 2.0 - 1024, "-1024 + 2"),
         ({}, BODY, ""),
     ],
 )
@@ -198,6 +199,19 @@ def test_positions_without_a_unit_are_compared_and_not_taken(tmp_path: Path) -> 
     dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, depth="1.0", planes=planes))
     assert dataset.levels[0].spacing_um[0] == 1.0
     assert "PositionZ of the planes (um are assumed) states 0.6 um" in dataset.notes[0]
+
+
+@pytest.mark.parametrize(("stated", "is_noted"), [("int16", True), ("uint16", False)])
+def test_types_of_voxels_that_disagree_are_noted(
+    tmp_path: Path, stated: str, is_noted: bool
+) -> None:
+    path = write_ome(tmp_path / "a.ome.tif", BODY.astype(np.uint16))
+    tifffile.tiffcomment(path, tifffile.tiffcomment(path).replace('"uint16"', f'"{stated}"'))
+    note = (
+        "type of the voxels: the TIFF header states uint16, Type of Pixels states int16: "
+        "the TIFF header is used"
+    )
+    assert (note in read.open(path).notes) is is_noted
 
 
 def test_planes_at_one_position_whose_time_rises_are_noted(tmp_path: Path) -> None:

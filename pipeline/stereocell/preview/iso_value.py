@@ -122,6 +122,8 @@ def preview(
     volume = open_source(source_of(plan, channel=channel)).read(channel.index, tile.box, plan.level)
     smoothing_um = float(plan.settings.surface.smoothing_um)
     field = denoise(volume, smoothing_um, window.max_shift)
+    if window.holder is not None:  # contours go round what a build's surface goes round
+        field = window.holder.left_out_of(field, tile.box)
     under = np.zeros((1, 1, 1), np.float32)
     if window.statistics.background is not None:
         under = window.statistics.background.at(tile.box)
