@@ -102,8 +102,7 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
             f"{where}: no multiscales: {describe_group(ome, series, tree)}; expected the "
             "attribute `multiscales` of an image"
         )
-    with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.1 to 0.6"):
-        multiscale = ngff.parse(where, ome)
+    multiscale = _parsed(where, ome, node)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
             f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
@@ -142,6 +141,22 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
         labels=labels_evidence(ome, location),
         objects=notes_of_ngff(ome.get("image-label")),
     )
+
+
+def _parsed(where: str, ome: Mapping[str, Any], group: zarr.Group) -> Multiscale:
+    """Return the metadata of the first image. Raises SourceError, of other versions with a way."""
+    version, titled = ngff.version_of(ome), where
+    expected = "axes, datasets and scales as OME-Zarr 0.1 to 0.6"
+    if not ngff.is_known(version):
+        with quiet(), one_line(where, "a group whose arrays can be listed"):
+            path = next((name for name, node in group.members() if isinstance(node, zarr.Array)), 0)
+        titled = f"{where}: OME-Zarr {version:.20}, a version that is not known"
+        expected += (
+            f"; {where.rstrip('/')}/{path} --axes zyx --spacing-um z,y,x reads the voxels of an "
+            "array as they are stored"
+        )
+    with one_line(f"{titled}: multiscales[0]", expected):
+        return ngff.parse(where, ome)
 
 
 def _levels(

@@ -182,8 +182,7 @@ def _of_planes(location: Location, volume: Volume, first: Head, notes: list[str]
         z if z is not None else _step([heads[0, 0, n].z_um for n in range(len(volume.planes))])
     )
     log = find_log(location.source, volume.files[0, 0, 0].path)
-    numbers = volume.planes
-    spacing, told = with_log((stepped, y, x), log, numbers[1] - numbers[0] if numbers[1:] else 1)
+    spacing, told = with_log((stepped, y, x), log, volume.planes)
     image = _image(
         VoxelArray(array, _AXES), spacing, names, colors, [_read_as(volume), *notes, *told]
     )
