@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.read.dicom.frame import Frame, Vector
+from stereocell.read.dicom.rounded_positions import restore_positions
 from stereocell.read.dicom.split_kinds import split_kinds
 from stereocell.read.plane_stack import SAME_PLACE, NoStackError, lay_out
 
@@ -150,6 +151,8 @@ def find_groups(frames: Iterable[Frame]) -> list[Group]:
     whole = _join_references([group for alike in groups.values() for group in alike])
     found = [part for group in whole for part in _parts(group)]
     for group in found:
+        group.frames, notes = restore_positions(group.frames, _axes(group)[0])
+        group.notes += notes
         group.straighten()
     return found
 
