@@ -87,7 +87,7 @@ def test_a_slice_that_lacks_among_rounded_ones_is_interpolated(tmp_path: Path) -
     lacking.unlink()
     dataset = read.open(tmp_path)
     assert dataset.levels[0].shape == (12, 25, 14)
-    assert any("1 missing slices of 25" in note for note in dataset.notes)
+    assert any("1 missing slice of 25" in note for note in dataset.notes)
 
 
 def test_an_image_stored_twice_at_whole_millimetres_is_no_rounding(tmp_path: Path) -> None:
