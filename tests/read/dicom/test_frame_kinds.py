@@ -181,6 +181,11 @@ PROPERTIES: dict[str, tuple[Change, Change, str]] = {
     "echo number": (setting(EchoNumbers=1), setting(EchoNumbers=2), "echo 2"),
     "inversion time": (setting(InversionTime=700), setting(InversionTime=2500), "2500 ms"),
     "flip angle": (setting(FlipAngle=5), setting(FlipAngle=26), "flip angle 26 degrees"),
+    "attenuation": (
+        setting(CorrectedImage=["DECY", "ATTN"]),
+        setting(CorrectedImage=["DECY"]),
+        "no attenuation correction",
+    ),
     "Dixon": (image_type("M", "WATER"), image_type("M", "FAT"), "fat"),
 }
 
@@ -190,7 +195,8 @@ PROPERTIES: dict[str, tuple[Change, Change, str]] = {
 def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
     tmp_path: Path, name: str, shift: float
 ) -> None:
-    modality = "CT" if name in ("kernel", "energy", "monoenergetic", "contrast") else "MR"
+    is_ct = name in ("kernel", "energy", "monoenergetic", "contrast")
+    modality = "CT" if is_ct else "PT" if name == "attenuation" else "MR"
     first, second, words = PROPERTIES[name]
     write_kind(tmp_path, 100, first, modality=modality)
     indices = [index + shift for index in range(10 - (shift > 0))]
@@ -203,6 +209,16 @@ def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
     assert added(tmp_path, 3 - number) == 100
     assert read.open(tmp_path).levels[0].spacing_um[1] == pytest.approx(3000)
     assert "Jane" not in "".join((*lines, *read.open(tmp_path).notes))
+
+
+def test_water_comes_before_the_other_images_of_a_dixon_series(tmp_path: Path) -> None:
+    for place, word in enumerate(("FAT", "OPP_PHASE", "IN_PHASE", "WATER")):
+        change = image_type("M", word)
+        write_kind(tmp_path, 100 * (place + 1), change, first_number=1 + 20 * place)
+    assert added(tmp_path) == 400
+    words = ("water", "in phase", "opposed phase", "fat")
+    lines = read.list_series(tmp_path)
+    assert [next(word for word in words if word in line) for line in lines] == list(words)
 
 
 @pytest.mark.parametrize("told", [setting(AcquisitionNumber=2), setting()])

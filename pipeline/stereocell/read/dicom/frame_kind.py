@@ -68,18 +68,19 @@ _ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"TRACE.*|ISOTROPIC", "trace of diffusion"),
         (
             r"ADC.*|EADC|FA|DIFFUSION MAP|(T1|T2|T2\*|T2STAR|R2|R2\*|DENSITY) MAP|[TR][12]_?MAP"
+            r"|FF|FAT_?FRACTION|[TR]2_?STAR"
             r"|CBF|CBV|RCBF|RCBV|MTT|TTP|TMAX|PERFUSION MAP|STD_DEVIATION|EFF_ATOMIC_NUM"
             r"|ELECTRON_DENSITY|MAT_(SPECIFIC|REMOVED|FRACTIONAL|VALUE_BASED)",
             "parametric map",
         ),
     )
 )
-# words of ImageType that name a contrast
+# words of ImageType that name a contrast, the one that is shown first at the top
 _CONTRASTS = {
     **dict.fromkeys(("W", "WATER"), "water"),
-    **dict.fromkeys(("F", "FAT"), "fat"),
     **dict.fromkeys(("IN_PHASE", "INPHASE", "IP"), "in phase"),
     **dict.fromkeys(("OUT_PHASE", "OPP_PHASE", "OPPOSED_PHASE", "OP"), "opposed phase"),
+    **dict.fromkeys(("F", "FAT"), "fat"),
     **dict.fromkeys(("UNI",), "uniform"),
     "INV1": "first inversion",
     "INV2": "second inversion",
@@ -115,6 +116,7 @@ KIND_TAGS: list[Any] = [
     "InversionTime",
     "FlipAngle",
     "AcquisitionNumber",
+    "CorrectedImage",
     "TemporalPositionIdentifier",
     "NominalPercentageOfCardiacPhase",
     "TriggerTime",
@@ -129,6 +131,7 @@ class FrameKind:
     part             of a complex signal: a name above
     role             a key of _RANKS; empty: an image as it was acquired
     contrast_words   contrasts that ImageType names, for the user
+    is_attenuation_corrected  of PET; None: CorrectedImage is not stated
     image_type       ImageType, compared and never shown
     kernel           ConvolutionKernel, shown only in the form of a maker's code
     has_agent        a contrast agent is stated
@@ -141,6 +144,7 @@ class FrameKind:
     part: str = ""
     role: str = ""
     contrast_words: str = ""
+    is_attenuation_corrected: bool | None = None
     image_type: tuple[str, ...] = ()
     kernel: str = ""
     has_agent: bool = False
@@ -166,6 +170,13 @@ class FrameKind:
         )
 
     @property
+    def contrast_rank(self) -> int:
+        """Lower ranks of contrasts are shown first, as water before fat."""
+        order = list(dict.fromkeys(_CONTRASTS.values()))
+        named = [order.index(word) for word in self.contrast_words.split(", ") if word in order]
+        return min(named, default=len(order))
+
+    @property
     def words(self) -> tuple[str, ...]:
         """The part and the role for the user; a plain image has none."""
         return tuple(word for word in (self.part, self.role) if word)
@@ -188,6 +199,7 @@ def kind_of(header: Any, groups: Sequence[Any]) -> FrameKind:
         part=_part(header, groups, words) if is_mr else "",
         role=_role(header, groups, words),
         contrast_words=", ".join(dict.fromkeys(_CONTRASTS[w] for w in words if w in _CONTRASTS)),
+        is_attenuation_corrected=_is_attenuation_corrected(header),
         image_type=words,
         kernel=kernel,
         has_agent=bool(_has_agent(header, groups)),
@@ -274,6 +286,16 @@ def _has_agent(header: Any, groups: Sequence[Any]) -> bool:
         return bool(agent) and agent not in ("NONE", "NO", "WITHOUT", "N/A")
     except DICOM_FAULTS:
         return False
+
+
+def _is_attenuation_corrected(header: Any) -> bool | None:
+    """Return whether PET values are corrected for attenuation; None: not stated."""
+    try:
+        stated = header.get("CorrectedImage") or ()
+        words = (stated,) if isinstance(stated, str) else tuple(stated)
+        return "ATTN" in (str(word).strip().upper() for word in words) if words else None
+    except DICOM_FAULTS:
+        return None
 
 
 def _b_value(header: Any, groups: Sequence[Any]) -> float | None:

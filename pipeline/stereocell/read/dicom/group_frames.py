@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.read.dicom.frame import Frame, Vector
+from stereocell.read.dicom.rounded_positions import restore_positions
 from stereocell.read.dicom.split_kinds import split_kinds
 from stereocell.read.plane_stack import SAME_PLACE, NoStackError, lay_out
 
@@ -151,6 +152,8 @@ def find_groups(frames: Iterable[Frame]) -> list[Group]:
     found = [part for group in whole for part in _parts(group)]
     for group in found:
         group.straighten()
+        group.frames, notes = restore_positions(group.frames, _axes(group)[0])
+        group.notes += notes
     return found
 
 

@@ -65,7 +65,7 @@ def _kernel_words(value: Any, place: int) -> str:
 
 
 def _type_words(value: Any, place: int) -> str:
-    contrast, origin, _ = value
+    _, contrast, origin, _ = value
     if contrast:
         return str(contrast)
     return f"{origin.lower() or 'unknown'} image type no. {place + 1}"
@@ -76,10 +76,22 @@ def _acquisition_words(value: Any, place: int) -> str:
     return f"acquisition {value:g}" if is_shown else f"acquisition no. {place + 1}"
 
 
-def _type_of(frame: Frame) -> tuple[str, str, tuple[str, ...]]:
-    words = frame.kind.image_type
-    origin = words[0] if words and words[0] in ("ORIGINAL", "DERIVED") else ""
-    return frame.kind.contrast_words, origin, words
+def _type_of(frame: Frame) -> tuple[int, str, str, tuple[str, ...]]:
+    kind = frame.kind
+    origin = kind.image_type[0] if kind.image_type[:1] in (("ORIGINAL",), ("DERIVED",)) else ""
+    return kind.contrast_rank, kind.contrast_words, origin, kind.image_type
+
+
+def _attenuation_of(frame: Frame) -> int | None:
+    """Return 0 of corrected images, which are shown first."""
+    is_corrected = frame.kind.is_attenuation_corrected
+    return None if is_corrected is None else int(not is_corrected)
+
+
+def _attenuation_words(value: Any, _: int) -> str:
+    if value is None:
+        return ""
+    return "no attenuation correction" if value else "attenuation corrected"
 
 
 _ACQUISITION = Property(_kind("acquisition"), _acquisition_words, is_time=True)
@@ -95,6 +107,7 @@ PROPERTIES = (
     Property(_kind("echo_number"), _measured("echo {:g}")),
     Property(_kind("inversion_time"), _measured("inversion time {:g} ms"), 0.01),
     Property(_kind("flip_angle"), _measured("flip angle {:g} degrees"), 0.01),
+    Property(_attenuation_of, _attenuation_words),
     Property(_type_of, _type_words),
     Property(lambda frame: frame.stated.thickness_mm, _measured("slices {:g} mm thick"), 0.05),
     _ACQUISITION,
