@@ -42,25 +42,6 @@ function largestAround(values: readonly number[], width: number, stride: number)
   });
 }
 
-/** The silhouette with all that the object encloses. */
-export function filled(silhouette: Silhouette, width: number): Silhouette {
-  const height = silhouette.length / width;
-  const isOutside = silhouette.map(() => false);
-  const open = silhouette.flatMap((_, i) => {
-    const [x, y] = [i % width, Math.floor(i / width)];
-    return x === 0 || y === 0 || x === width - 1 || y === height - 1 ? [i] : [];
-  });
-  for (let i = open.pop(); i !== undefined; i = open.pop()) {
-    if (isOutside[i] || silhouette[i]) continue;
-    isOutside[i] = true;
-    if (i % width > 0) open.push(i - 1);
-    if (i % width < width - 1) open.push(i + 1);
-    if (i >= width) open.push(i - width);
-    if (i + width < silhouette.length) open.push(i + width);
-  }
-  return isOutside.map((outside) => !outside);
-}
-
 /** Intersection over union. */
 export function overlap(a: Silhouette, b: Silhouette): number {
   const both = a.filter((inside, i) => inside && b[i]).length;
