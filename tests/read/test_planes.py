@@ -367,7 +367,9 @@ def test_only_the_planes_of_a_window_are_decoded(
         return once(path, named)
 
     monkeypatch.setitem(
-        planes_files._FORMATS, "tiff", planes_files._Format(planes_files._tiff_head, counting)
+        planes_files._FORMATS,
+        "tiff",
+        planes_files._Format(planes_files._FORMATS["tiff"].head, counting),
     )
     dataset.read(0, Box((3, 0, 0), (5, 2, 2)))
     assert decoded == ["z03.tif", "z04.tif"]

@@ -117,6 +117,7 @@ def test_planes_of_a_folder_stand_as_their_orientation_states(
         ({"cf": 0, "c0": 0.0, "c1": 1.0, "vunit": "Gray Value"}, BODY, ""),
         ({"cf": 1, "c0": 0.0, "c1": 1.0, "c2": 2.0, "vunit": "OD"}, BODY, "no straight line"),
         ({"cf": 20}, BODY, ""),
+        ({"c0": -1024.0, "c1": 2.0}, BODY * 2.0 - 1024, "-1024 + 2"),
         ({}, BODY, ""),
     ],
 )

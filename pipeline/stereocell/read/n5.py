@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import settle_stated_axes
+from stereocell.read.bdv_described import Described
 from stereocell.read.bdv_image import chosen_view, grids_of, image_of
-from stereocell.read.bdv_registration import registered
-from stereocell.read.bdv_xml import Described, read_described
+from stereocell.read.bdv_times import with_times
+from stereocell.read.bdv_xml import read_described
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.n5_blocks import unpack_block
@@ -128,22 +129,15 @@ def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str 
         described = Described({})
         if location.is_local and number:
             described = read_described(os.path.dirname(location.source))
-        own = described.setups.get(int(number[1])) if number else None
-        placed = {
-            (time, 0): matrix
-            for (time, setup), matrix in described.registrations.items()
-            if number and setup == int(number[1])
-        }
-        alone = Described({0: own} if own else {}, described.times, placed)
-        return _container(files, [""], alone)
+        own = int(number[1]) if number else 0
+        return _container(files, {own: ""}, described.alone(own))
     if "dimensions" in files.attributes("setup0/timepoint0/s0"):
         numbers = files.numbered("setup")[:MAX_CHANNELS]
         if not numbers:
             numbers = list(range(_count(files, "setup{}/timepoint0/s0", MAX_CHANNELS)))
         described = read_described(location.source, xml) if location.is_local else Described({})
-        return _container(
-            files, [f"setup{number}/" for number in numbers], described, (series, xml)
-        )
+        folders = {number: f"setup{number}/" for number in numbers}
+        return _container(files, folders, described, (series, xml))
     found = files.datasets(_LISTED + 1)
     if len(found) == 1:
         return _pyramid(files, attributes, [(found[0], files.attributes(found[0]))], axes)
@@ -199,43 +193,51 @@ def _pyramid(
 
 def _container(
     files: N5Files,
-    setups: Sequence[str],
+    folders: Mapping[int, str],
     described: Described,
     view: tuple[int, str] = (0, ""),
 ) -> Image:
     """Return the image of a view in BigDataViewer's container: its setups are channels.
 
-    setups     the folders of the setups, each with a slash at its end
+    folders    the folders of the setups, by number, each with a slash at its end
     described  the setups and time points of the XML
     view       number of the view as the XML lists them, from 1 (0: the largest), and the path of
                the XML that the user named
     """
-    numbers = [int(setup[len("setup") : -1] or 0) for setup in setups]
-    times = files.numbered(f"{setups[0]}timepoint")[:_MAX_TIMES]
-    times = times or list(range(_count(files, f"{setups[0]}timepoint{{}}/s0", _MAX_TIMES)))
-    described.require_views(files.where, numbers, times)
-    if len(setups) > 1:
-        numbers, notes = chosen_view(files.where, described, numbers, *view)
-        setups = [f"setup{number}/" for number in numbers]
-    else:
-        notes = ()
-    levels = _levels(files, f"{setups[0]}timepoint{times[0]}")
+    times = sorted({time for folder in folders.values() for time in _times(files, folder)})
+    described.require_views(files.where, list(folders), times)
+    numbers, notes = chosen_view(files.where, described, list(folders), *view)
+    taken = described.taken(files.where, numbers, times)
+    first = min(taken, key=lambda one: (numbers.index(one[1]), one[0]))
+    setup, path = folders[first[1]], f"{folders[first[1]]}timepoint{first[0]}"
+    levels = _levels(files, path)
+
+    def view_of(time: int, number: int, level: int) -> N5Array | None:
+        if (time, number) not in taken:
+            return None
+        return _dataset(files, f"{folders[number]}timepoint{time}/s{level}")
+
     views = [
-        [[_dataset(files, f"{setup}timepoint{t}/s{index}") for setup in setups] for t in times]
+        [[view_of(time, number, index) for number in numbers] for time in times]
         for index in range(len(levels))
     ]
-    group = files.attributes(setups[0].rstrip("/"))
+    group = files.attributes(setup.rstrip("/"))
     if isinstance(factors := group.get("downsamplingFactors"), list) and len(factors) > len(levels):
         raise SourceError(
-            f"{files.where}: {setups[0]}: found {len(levels)} levels, expected {len(factors)} as "
+            f"{files.where}: {setup}: found {len(levels)} levels, expected {len(factors)} as "
             "downsamplingFactors: a part is missing: copy it again"
         )
-    first = files.attributes(f"{setups[0]}timepoint{times[0]}")
-    stated, more = settle_spacing(first, {}, "zyx")
+    stated, more = settle_spacing(files.attributes(path), {}, "zyx")
     scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
     image = image_of(files.where, views, scales, stated, described.among(numbers))
-    image = registered(image, described, numbers, times[0])
+    image = with_times(files.where, image, described, numbers, times)
     return replace(image, notes=(*notes, *more, *image.notes))
+
+
+def _times(files: N5Files, folder: str) -> list[int]:
+    """Return the numbers of a setup's time points. At an address they are counted one by one."""
+    found = files.numbered(f"{folder}timepoint")[:_MAX_TIMES]
+    return found or list(range(_count(files, f"{folder}timepoint{{}}/s0", _MAX_TIMES)))
 
 
 def _dataset(files: N5Files, path: str) -> N5Array:

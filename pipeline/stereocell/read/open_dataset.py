@@ -59,9 +59,10 @@ def open(
     location, reader = find_reader(source)
     with library_boundary(location.shown, f"{reader.name} that is whole"):
         image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
-        if dark:
-            image = _inverted(image)
         try:
+            image = _at_time(location.shown, image, time)
+            if dark:
+                image = _inverted(image)
             return _dataset(location, image, time, spacing_um)
         except BaseException:
             if image.close is not None:
@@ -74,11 +75,6 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     finest = image.arrays[0]
     _check_arrays(where, image)
     grids, level_notes = settle_levels(image.grids)
-    if not 0 <= time < finest.size("t"):
-        raise UsageError(
-            f"{where}: --time: found {time}, expected 0 to {finest.size('t') - 1} "
-            f"(the source holds {finest.size('t')} time points)"
-        )
     given = [printable(name or "") for name in image.names]
     channels = map(ChannelInfo, _unique(given), image.colors, map(bool, given))
     return Dataset(
@@ -109,6 +105,17 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         objects=image.objects,
         offset_um=image.grids[0].offset_um or (0.0, 0.0, 0.0),
     )
+
+
+def _at_time(where: str, image: Image, time: int) -> Image:
+    """Return an image as one time point has it. Raises UsageError for a time that isn't there."""
+    count = image.arrays[0].size("t")
+    if not 0 <= time < count:
+        raise UsageError(
+            f"{where}: --time: found {time}, expected 0 to {count - 1} "
+            f"(the source holds {count} time points)"
+        )
+    return image if image.at_time is None else image.at_time(image, time)
 
 
 def _inverted(image: Image) -> Image:

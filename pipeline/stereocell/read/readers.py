@@ -29,6 +29,11 @@ _SURFACES = (
 )
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp")  # which are planes of a folder
 _FOLDERS = ("planes", "dicom")  # formats of folders whose files may have any name
+_DICOM_ORDER = (
+    "images before phases, projections and localizers, larger series first; then images as "
+    "acquired before derived ones, in phase and water before opposed phase and fat, then lower "
+    "echo times, b-values and energies"
+)
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 
 
@@ -38,6 +43,7 @@ class Reader:
 
     title       the format's usual name
     has_series  one source may hold several images: `read_image(location, series=1)`
+    order       a sentence on the order of its images; empty: the source's own
     has_pattern names of files tell what they hold: `read_image(location, pattern="a_z{z}.tif")`
     has_axes    a source may not name its axes: `read_image(location, axes="czyx")`
     is_remote   it is read from an address, too
@@ -46,6 +52,7 @@ class Reader:
     module: str
     title: str
     has_series: bool = False
+    order: str = ""
     has_pattern: bool = False
     has_axes: bool = False
     is_remote: bool = False
@@ -71,7 +78,9 @@ class Reader:
 
 
 READERS = {
-    "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", has_axes=True, is_remote=True),
+    "ome-zarr": Reader(
+        "stereocell.read.ome_zarr", "OME-Zarr", has_series=True, has_axes=True, is_remote=True
+    ),
     "tiff": Reader("stereocell.read.tiff", "TIFF", has_series=True, has_axes=True, is_remote=True),
     "planes": Reader(
         "stereocell.read.planes",
@@ -79,7 +88,9 @@ READERS = {
         has_series=True,
         has_pattern=True,
     ),
-    "dicom": Reader("stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True),
+    "dicom": Reader(
+        "stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True, order=_DICOM_ORDER
+    ),
     "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze"),
     "mgh": Reader("stereocell.read.mgh", "MGH (FreeSurfer)"),
     "ims": Reader("stereocell.read.ims", "Imaris"),
@@ -173,6 +184,11 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     with library_boundary(location.shown, f"{reader.name} that is whole"):
         lines: tuple[str, ...] = import_module(reader.module).list_series(location)
     return lines
+
+
+def series_order(source: str | Path) -> str:
+    """Return a sentence on the order of `list_series`; empty: that of the source itself."""
+    return find_reader(source)[1].order
 
 
 def _unknown(location: Location) -> SourceError:

@@ -53,6 +53,12 @@ class ValueScale:
         """Whether some stored values stand for no measurement."""
         return bool(self.missing) or self.low > -np.inf or self.high < np.inf
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether the stored numbers are the values."""
+        is_same = (self.slope, self.intercept) == (1.0, 0.0) and self.signed is None
+        return is_same and not self.has_gaps
+
 
 def scaled(
     where: str, array: StoredArray, attributes: Mapping[str, Any]
@@ -64,8 +70,7 @@ def scaled(
     Raises SourceError where a stated factor is no finite number.
     """
     scale = scale_of(where, np.dtype(array.dtype), attributes)
-    is_plain = (scale.slope, scale.intercept) == (1.0, 0.0) and scale.signed is None
-    if is_plain and not scale.has_gaps:
+    if scale.is_plain:
         return array, scale.notes
     return ScaledArray(array, scale), scale.notes
 
@@ -232,37 +237,40 @@ class ScaledArray:
     def __init__(self, array: StoredArray, scale: ValueScale) -> None:
         self.shape, self.chunks = tuple(array.shape), tuple(array.chunks)
         self._array, self._scale = array, scale
-        self._stored = _resigned(np.dtype(array.dtype), scale)
-        is_float = self._stored.kind == "f"  # such a fill value was rounded as the voxels were
-        kind = self._stored.type if is_float else float
-        self._missing = [kind(value) for value in scale.missing]
-        self.dtype = self._values_dtype()
+        self.dtype = dtype_of_values(np.dtype(array.dtype), scale)
 
     @property
     def stored(self) -> StoredArray:
         """The array as it is stored."""
         return self._array
 
-    def _values_dtype(self) -> np.dtype[Any]:
-        scale, stored = self._scale, self._stored
-        if scale.has_gaps or stored.kind not in "iu":
-            return np.dtype(np.float64 if stored.itemsize > 4 else np.float32)
-        if (scale.slope, scale.intercept) == (1.0, 0.0):
-            return stored
-        limits = np.iinfo(stored)
-        return dtype_for([(float(limits.min), float(limits.max), scale.slope, scale.intercept)])
-
     def __getitem__(self, key: Any) -> NDArray[Any]:
-        scale = self._scale
-        stored = np.asarray(self._array[key])
-        if stored.dtype != self._stored:
-            stored = stored.view(self._stored)
-        if stored.dtype.kind == "b":
-            stored = stored.astype(np.uint8)
-        values = rescale(stored, scale.slope, scale.intercept, self.dtype)
-        if not scale.has_gaps:
-            return values
-        is_gap = (stored < scale.low) | (stored > scale.high)
-        for missing in self._missing:
-            is_gap |= stored == missing
-        return np.where(is_gap, values.dtype.type(np.nan), values)
+        return values_of(np.asarray(self._array[key]), self._scale, self.dtype)
+
+
+def dtype_of_values(stored: np.dtype[Any], scale: ValueScale) -> np.dtype[Any]:
+    """Return the dtype of the values of stored numbers."""
+    stored = _resigned(stored, scale)
+    if scale.has_gaps or stored.kind not in "iu":
+        return np.dtype(np.float64 if stored.itemsize > 4 else np.float32)
+    if (scale.slope, scale.intercept) == (1.0, 0.0):
+        return stored
+    limits = np.iinfo(stored)
+    return dtype_for([(float(limits.min), float(limits.max), scale.slope, scale.intercept)])
+
+
+def values_of(stored: NDArray[Any], scale: ValueScale, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return the values of stored numbers in `dtype`; NaN where there is no measurement."""
+    signed = _resigned(stored.dtype, scale)
+    if stored.dtype != signed:
+        stored = stored.view(signed)
+    if stored.dtype.kind == "b":
+        stored = stored.astype(np.uint8)
+    values = rescale(stored, scale.slope, scale.intercept, dtype)
+    if not scale.has_gaps:
+        return values
+    is_gap = (stored < scale.low) | (stored > scale.high)
+    kind = signed.type if signed.kind == "f" else float  # a float's fill value was rounded as well
+    for missing in scale.missing:
+        is_gap |= stored == kind(missing)
+    return np.where(is_gap, values.dtype.type(np.nan), values)

@@ -142,8 +142,9 @@ def _positions(
         path = f"{one.path}/{name}".lstrip("/")
         with quiet(), one_line(f"{one.location.shown}/{path}", "an array of positions"):
             node = one.group.get(name)
-            is_list = isinstance(node, zarr.Array) and node.shape == (size,)
-            if not is_list or node.dtype.kind not in "iuf" or not 1 < size <= MAX_POSITIONS:
+            if not isinstance(node, zarr.Array) or node.shape != (size,):
+                continue
+            if node.dtype.kind not in "iuf" or not 1 < size <= MAX_POSITIONS:
                 continue
             array = open_array(one.location, one.store, path, title="positions")
             values = with_values(one.location.shown, VoxelArray(array, ("x",)))[0].array

@@ -340,8 +340,10 @@ def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
     if len(found.stacks) == 1:
         return ()
     number = found.stacks.index(stack) + 1
-    most = max(other.voxels * len(other.times) for other in found.stacks)
-    why = "the largest" if stack.voxels * len(stack.times) == most else "the first image of all"
+    sizes = [other.voxels * len(other.times) for other in found.stacks]
+    why = "the largest" if sizes.count(max(sizes)) == 1 else "the first of the largest"
+    if sizes[number - 1] < max(sizes):
+        why = "the first image of all"
     choice = (
         f"{len(found.stacks)} series or orientations; building --series {number}, "
         f"{'asked for' if series else why}: {stack.label}"

@@ -7,7 +7,8 @@ each place are points in time (read/dicom/points_in_time.py); a point that lacks
 of its own. Of other frames at one place the first by instance number is taken.
 
 Series are in the order of their best stacks, images before phases, projections and localizers, and
-so are the stacks of a series.
+so are the stacks of a series. Larger series come first; of equal ones, images as acquired, and the
+contrast that looks like a conventional image: in phase, water, opposed phase, fat.
 """
 
 from collections.abc import Iterable, Sequence
@@ -42,7 +43,7 @@ class Stack:
     layout   the planes' grid; None: they make no volume, and `problem` gives the reason
     notes    changes and omissions, a sentence each
     words    what separates it from other stacks of the series, such as `magnitude`
-    order    sorts it among those
+    order    sorts it among those: rank of its kind, rank of its contrast, places of other values
     """
 
     times: tuple[tuple[Frame, ...], ...]
@@ -113,7 +114,8 @@ def is_other_kind(other: Stack, stack: Stack) -> bool:
 
 def _sorted(stacks: Sequence[Stack]) -> tuple[Stack, ...]:
     def own(stack: Stack) -> tuple[object, ...]:
-        return (stack.rank, -stack.voxels, stack.order, stack.first.file, stack.first.index)
+        kind = stack.order[:2]
+        return (kind, -stack.voxels, stack.order, stack.first.file, stack.first.index)
 
     best: dict[bytes, Stack] = {}
     for stack in sorted(stacks, key=lambda s: (s.layout is None, own(s))):
@@ -123,7 +125,7 @@ def _sorted(stacks: Sequence[Stack]) -> tuple[Stack, ...]:
         leader = best[stack.first.series]
         side = leader.rank if leader.rank >= _SIDE else 0
         total = -leader.voxels * len(leader.times)
-        place = (side, total, leader.first.file, leader.first.index)
+        place = (side, total, leader.order[:2], leader.first.file, leader.first.index)
         return (stack.layout is None, stack.first.segmentation is not None, place, own(stack))
 
     return tuple(sorted(stacks, key=key))
@@ -145,16 +147,18 @@ def _stacks(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> l
     near = SAME_PLACE * min(group.spacing)
     points = find_points(_places(group), normal, near, are_equal)
     kind = group.frames[0].kind
-    words = (*kind.words, *group.words)
+    words = (*kind.words, *_contrasts(group), *group.words)
     notes = [*group.notes, *neighbours]
     slices = 1 + max(frame.tile for frame in group.frames)
     if slices > 1:
         notes.append(f"mosaics of {slices} slices in one image: taken apart")
     notes += _time_notes(points)
-    stacks = [_stack(points.whole, group, notes, words, (kind.rank, *group.order))]
+    stacks = [
+        _stack(points.whole, group, notes, words, (kind.rank, kind.contrast_rank, *group.order))
+    ]
     for place, point in enumerate(points.incomplete):
         rest = f"incomplete point in time {len(points.whole) + place + 1}"
-        order = (_LAST, *group.order, place)
+        order = (_LAST, kind.contrast_rank, *group.order, place)
         stacks.append(_stack((point,), group, [], (*words, rest), order))
     return stacks
 
@@ -183,6 +187,13 @@ def _stack(
     stated = geometry_notes(times[0], layout)
     found = (*notes, *layout.notes, *stated)
     return Stack(times, layout, "", found, words, order)
+
+
+def _contrasts(group: Group) -> tuple[str, ...]:
+    """Return the contrasts that all frames share and that `group.words` doesn't name already."""
+    shared = {frame.kind.contrasts for frame in group.frames}
+    named = ", ".join(group.words)
+    return tuple(w for w in next(iter(shared)) if w not in named) if len(shared) == 1 else ()
 
 
 def _time_notes(points: Points) -> list[str]:

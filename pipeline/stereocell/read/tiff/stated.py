@@ -18,6 +18,8 @@ from stereocell.model.color import linear_color
 from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
 from stereocell.read.stated_numbers import number_of
+from stereocell.read.tiff.gdal import gdal_scale
+from stereocell.read.value_scale import ValueScale
 
 _CENTIMETRE = 3  # TIFF tag ResolutionUnit
 _ESCAPED = re.compile(r"\\u([0-9A-Fa-f]{4})")
@@ -33,7 +35,7 @@ class Stated:
     spacing_um  (z, y, x), um
     names       of channels, maybe fewer than there are; `colors` the same, linear RGB
     hint        where a missing spacing may come from
-    calibration  intercept and slope from stored numbers to values; None: none
+    values      how stored numbers become values
     notes       sentences for the user
     """
 
@@ -41,7 +43,7 @@ class Stated:
     names: tuple[str | None, ...] = ()
     colors: tuple[Color | None, ...] = ()
     hint: str = ""
-    calibration: tuple[float, float] | None = None
+    values: ValueScale = ValueScale()  # noqa: RUF009  (frozen)
     notes: tuple[str, ...] = ()
 
 
@@ -56,7 +58,12 @@ def stated_by(tiff: TiffFile) -> Stated:
     z, y, x = stated.spacing_um
     if y is None and x is None:
         _, y, x = _by_tags(tiff)
-    return replace(stated, spacing_um=(z, y, x))
+    stated = replace(stated, spacing_um=(z, y, x))
+    by_gdal = gdal_scale(tiff.pages.first)
+    if not by_gdal.notes:
+        return stated
+    values = by_gdal if stated.values.is_plain else stated.values
+    return replace(stated, values=values, notes=(*stated.notes, *by_gdal.notes))
 
 
 def _imagej(tiff: TiffFile) -> Stated:
@@ -70,17 +77,17 @@ def _imagej(tiff: TiffFile) -> Stated:
     hint = "ImageJ leaves out a depth of 1" if "spacing" not in meta else ""
     luts = meta.get("LUTs")
     colors = tuple(_lut_color(lut) for lut in luts) if isinstance(luts, list) else ()
-    calibration, notes = _imagej_calibration(meta)
+    values, notes = _imagej_calibration(meta)
     notes += _label_notes(meta)
-    return Stated((z, y, x), _imagej_names(meta), colors, hint, calibration, notes)
+    return Stated((z, y, x), _imagej_names(meta), colors, hint, values, notes)
 
 
-def _imagej_calibration(
-    meta: Mapping[str, Any],
-) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
-    """Return intercept and slope of ImageJ's values, and notes. `cf` is the kind of function."""
-    if (kind := meta.get("cf")) is None or kind in _UNCALIBRATED:
-        return None, ()
+def _imagej_calibration(meta: Mapping[str, Any]) -> tuple[ValueScale, tuple[str, ...]]:
+    """Return the scale of ImageJ's values, and notes. `cf` is the kind of function."""
+    # ImageJ takes factors without a function for a straight line
+    kind = meta.get("cf", _STRAIGHT if {"c0", "c1"} <= meta.keys() else None)
+    if kind is None or kind in _UNCALIBRATED:
+        return ValueScale(), ()
     factors = [_times(1.0, meta.get(name)) for name in ("c0", "c1")]
     intercept, slope = factors
     unit = _name(meta.get("vunit", "")) or "values"
@@ -89,14 +96,14 @@ def _imagej_calibration(
             f"values: ImageJ's calibration ({unit}) is no straight line: the voxels are read as "
             "they are stored"
         )
-        return None, (note,)
+        return ValueScale(), (note,)
     if (intercept, slope) == (0.0, 1.0):
-        return None, ()
+        return ValueScale(), ()
     note = (
         f"values: ImageJ's calibration {intercept:g} + {slope:g} * stored number ({unit}) is "
         "applied"
     )
-    return (intercept, slope), (note,)
+    return ValueScale(slope=slope, intercept=intercept), (note,)
 
 
 def _imagej_names(meta: Mapping[str, Any]) -> tuple[str | None, ...]:
