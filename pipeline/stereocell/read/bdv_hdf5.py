@@ -74,7 +74,7 @@ def read_image(tree: Hdf5Tree, location: Location, *, series: int = 0, xml: str 
     first = next(group for row in groups for group in row if group is not None)
     count = _count_levels(tree, first, setups[0])
     levels = [
-        [[group and _cells(tree, f"{group}/{level}/cells") for group in row] for row in groups]
+        [[_cells(tree, f"{one}/{level}/cells") if one else None for one in row] for row in groups]
         for level in range(count)
     ]
     factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]

@@ -117,9 +117,9 @@ def _read(
             "attribute `multiscales` of an image"
         )
     converted = converted_of(location)
-    image = _image(tree, store, ome, axes, converted)
-    is_described = converted is not None and converted.shape == image.arrays[0].shape
-    return image, converted.root if converted is not None and is_described else None
+    found = _image(tree, store, ome, axes, converted)
+    is_described = converted is not None and converted.shape == found.arrays[0].shape
+    return found, converted.root if converted is not None and is_described else None
 
 
 def _image(
