@@ -12,7 +12,7 @@ from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Image
 from stereocell.read.series import choose
 from stereocell.read.spacing import Grid, Triple
-from stereocell.read.statements import Statement, Subject, Trust, settle
+from stereocell.read.statements import Statement, Subject, Trust, omission, settle
 
 # The views of one level, by time and then by setup, each (z, y, x). None: the view is missing.
 Views = Sequence[Sequence[StoredArray | None]]
@@ -98,6 +98,18 @@ def chosen_view(
     if notes and not xml:
         notes = (f"{notes[0]} (--series needs the name of the XML)",)
     return views[index], notes
+
+
+def common_levels(counts: Sequence[int]) -> tuple[int, tuple[str, ...]]:
+    """Return the number of levels that all setups have, and a note where some have more.
+
+    counts  of the setups' levels
+    """
+    fewest, most = min(counts), max(counts)
+    if fewest == most:
+        return fewest, ()
+    found = f"{most - fewest} of {most} levels of detail"
+    return fewest, (omission(found, f"some setups have {fewest} alone"),)
 
 
 def grids_of(

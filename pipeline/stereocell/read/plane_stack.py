@@ -81,9 +81,10 @@ class StackLayout:
             wide = self.gaps_mm[self.gaps_mm > 1.5 * spacing]
             shown = ", ".join(f"{gap:.4g}" for gap in wide[:6]) + (", ..." if len(wide) > 6 else "")
             total = len(self.gaps_mm) + 1 + self.missing
+            missing = f"{self.missing} missing slice{'s' * (self.missing > 1)}"
             notes.append(
-                f"{self.missing} missing slices of {total} ({self.missing / total:.1%}), gaps of "
-                f"{shown} mm among slices {spacing:.4g} mm apart: interpolated"
+                f"{missing} of {total} ({self.missing / total:.1%}), gaps of {shown} mm among "
+                f"slices {spacing:.4g} mm apart: interpolated"
             )
         if self.tilt_deg:
             notes.append(

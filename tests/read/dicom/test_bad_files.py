@@ -228,7 +228,7 @@ def test_files_cut_short_are_left_out_and_their_gap_is_told(tmp_path: Path) -> N
     paths = series(tmp_path / "s")
     paths[2].write_bytes(paths[2].read_bytes()[:-500])
     notes = read.open(tmp_path / "s").notes
-    assert any(f"1 missing slices of {len(paths)} (" in note for note in notes)
+    assert any(f"1 missing slice of {len(paths)} (" in note for note in notes)
     assert any("1 cut short" in note for note in notes)
 
 

@@ -74,11 +74,18 @@ def _imagej(tiff: TiffFile) -> Stated:
         per = dict.fromkeys("zyx", um_per("cm"))
     y, x = (_over(per[axis], _resolution(tiff, axis)) for axis in "yx")
     z = _times(per["z"], meta.get("spacing"))
+    step_notes: tuple[str, ...] = ()
+    if z is not None and z < 0:  # the sign is that of the stage's way; ImageJ leaves it out, too
+        z = -z
+        step_notes = (
+            f"voxel spacing along z: ImageJ states {-z:.5g} um: the planes are read in the order "
+            "of the file",
+        )
     hint = "ImageJ leaves out a depth of 1" if "spacing" not in meta else ""
     luts = meta.get("LUTs")
     colors = tuple(_lut_color(lut) for lut in luts) if isinstance(luts, list) else ()
     values, notes = _imagej_calibration(meta)
-    notes += _label_notes(meta)
+    notes = (*step_notes, *notes, *_label_notes(meta))
     return Stated((z, y, x), _imagej_names(meta), colors, hint, values, notes)
 
 
