@@ -74,7 +74,10 @@ def read_image(tree: Hdf5Tree, location: Location, *, series: int = 0, xml: str 
     ]
     count, level_notes = _common_levels(tree, groups, setups)
     levels = [
-        [[_cells(tree, f"{one}/{level}/cells") if one else None for one in row] for row in groups]
+        [
+            [None if group is None else _cells(tree, f"{group}/{level}/cells") for group in row]
+            for row in groups
+        ]
         for level in range(count)
     ]
     factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]

@@ -10,7 +10,6 @@ absent block is 0.
 References: https://github.com/saalfeldlab/n5 (the specification in its README)
 """
 
-import math
 import os
 import re
 import struct
@@ -23,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
-from stereocell.read.array_axes import settle_axes
-from stereocell.read.array_spacing import spacing_of
+from stereocell.read.array_axes import settle_stated_axes
 from stereocell.read.bdv_described import Described
 from stereocell.read.bdv_image import chosen_view, common_levels, grids_of, image_of
 from stereocell.read.bdv_times import with_times
@@ -33,9 +31,11 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.n5_blocks import unpack_block
 from stereocell.read.n5_files import N5Files
+from stereocell.read.n5_statements import named_axes, order_note, settle_spacing
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import Triple
 from stereocell.read.stated_numbers import numbers_of
+from stereocell.read.value_scale import ignored_note, scaled
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
@@ -170,19 +170,24 @@ def _pyramid(
     axes: str,
 ) -> Image:
     arrays = [N5Array(files, path, attributes) for path, attributes in levels]
-    named = levels[0][1].get("axes", group.get("axes"))
-    listed = [str(a).lower() for a in reversed(named)] if isinstance(named, list) else []
-    names, notes = settle_axes(files.where, arrays[0].shape, axes, named=listed)
+    finest = levels[0][1]
+    shape = arrays[0].shape
+    stated = named_axes(finest, group)
+    names, notes = settle_stated_axes(files.where, shape, axes, stated)
     if any(len(array.shape) != len(names) for array in arrays):
         raise SourceError(f"{files.where}: levels: expected {len(names)} dimensions in each")
-    voxels = tuple(VoxelArray(array, names) for array in arrays)
+    valued = [scaled(files.where, array, finest) for array in arrays]
+    voxels = tuple(VoxelArray(array, names) for array, _ in valued)
     if (count := voxels[0].size("c")) > MAX_CHANNELS:
         raise SourceError(f"{files.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
-    finest = _spacing(levels[0][1], names) or _spacing(group, names)
+    spacing, spacing_notes = settle_spacing(finest, group, names)
     scales = [_factors(group, attributes, i, names) for i, (_, attributes) in enumerate(levels)]
-    grids = grids_of([v.shape for v in voxels], finest, scales)
+    grids = grids_of([v.shape for v in voxels], spacing, scales)
     unnamed = (None,) * count
     read = tuple(files.address(path) for path, _ in levels)
+    notes = (*notes, *order_note(stated, names, axes), *spacing_notes, *valued[0][1])
+    if ignored := ignored_note("the group", group):
+        notes = (*notes, ignored)
     return Image(voxels, grids, unnamed, unnamed, 1, notes=notes, files=read)
 
 
@@ -216,11 +221,11 @@ def _container(
         for index in range(len(levels))
     ]
     group = files.attributes(folders[first].rstrip("/"))
-    stated = _spacing(files.attributes(path), "zyx")
+    stated, more = settle_spacing(files.attributes(path), {}, "zyx")
     scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
     image = image_of(files.where, views, scales, stated, described.among(numbers))
     image = with_times(files.where, image, described, numbers, times)
-    return replace(image, notes=(*notes, *level_notes, *image.notes))
+    return replace(image, notes=(*notes, *level_notes, *more, *image.notes))
 
 
 def _common_levels(
@@ -284,24 +289,6 @@ def _factors(
         along = dict(zip(reversed([a for a in axes if a in "zyx"]), found, strict=True))
     values = [along.get(axis, 0.0) for axis in "zyx"]
     return (values[0], values[1], values[2]) if min(values) > 0 else None
-
-
-def _spacing(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | None:
-    """Return the spacing (z, y, x), um, of a level's or a group's attributes; None: not stated."""
-    transform = attributes.get("transform")  # COSEM's, axes slowest first
-    if isinstance(transform, Mapping) and isinstance(transform.get("scale"), list):
-        listed = transform.get("axes")
-        named = [str(axis) for axis in listed] if isinstance(listed, list) else []
-        if set("zyx") <= set(named) and math.prod(named.count(a) for a in "zyx") == 1:
-            return spacing_of(numbers_of(transform["scale"]), transform.get("units"), named)
-    sizes: Any = attributes.get("pixelResolution", attributes.get("resolution"))
-    unit: Any = None
-    if isinstance(sizes, Mapping):
-        sizes, unit = sizes.get("dimensions"), sizes.get("unit")
-    unit = unit or attributes.get("units", attributes.get("unit"))
-    if isinstance(unit, list):
-        unit = unit[::-1]
-    return spacing_of(numbers_of(sizes)[::-1], unit, axes)
 
 
 def _whole(where: str, attributes: Mapping[str, Any], name: str) -> list[int]:

@@ -33,6 +33,7 @@ from stereocell.read.ngff_sides import with_sides
 from stereocell.read.ngff_statements import dimension_names, settled_axes
 from stereocell.read.series import lines
 from stereocell.read.spacing import Grid, Triple
+from stereocell.read.value_scale import ignored_note
 from stereocell.read.zarr_collections import (
     ZarrTree,
     describe_group,
@@ -91,9 +92,9 @@ def _read(
         guard = GuardedStore(store, location)
         node = zarr.open(guard, mode="r")
     if isinstance(node, zarr.Array):
-        if not axes and (image := image_of_level(location)):
+        if not axes and (whole := image_of_level(location)):
             raise SourceError(
-                f"{where}: found a level of an OME-Zarr image, expected the image, as {image} "
+                f"{where}: found a level of an OME-Zarr image, expected the image, as {whole} "
                 "(--level picks the level), or its axes by --axes"
             )
         return bare_zarr.read_array(location, store, "", axes=axes), None
@@ -117,7 +118,9 @@ def _read(
             "attribute `multiscales` of an image"
         )
     converted = converted_of(location)
-    found = _image(tree, store, ome, axes, converted)
+    found = _image(tree, store, ome, _parsed(where, ome, node), axes, converted)
+    if ignored := ignored_note("the image's group", attributes):
+        found = replace(found, notes=(*found.notes, ignored))
     is_described = converted is not None and converted.shape == found.arrays[0].shape
     return found, converted.root if converted is not None and is_described else None
 
@@ -126,13 +129,12 @@ def _image(
     tree: ZarrTree,
     store: Store,
     ome: Mapping[str, Any],
+    multiscale: Multiscale,
     axes: str,
     converted: Converted | None,
 ) -> Image:
     """Return the first multiscale image of a group's OME attributes. Raises SourceError."""
     location, where = tree.location, tree.location.shown
-    with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.1 to 0.6"):
-        multiscale = ngff.parse(where, ome)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
             f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
@@ -161,10 +163,32 @@ def _image(
         placement=sided.placement,
         has_sides=sided.has_sides,
         acquired=sided.acquired,
-        notes=(*multiscale.notes, *notes, *more, *sided.notes, *notes_on_labels(tree)),
+        notes=(
+            *multiscale.notes,
+            *notes,
+            *more,
+            *sided.notes,
+            *notes_on_labels(tree),
+        ),
         labels=labels_evidence(ome, location),
         objects=notes_of_ngff(ome.get("image-label")),
     )
+
+
+def _parsed(where: str, ome: Mapping[str, Any], group: zarr.Group) -> Multiscale:
+    """Return the metadata of the first image. Raises SourceError, of other versions with a way."""
+    version, titled = ngff.version_of(ome), where
+    expected = "axes, datasets and scales as OME-Zarr 0.1 to 0.6"
+    if not ngff.is_known(version):
+        with quiet(), one_line(where, "a group whose arrays can be listed"):
+            path = next((name for name, node in group.members() if isinstance(node, zarr.Array)), 0)
+        titled = f"{where}: OME-Zarr {version:.20}, a version that is not known"
+        expected += (
+            f"; {where.rstrip('/')}/{path} --axes zyx --spacing-um z,y,x reads the voxels of an "
+            "array as they are stored"
+        )
+    with one_line(f"{titled}: multiscales[0]", expected):
+        return ngff.parse(where, ome)
 
 
 def _levels(

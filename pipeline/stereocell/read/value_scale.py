@@ -9,6 +9,7 @@ whose type has the other one.
 References: CF conventions 1.11, sections 2.5.1 and 8.1; NetCDF Users Guide, attribute conventions.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +23,7 @@ from stereocell.read.rescale import dtype_for, rescale
 from stereocell.read.stated_numbers import number_of, numbers_of
 
 _FILLS = ("_FillValue", "missing_value")
+_SEPARATORS = re.compile(r"[,;\s]+")
 ATTRIBUTES = (
     *("scale_factor", "add_offset", "_Unsigned"),
     *(*_FILLS, "valid_range", "valid_min", "valid_max"),
@@ -71,6 +73,21 @@ def scaled(
     if scale.is_plain:
         return array, scale.notes
     return ScaledArray(array, scale), scale.notes
+
+
+def ignored_note(of: str, attributes: Mapping[str, Any]) -> str:
+    """Return a sentence on factors among the attributes of a group; empty: there are none.
+
+    CF defines them for the array that they stand on, so those of a group are not applied.
+    """
+    stated = {name: attributes.get(name) for name in ("scale_factor", "add_offset")}
+    named = [f"{name} {value}"[:40] for name, value in stated.items() if value is not None]
+    if not named:
+        return ""
+    return (
+        f"values: {' and '.join(named)} of {of} are not applied: they count only among the "
+        "attributes of the array itself"
+    )
 
 
 def scale_of(where: str, stored: np.dtype[Any], attributes: Mapping[str, Any]) -> ValueScale:
@@ -123,6 +140,8 @@ def _gaps(
         found = _stored_values(stored, scale, attributes.get(name))
         if found := tuple(value for value in found if np.isfinite(value)):
             fills[name] = found
+        elif _is_unread(attributes.get(name)):
+            notes.append(f"values: {name} is {_shown(attributes[name])}, no number: it is not used")
     missing = tuple(dict.fromkeys(value for values in fills.values() for value in values))
     if stored.kind in "iu" and scale.slope > 0 and missing == (_least(stored, scale),) == (0.0,):
         missing, fills = (), {}  # 0 of unsigned numbers is the smallest value anyway
@@ -176,15 +195,29 @@ def _limits(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float
 
 def _stored_values(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float, ...]:
     """Return an attribute's numbers in the sign of the voxels; empty: it states none."""
-    if value is None or isinstance(value, str | bytes):
-        return ()
-    numbers = np.ravel(np.asarray(value))
+    numbers = np.ravel(np.asarray(() if value is None else value))
+    if numbers.dtype.kind in "SUO":  # numbers as texts, such as "-9999" or "0, 4095"
+        return tuple(numbers_of(_SEPARATORS.split(" ".join(map(_text, numbers)).strip("[]() "))))
     if scale.signed is not None and numbers.dtype == stored:
         numbers = numbers.view(_resigned(stored, scale))
     try:
         return tuple(number_of(number) for number in numbers)
     except (TypeError, ValueError):
         return ()
+
+
+def _is_unread(value: Any) -> bool:
+    """Return whether an attribute that should be a number is another text."""
+    texts = [_text(one) for one in np.ravel(np.asarray(value))] if value is not None else []
+    return any(texts) and not numbers_of(texts)
+
+
+def _shown(value: Any) -> str:
+    return repr(", ".join(_text(one) for one in np.ravel(np.asarray(value))))[:40]
+
+
+def _text(value: Any) -> str:
+    return str(value.decode("utf-8", "replace") if isinstance(value, bytes) else value).strip()
 
 
 def _least(stored: np.dtype[Any], scale: ValueScale) -> float:

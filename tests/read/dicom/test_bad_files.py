@@ -262,7 +262,7 @@ def test_files_without_preamble_are_read(tmp_path: Path) -> None:
 def test_files_that_others_may_not_stay_for_are_passed_by(tmp_path: Path) -> None:
     series(tmp_path / "s")
     os.mkfifo(tmp_path / "s" / "pipe")  # opening it would wait for ever
-    assert read.open(tmp_path / "s").notes == ("files left out: 1 not DICOM",)
+    assert read.open(tmp_path / "s").notes == ("file left out: 1 not DICOM",)
 
 
 def test_a_folder_of_another_format_is_told_by_what_it_holds(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ CONTRADICTIONS: dict[str, tuple[Change, str]] = {
     ),
     "order of locations": (
         by_number("SliceLocation", lambda n: 2.5 * (n + (n == 4) - (n == 5))),
-        "SliceLocation states another one (1 of 9 steps lead back)",
+        "SliceLocation states another one (1 of 9 steps leads back)",
     ),
     "gantry": (
         setting(GantryDetectorTilt=20.0),

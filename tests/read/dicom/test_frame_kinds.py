@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pydicom
@@ -11,55 +10,9 @@ import SimpleITK
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
+from support.dicom_kinds import AFFINE, SHAPE, added, image_type, private, write_kind
 from support.dicom_reading import whole
 from support.dicom_series import Change, grid, setting, write_enhanced, write_series
-
-SHAPE = (10, 12, 14)
-AFFINE = grid(shape=SHAPE, spacing=(3.0, 2.0, 2.2))
-
-
-def image_type(*words: str) -> Change:
-    return setting(ImageType=["ORIGINAL", "PRIMARY", *words])
-
-
-def private(group: int, creator: str, element: int, vr: str, value: Any) -> Change:
-    def change(ds: pydicom.Dataset) -> None:
-        ds.private_block(group, creator, create=True).add_new(element, vr, value)
-
-    return change
-
-
-def write_kind(
-    folder: Path,
-    add: float,
-    change: Change,
-    *,
-    indices: Iterable[float] = range(10),
-    modality: str = "MR",
-    first_number: int = 1,
-) -> None:
-    """Write slices of series 1.2.3 whose values are the scene's, and `add`."""
-
-    def changed(ds: pydicom.Dataset) -> None:
-        ds.InstanceNumber += first_number - 1
-        change(ds)
-
-    write_series(
-        folder / f"{add:g}",
-        AFFINE,
-        SHAPE,
-        indices=indices,
-        series="1.2.3",
-        intercept=add,
-        change=changed,
-        modality=modality,
-    )
-
-
-def added(folder: Path, series: int = 0, time: int = 0) -> float:
-    """Return the constant that the read volume has above the scene, which is 0 at its edge."""
-    return float(whole(read.open(folder, series=series, time=time)).min())
-
 
 PARTS: dict[str, tuple[Change, Change]] = {
     "Siemens": (image_type("P", "ND"), image_type("M", "ND")),
@@ -181,11 +134,6 @@ PROPERTIES: dict[str, tuple[Change, Change, str]] = {
     "echo number": (setting(EchoNumbers=1), setting(EchoNumbers=2), "echo 2"),
     "inversion time": (setting(InversionTime=700), setting(InversionTime=2500), "2500 ms"),
     "flip angle": (setting(FlipAngle=5), setting(FlipAngle=26), "flip angle 26 degrees"),
-    "attenuation": (
-        setting(CorrectedImage=["DECY", "ATTN"]),
-        setting(CorrectedImage=["DECY"]),
-        "no attenuation correction",
-    ),
     "Dixon": (image_type("M", "WATER"), image_type("M", "FAT"), "fat"),
 }
 
@@ -195,8 +143,7 @@ PROPERTIES: dict[str, tuple[Change, Change, str]] = {
 def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
     tmp_path: Path, name: str, shift: float
 ) -> None:
-    is_ct = name in ("kernel", "energy", "monoenergetic", "contrast")
-    modality = "CT" if is_ct else "PT" if name == "attenuation" else "MR"
+    modality = "CT" if name in ("kernel", "energy", "monoenergetic", "contrast") else "MR"
     first, second, words = PROPERTIES[name]
     write_kind(tmp_path, 100, first, modality=modality)
     indices = [index + shift for index in range(10 - (shift > 0))]
@@ -209,16 +156,6 @@ def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
     assert added(tmp_path, 3 - number) == 100
     assert read.open(tmp_path).levels[0].spacing_um[1] == pytest.approx(3000)
     assert "Jane" not in "".join((*lines, *read.open(tmp_path).notes))
-
-
-def test_water_comes_before_the_other_images_of_a_dixon_series(tmp_path: Path) -> None:
-    for place, word in enumerate(("FAT", "OPP_PHASE", "IN_PHASE", "WATER")):
-        change = image_type("M", word)
-        write_kind(tmp_path, 100 * (place + 1), change, first_number=1 + 20 * place)
-    assert added(tmp_path) == 400
-    words = ("water", "in phase", "opposed phase", "fat")
-    lines = read.list_series(tmp_path)
-    assert [next(word for word in words if word in line) for line in lines] == list(words)
 
 
 @pytest.mark.parametrize("told", [setting(AcquisitionNumber=2), setting()])

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.counted import agreeing
 from stereocell.read.dicom.frame import Frame
 from stereocell.read.plane_stack import REGULAR, StackLayout, normal_of
 from stereocell.read.statements import Statement, Subject, Trust, settle
@@ -123,7 +124,9 @@ def _order_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
             continue
         back = int(min((steps < 0).sum(), (steps > 0).sum()))
         if back:
-            text = f"another one ({back} of {len(steps)} steps lead back)"
+            text = (
+                f"another one ({back} of {len(steps)} steps {agreeing(back, 'leads', 'lead')} back)"
+            )
             statements.append(Statement(text, name, Trust.REPEATED))
     return settle(_ORDER, statements).notes
 

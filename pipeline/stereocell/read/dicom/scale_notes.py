@@ -6,6 +6,7 @@ leave it open the values decide.
 
 from collections.abc import Callable, Sequence
 
+from stereocell.model.counted import agreeing
 from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.value_scale import HOUNSFIELD
 from stereocell.read.statements import Statement, Subject, Trust, settle
@@ -97,7 +98,8 @@ def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
     without = sum(not f.scale.has_rescale and f.encoding.table is None for f in frames)
     if 0 < without < len(frames):
         notes.append(
-            f"{without} of {len(frames)} images state no rescale: their stored values are taken"
+            f"{without} of {len(frames)} images {agreeing(without, 'states', 'state')} no rescale: "
+            f"{agreeing(without, 'its', 'their')} stored values are taken"
         )
     mapped = next((frame for frame in frames if frame.scale.real_world is not None), None)
     if mapped is None or mapped.scale.real_world is None:
