@@ -57,7 +57,7 @@ def stated_by(tiff: TiffFile) -> Stated:
         stated = Stated()
     z, y, x = stated.spacing_um
     if y is None and x is None:
-        _, y, x = _by_tags(tiff)
+        _, y, x = sizes_by_tags(tiff)
     stated = replace(stated, spacing_um=(z, y, x))
     by_gdal = gdal_scale(tiff.pages.first)
     if not by_gdal.notes:
@@ -224,7 +224,7 @@ _READERS: dict[str, Callable[[TiffFile], Stated]] = {
 }
 
 
-def _by_tags(tiff: TiffFile) -> PartialTriple:
+def sizes_by_tags(tiff: TiffFile) -> PartialTriple:
     """Return y and x where the tags state them per centimetre."""
     per = um_per("cm") if _resolution_unit(tiff) == _CENTIMETRE else None
     y, x = (_over(per, _resolution(tiff, axis)) for axis in "yx")
