@@ -73,7 +73,7 @@ def image_of(
     spacing_um, notes = _spacing(setups, stated_um)
     notes = (*notes, *_size_notes(setups, arrays[0].shape), *_setup_notes(setups))
     names = tuple(setup.name if setup is not None else None for setup in setups.values())
-    hint = "" if any(setups.values()) else "BigDataViewer's XML has it, which is not beside"
+    hint = "" if any(setups.values()) else "BigDataViewer states it in an XML, and none lies beside the container"
     return Image(
         tuple(arrays),
         grids_of([array.shape for array in arrays], spacing_um, factors, hint),

@@ -136,7 +136,7 @@ def _are_planes(found: Sequence[TiffPageSeries]) -> bool:
 
 
 def _left_out(found: Sequence[TiffPageSeries], chosen: TiffPageSeries) -> list[str]:
-    """Return a note on the images that are not built, with the first of those of as many voxels."""
+    """Return a note on the images that are not built; it names one that is as large, if any is."""
     others = [one for one in found if one is not chosen]
     if not others:
         return []
