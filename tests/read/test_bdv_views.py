@@ -228,7 +228,7 @@ def test_setups_of_one_channel_are_not_overlaid(tmp_path: Path) -> None:
 def test_setups_without_an_xml_are_channels_with_a_note(tmp_path: Path, kind: str) -> None:
     write(tmp_path, [{"body": BODY, "tile": 0}, {"body": BODY, "tile": 1}], kind=kind).unlink()
     source = tmp_path / ("a.h5" if kind == "hdf5" else "a.n5")
-    with pytest.raises(SourceError, match="BigDataViewer states it in an XML, and none lies beside"):
+    with pytest.raises(SourceError, match="states it in an XML, and none lies beside"):
         read.open(source)
     dataset = read.open(source, spacing_um=(0.5, 0.2, 0.2))
     assert "whether they are tiles, angles or channels" in dataset.notes[0]

@@ -17,6 +17,7 @@ from stereocell.read.statements import Statement, Subject, Trust, omission, sett
 # The views of one level, by time and then by setup, each (z, y, x). None: the view is missing.
 Views = Sequence[Sequence[StoredArray | None]]
 _REMEDY = "--spacing-um z,y,x replaces it"
+_NO_XML = "BigDataViewer states it in an XML, and none lies beside the container"
 _TOLERANCE = 5e-3  # relative difference of two spacings that needs no note
 
 
@@ -73,7 +74,7 @@ def image_of(
     spacing_um, notes = _spacing(setups, stated_um)
     notes = (*notes, *_size_notes(setups, arrays[0].shape), *_setup_notes(setups))
     names = tuple(setup.name if setup is not None else None for setup in setups.values())
-    hint = "" if any(setups.values()) else "BigDataViewer states it in an XML, and none lies beside the container"
+    hint = "" if any(setups.values()) else _NO_XML
     return Image(
         tuple(arrays),
         grids_of([array.shape for array in arrays], spacing_um, factors, hint),
