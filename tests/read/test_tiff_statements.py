@@ -136,6 +136,40 @@ def test_a_calibration_of_imagej_is_applied(
     assert all(told in note for note in notes)
 
 
+@pytest.mark.parametrize(
+    ("per_cm", "unit", "is_noted"),
+    [((20_000, 25_000), "CENTIMETER", True), ((40_000, 50_000), "CENTIMETER", False),
+     ((72 / 2.54, 72 / 2.54), "CENTIMETER", False), ((300, 300), "INCH", False)],
+)  # fmt: skip
+def test_the_resolution_of_the_tags_is_compared_with_the_physical_size(
+    tmp_path: Path, per_cm: tuple[float, float], unit: str, is_noted: bool
+) -> None:
+    path = write_ome(tmp_path / "a.ome.tif", BODY, resolution=per_cm, resolutionunit=unit)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(UM)
+    found = [note for note in dataset.notes if "Resolution states" in note]
+    assert len(found) == 2 * is_noted
+
+
+def test_a_negative_depth_of_imagej_is_a_depth(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    metadata = {"axes": "ZYX", "spacing": -0.5, "unit": "um"}
+    tifffile.imwrite(path, BODY, imagej=True, resolution=(4.0, 5.0), metadata=metadata)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx((0.5, 0.2, 0.25))
+    assert "ImageJ states -0.5 um" in dataset.notes[0]
+
+
+def test_pages_of_another_type_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    with tifffile.TiffWriter(path) as writer:
+        for z, plane in enumerate(BODY):
+            page = plane if z < 8 else (plane // 8).astype(np.uint8)
+            writer.write(page, metadata=None, photometric="minisblack")
+    notes = read.open(path, spacing_um=UM).notes
+    assert any("8 of 16 pages" in note and "uint8" in note for note in notes)
+
+
 def test_labels_that_name_channels_among_the_slices_are_noted(tmp_path: Path) -> None:
     labels = [f"c:{c}/2 z:{z}/8 - a.nd2" for z in range(1, 9) for c in (1, 2)]
     for given, is_told in ((labels, True), ([f"z:{z}/16" for z in range(16)], False)):

@@ -119,11 +119,11 @@ def _read(
             "attribute `multiscales` of an image"
         )
     converted = converted_of(location)
-    image = _image(tree, store, ome, axes, converted)
+    found = _image(tree, store, ome, axes, converted)
     if ignored := ignored_note("the image's group", attributes):
-        image = replace(image, notes=(*image.notes, ignored))
-    is_described = converted is not None and converted.shape == image.arrays[0].shape
-    return image, converted.root if converted is not None and is_described else None
+        found = replace(found, notes=(*found.notes, ignored))
+    is_described = converted is not None and converted.shape == found.arrays[0].shape
+    return found, converted.root if converted is not None and is_described else None
 
 
 def _image(
@@ -278,11 +278,13 @@ def _spatial(
     axes: tuple[str, ...], units: tuple[float | None, ...], values: Sequence[float] | None
 ) -> PartialTriple:
     """Return lengths (z, y, x), um; None: not stated, or without a unit of length."""
-    picked = []
+    picked: list[float | None] = []
     for axis in "zyx":
         unit = units[axes.index(axis)]
-        is_length = unit is not None and values is not None
-        picked.append(values[axes.index(axis)] * unit if is_length else None)
+        if unit is None or values is None:
+            picked.append(None)
+        else:
+            picked.append(values[axes.index(axis)] * unit)
     z, y, x = picked
     return z, y, x
 

@@ -80,12 +80,11 @@ def decode(
 def _grey_values(raw: NDArray[Any], encoding: Encoding, dtype: np.dtype[Any]) -> NDArray[Any]:
     if encoding.table is not None:
         low, high = encoding.stored_range
-        values: NDArray[Any] = encoding.table.apply(
-            low + high - raw if encoding.is_inverted else raw
-        )
-        if encoding.is_inverted:  # the table is for the numbers as they are stored
-            values = int(sum(encoding.table.ends)) - values.astype(np.int64)
-        return values.astype(dtype)
+        if not encoding.is_inverted:
+            return encoding.table.apply(raw).astype(dtype)
+        # the table is for the numbers as they are stored
+        values = encoding.table.apply(low + high - raw).astype(np.int64)
+        return np.asarray(int(sum(encoding.table.ends)) - values).astype(dtype)
     return rescale(raw, encoding.slope, encoding.intercept, dtype)
 
 
