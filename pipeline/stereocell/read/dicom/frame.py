@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from stereocell.read.dicom.frame_kind import FrameKind
+from stereocell.read.dicom.modality_table import ModalityTable
 from stereocell.read.dicom.segmentation import Segmentation
 from stereocell.read.dicom.stated import Stated
 from stereocell.read.dicom.value_scale import ValueScale
@@ -21,12 +22,13 @@ class NoPlaneError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """The map from a stored value to a grey value: bits, sign, then slope * value + intercept.
+    """The map from a stored to a grey value: bits, sign, then slope * value + intercept or a table.
 
     bits, high_bit  of the value inside its container of `allocated` bits; 0 bits: floats
     is_inverted     MONOCHROME1: the lowest value is the brightest
     padding         lowest and highest stored value outside the image, before the inversion;
                     None: the header names none
+    table           gives the grey values in place of slope and intercept; None: there is none
 
     References: DICOM PS3.3 C.7.6.3 (Image Pixel module).
     """
@@ -39,6 +41,15 @@ class Encoding:
     slope: float = 1.0
     intercept: float = 0.0
     padding: tuple[int, int] | None = None
+    table: ModalityTable | None = None
+
+    @property
+    def grey_ends(self) -> tuple[float, float]:
+        """The grey values between which all lie that this many bits can become."""
+        if self.table is not None:
+            return self.table.grey_range(is_inverted=self.is_inverted)
+        low, high = (self.slope * value + self.intercept for value in self.stored_range)
+        return low, high
 
     @property
     def stored_range(self) -> tuple[int, int]:

@@ -28,6 +28,7 @@ from stereocell.read.dicom.frame_offsets import (
     place_first,
 )
 from stereocell.read.dicom.header_values import find_value, first_item
+from stereocell.read.dicom.modality_table import TABLE_TAGS
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.segmentation import (
     LABELMAP,
@@ -66,7 +67,6 @@ _TAGS: list[Any] = [
     "AnatomicalOrientationType",
     "RescaleSlope",
     "RescaleIntercept",
-    "ModalityLUTSequence",
     "SegmentSequence",
     "SegmentationType",
     "SegmentsOverlap",
@@ -80,6 +80,7 @@ _TAGS: list[Any] = [
     *KIND_TAGS,
     *STATED_TAGS,
     *SCALE_TAGS,
+    *TABLE_TAGS,
 ]
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _NO_PLACE = "without a place in the patient"
@@ -164,8 +165,6 @@ def _frames(
     colours = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
     if int(header.get("SamplesPerPixel") or 1) != 1 or colours not in grey:
         raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
-    if "ModalityLUTSequence" in header:
-        raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
     shared = first_item(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     is_mask = segmentation is not None

@@ -39,11 +39,7 @@ def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
     reach = 0.0
     for frame in frames:
         encoding = frame.encoding
-        if encoding.bits:
-            ends = [encoding.slope * value + encoding.intercept for value in encoding.stored_range]
-            reach = min(reach, *ends)
-        else:
-            reach = -float("inf")
+        reach = min(reach, *encoding.grey_ends) if encoding.bits else -float("inf")
     if reach > _AIR_HU:
         return False
     if all(f.scale.has_rescale and f.encoding.intercept <= _AIR_HU for f in frames):
@@ -80,6 +76,22 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
     return tuple(notes)
 
 
+def _table_notes(frames: Sequence[Frame], tables: int) -> list[str]:
+    """Return notes on values that a table gives, and on a rescale that the same file states."""
+    with_table = sum(frame.encoding.table is not None for frame in frames)
+    own = " of its own" if tables > 1 else ""
+    notes = [
+        f"values of {with_table} of {len(frames)} images are by a table{own} (ModalityLUTSequence)"
+    ]
+    both = sum(frame.encoding.table is not None and frame.scale.has_rescale for frame in frames)
+    if both:
+        notes.append(
+            f"{both} of {len(frames)} images {agreeing(both, 'states', 'state')} RescaleSlope and "
+            "RescaleIntercept beside the table: the table is used"
+        )
+    return notes
+
+
 def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
     """Return notes on rescales that differ among frames, lack in some, or are stated otherwise."""
     notes: list[str] = []
@@ -93,12 +105,16 @@ def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
             notes.append(
                 f"{name} differs among the images ({low:.4g} to {high:.4g}): each has its own"
             )
-    without = sum(not frame.scale.has_rescale for frame in frames)
+    without = sum(not f.scale.has_rescale and f.encoding.table is None for f in frames)
     if 0 < without < len(frames):
         notes.append(
             f"{without} of {len(frames)} images {agreeing(without, 'states', 'state')} no rescale: "
             f"{agreeing(without, 'its', 'their')} stored values are taken"
         )
+    tables = {encoding.table for encoding in encodings if encoding.table is not None}
+    if tables:
+        notes += _table_notes(frames, len(tables))
+        return notes
     mapped = next((frame for frame in frames if frame.scale.real_world is not None), None)
     if mapped is None or mapped.scale.real_world is None:
         return notes

@@ -53,6 +53,8 @@ def scale_of(header: Any, groups: Sequence[Any]) -> ValueScale:
     slope = find_number(header, groups, _RESCALE, "RescaleSlope")
     intercept = find_number(header, groups, _RESCALE, "RescaleIntercept")
     kind = find_text(header, groups, _RESCALE, "RescaleType").upper()
+    if header.get("ModalityLUTSequence"):
+        kind = str(first_item(header.ModalityLUTSequence).get("ModalityLUTType") or "").upper()
     units = find_text(header, groups, "", "Units").upper()
     return ValueScale(
         has_rescale=slope is not None or intercept is not None,
