@@ -27,6 +27,11 @@ _PET_UNITS = {
     "NONE": "without unit (Units NONE)",
 }
 
+_DOSE_UNITS = {
+    "GY": "in gray (DoseUnits GY)",
+    "RELATIVE": "relative to a reference (DoseUnits RELATIVE)",
+}
+
 
 def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
     """Return whether the values of a CT are Hounsfield units.
@@ -68,12 +73,20 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
     if first.modality == "PT":
         unit = _PET_UNITS.get(first.scale.units, "of an unknown unit (no Units)")
         notes.append(f"PET values are {unit}")
+    if first.modality == "RTDOSE":
+        notes.append(_dose_note(first))
     if first.scale.philips is not None:
         notes.append(
             f"Philips states a scale slope of {first.scale.philips:.4g} (2005,100e) as well, which "
             "is not applied: values compare within this series alone"
         )
     return tuple(notes)
+
+
+def _dose_note(first: Frame) -> str:
+    if not first.scale.has_rescale and first.encoding.slope == 1:
+        return "dose values are as they are stored, in no unit: DoseGridScaling is not stated"
+    return f"dose values are {_DOSE_UNITS.get(first.scale.units, 'of an unknown unit')}"
 
 
 def _table_notes(frames: Sequence[Frame], tables: int) -> list[str]:
