@@ -7,10 +7,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from stereocell.read.dicom.frame import Encoding, NoPlaneError
+from stereocell.read.dicom.frame import Encoding
 from stereocell.read.dicom.frame_offsets import is_dose
 from stereocell.read.dicom.header_values import find_value
 from stereocell.read.dicom.modality_table import ModalityTable, ModalityTableError, table_of
+from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.segmentation import FRACTIONAL
 from stereocell.read.dicom.value_scale import ValueScale
 

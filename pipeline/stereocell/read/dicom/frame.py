@@ -11,15 +11,6 @@ from stereocell.read.dicom.value_scale import ValueScale
 Vector = tuple[float, float, float]
 
 
-class NoPlaneError(Exception):
-    """A file holds no usable plane; the text gives the reason without the file's values.
-
-    way_out  what the file is, and what to name or to export instead; empty: nothing is known
-    """
-
-    way_out = ""
-
-
 @dataclass(frozen=True, slots=True)
 class Encoding:
     """The map from a stored to a grey value: bits, sign, then slope * value + intercept or a table.

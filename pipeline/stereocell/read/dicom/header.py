@@ -20,7 +20,7 @@ from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.encoding import encoding_of
-from stereocell.read.dicom.frame import Frame, NoPlaneError, Vector
+from stereocell.read.dicom.frame import Frame, Vector
 from stereocell.read.dicom.frame_kind import KIND_TAGS, FrameKind, kind_of
 from stereocell.read.dicom.frame_offsets import (
     frame_offsets,
@@ -30,6 +30,7 @@ from stereocell.read.dicom.frame_offsets import (
 from stereocell.read.dicom.header_values import find_value, first_item
 from stereocell.read.dicom.modality_table import TABLE_TAGS
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
+from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.segmentation import (
     LABELMAP,
     Segmentation,
