@@ -218,9 +218,9 @@ def _time_notes(points: Points) -> list[str]:
     if points.attribute == BY_NUMBER:
         is_diffusion = points.whole[0][0].kind.is_diffusion
         what = "directions or b-values of diffusion" if is_diffusion else "points in time"
-        counts = len(points.whole) + len(points.incomplete)
+        images = len(points.whole) + len(points.incomplete)
         notes.append(
-            f"{counts} images at a place: {BY_NUMBER} alone tells them apart, {what} are assumed; "
+            f"{images} images at a place: {BY_NUMBER} alone tells them apart, {what} are assumed; "
             "--time picks one"
         )
     if not points.incomplete:
