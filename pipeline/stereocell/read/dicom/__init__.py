@@ -358,6 +358,15 @@ def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
         for place, other in enumerate(found.stacks, start=1)
         if is_other_kind(other, stack)
     ]
+    rest = [
+        f"--series {place}: {other.label}"
+        for place, other in enumerate(found.stacks, start=1)
+        if other is not stack and not is_other_kind(other, stack)
+    ]
+    if rest:
+        most = f"; {len(rest) - _MOST_KINDS} more are in `--series list`"
+        listed = "; ".join(rest[:_MOST_KINDS]) + (most if len(rest) > _MOST_KINDS else "")
+        kinds.insert(0, f"not built: {listed}")
     more = (f"{len(kinds) - _MOST_KINDS} more kinds of images are in `--series list`",)
     return (choice, *kinds[:_MOST_KINDS], *(more if len(kinds) > _MOST_KINDS else ()))
 
