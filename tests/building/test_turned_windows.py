@@ -132,3 +132,20 @@ def test_a_background_of_the_same_voxels_turns_with_them(axis: int) -> None:
         for turned in [_turned(voxels, side)]
     ]
     np.testing.assert_allclose(found[1], slices_back(found[0], axis), atol=1e-6)
+
+
+@pytest.mark.parametrize("zeros", [0.0, 0.5, 0.9])
+def test_the_noise_of_bodies_is_measured_however_much_even_ground_is_around(
+    tmp_path: Path, zeros: float
+) -> None:
+    """A masked volume has no noise in its ground, and what is left has it all the same."""
+    voxels = np.random.default_rng(1).normal(1000, 30, (12, 100, 100)).round().astype(np.uint16)
+    voxels[:, :, : round(100 * zeros)] = 0
+    voxels[:, 40:60, 94:] += 800
+    source = phantoms.write_ome_zarr(
+        tmp_path / "one.ome.zarr", [voxels], scales=[dict(zip("zyx", (1.0,) * 3, strict=True))]
+    )
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
+    plan = OutFolder(tmp_path / "out").plan()
+    shift = measure_window(statistics_task(plan, plan.channels[0])).max_shift
+    assert shift == pytest.approx(2 * 30, rel=0.3)

@@ -328,3 +328,24 @@ def test_imaris_without_a_unit_or_a_calibration_is_an_assumption(tmp_path: Path)
             file["DataSetInfo/Image"].attrs[f"ExtMin{axis}"] = characters("0")
             file["DataSetInfo/Image"].attrs[f"ExtMax{axis}"] = characters(str(size))
     assert "exactly 1 um" in spacing_notes(read.open(path))[0]
+
+
+def test_voxels_behind_those_that_a_header_describes_are_told(tmp_path: Path) -> None:
+    lengths = "ElementSpacing = 0.5 0.7 2"
+    paths = [
+        write_nrrd(tmp_path / "a.nrrd", "spacings: 1 1 1", 'units: "um" "um" "um"'),
+        write_meta(tmp_path / "a.mha", lengths),
+        tmp_path / "a.nii",
+        tmp_path / "a.mrc",
+    ]
+    sitk.WriteImage(sitk.GetImageFromArray(f_phantom()), str(paths[2]))
+    with mrcfile.new(paths[3]) as file:
+        file.set_data(f_phantom())
+        file.voxel_size = 4.0
+    plane = f_phantom()[:, 0].nbytes  # the smallest one
+    for path in paths:
+        whole = path.read_bytes()
+        for rest, is_told in ((plane - 1, False), (plane, True)):
+            path.write_bytes(whole + bytes(rest))
+            told = f"left out: {rest:,} bytes behind the voxels"
+            assert any(told in note for note in read.open(path).notes) == is_told, path

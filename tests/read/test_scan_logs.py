@@ -60,6 +60,14 @@ def test_numbers_of_slices_count_lines_of_the_camera(tmp_path: Path) -> None:
     assert "the slices' numbering states 5 pixels" in " ".join(dataset.notes)
 
 
+@pytest.mark.parametrize(("count", "is_told"), [(48, True), (len(VOXELS), False)])
+def test_a_log_that_counts_other_slices_is_told(tmp_path: Path, count: int, is_told: bool) -> None:
+    lines = f"Sections Count={count}\nPixel Size (um)=9.92\n"
+    dataset = scan(tmp_path / "s", ".bmp", LOG.format("", lines))
+    told = f"found {len(VOXELS)} images, and the log states {count}"
+    assert any(told in note for note in dataset.notes) == is_told
+
+
 @pytest.mark.parametrize("log", ["", "[Reconstruction]\nPixel Size (um)=none\n", "Pixel Size=3\n"])
 def test_a_log_without_a_size_is_ignored(tmp_path: Path, log: str) -> None:
     with pytest.raises(SourceError, match="voxel size: not found"):

@@ -20,7 +20,7 @@ import numpy as np
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray
-from stereocell.read.file_array import FileArray, PackedArray, unpack_array
+from stereocell.read.file_array import FileArray, PackedArray, notes_on_rest, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.metaimage_fields import (
     NAME,
@@ -67,6 +67,7 @@ def read_image(location: Location) -> Image:
     array = _array(location, fields, end, (*reversed(shape), samples[0]))
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
     affine, notes = _affine(where, header, shape)
+    notes = (*notes, *notes_on_rest(array))
     image = place(where, array, axes, affine, "TransformMatrix").image(
         NAME, notes=notes, has_sides="TransformMatrix" in fields
     )

@@ -80,7 +80,7 @@ def read_image(location: Location) -> Image:
     counts: dict[int, int] = {}
     load = partial(_load, location, canonical, skewed, dtype, counts)
     voxels = WholeArray((times, z, y, x), dtype, load)
-    require_whole(image, where)
+    notes += require_whole(image, where)
     return Image(
         arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
         grids=(Grid((z, y, x), canonical.spacing_um),),

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.file_array import FileArray, PackedArray, unpack_array
+from stereocell.read.file_array import FileArray, PackedArray, notes_on_rest, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.nrrd_statements import (
     axis_lengths,
@@ -84,6 +84,7 @@ def read_image(location: Location) -> Image:
         *kind_notes(fields, at),
         *unit_notes,
         *value_notes(fields),
+        *notes_on_rest(array),
     )
     if to_lps is None:
         swapped = {"i": "x", "j": "y", "k": "z"}

@@ -118,7 +118,7 @@ def _read(
             "attribute `multiscales` of an image"
         )
     converted = converted_of(location)
-    image = _image(tree, store, ome, axes, converted)
+    image = _image(tree, store, ome, _parsed(where, ome, node), axes, converted)
     if ignored := ignored_note("the image's group", attributes):
         image = replace(image, notes=(*image.notes, ignored))
     is_described = converted is not None and converted.shape == image.arrays[0].shape
@@ -129,13 +129,12 @@ def _image(
     tree: ZarrTree,
     store: Store,
     ome: Mapping[str, Any],
+    multiscale: Multiscale,
     axes: str,
     converted: Converted | None,
 ) -> Image:
     """Return the first multiscale image of a group's OME attributes. Raises SourceError."""
     location, where = tree.location, tree.location.shown
-    with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.1 to 0.6"):
-        multiscale = ngff.parse(where, ome)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
             f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
@@ -174,6 +173,22 @@ def _image(
         labels=labels_evidence(ome, location),
         objects=notes_of_ngff(ome.get("image-label")),
     )
+
+
+def _parsed(where: str, ome: Mapping[str, Any], group: zarr.Group) -> Multiscale:
+    """Return the metadata of the first image. Raises SourceError, of other versions with a way."""
+    version, titled = ngff.version_of(ome), where
+    expected = "axes, datasets and scales as OME-Zarr 0.1 to 0.6"
+    if not ngff.is_known(version):
+        with quiet(), one_line(where, "a group whose arrays can be listed"):
+            path = next((name for name, node in group.members() if isinstance(node, zarr.Array)), 0)
+        titled = f"{where}: OME-Zarr {version:.20}, a version that is not known"
+        expected += (
+            f"; {where.rstrip('/')}/{path} --axes zyx --spacing-um z,y,x reads the voxels of an "
+            "array as they are stored"
+        )
+    with one_line(f"{titled}: multiscales[0]", expected):
+        return ngff.parse(where, ome)
 
 
 def _levels(

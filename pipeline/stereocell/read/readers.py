@@ -4,6 +4,7 @@ No key of a result follows this module: the reader that is found here is named i
 """
 
 import os
+import zipfile
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -15,6 +16,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.file_kind import require_kind
 from stereocell.read.foreign_files import bare_voxels_words, foreign_words
 from stereocell.read.image import Image, printable
+from stereocell.storage.archives import ARCHIVE_SUFFIXES
 from stereocell.storage.contents import contents_of
 from stereocell.storage.first_bytes import SHARED, identify
 from stereocell.storage.kinds import Kind
@@ -207,6 +209,11 @@ def _unknown(location: Location) -> SourceError:
                 "folder of its planes"
             )
         found += f": found {content}"
+    if last.endswith(ARCHIVE_SUFFIXES) and zipfile.is_zipfile(location.path):
+        return SourceError(
+            f"{location.shown}: found a zip archive without a Zarr group, expected OME-Zarr: unzip "
+            "it, and name the file or folder in it"
+        )
     formats = ", ".join(reader.title for reader in READERS.values())
     if found.endswith(")"):  # the way out is the message, so the list would hide it
         formats = "OME-Zarr, TIFF, DICOM, NIfTI, HDF5 and others that are read"

@@ -120,7 +120,7 @@ def measure_window(task: StatisticsTask) -> Window:
     surface = task.settings.surface
     mask = _mask_of([voxels] if level == task.level else _blocks(task, dataset))
     # a mask's ground is even, and no padding
-    darkest = float(voxels.min()) if mask is None else None
+    least = darkest = float(voxels.min()) if mask is None else None
     across, rows, columns = first_of_three(
         denoising_reach(float(surface.smoothing_um), spacing, axis), axis
     )
@@ -151,7 +151,7 @@ def measure_window(task: StatisticsTask) -> Window:
     )
     if voxels.shape != task.region.shape and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
         statistics = replace(statistics, values=_count_values(task, dataset, statistics.window))
-    suggested, noise = _look_closely(task, dataset, statistics.window, darkest)
+    suggested, noise = _look_closely(task, dataset, statistics.window, least)
     statistics = replace(statistics, suggested=suggested)
     shift = find_max_shift(noise, task.max_shift, mask) if task.max_shift > 0 else None
     return Window(statistics, Counting(scale, scale_above, darkest, mask), holder, shift)
@@ -180,7 +180,7 @@ def _look_closely(
 
     Coarser levels have softer edges and less noise.
 
-    darkest  the value of padding; None: there is none
+    darkest  the least value, whose even runs have no noise to measure; None: nothing is left out
     """
     axis = dataset.slice_axis(task.level)
     spacing = first_of_three(dataset.levels[task.level].spacing_um, axis)
