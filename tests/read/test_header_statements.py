@@ -349,3 +349,15 @@ def test_voxels_behind_those_that_a_header_describes_are_told(tmp_path: Path) ->
             path.write_bytes(whole + bytes(rest))
             told = f"left out: {rest:,} bytes behind the voxels"
             assert any(told in note for note in read.open(path).notes) == is_told, path
+
+
+def test_segments_of_slicer_are_objects_with_their_names(tmp_path: Path) -> None:
+    image = sitk.GetImageFromArray((f_phantom() > 0).astype(np.uint8) * 3)
+    for key, value in {"ID": "Segment_1", "LabelValue": "3", "Name": "liver",
+                       "Color": "1 0 0"}.items():  # fmt: skip
+        image.SetMetaData(f"Segment0_{key}", value)
+    sitk.WriteImage(image, str(tmp_path / "a.seg.nrrd"))
+    dataset = read.open(tmp_path / "a.seg.nrrd")
+    assert dataset.labels == "segments of 3D Slicer in its header"
+    assert dataset.objects.names == {3: "liver"}
+    assert dataset.objects.colors == {3: (1.0, 0.0, 0.0)}

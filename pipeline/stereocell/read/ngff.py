@@ -90,13 +90,13 @@ class Multiscale:
         return f"OME-Zarr {self.version}".rstrip()
 
 
-def parse(where: str, ome: Mapping[str, Any], index: int = 0) -> Multiscale:
-    """Return an image of a group's attributes, the first by default.
+def parse(where: str, ome: Mapping[str, Any]) -> Multiscale:
+    """Return the first image of a group's attributes.
 
     Raises SourceError where transformations turn the grid, and ValueError, KeyError or TypeError
     where the metadata are of no version.
     """
-    multiscale = ome["multiscales"][index]
+    multiscale = ome["multiscales"][0]
     version = version_of(ome)
     datasets = list(multiscale["datasets"])
     paths = tuple(str(dataset["path"]) for dataset in datasets)

@@ -26,13 +26,13 @@ def dimension_names(array: Any) -> tuple[str, ...]:
     return listed if listed and set(listed) <= set(AXES) else ()
 
 
-def version_notes(ome: Mapping[str, Any], index: int, zarr_format: int) -> tuple[str, ...]:
+def version_notes(ome: Mapping[str, Any], zarr_format: int) -> tuple[str, ...]:
     """Return a note where the version of the metadata is stated twice, or is not that of the files.
 
-    index        of the image among the multiscales
+    ome          the group's attributes, with one image
     zarr_format  2 or 3, of the files: OME-Zarr up to 0.4 is of Zarr v2, later ones are of v3
     """
-    places = [("the image", ome["multiscales"][index]), ("the group", ome)]
+    places = [("the image", ome["multiscales"][0]), ("the group", ome)]
     stated = [
         Statement(str(table["version"]), f"`version` of {name}", trust)
         for (name, table), trust in zip(places, (Trust.STATED, Trust.REPEATED), strict=True)

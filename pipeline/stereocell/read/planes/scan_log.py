@@ -119,7 +119,11 @@ def _read(path: str) -> ScanLog:
             if key in (*_SIZES, _STEP):
                 lines.append((_named(key), str(number)))
     texts, notes = settle_repeats(lines, "the log")
-    numbers = {key: float(texts[_named(key)]) for key in (*_SIZES, _STEP) if _named(key) in texts}
+    numbers = {
+        key: float(texts[_named(key)])
+        for key in (*_SIZES, _STEP, _SECTIONS)
+        if _named(key) in texts
+    }
     statements = [
         Statement(numbers[key], f"[{key[0].capitalize()}] of the log", trust)
         for key, trust in _SIZES.items()
