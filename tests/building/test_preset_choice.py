@@ -68,8 +68,12 @@ def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_that_build_it_are_na
     chosen, reason = choose_preset(open_dataset(source))
     assert chosen == "mri"
     assert f"{words}" in reason
-    assert "MR is assumed (for a CT --preset ct --iso-value 0=" in reason
-    flags = reason[reason.index("--preset ct") : reason.index(";")].split()
+    assert "no modality is stated: MR is assumed; " in reason
+    assert "(for a CT --preset ct --iso-value 0=" in reason
+    assert ("no scaling to Hounsfield units is known" in reason) == (voxels.dtype == np.uint8)
+    assert ("plus 1024 would be those of a CT" in reason) == (voxels.dtype != np.uint8)
+    advice = reason[reason.index("--preset ct") :]
+    flags = advice[: min(advice.index(mark) for mark in (";", ", a") if mark in advice)].split()
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     assert "is assumed" not in capsys.readouterr().err
     plan = OutFolder(tmp_path / "out").plan()

@@ -9,7 +9,7 @@ import zarr
 
 from stereocell import read
 from stereocell.cli.__main__ import main
-from stereocell.model.errors import SourceError
+from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.level_spacing import settle_levels
 from stereocell.read.spacing import Grid
 from support.phantoms import f_phantom, write_ome_zarr
@@ -215,3 +215,58 @@ def test_a_scale_that_image_and_level_both_state_is_noted(tmp_path: Path) -> Non
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx((0.25, 0.04, 0.04))
     assert "the same scale" in dataset.notes[0]
+
+
+def test_the_second_image_of_a_group_is_a_series(tmp_path: Path) -> None:
+    scales = [UM, {axis: 2 * um for axis, um in UM.items()}]
+    path = write_ome_zarr(tmp_path / "a.zarr", [BODY, HALF], scales=scales)
+    group = zarr.open_group(path, mode="r+")
+    ome: Any = group.attrs["ome"]
+    (first,) = ome["multiscales"]
+    second = {**first, "datasets": first["datasets"][1:]}
+    group.attrs["ome"] = {**ome, "multiscales": [first, second]}
+    assert ["16 x 48 x 36" in line for line in read.list_series(path)] == [True, False]
+    dataset = read.open(path, series=2)
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, HALF)
+    assert "building --series 2, asked for; not built: --series 1: 16 x" in dataset.notes[-1]
+    with pytest.raises(UsageError, match="found 3, expected 1 to 2"):
+        read.open(path, series=3)
+
+
+def test_a_second_image_that_is_no_volume_is_listed(tmp_path: Path) -> None:
+    path = write_ome_zarr(tmp_path / "a.zarr", [BODY])
+    group = zarr.open_group(path, mode="r+")
+    ome: Any = group.attrs["ome"]
+    group.attrs["ome"] = {**ome, "multiscales": [*ome["multiscales"], {"datasets": []}]}
+    assert "can't be read; no volume" in read.list_series(path)[1]
+    assert "not built: --series 2" in read.open(path).notes[-1]
+
+
+@pytest.mark.parametrize(
+    ("stored", "image", "group", "told"),
+    [
+        (2, "0.5", None, "0.5 is stated, which is stored as Zarr v3, but the files are Zarr v2"),
+        (3, "0.4", "0.5", "`version` of the image states 0.4, `version` of the group states 0.5"),
+        (2, "0.4", None, ""),
+        (3, None, "0.5", ""),
+    ],
+)
+def test_a_version_that_the_files_contradict_is_noted(
+    tmp_path: Path, stored: Any, image: str | None, group: str | None, told: str
+) -> None:
+    axes = [{"name": a, "type": "space", "unit": "micrometer"} for a in "zyx"]
+    scale = [{"type": "scale", "scale": [0.5, 0.2, 0.2]}]
+    entry: dict[str, Any] = {
+        "axes": axes,
+        "datasets": [{"path": "0", "coordinateTransformations": scale}],
+    }
+    entry |= {"version": image} if image else {}
+    ome: dict[str, Any] = {"multiscales": [entry], **({"version": group} if group else {})}
+    root = zarr.open_group(tmp_path / "a.zarr", mode="w", zarr_format=stored)
+    root.create_array("0", data=BODY)
+    root.attrs.update({"ome": ome} if stored == 3 else ome)
+    dataset = read.open(tmp_path / "a.zarr")
+    np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, BODY)
+    assert bool(dataset.notes) == bool(told)
+    assert all("version of OME-Zarr" in note for note in dataset.notes)
+    assert told in "".join(dataset.notes)

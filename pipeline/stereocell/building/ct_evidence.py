@@ -22,6 +22,10 @@ WINDOW_HU = (-1024.0, 2000.0)  # window of the presets
 _LIKE_HU = "values like Hounsfield units"
 _OFFSET = 1024.0  # that scanners add to store Hounsfield units without a sign; some programs: 1000
 _PLANES = 8  # in the middle, that are looked at
+# A volume that was mapped to 8 bits does not state the mapping, so no level in HU can be computed.
+_BASIS = (
+    "half-way between its dark and bright voxels, since no scaling to Hounsfield units is known"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +37,7 @@ class CtEvidence:
     flags          the flags by which a CT of these values is built; empty: it is by the preset
     bone_flags     the same for bone; empty: no level of bone is known
     least          the darkest voxel
+    basis          where the level of `flags` comes from; empty: it is in Hounsfield units, shifted
     """
 
     is_hounsfield: bool
@@ -40,6 +45,7 @@ class CtEvidence:
     flags: str = ""
     bone_flags: str = ""
     least: float = 0.0
+    basis: str = ""
 
     @property
     def has_no_air(self) -> bool:
@@ -65,7 +71,7 @@ def find_ct_evidence(dataset: Dataset) -> CtEvidence:
         words = "8-bit values, which are no Hounsfield units"
     low, high = (float(value) for value in np.quantile(voxels, (0.001, 0.999)))
     flags = "--preset ct" if low >= high else _flags("ct", _halfway(voxels), (low, high))
-    return CtEvidence(False, words, flags, least=least)
+    return CtEvidence(False, words, flags, least=least, basis=_BASIS)
 
 
 def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building.channels import ALL
-from stereocell.building.ct_evidence import LEVELS_HU, find_ct_evidence
+from stereocell.building.ct_evidence import LEVELS_HU, CtEvidence, find_ct_evidence
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.settings import NO_PRESET, Settings, load
 from stereocell.engine.run import console
@@ -105,13 +105,22 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
         return by_kind, _describe(by_kind, f"the input is {known}" + (doubt and f": {doubt}"))
     evidence = find_ct_evidence(dataset)
     chosen = "ct" if evidence.is_hounsfield else "mri"
-    reason = f"voxels of {finest / 1000:.3g} mm and {evidence.words}"
+    size = f"voxels of {finest / 1000:.3g} mm"
     if evidence.flags:
+        basis = f", a level {evidence.basis}" if evidence.basis else ""
         return chosen, (
-            f"preset {chosen}: {reason}: MR is assumed (for a CT {evidence.flags}; "
+            f"preset {chosen}: {size}, and no modality is stated: MR is assumed; "
+            f"{_may_be_ct(evidence)}(for a CT {evidence.flags}{basis}; "
             f"--preset {NO_PRESET}: the defaults)"
         )
-    return chosen, _describe(chosen, reason)
+    return chosen, _describe(chosen, f"{size} and {evidence.words}")
+
+
+def _may_be_ct(evidence: CtEvidence) -> str:
+    """Return words on values that speak for a CT; empty: they are no evidence."""
+    return (
+        f"{evidence.words} would be those of a CT " if not evidence.basis else evidence.words + " "
+    )
 
 
 def _describe(chosen: str | None, reason: str) -> str:

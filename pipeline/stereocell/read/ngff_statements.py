@@ -5,12 +5,17 @@ xarray in v2. A permutation of the axes mirrors the specimen, so the user decide
 converted file is compared in bioformats2raw.py.
 """
 
+import re
+from collections.abc import Mapping
 from typing import Any
 
 from stereocell.model.axes import AXES
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import axis_of, given_axes
 from stereocell.read.statements import Statement, Subject, Trust, settle
+
+_OF_ZARR_V2 = ("0.1", "0.2", "0.3", "0.4")
+_VERSION = re.compile(r"0\.\d")
 
 
 def dimension_names(array: Any) -> tuple[str, ...]:
@@ -19,6 +24,32 @@ def dimension_names(array: Any) -> tuple[str, ...]:
     named = named or array.attrs.get("_ARRAY_DIMENSIONS", ())
     listed = tuple(axis_of(str(name)) for name in named) if isinstance(named, list | tuple) else ()
     return listed if listed and set(listed) <= set(AXES) else ()
+
+
+def version_notes(ome: Mapping[str, Any], zarr_format: int) -> tuple[str, ...]:
+    """Return a note where the version of the metadata is stated twice, or is not that of the files.
+
+    ome          the group's attributes, with one image
+    zarr_format  2 or 3, of the files: OME-Zarr up to 0.4 is of Zarr v2, later ones are of v3
+    """
+    places = [("the image", ome["multiscales"][0]), ("the group", ome)]
+    stated = [
+        Statement(str(table["version"]), f"`version` of {name}", trust)
+        for (name, table), trust in zip(places, (Trust.STATED, Trust.REPEATED), strict=True)
+        if table.get("version")
+    ]
+    if not stated:
+        return ()
+    settled = settle(Subject("version of OME-Zarr"), stated)
+    version = str(settled.value)
+    of_files = 2 if version in _OF_ZARR_V2 else 3
+    if zarr_format == of_files or not _VERSION.match(version):
+        return settled.notes
+    note = (
+        f"version of OME-Zarr: {version:.20} is stated, which is stored as Zarr v{of_files}, but "
+        f"the files are Zarr v{zarr_format}: they are read as they are stored"
+    )
+    return (*settled.notes, note)
 
 
 def settled_axes(

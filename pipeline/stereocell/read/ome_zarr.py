@@ -13,7 +13,7 @@ References: https://ngff.openmicroscopy.org; ngff.py reads the metadata of all v
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -30,8 +30,8 @@ from stereocell.read.label_notes import notes_of_ngff
 from stereocell.read.modulo import listed, split
 from stereocell.read.ngff import Multiscale
 from stereocell.read.ngff_sides import with_sides
-from stereocell.read.ngff_statements import dimension_names, settled_axes
-from stereocell.read.series import lines
+from stereocell.read.ngff_statements import dimension_names, settled_axes, version_notes
+from stereocell.read.series import Candidate, choose, lines
 from stereocell.read.spacing import Grid, PartialTriple, grid_of
 from stereocell.read.value_scale import ignored_note
 from stereocell.read.zarr_collections import (
@@ -58,33 +58,81 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64  # most levels of the pyramid
+_MOST_NAMED = 4  # most images of a group that a note names
 
 
 def read_image(location: Location, *, axes: str = "", series: int = 0) -> Image:
-    """Return the first multiscale image of a group, or a bare array (bare_zarr.py).
+    """Return a multiscale image of a group, or a bare array (bare_zarr.py).
 
     The group may be a container of series, if it holds one image.
 
     axes    the user's `--axes`, for a bare array
-    series  of the images that lie along a further axis of the OME-XML beside it; 0: the first
+    series  of the group's images, and of those along a further axis of the OME-XML beside one, as
+            `list_series` counts; 0: the first
 
     Raises SourceError where there is no image, or where there are several groups of images;
     UsageError where `axes` doesn't fit or there is no such series.
     """
     image, root = _read(location, axes)
-    return split(location.shown, image, root, series)
+    if image.images == 1:
+        return split(location.shown, image, root, series)
+    entries = _entries(location, axes, image, root)
+    at, _ = choose(location.shown, [one.candidate for one in entries], series or 1)
+    entry = entries[at]
+    others = [
+        f"--series {n}: {one.candidate.label}" for n, one in enumerate(entries, 1) if n != at + 1
+    ]
+    more = "; more are in `--series list`" * (len(others) > _MOST_NAMED)
+    note = (
+        f"{image.images} images in the group; building --series {at + 1}, "
+        f"{'asked for' if series else 'the first'}; not built: {'; '.join(others[:_MOST_NAMED])}"
+        f"{more}"
+    )
+    if entry.image:
+        image, root = _read(location, axes, index=entry.image)
+    image = split(location.shown, image, root, entry.part)
+    return replace(image, images=1, notes=(*image.notes, note))
 
 
 def list_series(location: Location) -> tuple[str, ...]:
-    """Return a line for each image along a further axis. Raises SourceError."""
-    return lines(listed(*_read(location, "")))
+    """Return a line for each image of a group, and along a further axis. Raises SourceError."""
+    entries = _entries(location, "", *_read(location, ""))
+    return lines([one.candidate for one in entries])
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """One line of the list: an image of the group, or a part of it along a further axis.
+
+    image  its index among the multiscales
+    part   from 1
+    """
+
+    image: int
+    part: int
+    candidate: Candidate
+
+
+def _entries(
+    location: Location, axes: str, image: Image, root: ElementTree.Element | None
+) -> list[_Entry]:
+    """Return the list of a group's images, of which the first one is read already."""
+    found = [_Entry(0, n, one) for n, one in enumerate(listed(image, root), 1)]
+    for index in range(1, image.images):
+        try:
+            parts = listed(*_read(location, axes, index=index))
+        except SourceError:
+            parts = [Candidate(f"image {index + 1} of `multiscales`, which can't be read", 0)]
+        found += [_Entry(index, n, one) for n, one in enumerate(parts, 1)]
+    return found
 
 
 def _read(
-    location: Location, axes: str, *, is_part: bool = False
+    location: Location, axes: str, *, index: int = 0, is_part: bool = False
 ) -> tuple[Image, ElementTree.Element | None]:
-    """Return the image as it is stored, and the OME-XML beside it, if it describes the image.
+    """Return an image as it is stored, and the OME-XML beside it, if it describes the image.
 
+    index    of the image among the multiscales
     is_part  it is the one image of a container, and no container itself
     """
     where = location.shown
@@ -109,7 +157,7 @@ def _read(
     if not isinstance(multiscales, list) or not multiscales:
         series = series_of(ome, tree)
         if len(series) == 1 and not is_part:
-            return _read(part_of(location, series[0]), axes, is_part=True)
+            return _read(part_of(location, series[0]), axes, index=index, is_part=True)
         if multiscales is None and not is_collection(ome):
             only = bare_zarr.read_only_array(location, store, node, axes=axes)
             if only is not None:
@@ -119,7 +167,8 @@ def _read(
             "attribute `multiscales` of an image"
         )
     converted = converted_of(location)
-    found = _image(tree, store, ome, axes, converted)
+    one = {**ome, "multiscales": [multiscales[index]]}
+    found = replace(_image(tree, store, one, axes, converted), images=len(multiscales))
     if ignored := ignored_note("the image's group", attributes):
         found = replace(found, notes=(*found.notes, ignored))
     is_described = converted is not None and converted.shape == found.arrays[0].shape
@@ -133,7 +182,7 @@ def _image(
     axes: str,
     converted: Converted | None,
 ) -> Image:
-    """Return the first multiscale image of a group's OME attributes. Raises SourceError."""
+    """Return a multiscale image of a group's OME attributes. Raises SourceError."""
     location, where = tree.location, tree.location.shown
     multiscale = _parsed(tree, ome)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
@@ -178,7 +227,7 @@ def _image(
 
 
 def _parsed(tree: ZarrTree, ome: Mapping[str, Any]) -> Multiscale:
-    """Return the metadata of the first image. Raises SourceError, of other versions with a way."""
+    """Return the metadata of the only image. Raises SourceError, of other versions with a way."""
     where = tree.location.shown
     version, titled = ngff.version_of(ome), where
     expected = "axes, datasets and scales as OME-Zarr 0.1 to 0.6"
@@ -192,7 +241,9 @@ def _parsed(tree: ZarrTree, ome: Mapping[str, Any]) -> Multiscale:
             "array as they are stored"
         )
     with one_line(f"{titled}: multiscales[0]", expected):
-        return ngff.parse(where, ome)
+        parsed = ngff.parse(where, ome)
+    versions = version_notes(ome, tree.zarr_format)
+    return replace(parsed, notes=(*versions, *parsed.notes))
 
 
 def _levels(

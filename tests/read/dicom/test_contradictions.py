@@ -33,6 +33,15 @@ CONTRADICTIONS: dict[str, tuple[Change, str]] = {
         setting(ImagerPixelSpacing=[3.0, 3.3]),
         "PixelSpacing states 2, 2.2 mm, ImagerPixelSpacing states 3, 3.3 mm: PixelSpacing is used",
     ),
+    "aspect": (
+        setting(PixelAspectRatio=[1, 2]),
+        "PixelSpacing states 0.90909, PixelAspectRatio states 0.5: PixelSpacing is used",
+    ),
+    "absent slices": (
+        setting(NumberOfSlices=20),
+        "NumberOfSlices states 20, and 10 are there: 50% of the stated slices are absent",
+    ),
+    "more slices": (setting(NumberOfSlices=8), "states 8, and 10 are there: all of them are read"),
     "numbers": (
         by_number("InstanceNumber", lambda n: (7 * n) % 11),
         "order of slices: ImagePositionPatient states the order that is built, InstanceNumber",
@@ -76,6 +85,9 @@ AGREEMENTS: dict[str, Change] = {
     "no numbers": setting(InstanceNumber=0),
     "overlap": setting(SliceThickness=5.0),
     "detector": setting(ImagerPixelSpacing=[2.0, 2.2]),
+    "aspect": setting(PixelAspectRatio=[10, 11]),
+    "aspect of zero": setting(PixelAspectRatio=[0, 0]),
+    "slices": setting(NumberOfSlices=10),
     "junk": setting(PatientPosition="JANE", PatientOrientation="JANE"),
 }
 

@@ -191,7 +191,9 @@ def test_the_largest_series_is_taken_and_any_can_be_named(tmp_path: Path) -> Non
         "5 series or orientations; building --series 1, the largest: MR, coronal"
         in (dataset.notes[0])
     )
-    assert dataset.notes[1] == "file left out: 1 not DICOM"
+    assert dataset.notes[1].startswith("not built: --series 2: CT, axial, 6 x 10 x 12 voxels")
+    assert all(f"; --series {n}: " in dataset.notes[1] for n in (3, 4, 5))
+    assert dataset.notes[2] == "file left out: 1 not DICOM"
     second = read.open(tmp_path / "s", series=2)
     assert (second.modality, second.dtype) == ("CT", np.int16)
     assert np.abs(whole(second) + 1024 - scene(lps_mm(second))).max() <= 0.51

@@ -70,6 +70,18 @@ def test_a_ct_whose_scale_or_values_reach_air_is_in_hounsfield_units(
     assert dataset.notes == ()
 
 
+@pytest.mark.parametrize(
+    ("kind", "is_told"), [("JANEDOE", True), ("US", True), ("HOUNSFIELD", False), ("HU", False)]
+)
+def test_a_rescale_type_that_is_no_hounsfield_unit_is_said(
+    tmp_path: Path, kind: str, is_told: bool
+) -> None:
+    dataset = opened(tmp_path, setting(RescaleType=kind), modality="CT", intercept=-1024)
+    assert any("RescaleType is" in note for note in dataset.notes) == is_told
+    assert dataset.has_hounsfield_units == (kind != "US")
+    assert "JANE" not in "".join(dataset.notes)
+
+
 def shifted(ds: pydicom.Dataset, by: int) -> bytes:
     return (np.frombuffer(ds.PixelData, np.int16) + by).astype(np.int16).tobytes()
 

@@ -177,6 +177,10 @@ def test_decimal_marks_and_marks_between_thousands(
 def test_marks_between_thousands_are_noted(tmp_path: Path, cell: str) -> None:
     told = notes(tmp_path, f"label;a;b\n1;{cell};1,5\n2;5,5;2\n")
     assert f"marks between thousands are left out: {cell} is 99250.5" in told
+    once = notes(
+        tmp_path, 'label,a\n1,"2,001"\n2,"3,002"\n'
+    )  # a doubt that names the number itself
+    assert once.count("2,001 is 2001") + once.count("3,002 is 3002") == 1
     assert "thousands" not in notes(tmp_path, "label;a\n1;0,125\n2;12,5\n3;5\n")
     assert "thousands" not in notes(tmp_path, "label,a,b\n1,0.125,7\n2,12.5,100\n")
 

@@ -367,6 +367,15 @@ def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
         for place, other in enumerate(found.stacks, start=1)
         if is_other_kind(other, stack)
     ]
+    others = [
+        f"--series {place}: {other.label}"
+        for place, other in enumerate(found.stacks, start=1)
+        if other is not stack and not is_other_kind(other, stack)
+    ]
+    if others:
+        most = f"; {len(others) - _MOST_KINDS} more are in `--series list`"
+        listed = "; ".join(others[:_MOST_KINDS]) + (most if len(others) > _MOST_KINDS else "")
+        kinds.insert(0, f"not built: {listed}")
     rest = len(kinds) - _MOST_KINDS
     if rest <= 0:
         return (choice, *kinds)

@@ -21,6 +21,7 @@ _POSITION = "ImagePositionPatient"
 _GIVEN = "--spacing-um z,y,x replaces it"
 _DISTANCE = Subject("distance of slices", "mm", REGULAR, _GIVEN)
 _PIXELS = Subject("pixel spacing (rows, columns)", "mm", 0.01, _GIVEN)
+_ASPECT = Subject("spacing of rows over that of columns", tolerance=0.01, remedy=_GIVEN)
 _ORDER = Subject("order of slices")
 _TILT = Subject("gantry tilt", "degrees")
 _LETTERS = Subject("directions of rows and columns in the patient")
@@ -39,6 +40,7 @@ def geometry_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, .
     """
     return (
         *dict.fromkeys(note for frame in frames for note in frame.stated.count_notes),
+        *_slice_notes(frames, layout),
         *_distance_notes(frames, layout),
         *_thickness_notes(frames, layout),
         *_pixel_notes(frames),
@@ -46,6 +48,21 @@ def geometry_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, .
         *_wobble_notes(frames),
         *_tilt_notes(frames, layout),
         *_patient_notes(frames),
+    )
+
+
+def _slice_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, ...]:
+    """Return a note where NumberOfSlices states another number of slices than there are."""
+    stated = [int(f.stated.slices) for f in frames if f.stated.slices and f.stated.slices > 0]
+    count = len(frames)
+    if not stated or count in stated or count + layout.missing in stated:
+        return ()
+    words = f"number of slices: NumberOfSlices states {stated[0]}, and {count} are there"
+    if count > stated[0]:
+        return (f"{words}: all of them are read",)
+    return (
+        f"{words}: {1 - count / stated[0]:.0%} of the stated slices are absent (copy the series "
+        "again if they were lost)",
     )
 
 
@@ -101,12 +118,17 @@ def _thickness_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str,
 
 
 def _pixel_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
+    notes: list[str] = []
     first = frames[0]
-    if first.stated.detector_mm is None:
-        return ()
-    stated = Statement(first.spacing, "PixelSpacing")
-    detector = Statement(first.stated.detector_mm, first.stated.detector_name, Trust.REPEATED)
-    return settle(_PIXELS, [stated, detector]).notes
+    if first.stated.detector_mm is not None:
+        stated = Statement(first.spacing, "PixelSpacing")
+        detector = Statement(first.stated.detector_mm, first.stated.detector_name, Trust.REPEATED)
+        notes += settle(_PIXELS, [stated, detector]).notes
+    if first.stated.aspect is not None:
+        stated = Statement(first.spacing[0] / first.spacing[1], "PixelSpacing")
+        aspect = Statement(first.stated.aspect, "PixelAspectRatio", Trust.REPEATED)
+        notes += settle(_ASPECT, [stated, aspect]).notes
+    return tuple(notes)
 
 
 def _order_notes(frames: Sequence[Frame]) -> tuple[str, ...]:

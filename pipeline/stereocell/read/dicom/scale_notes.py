@@ -8,11 +8,12 @@ from collections.abc import Callable, Sequence
 
 from stereocell.model.counted import agreeing
 from stereocell.read.dicom.frame import Frame
-from stereocell.read.dicom.value_scale import HOUNSFIELD
+from stereocell.read.dicom.value_scale import HOUNSFIELD, UNKNOWN_KIND
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
 _SCALE = Subject("value scale (slope, intercept)")
 _AIR_HU = -500.0  # a scale that reaches no lower can't show air, which has -1000 HU
+_KIND_WORDS = {UNKNOWN_KIND: "none of the standard's terms, such as HU"}
 # Units of PET, as notes name them
 _PET_UNITS = {
     "CNTS": "counts, not activity (Units CNTS)",
@@ -39,7 +40,7 @@ def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
     lowest  returns the lowest grey value of a slice in the middle; it is called where the headers
             leave the question open
     """
-    if any(frame.scale.kind not in ("", HOUNSFIELD) for frame in frames):
+    if any(frame.scale.kind not in ("", HOUNSFIELD, UNKNOWN_KIND) for frame in frames):
         return False
     reach = 0.0
     for frame in frames:
@@ -59,8 +60,11 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
     """
     first = frames[0]
     notes = list(_rescale_notes(frames))
+    kinds = [_KIND_WORDS.get(kind, kind) for kind in _other_kinds(frames)]
     if first.modality == "CT" and not is_hounsfield:
         why = "" if first.scale.has_rescale else " (no RescaleSlope and no RescaleIntercept)"
+        if kinds:
+            why = f" (RescaleType is {kinds[0]})"
         notes.append(
             f"this CT states no Hounsfield units{why}: its levels and window are found as for any "
             "other volume (--iso-value and --window set them in voxel values)"
@@ -69,6 +73,11 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
         notes.append(
             "Hounsfield units are assumed, because the values reach those of air, although the "
             "CT states no RescaleIntercept (--iso-value and --window set other levels)"
+        )
+    if first.modality == "CT" and is_hounsfield and kinds:
+        notes.append(
+            f"RescaleType is {kinds[0]}: Hounsfield units are assumed, because the values reach "
+            "those of air (--iso-value and --window set other levels)"
         )
     if first.modality == "PT":
         unit = _PET_UNITS.get(first.scale.units, "of an unknown unit (no Units)")
@@ -103,6 +112,11 @@ def _table_notes(frames: Sequence[Frame], tables: int) -> list[str]:
             "RescaleIntercept beside the table: the table is used"
         )
     return notes
+
+
+def _other_kinds(frames: Sequence[Frame]) -> list[str]:
+    """Return the frames' RescaleTypes but for Hounsfield units, sorted."""
+    return sorted({frame.scale.kind for frame in frames} - {"", HOUNSFIELD})
 
 
 def _rescale_notes(frames: Sequence[Frame]) -> list[str]:

@@ -22,6 +22,8 @@ STATED_TAGS: list[Any] = [
     "GantryDetectorTilt",
     "PatientPosition",
     "PatientOrientation",
+    "NumberOfSlices",
+    "PixelAspectRatio",
 ]
 _COUNT = Subject("number of frames in a file")
 _POSITION = re.compile(r"(HF|FF)(S|P|DR|DL)|(L|R|A|P)F[SP]|(AF|PF)D[RL]")
@@ -38,6 +40,8 @@ class Stated:
     in_stack     InStackPositionNumber
     position     PatientPosition, one of the standard's codes
     directions   PatientOrientation: where rows and columns lead, as ("L", "P")
+    slices       NumberOfSlices of the volume
+    aspect       PixelAspectRatio: spacing of rows over that of columns
     count_notes  contradictions in the number of the file's frames
     """
 
@@ -50,6 +54,8 @@ class Stated:
     in_stack: float | None = None
     position: str = ""
     directions: tuple[str, ...] = ()
+    slices: float | None = None
+    aspect: float | None = None
     count_notes: tuple[str, ...] = ()
 
 
@@ -88,6 +94,8 @@ def stated_of(header: Any, groups: Sequence[Any], count_notes: tuple[str, ...] =
         in_stack=find_number(header, groups, "FrameContentSequence", "InStackPositionNumber"),
         position=position if _POSITION.fullmatch(position) else "",
         directions=_directions(header),
+        slices=find_number(header, groups, "", "NumberOfSlices"),
+        aspect=_aspect(header),
         count_notes=count_notes,
     )
 
@@ -101,6 +109,14 @@ def _detector(header: Any) -> tuple[tuple[float, float] | None, str]:
         if rows > 0 and columns > 0:
             return (rows, columns), name
     return None, ""
+
+
+def _aspect(header: Any) -> float | None:
+    try:
+        rows, columns = (float(value) for value in header.get("PixelAspectRatio") or ())
+    except DICOM_FAULTS:
+        return None
+    return rows / columns if rows > 0 and columns > 0 else None
 
 
 def _directions(header: Any) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ from stereocell.read.dicom.silence_logs import DICOM_FAULTS
 _RESCALE = "PixelValueTransformationSequence"
 _MAPPING = "RealWorldValueMappingSequence"
 HOUNSFIELD = "HU"
+UNKNOWN_KIND = "unknown"  # stands for free text, which notes must not quote
 # Units of PET, and DoseUnits
 _UNITS = (
     "CNTS",
@@ -54,7 +55,7 @@ class ValueScale:
     """The statements of a header on the values of a frame.
 
     has_rescale  RescaleSlope and RescaleIntercept are stated
-    kind         RescaleType, one of the standard's terms; empty: another, or none
+    kind         RescaleType, one of the standard's terms; UNKNOWN_KIND: another; empty: none
     units        of PET or a dose, one of the standard's terms; empty: another, or none
     real_world   slope and intercept of the only RealWorldValueMapping; None: there is none
     philips      Philips's scale slope
@@ -78,11 +79,17 @@ def scale_of(header: Any, groups: Sequence[Any]) -> ValueScale:
     units = units or find_text(header, groups, "", "DoseUnits").upper()
     return ValueScale(
         has_rescale=slope is not None or intercept is not None,
-        kind=kind if kind in _TYPES else "",
+        kind=_kind(kind),
         units=units if units in _UNITS else "",
         real_world=_real_world(header, groups),
         philips=private_number(header, *_PHILIPS),
     )
+
+
+def _kind(text: str) -> str:
+    if text.startswith("HOUNSFIELD"):  # which is spelled out in some exports
+        return HOUNSFIELD
+    return text if text in _TYPES or not text else UNKNOWN_KIND
 
 
 def _real_world(header: Any, groups: Sequence[Any]) -> tuple[float, float] | None:

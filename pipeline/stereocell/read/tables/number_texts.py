@@ -74,7 +74,7 @@ def read_columns(named: Mapping[str, Sequence[str]], separator: str) -> Reading:
             missing[name] = words
             notes += [note] if note else []
             notes += _marker_notes(name, numbers)
-            grouped = grouped or _grouped_note(texts, mark)
+            grouped = grouped or ("" if note else _grouped_note(texts, mark))
         else:
             columns.append(TableColumn(name, None, tuple(map(word_of, named[name]))))
             notes += _mixed_notes(name, numbers, words)
