@@ -35,6 +35,7 @@ from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import Window, measure_window
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels
+from stereocell.isosurface.holder import AIR_HU
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import LADDER
 from stereocell.isosurface.repair_rules import sum_components
@@ -122,6 +123,8 @@ def preview(
     volume = open_source(source_of(plan, channel=channel)).read(channel.index, tile.box, plan.level)
     smoothing_um = float(plan.settings.surface.smoothing_um)
     field = denoise(volume, smoothing_um, window.max_shift)
+    if window.holder is not None:  # the surface leaves it out, so it has no outline
+        np.minimum(field, AIR_HU, out=field, where=window.holder.at(tile.box))
     under = np.zeros((1, 1, 1), np.float32)
     if window.statistics.background is not None:
         under = window.statistics.background.at(tile.box)
