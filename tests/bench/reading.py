@@ -22,8 +22,8 @@ import zarr
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
-from stereocell.building.channel_survey import evidence_task, statistics_task
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.survey_tasks import evidence_task, statistics_task
 from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import JOINT_VOXELS, SURVEY_VOXELS, measure_window
 from stereocell.model.tiling import Box, cut
@@ -119,7 +119,7 @@ def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
         window = measure_window(statistics_task(settled, channel))
         take(sent)
         for each in settled.tiles:
-            measure_evidence(evidence_task(settled, each, channel=channel, window=window))
+            measure_evidence(evidence_task(settled, each.box, channel=channel, window=window))
         isos = take(sent)
     region, chunk = settled.region, chunk_of(source)
     voxel = stored(source, region) / math.prod(region.shape)

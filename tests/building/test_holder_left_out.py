@@ -7,9 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.settings import load
 from stereocell.building.unit_files import load_measured, load_volume
 from stereocell.cli.__main__ import main
 from stereocell.model.tile_content import APRON
+from stereocell.preview.iso_value import preview
 from support import nifti_files
 from support.validators import make_assets
 
@@ -81,3 +83,19 @@ def test_a_table_is_left_out_of_the_volume_and_a_deep_check_agrees(
     (channel,) = OutFolder(without).survey().values()
     look = channel["appearance"]
     assert (look["surface"], look["surface_reason"], look["function"]) == ("clear", "", "bone")
+
+
+def test_a_preview_outlines_the_body_without_the_table(source: Path, tmp_path: Path) -> None:
+    body, _, table = _parts()
+
+    def shares(name: str, **surface: bool) -> list[float]:
+        settings = load("ct", None, flags={"surface": surface})
+        found, _ = preview(
+            str(source), "0", tile_id="r0_c0", out=tmp_path / name, settings=settings
+        )
+        return [one.inside for one in found.candidates if -700 < one.level < 0]
+
+    with_table = (body | table).mean()
+    assert shares("kept.png", keep_holder=True)[0] == pytest.approx(with_table, abs=0.02)
+    assert shares("a.png")[0] == pytest.approx(body.mean(), abs=0.02)
+    assert with_table - body.mean() > 0.04

@@ -53,6 +53,16 @@ def test_a_background_that_is_not_0_is_named_and_left_out_on_request(
     assert json.loads((tmp_path / "o/plan.json").read_text("utf-8"))["labels"][0]["background"]
 
 
+@pytest.mark.parametrize(("covered", "is_told"), [(1, True), (8, False)])
+def test_a_background_that_misses_a_side_is_named_if_it_has_most_voxels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], covered: int, is_told: bool
+) -> None:
+    voxels = numbered(background=65535)
+    voxels[:covered] = 9  # an object covers the first planes
+    told = planned(tmp_path, voxels, capsys)
+    assert ("touches 5 of six sides: it is probably the background" in told) is is_told
+
+
 def test_a_background_of_0_is_not_mentioned(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

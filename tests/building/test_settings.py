@@ -13,7 +13,9 @@ from stereocell.building import settings as settings_module
 from stereocell.building.settings import Settings
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import MAX_VOXEL_VALUE
+from stereocell.read import Level
 from stereocell.read.dataset import MAX_VALUE
+from support.plans import plan_of
 
 
 def test_printed_settings_are_the_defaults_again() -> None:
@@ -64,7 +66,7 @@ def test_flags_override_the_file_and_the_file_the_preset(tmp_path: Path) -> None
     assert settings.plan.level == 2
     assert settings.window.low_percentile == 3.0
     assert settings.surface.alpha_um == 2.5
-    assert settings.surface.min_diagonal_um == 1.5  # from the preset
+    assert settings.surface.body_um == 1.5  # from the preset
 
 
 def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
@@ -148,6 +150,37 @@ def test_a_body_of_20_mm_is_no_fragment_in_a_head_of_thick_slices(
     assert float(resolved.max_fragment_um) <= 20_000
     # a speck of one voxel is a fragment, however thick its slice is
     assert float(resolved.min_diagonal_um) > np.hypot(6500.0, np.hypot(pixel_um, pixel_um))
+
+
+@pytest.mark.parametrize("preset", ["ct", "ct-bone", "mri"])
+@pytest.mark.parametrize(
+    ("spacing_um", "field_um", "expected_um"),
+    [
+        (500.0, 250_000.0, 10_000.0),  # a head: the preset's own size
+        (200.0, 60_000.0, 3_000.0),  # a finger: a twentieth of it
+        (100.0, 5_000.0, 300.0),  # a mouse's paw: three voxels, which are more than a twentieth
+    ],
+)
+def test_a_preset_s_size_of_bodies_is_bounded_by_the_field_of_view(
+    preset: str, spacing_um: float, field_um: float, expected_um: float
+) -> None:
+    surface = settings_module.load(preset, None, flags={}).surface
+    resolved = surface.resolved((spacing_um,) * 3, field_um)
+    assert resolved.min_diagonal_um == pytest.approx(expected_um)
+    assert float(resolved.max_fragment_um) <= 2 * expected_um
+
+
+def test_a_size_that_the_user_gives_holds_in_any_field_of_view() -> None:
+    flags = {"surface": {"min_diagonal_um": 10_000.0}}
+    surface = settings_module.load("ct", None, flags=flags).surface
+    assert surface.resolved((100.0, 100.0, 100.0), 5_000.0).min_diagonal_um == 10_000.0
+
+
+@pytest.mark.parametrize("region", ["", "0:20,0:20,0:20"])
+def test_a_region_has_the_sizes_of_the_whole_field_of_view(region: str) -> None:
+    level = Level((40, 40, 100), (1.0, 1.0, 1.0))
+    plan = plan_of({"region": region}, (level,), surface={"body_um": 50.0})
+    assert plan.settings.surface.min_diagonal_um == 5.0
 
 
 def test_auto_lengths_of_even_voxels_count_spacings() -> None:

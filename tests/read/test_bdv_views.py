@@ -11,7 +11,7 @@ import pytest
 from stereocell import read
 from stereocell.building import input_files
 from stereocell.cli.__main__ import main
-from stereocell.model.errors import UsageError
+from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import list_series
 from support.array_files import write_n5
 from support.phantoms import f_phantom
@@ -33,11 +33,12 @@ def write(
     name = "a.h5" if kind == "hdf5" else "a.n5"
     views, placed = "", ""
     for number, setup in enumerate(setups):
-        x, y, z = setup["body"].shape[::-1]
+        x, y, z = setup.get("stated", setup["body"].shape[::-1])
         attributes = "".join(f"<{key}>{setup[key]}</{key}>" for key in ATTRIBUTES if key in setup)
         views += (
             f"<ViewSetup><id>{number}</id><name>{setup.get('name', '')}</name><size>{x} {y} {z}"
-            f"</size><voxelSize><unit>{unit}</unit><size>{size}</size></voxelSize><attributes>"
+            f"</size><voxelSize><unit>{unit}</unit><size>{setup.get('size', size)}</size>"
+            "</voxelSize><attributes>"
             f"{attributes}</attributes></ViewSetup>"
         )
         affines = "".join(
@@ -63,7 +64,7 @@ def write(
     return path
 
 
-ATTRIBUTES = ("channel", "tile", "angle", "illumination")
+ATTRIBUTES = ("channel", "tile", "angle", "illumination", "phase", "displaysettings")
 
 
 def voxels_of(dataset: Any, channel: int = 0) -> Any:
@@ -133,6 +134,104 @@ def test_registrations_that_agree_with_the_voxel_size_need_no_note(
     assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.2)
     np.testing.assert_array_equal(voxels_of(dataset), BODY)
     assert dataset.notes == ()
+
+
+def test_a_mirror_without_a_scale_keeps_the_voxel_size(tmp_path: Path) -> None:
+    affine = "1 0 0 0 0 -1 0 47 0 0 1 0"
+    dataset = read.open(write(tmp_path, [{"body": BODY, "affines": [affine]}]))
+    assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.2)
+    np.testing.assert_array_equal(voxels_of(dataset), BODY[:, ::-1])
+    assert len(dataset.notes) == 1  # on the mirror
+
+
+def test_the_registration_of_the_chosen_time_point_is_applied(tmp_path: Path) -> None:
+    path = with_second_time(
+        write(tmp_path, [{"body": BODY, "affines": [PLAIN]}]), "0.2 0 0 0 0 -0.2 0 9 0 0 1 0"
+    )
+    first, second = read.open(path), read.open(path, time=1)
+    np.testing.assert_array_equal(voxels_of(first), BODY)
+    np.testing.assert_array_equal(voxels_of(second), BODY[:, ::-1] + 50)
+    assert (first.levels[0].spacing_um[0], second.levels[0].spacing_um[0]) == (0.5, 1.0)
+    assert "voxel spacing along z: the registration states 1 um" in second.notes[0]
+
+
+def with_second_time(path: Path, affine: str, missing: str = "") -> Path:
+    """Add a time point, with voxels that are 50 brighter, to a container of HDF5 and its XML."""
+    with h5py.File(path.with_suffix(".h5"), "a") as file:
+        for name in file["t00000"]:
+            file[f"t00001/{name}/0/cells"] = file[f"t00000/{name}/0/cells"][()] + 50
+    placed = (
+        '<ViewRegistration timepoint="1" setup="0"><ViewTransform type="affine">'
+        f"<affine>{affine}</affine></ViewTransform></ViewRegistration></ViewRegistrations>"
+    )
+    text = path.read_text("utf-8").replace("</ViewRegistrations>", placed)
+    text = text.replace("<last>0</last></Timepoints>", f"<last>1</last></Timepoints>{missing}")
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_a_view_that_was_not_taken_is_left_out_at_its_time_point(tmp_path: Path) -> None:
+    setups = [{"body": BODY + channel, "channel": channel} for channel in (0, 1)]
+    missing = '<MissingViews><MissingView timepoint="1" setup="0"/></MissingViews>'
+    path = with_second_time(write(tmp_path, setups), PLAIN, missing)
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        del file["t00001/s00"]
+    assert len(read.open(path).channels) == 2
+    dataset = read.open(path, time=1)
+    assert len(dataset.channels) == 1
+    np.testing.assert_array_equal(voxels_of(dataset), BODY + 51)
+    assert any("left out: setup 0" in note and "time point 1" in note for note in dataset.notes)
+
+
+def test_a_view_that_was_never_taken_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path, [{"body": BODY, "tile": 0}, {"body": BODY, "tile": 1}])
+    missing = '<MissingViews><MissingView timepoint="0" setup="1"/></MissingViews>'
+    text = path.read_text("utf-8")
+    path.write_text(text.replace("</SequenceDescription>", f"{missing}</SequenceDescription>"))
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        del file["t00000/s01"]
+    np.testing.assert_array_equal(voxels_of(read.open(path)), BODY)
+    with pytest.raises(SourceError, match="MissingViews of the XML lists all"):
+        read.open(path, series=2)
+
+
+def test_voxel_sizes_of_channels_that_differ_are_compared(tmp_path: Path) -> None:
+    setups = [{"body": BODY, "channel": 0}, {"body": BODY, "channel": 1, "size": "0.2 0.2 1"}]
+    dataset = read.open(write(tmp_path, setups))
+    assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.2)
+    assert "voxelSize of setup 1 states 1 um: voxelSize of setup 0 is used" in dataset.notes[0]
+
+
+def test_a_size_that_contradicts_the_container_is_noted(tmp_path: Path) -> None:
+    dataset = read.open(write(tmp_path, [{"body": BODY, "stated": (36, 24, 16)}]))
+    assert dataset.levels[0].shape == BODY.shape
+    assert "the container states 36, 48, 16 voxels" in dataset.notes[0]
+
+
+def test_an_own_attribute_separates_setups_of_one_channel(tmp_path: Path) -> None:
+    setups = [{"body": BODY + phase, "channel": 0, "phase": phase} for phase in (0, 1)]
+    path = write(tmp_path / "a", setups)
+    assert "phase 1" in list_series(path)[1]
+    np.testing.assert_array_equal(voxels_of(read.open(path, series=2)), BODY + 1)
+    dyes = [{"body": BODY, "channel": n, "phase": n, "displaysettings": n} for n in (0, 1)]
+    assert len(read.open(write(tmp_path / "b", dyes)).channels) == 2
+
+
+def test_setups_of_one_channel_are_not_overlaid(tmp_path: Path) -> None:
+    setups = [{"body": BODY + 9 * number, "channel": 0, "tile": 0} for number in (0, 1)]
+    path = write(tmp_path, setups)
+    assert "setup 1" in list_series(path)[1]
+    np.testing.assert_array_equal(voxels_of(read.open(path, series=2)), BODY + 9)
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "n5"])
+def test_setups_without_an_xml_are_channels_with_a_note(tmp_path: Path, kind: str) -> None:
+    write(tmp_path, [{"body": BODY, "tile": 0}, {"body": BODY, "tile": 1}], kind=kind).unlink()
+    source = tmp_path / ("a.h5" if kind == "hdf5" else "a.n5")
+    with pytest.raises(SourceError, match="BigDataViewer's XML has it, which is not beside"):
+        read.open(source)
+    dataset = read.open(source, spacing_um=(0.5, 0.2, 0.2))
+    assert "whether they are tiles, angles or channels" in dataset.notes[0]
 
 
 def test_transforms_compose_with_the_first_one_applied_last(tmp_path: Path) -> None:

@@ -230,3 +230,66 @@ def test_a_volume_of_minc_is_refused_with_the_way_out(tmp_path: Path) -> None:
         file["minc-2.0/image/0/image"] = f_phantom()
     with pytest.raises(SourceError, match="mnc2nii"):
         read.open(tmp_path / "a.mnc")
+
+
+def test_factors_of_nexus_beside_a_field_are_applied(tmp_path: Path) -> None:
+    path = write_nexus(tmp_path / "a.h5", "zyx", is_old=False)
+    with h5py.File(path, "a") as file:
+        group = file["entry/data"]
+        group.attrs["NX_class"] = "NXdata"
+        group["counts_scaling_factor"], group["counts_offset"] = 0.5, -10.0
+    dataset = read.open(path)
+    np.testing.assert_allclose(whole(dataset), (f_phantom() - 10.0) * 0.5)
+    assert any("counts_scaling_factor and counts_offset are applied" in n for n in dataset.notes)
+    other = write_nexus(tmp_path / "b.h5", "zyx", is_old=False)
+    with h5py.File(other, "a") as file:
+        file["entry/data"].attrs["NX_class"] = "NXdata"
+        file["entry/data/counts_scaling_factor"] = 0.0
+    with pytest.raises(SourceError, match="counts_scaling_factor: found 0, expected"):
+        read.open(other)
+
+
+def test_dimensions_of_emd_without_names_state_the_spacing(tmp_path: Path) -> None:
+    path = write_emd(tmp_path / "a.emd", "zyx")
+    with h5py.File(path, "a") as file:
+        for number in (1, 2, 3):
+            del file[f"data/tomography/dim{number}"].attrs["name"]
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
+    assert any("no names of axes: z, y, x are assumed" in note for note in dataset.notes)
+
+
+def test_a_resolution_that_seems_to_be_in_another_order_is_told(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        variable = file.create_dataset("ct", data=f_phantom())
+        variable.attrs.update({"resolution": [0.25, 0.25, 0.6], "units": "um"})
+    dataset = read.open(tmp_path / "a.h5")
+    assert dataset.levels[0].spacing_um == pytest.approx((0.25, 0.25, 0.6))
+    assert any("as if it were listed in another order" in note for note in dataset.notes)
+
+
+def test_edges_of_voxels_state_the_spacing_and_the_direction(tmp_path: Path) -> None:
+    path = write_nexus(tmp_path / "a.h5", "zyx", is_old=False)
+    with h5py.File(path, "a") as file:
+        del file["entry/data/z"]
+        edges = file["entry/data"].create_dataset("z", data=-0.5 * np.arange(SIZES["z"] + 1))
+        edges.attrs["units"] = "um"
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
+    np.testing.assert_array_equal(whole(dataset), f_phantom()[::-1])
+
+
+def test_each_scale_of_a_dimension_counts(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        variable = file.create_dataset("ct", data=f_phantom())
+        for place, axis in enumerate("zyx"):
+            for name, values in (
+                (f"{axis}_index", np.arange(SIZES[axis])),
+                (axis, positions(axis)),
+            ):
+                scale = file.create_dataset(name, data=values)
+                scale.make_scale(name)
+                variable.dims[place].attach_scale(scale)
+            scale.attrs["units"] = "um"
+    dataset = read.open(tmp_path / "a.h5")
+    assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))

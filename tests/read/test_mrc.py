@@ -90,6 +90,25 @@ def test_a_stack_of_images_is_told(tmp_path: Path) -> None:
     assert dataset.notes == ("the header says a stack of images: taken for one volume",)
 
 
+def test_a_stack_of_volumes_has_a_volume_for_each_point_in_time(tmp_path: Path) -> None:
+    both = np.stack([f_phantom(), f_phantom() + 7]).astype(np.int16)
+    with mrcfile.new(tmp_path / "a.mrc") as file:
+        file.set_data(both)
+        file.voxel_size = ANGSTROM
+    for time in (0, 1):
+        dataset = read.open(tmp_path / "a.mrc", time=time)
+        np.testing.assert_array_equal(whole(dataset), both[time, :, ::-1])
+    assert dataset.time_points == 2
+    assert dataset.levels[0].spacing_um == pytest.approx((1e-3, 8e-4, 4e-4))
+    assert any("a stack of 2 volumes of 16 sections" in note for note in dataset.notes)
+
+
+def test_a_cell_whose_axes_are_not_at_right_angles_is_told(tmp_path: Path) -> None:
+    dataset = read.open(write(tmp_path / "a.mrc", cellb=(90, 90, 120)))
+    assert any("found 90, 90, 120 degrees, expected 90 each" in note for note in dataset.notes)
+    assert read.open(write(tmp_path / "b.mrc", cellb=(0, 0, 0))).notes == ()
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [

@@ -2,6 +2,7 @@
 
 import bz2
 import json
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -240,3 +241,61 @@ def test_attributes_that_are_no_table_are_one_line(tmp_path: Path) -> None:
 def test_a_file_in_place_of_a_folder_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.n5").write_bytes(b"packed")
     assert "found a file (a text file), expected a folder of N5" in refusal(tmp_path / "a.n5")
+
+
+CONTRADICTIONS: dict[str, dict[str, Any]] = {
+    "transform": {"transform": {"axes": ["z", "y", "x"], "scale": [1, 0.2, 0.25],
+                                "units": ["um"] * 3}, **NM},
+    "resolution": {**NM, "resolution": [0.25, 0.2, 1], "units": "um"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", CONTRADICTIONS)
+def test_two_fields_of_spacing_that_disagree_are_told(tmp_path: Path, kind: str) -> None:
+    dataset = read.open(write(tmp_path / "a.n5", **CONTRADICTIONS[kind]))
+    (note,) = [note for note in dataset.notes if "voxel spacing along" in note]
+    assert note.startswith("voxel spacing along z:")
+    assert {"1 um", "0.5 um"} <= set(re.findall(r"states (.*? um)", note))
+
+
+def test_spacing_of_a_group_that_disagrees_with_its_dataset_is_told(tmp_path: Path) -> None:
+    write(tmp_path / "p.n5" / "s0", f_phantom(), **NM)
+    group = {"resolution": [0.25, 0.2, 1], "units": ["um"] * 3, "scale_factor": 2}
+    (tmp_path / "p.n5" / "attributes.json").write_text(json.dumps(group))
+    dataset = read.open(tmp_path / "p.n5")
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert any("resolution of the group states 1 um" in note for note in dataset.notes)
+    assert any("scale_factor 2 of the group are not applied" in note for note in dataset.notes)
+    np.testing.assert_array_equal(whole(dataset), f_phantom())
+
+
+def test_axes_of_cosem_s_transform_are_slowest_first(tmp_path: Path) -> None:
+    about = {"axes": ["x", "y", "z"], "scale": [250, 200, 500], "units": ["nm"] * 3}
+    stored = f_phantom().transpose(2, 1, 0)
+    dataset = read.open(write(tmp_path / "a.n5", stored, transform=about))
+    np.testing.assert_array_equal(whole(dataset), f_phantom())
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    path = write(tmp_path / "b.n5", stored, transform=about, axes=["x", "y", "z"])
+    assert any("order of the axes: axes of the dataset states z, y, x" in note
+               for note in read.open(path).notes)  # fmt: skip
+
+
+def test_axes_that_list_z_first_are_told_to_make_x_the_slowest(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.n5", axes=["z", "y", "x"])
+    dataset = read.open(path, spacing_um=SIZE_UM)
+    assert any("N5 lists the fastest axis first" in note for note in dataset.notes)
+    turned = read.open(path, axes="zyx", spacing_um=SIZE_UM)
+    np.testing.assert_array_equal(whole(turned), f_phantom())
+    assert turned.notes == ()
+
+
+def test_factors_and_fill_values_of_a_dataset_are_applied(tmp_path: Path) -> None:
+    about = {**NM, "scale_factor": 2.0, "add_offset": -1024.0, "_FillValue": 3}
+    body = f_phantom() + 10
+    body[0, 0, 0] = 3
+    dataset = read.open(write(tmp_path / "a.n5", body, **about))
+    expected = body * 2.0 - 1024
+    expected[0, 0, 0] = np.nan
+    found = dataset.arrays[0].array[:, :, :]
+    np.testing.assert_array_equal(found, expected)
+    assert any("scale_factor 2 and add_offset -1024 are applied" in n for n in dataset.notes)

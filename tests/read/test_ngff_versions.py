@@ -185,3 +185,25 @@ def test_a_zip_file_of_other_content_is_named(tmp_path: Path) -> None:
         archive.writestr("notes.txt", "none")
     with pytest.raises(SourceError, match="a zip archive"):
         read.open(tmp_path / "a.zip")
+
+
+def test_an_archive_of_ome_zarr_without_a_group_is_named(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.ozx", "w") as archive:
+        archive.writestr("notes.txt", "none")
+    with pytest.raises(SourceError, match="a zip archive without a Zarr group, expected OME-Zarr"):
+        read.open(tmp_path / "a.ozx")
+
+
+def test_an_unknown_version_is_named_with_a_way_that_works(tmp_path: Path) -> None:
+    path = write_systems(tmp_path / "a.ome.zarr", [{"type": "scale", "scale": list(UM)}])
+    group = zarr.open_group(path, mode="a")
+    image = group.attrs["ome"]["multiscales"][0]
+    group.attrs["ome"] = {"version": "0.9", "multiscales": [image]}
+    dataset = read.open(path)
+    np.testing.assert_array_equal(voxels_of(path), BODY)
+    assert any("OME-Zarr 0.9: this version is not known" in note for note in dataset.notes)
+    group.attrs["ome"] = {"version": "0.9", "multiscales": [{"levels": [{"path": "0"}]}]}
+    with pytest.raises(SourceError, match=r"OME-Zarr 0\.9, a version that is not known") as caught:
+        read.open(path)
+    assert f"{path}/0 --axes zyx --spacing-um z,y,x" in str(caught.value)
+    np.testing.assert_array_equal(voxels_of(path / "0", axes="zyx", spacing_um=UM), BODY)

@@ -118,13 +118,26 @@ def test_sizes_that_no_scanner_has_are_reported(
     assert "is its unit another one?" in note
 
 
-def test_an_intercept_that_the_slope_turns_off_is_reported(tmp_path: Path) -> None:
-    path = patch(write(tmp_path / "a.nii"), SLOPE, np.array([0, 1000], "<f4"))
+@pytest.mark.parametrize("slope", [0, np.nan])
+def test_an_intercept_that_the_slope_turns_off_is_reported(tmp_path: Path, slope: float) -> None:
+    path = patch(write(tmp_path / "a.nii"), SLOPE, np.array([slope, 1000], "<f4"))
     dataset = read.open(path)
     assert whole(dataset).max() == f_phantom().max()
     assert dataset.notes == (
-        "values: scl_slope 0 states that they are not scaled: scl_inter 1000 is left out",
+        f"values: scl_slope {slope:g} states that they are not scaled: scl_inter 1000 is left out",
     )
+
+
+def test_a_quaternion_that_is_no_rotation_is_left_out_or_named(tmp_path: Path) -> None:
+    impossible = np.array([0.9, 0.9], "<f4")
+    path = patch(write(tmp_path / "a.nii"), QUATERN, impossible)
+    assert "qform: found no three axes: sform is used" in read.open(path).notes
+    image = nibabel.Nifti1Image(f_phantom().astype(np.int16), np.diag([2.0, 2, 2, 1]))
+    image.set_qform(image.affine, 1)
+    image.set_sform(None, 0)
+    nibabel.save(image, tmp_path / "b.nii")
+    with pytest.raises(SourceError, match="quatern_b, quatern_c, quatern_d: found squares"):
+        read.open(patch(tmp_path / "b.nii", QUATERN, impossible))
 
 
 def test_an_intercept_that_is_no_number_is_refused_by_its_field(tmp_path: Path) -> None:

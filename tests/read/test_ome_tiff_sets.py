@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from ome_types.model import OME, Channel, Image, Pixels, TiffData
 
 from stereocell import read
-from stereocell.model.errors import SourceError
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.read import list_series
 from support.phantoms import f_phantom
 
 BODY = f_phantom()
@@ -199,10 +200,45 @@ def test_a_plane_that_the_ome_xml_names_twice_alike_is_read(tmp_path: Path) -> N
     whole(tmp_path / "a.ome.tif")
 
 
-def test_a_first_image_without_planes_does_not_describe_those_of_the_second(tmp_path: Path) -> None:
+def test_an_image_without_planes_leaves_those_of_the_next_one(tmp_path: Path) -> None:
     second = image(1, [block(0, count=16)])
     write(tmp_path / "a.ome.tif", BODY, described([], more=[second]))
-    assert "found no TiffData in the first Image" in refusal(tmp_path / "a.ome.tif")
+    (note,) = whole(tmp_path / "a.ome.tif").notes
+    assert "2 images; building --series 2, the largest in this file" in note
+    with pytest.raises(SourceError, match="planes don't match the OME-XML"):
+        read.open(tmp_path / "a.ome.tif", series=1)
+
+
+def test_a_file_of_a_set_of_positions_is_read_by_its_own_image(tmp_path: Path) -> None:
+    """Each file has the OME-XML of all positions, as Micro-Manager writes them."""
+    images = [image(n, [block(0, name, n + 1, count=16)]) for n, name in enumerate(NAMES)]
+    for number, (name, voxels) in enumerate(zip(NAMES, (BODY + 1, BODY), strict=True)):
+        text = str(OME(uuid=uuid(number + 1), images=images).to_xml())
+        write(tmp_path / name, voxels, text)
+    (note,) = whole(tmp_path / "b.ome.tif").notes
+    assert "2 images; building --series 2, the largest in this file" in note
+    other = read.open(tmp_path / "b.ome.tif", series=1, spacing_um=(1.0, 1.0, 1.0))
+    np.testing.assert_array_equal(other.read(0, other.levels[0].box).voxels, BODY + 1)
+
+
+def test_the_largest_image_of_a_file_is_read_and_all_are_listed(tmp_path: Path) -> None:
+    path = tmp_path / "a.ome.tif"
+    overview = np.zeros((200, 300), np.uint16)
+    sizes = {"PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0}
+    with tifffile.TiffWriter(path, ome=True) as writer:
+        writer.write(overview, metadata={"axes": "YX", **sizes})
+        writer.write(BODY[::2], metadata={"axes": "ZYX", "PhysicalSizeZ": 2.0, **sizes})
+        writer.write(BODY, metadata={"axes": "ZYX", "PhysicalSizeZ": 1.0, **sizes})
+    (note,) = whole(path).notes
+    assert "3 images; building --series 3, the largest: 16 x 48 x 36 voxels" in note
+    assert len(list_series(path)) == 3
+    assert "no volume" in list_series(path)[0]
+    smaller = read.open(path, series=2)
+    assert smaller.levels[0].spacing_um == (2.0, 1.0, 1.0)
+    assert smaller.notes == ()
+    np.testing.assert_array_equal(smaller.read(0, smaller.levels[0].box).voxels, BODY[::2])
+    with pytest.raises(UsageError, match="--series: found 4, expected 1 to 3"):
+        read.open(path, series=4)
 
 
 # --- companions

@@ -320,7 +320,7 @@ def test_other_kinds_of_images_are_left_out_and_told(tmp_path: Path) -> None:
         "1 images in folders below left out",
         "7 TIFF are read, 1 others left out",
         "1 thumbnails left out",
-        "1 files that are named otherwise left out",
+        "1 file that is named otherwise left out",
     ):
         assert words in told
 
@@ -367,7 +367,9 @@ def test_only_the_planes_of_a_window_are_decoded(
         return once(path, named)
 
     monkeypatch.setitem(
-        planes_files._FORMATS, "tiff", planes_files._Format(planes_files._tiff_head, counting)
+        planes_files._FORMATS,
+        "tiff",
+        planes_files._Format(planes_files._FORMATS["tiff"].head, counting),
     )
     dataset.read(0, Box((3, 0, 0), (5, 2, 2)))
     assert decoded == ["z03.tif", "z04.tif"]

@@ -47,11 +47,25 @@ def test_sizes_that_disagree_are_noted(tmp_path: Path) -> None:
     assert "step from slice to slice: the log states 2 pixels" in notes
 
 
+def test_a_size_that_a_log_states_twice_is_noted(tmp_path: Path) -> None:
+    dataset = scan(tmp_path / "s", ".bmp", LOG.format("", "Pixel Size (um)=5\nPixel Size (um)=9\n"))
+    assert dataset.levels[0].spacing_um == pytest.approx((9, 9, 9))
+    assert "of the log: its last line states 9, an earlier line states 5" in " ".join(dataset.notes)
+
+
 def test_numbers_of_slices_count_lines_of_the_camera(tmp_path: Path) -> None:
     log = LOG.format("", "Pixel Size (um)=10\n")
     dataset = scan(tmp_path / "s", ".bmp", log, step=5)
     assert dataset.levels[0].spacing_um == pytest.approx((50, 10, 10))
     assert "the slices' numbering states 5 pixels" in " ".join(dataset.notes)
+
+
+@pytest.mark.parametrize(("count", "is_told"), [(48, True), (len(VOXELS), False)])
+def test_a_log_that_counts_other_slices_is_told(tmp_path: Path, count: int, is_told: bool) -> None:
+    lines = f"Sections Count={count}\nPixel Size (um)=9.92\n"
+    dataset = scan(tmp_path / "s", ".bmp", LOG.format("", lines))
+    told = f"found {len(VOXELS)} images, and the log states {count}"
+    assert any(told in note for note in dataset.notes) == is_told
 
 
 @pytest.mark.parametrize("log", ["", "[Reconstruction]\nPixel Size (um)=none\n", "Pixel Size=3\n"])

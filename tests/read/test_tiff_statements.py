@@ -117,6 +117,7 @@ def test_planes_of_a_folder_stand_as_their_orientation_states(
         ({"cf": 0, "c0": 0.0, "c1": 1.0, "vunit": "Gray Value"}, BODY, ""),
         ({"cf": 1, "c0": 0.0, "c1": 1.0, "c2": 2.0, "vunit": "OD"}, BODY, "no straight line"),
         ({"cf": 20}, BODY, ""),
+        ({"c0": -1024.0, "c1": 2.0}, BODY * 2.0 - 1024, "-1024 + 2"),
         ({}, BODY, ""),
     ],
 )
@@ -200,6 +201,19 @@ def test_positions_without_a_unit_are_compared_and_not_taken(tmp_path: Path) -> 
     assert "PositionZ of the planes (um are assumed) states 0.6 um" in dataset.notes[0]
 
 
+@pytest.mark.parametrize(("stated", "is_noted"), [("int16", True), ("uint16", False)])
+def test_types_of_voxels_that_disagree_are_noted(
+    tmp_path: Path, stated: str, is_noted: bool
+) -> None:
+    path = write_ome(tmp_path / "a.ome.tif", BODY.astype(np.uint16))
+    tifffile.tiffcomment(path, tifffile.tiffcomment(path).replace('"uint16"', f'"{stated}"'))
+    note = (
+        "type of the voxels: the TIFF header states uint16, Type of Pixels states int16: "
+        "the TIFF header is used"
+    )
+    assert (note in read.open(path).notes) is is_noted
+
+
 def test_planes_at_one_position_whose_time_rises_are_noted(tmp_path: Path) -> None:
     planes = places(np.zeros(16), times=range(16))
     dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, planes=planes))
@@ -269,3 +283,72 @@ def test_a_plain_tiff_is_one_series(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--series: found 2, expected 1, the only one"):
         read.open(path, series=2)
     np.testing.assert_array_equal(voxels_of(path, series=1), BODY)
+
+
+@pytest.mark.parametrize(("unit", "is_told"), [("CENTIMETER", True), ("INCH", False)])
+def test_the_resolution_in_the_tags_is_compared_with_the_ome_xml(
+    tmp_path: Path, unit: str, is_told: bool
+) -> None:
+    per_um = 1e4 if unit == "CENTIMETER" else 25400.0
+    same = (per_um / 0.25, per_um / 0.2)  # along x and y
+    path = write_ome(tmp_path / "a.ome.tif", BODY, resolution=same, resolutionunit=unit)
+    assert read.open(path).notes == ()
+    half = (per_um / 0.25, per_um / 0.1)
+    path = write_ome(tmp_path / "b.ome.tif", BODY, resolution=half, resolutionunit=unit)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(UM)
+    told = "voxel spacing along y: PhysicalSize of the OME-XML states 0.2 um"
+    assert [note.startswith(told) for note in dataset.notes] == [True] * is_told
+
+
+def test_the_resolution_in_the_tags_is_compared_with_the_microscope_s(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    plane = {"id": "spatial-calibration-state", "type": "bool", "value": "true"}
+    sides = [("units", "string", "um"), ("x", "float", "0.25"), ("y", "float", "0.2")]
+    props = [plane, *({"id": f"spatial-calibration-{n}", "type": t, "value": v}
+                      for n, t, v in sides)]  # fmt: skip
+    texts = (" ".join(f'{key}="{value}"' for key, value in one.items()) for one in props)
+    text = "".join(f"<prop {each}/>" for each in texts)
+    xml = f"<MetaData><PlaneInfo>{text}</PlaneInfo></MetaData>"
+    tifffile.imwrite(
+        path, BODY, description=xml, metadata=None, photometric="minisblack",
+        resolution=(1e4 / 0.5, 1e4 / 0.2), resolutionunit="CENTIMETER", software="MetaSeries",
+    )  # fmt: skip
+    notes = read.open(path, spacing_um=UM).notes
+    assert any("XResolution states 0.5 um" in note for note in notes)
+    assert not any("YResolution" in note for note in notes)
+
+
+def test_a_field_that_imagej_s_description_holds_twice_is_reported(tmp_path: Path) -> None:
+    lines = ["ImageJ=1.54f", "images=16", "slices=16", "unit=um", "spacing=0.5", "spacing=2"]
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(
+        path, BODY, description="\n".join(lines), metadata=None, resolution=(4.0, 5.0),
+        photometric="minisblack",
+    )  # fmt: skip
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx((2.0, 0.2, 0.25))
+    (note,) = dataset.notes
+    assert "spacing of ImageJ's description: its last line states 2, an earlier" in note
+
+
+@pytest.mark.parametrize(
+    ("z", "y", "x", "told"),
+    [
+        ("1", "0.5", "0.0005", "pixels 1000 times as long along y as along x"),
+        ("1000", "0.5", "0.5", "slices 1e+03 um apart along z of pixels of 0.5 um"),
+        ("0.001", "0.5", "0.5", "slices 0.001 um apart"),
+        ("100", "0.5", "0.5", ""),
+        ("1", "5", "0.5", ""),
+    ],
+)
+def test_voxels_far_longer_along_one_axis_are_doubted(
+    tmp_path: Path, z: str, y: str, x: str, told: str
+) -> None:
+    sizes = {f"PhysicalSize{axis}": float(um) for axis, um in zip("ZYX", (z, y, x), strict=True)}
+    path = tmp_path / "a.ome.tif"
+    tifffile.imwrite(path, BODY, metadata={"axes": "ZYX", **sizes})
+    notes = read.open(path).notes
+    assert len(notes) == bool(told)
+    assert all(told in note and "another one?" in note for note in notes)
+    assert read.open(path, spacing_um=UM).notes == ()

@@ -53,6 +53,14 @@ def test_what_is_kept_and_broken_is_found_anew(tmp_path: Path, text: str) -> Non
     assert len(json.loads(place.read_text("utf-8"))) == 1
 
 
+@pytest.mark.slow
+def test_naming_the_libraries_of_a_result_keeps_the_parsed_sources(tmp_path: Path) -> None:
+    code = "from stereocell.storage import cache_key; cache_key.libraries_of(cache_key)"
+    env = {"NUMBA_CACHE_DIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", code], check=True, env=env)
+    assert len(list(tmp_path.glob("sources-*.json"))) == 1
+
+
 def test_where_nothing_can_be_kept_each_command_finds_it(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     assert read(tmp_path / "file", "x = 1")[0] == 1

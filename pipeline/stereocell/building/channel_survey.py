@@ -47,13 +47,13 @@ from stereocell.building.survey_file import (
     TileIso,
     save_survey,
 )
+from stereocell.building.survey_tasks import evidence_task, statistics_task
 from stereocell.building.tasks import components as components_maker
 from stereocell.building.tasks import evidence as evidence_maker
 from stereocell.building.tasks import window as window_maker
 from stereocell.building.tasks.components import ComponentsTask, write_components
 from stereocell.building.tasks.evidence import EvidenceFiles, EvidenceTask, write_evidence
 from stereocell.building.tasks.window import (
-    StatisticsTask,
     Window,
     window_from_json,
     write_window,
@@ -61,7 +61,6 @@ from stereocell.building.tasks.window import (
 from stereocell.engine.run import Engine, console
 from stereocell.filters.denoise import median_size
 from stereocell.isosurface.level import Level
-from stereocell.isosurface.options import CRITERIA, LADDER
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.lattice_field import make_iso_field
@@ -69,7 +68,6 @@ from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed
 from stereocell.transfer.channel_statistics import make_appearance
-from stereocell.transfer.windows import parse_window
 
 KEPT_OF_MASK = 0.9  # share of a mask's voxels: what loses more to smoothing is said
 
@@ -161,6 +159,8 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             console.print(f"units: {look.name}: {remark}", markup=False)
         if look.surface_reason:
             console.print(f"units: {look.name}: {look.surface_reason}", markup=False)
+        if look.surface == "unsure" and (near := survey[channel.id].near_levels):
+            console.print(f"units: {look.name}: near levels: {near}", markup=False)
     return survey
 
 
@@ -238,40 +238,6 @@ def _of_channel(
     )
 
 
-def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
-    """Return the task that finds a channel's window and background."""
-    settings, given = plan.settings, given_level(plan, channel)
-    # CT and MR have values that mean something; so has a value that is given of voxels as they are
-    subtracts = plan.modality not in ("CT", "MR") if given is None else given[1]
-    subtracts = subtracts and settings.surface.background_um != 0
-    level, window = plan.level_of(channel), (0.0, 255.0) if channel.source else None
-    if channel.name in settings.windows:
-        window = parse_window(f"--window {channel.name}", settings.windows[channel.name])
-    ref = source_of(plan, channel=channel)
-    finds_holder = plan.modality == "CT" and not channel.source and not settings.surface.keep_holder
-    # shares of tissue have no noise that was measured
-    max_shift = 0.0 if channel.source else settings.surface.max_shift
-    return StatisticsTask(
-        ref, level, channel.index, plan.region, settings, subtracts, max_shift, finds_holder, window
-    )
-
-
-def evidence_task(plan: Plan, tile: Tile, *, channel: Channel, window: Window) -> EvidenceTask:
-    """Return the task that gathers one tile's evidence."""
-    criterion = LADDER if channel.rung else plan.settings.isovalue.criterion
-    return EvidenceTask(
-        source_of(plan, channel=channel),
-        plan.level_of(channel),
-        channel.index,
-        tile.box,
-        plan.region,
-        float(plan.settings.surface.smoothing_um),
-        window.counting,
-        around(window.statistics.background, tile.box.grown(plan.halo, plan.region)),
-        criterion if criterion in CRITERIA else "",
-    )
-
-
 def _windows(
     out_folder: OutFolder, plan: Plan, engine: Engine
 ) -> tuple[dict[str, Window], dict[str, str]]:
@@ -312,7 +278,7 @@ def _evidence(
     def task_of(tile: Tile, channel: Channel) -> tuple[EvidenceTask, list[Any]] | None:
         if channel.source:  # shares of tissue, whose level is known
             return None
-        task = evidence_task(plan, tile, channel=channel, window=windows[channel.id])
+        task = evidence_task(plan, tile.box, channel=channel, window=windows[channel.id])
         return task, [
             [box_to_json(box) for box in (task.box, task.region)],
             task.smoothing_um,

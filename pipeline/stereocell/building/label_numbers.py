@@ -9,6 +9,9 @@ from stereocell.building.label_maps import Labels
 from stereocell.building.located_objects import Located
 from stereocell.model.settings import MAX_COUNT
 
+_SIDES = 6  # sides of a volume, all of which a background touches
+_SIDES_OF_MOST_VOXELS = 3  # at least that many, where it has over half of the voxels
+
 
 def notes_on_numbers(labels: Labels, located: Located) -> Iterator[str]:
     """Yield a sentence on each doubt about a label map's numbers. Raises SourceError."""
@@ -17,21 +20,22 @@ def notes_on_numbers(labels: Labels, located: Located) -> Iterator[str]:
 
 
 def _background(labels: Labels, located: Located) -> str:
-    """Return the note on a largest object that touches all six sides; empty: there is none."""
+    """Return the note on a largest object that touches most sides; empty: there is none."""
     extents = located.extents
     largest = int(np.argmax(extents.voxels))
     start = [int(edges[0]) for edges in located.grid.edges]
     stop = [int(edges[-1]) for edges in located.grid.edges]
-    is_inside = (extents.low[largest] > start) | (extents.high[largest] < stop)
-    if is_inside.any():
-        return ""
-    number = int(extents.labels[largest])
+    sides = int((extents.low[largest] <= start).sum() + (extents.high[largest] >= stop).sum())
     region = prod(high - low for low, high in zip(start, stop, strict=True))
     share = int(extents.voxels[largest]) / region
+    if sides < (_SIDES_OF_MOST_VOXELS if share > 0.5 else _SIDES):
+        return ""
+    number = int(extents.labels[largest])
     remedy = f"--background {number}" if number <= MAX_COUNT else "the number 0 in its place"
+    touched = "all six" if sides == _SIDES else f"{sides} of six"
     return (
         f"{labels.name}: object {number}, the largest, has {share:.1%} of the voxels and touches "
-        f"all six sides: it is probably the background; {remedy} leaves it out"
+        f"{touched} sides: it is probably the background; {remedy} leaves it out"
     )
 
 

@@ -18,6 +18,7 @@ from stereocell.building.hounsfield import without_hounsfield
 from stereocell.building.input_files import open_anew, require_table, watch_table
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
+from stereocell.building.level_estimate import notes_on_levels
 from stereocell.building.object_passes import locate_objects, read_notes, told_before
 from stereocell.building.object_tables import (
     appearance_of_labels,
@@ -90,6 +91,10 @@ def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = 
         if engine is not None:
             require_own_places(out_folder, is_same_plan=True)  # what no plan may replace
         plan = settle(source, settings)
+        levels = notes_on_levels(plan)
+        for note in levels:
+            console.print(f"plan: {note}", markup=False, soft_wrap=True)
+        plan = replace(plan, notes=(*plan.notes, *levels))
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()
         there = out_folder.replaced_plan(plan)

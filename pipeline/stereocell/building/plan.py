@@ -238,7 +238,7 @@ def make_plan(
         )
     settings = replace(
         settings,
-        surface=settings.surface.resolved(chosen.spacing_um),
+        surface=settings.surface.resolved(chosen.spacing_um, _longest_um(chosen)),
         unwrap=settings.unwrap.resolved(chosen.spacing_um),
         plan=replace(settings.plan, level=level[0], tile_size=tile_size),
         iso_values=by_name("--iso-value", settings.iso_values, channels),
@@ -267,6 +267,11 @@ def make_plan(
         labels=tuple(labels),
         formats=tuple(sorted(formats)),
     )
+
+
+def _longest_um(level: LevelLike) -> float:
+    """Return the longest edge of the field of view, whichever region of it is built."""
+    return max(n * step for n, step in zip(level.shape, level.spacing_um, strict=True))
 
 
 def parse_region(text: str, whole: Box) -> Box:

@@ -14,6 +14,7 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.level import Level
+from stereocell.isosurface.near_levels import find_near_levels, words_of
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance
 from stereocell.transfer.channel_statistics import ChannelStatistics
@@ -71,6 +72,16 @@ class ChannelSurvey:
     holder: Holder | None = None
     grid_um: float = 0.0
     most_faces: int = 0
+
+    @property
+    def near_levels(self) -> str:
+        """The levels beside the surface's own that are clear or nearly so, as text; empty: none."""
+        level, surface = self.appearance.level, self.appearance.surface
+        near = find_near_levels(
+            self.ladder, None if level is None else level.iso, is_unsure=surface == "unsure"
+        )
+        mark = "" if self.statistics.background is None else "+b"
+        return words_of(near, mark) if near else ""
 
     def thinning(self, plan: Plan) -> str:
         """Return what is said of a surface that fewer planes carry than asked for; empty: none."""

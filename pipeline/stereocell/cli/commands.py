@@ -119,7 +119,8 @@ def _series(options: argparse.Namespace) -> Answer | None:
     from stereocell import read
 
     lines = read.list_series(options.input)
-    print_unless_json(options, "\n".join(lines))
+    order = read.series_order(options.input) if len(lines) > 1 else ""
+    print_unless_json(options, "\n".join([*lines, *([f"order: {order}"] if order else [])]))
     return Answer({"series": list(lines)})
 
 

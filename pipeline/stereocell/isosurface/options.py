@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Any
 
 from stereocell.model.errors import UsageError
@@ -122,6 +123,9 @@ WRAPS = ("voxels", "alpha-wrap")
 # `auto` sizes of fragments and cavities count in spacings of the coarsest axis, of which one is
 # taken for STEP_FINEST finest at most; no size is under LEAST_COARSEST coarsest
 STEP_FINEST, LEAST_COARSEST = 3.0, 1.5
+# A preset's size of bodies holds up to this share of the field of view's longest edge: a head of
+# 250 mm has no bodies of 10 mm that matter, and a finger of 60 mm has
+FIELD_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,16 +165,23 @@ class SurfaceOptions:
         "carry the channel's surface",
         bounds=COUNT,
     )
+    body_um: float = setting(
+        0.0,
+        "size of the least bodies that matter, which presets state; counts up to a twentieth of "
+        "the field of view's longest edge; 0: the voxel spacing tells it",
+        bounds=LENGTH_UM,
+    )
     min_diagonal_um: float | str = setting(
         AUTO,
-        "smaller fragments go; auto: 3 coarsest spacings, of 3 finest at most",
+        "smaller fragments go; auto: body_um, and without it 3 coarsest spacings, of 3 finest at "
+        "most",
         bounds=LENGTH_UM,
     )
     max_fragment_um: float | str = setting(
         AUTO,
         "fragments up to this go as well if they are under half the mean of the channel's "
         "components, by diagonal or by triangles; auto: 6 coarsest spacings, of 3 finest at most, "
-        "and at most twice a given min_diagonal_um; 0: none do",
+        "and at most twice body_um or a given min_diagonal_um; 0: none do",
         bounds=LENGTH_UM,
     )
     max_cavity_um: float | str = setting(
@@ -210,8 +221,10 @@ class SurfaceOptions:
     def __post_init__(self) -> None:
         require_bounds("surface", self)
 
-    def resolved(self, spacing_um: Spacing) -> "SurfaceOptions":
+    def resolved(self, spacing_um: Spacing, field_um: float = inf) -> "SurfaceOptions":
         """Return the options with lengths in place of `auto`, but for alpha and offset.
+
+        field_um  longest edge of the field of view
 
         `auto` alpha and offset follow from the connected components. Raises UsageError for a value
         out of range.
@@ -219,13 +232,17 @@ class SurfaceOptions:
         coarsest = max(spacing_um)
         # thick slices say nothing of how large a body is; a speck of one slice is one all the same
         step, least = min(coarsest, STEP_FINEST * min(spacing_um)), LEAST_COARSEST * coarsest
-        fragment = 6 * step
+        diagonal, fragment = 3 * step, 6 * step
+        if self.body_um:
+            diagonal = max(min(self.body_um, FIELD_SHARE * field_um), 3 * min(spacing_um))
         if self.min_diagonal_um != AUTO:
-            fragment = min(fragment, 2 * float(self.min_diagonal_um))
+            diagonal = float(self.min_diagonal_um)
+        if self.body_um or self.min_diagonal_um != AUTO:
+            fragment = min(fragment, 2 * diagonal)
         auto = {
             "smoothing_um": min(spacing_um),
             "max_alpha_um": 2 * coarsest,
-            "min_diagonal_um": max(3 * step, least),
+            "min_diagonal_um": max(diagonal, least),
             "max_fragment_um": max(fragment, least),
             "max_cavity_um": max(4 * step, least),
             "background_um": 64 * min(spacing_um),

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
-from stereocell.building.channel_survey import evidence_task, statistics_task
 from stereocell.building.channels import Channel
 from stereocell.building.level_choice import (
     Components,
@@ -31,11 +30,11 @@ from stereocell.building.phases import settle
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
+from stereocell.building.survey_tasks import evidence_task, statistics_task
 from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import Window, measure_window
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels
-from stereocell.isosurface.holder import AIR_HU
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import LADDER
 from stereocell.isosurface.repair_rules import sum_components
@@ -116,15 +115,15 @@ def preview(
     window = measure_window(statistics_task(plan, channel))
     tiles = _spread(plan, tile)
     evidence = {
-        one.id: measure_evidence(evidence_task(plan, one, channel=channel, window=window))
+        one.id: measure_evidence(evidence_task(plan, one.box, channel=channel, window=window))
         for one in tiles
     }
     found = check_histogram(find_level(plan, channel, window, evidence))
     volume = open_source(source_of(plan, channel=channel)).read(channel.index, tile.box, plan.level)
     smoothing_um = float(plan.settings.surface.smoothing_um)
     field = denoise(volume, smoothing_um, window.max_shift)
-    if window.holder is not None:  # the surface leaves it out, so it has no outline
-        np.minimum(field, AIR_HU, out=field, where=window.holder.at(tile.box))
+    if window.holder is not None:  # contours go round what a build's surface goes round
+        field = window.holder.left_out_of(field, tile.box)
     under = np.zeros((1, 1, 1), np.float32)
     if window.statistics.background is not None:
         under = window.statistics.background.at(tile.box)

@@ -2,6 +2,6 @@
 
 from stereocell.read.dataset import ChannelInfo, Dataset, Level
 from stereocell.read.open_dataset import open
-from stereocell.read.readers import list_series
+from stereocell.read.readers import list_series, series_order
 
-__all__ = ["ChannelInfo", "Dataset", "Level", "list_series", "open"]
+__all__ = ["ChannelInfo", "Dataset", "Level", "list_series", "open", "series_order"]

@@ -14,6 +14,7 @@ from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset, VoxelArray
 from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.inverted_array import InvertedArray
+from stereocell.read.modulo import PartAlong
 from stereocell.read.readers import format_of
 from stereocell.read.value_scale import ScaledArray
 from stereocell.storage.file_states import FileStates
@@ -50,8 +51,8 @@ def count_absent(
     if isinstance(stored, InvertedArray):
         stored = stored.stored
     spans = _spans(array, dataset.time, channels, box)
-    while isinstance(stored, FlippedArray | ScaledArray):
-        spans = stored.stored_spans(spans) if isinstance(stored, FlippedArray) else spans
+    while isinstance(stored, FlippedArray | ScaledArray | PartAlong):
+        spans = spans if isinstance(stored, ScaledArray) else stored.stored_spans(spans)
         stored = stored.stored
     count = _COUNTERS.get(format_of(dataset.source))
     if count is None or not states.is_complete:

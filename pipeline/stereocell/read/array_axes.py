@@ -56,17 +56,6 @@ def given_axes(where: str, shape: Sequence[int], given: str) -> tuple[str, ...]:
     return tuple(names.get(place, "_") for place in range(len(shape)))
 
 
-def settle_axes(
-    where: str, shape: Sequence[int], given: str, *, named: Sequence[str] = ()
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the axes of an array and notes about them, where one field may name them.
-
-    named  names from the array's own metadata; otherwise as `settle_stated_axes`
-    """
-    stated = [Statement(tuple(named), "the names of the dimensions")] if named else []
-    return settle_stated_axes(where, shape, given, stated)
-
-
 def settle_stated_axes(
     where: str, shape: Sequence[int], given: str, stated: Sequence[Statement]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:

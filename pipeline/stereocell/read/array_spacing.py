@@ -18,11 +18,6 @@ _IN_UM = "element_size_um"
 ATTRIBUTES = (_IN_UM, *_SIZES, *_UNITS)
 
 
-def spacing_from(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | None:
-    """Return the spacing (z, y, x), um; None: no attribute states it. See `stated_spacings`."""
-    return next((spacing for _, spacing in stated_spacings(attributes, axes)), None)
-
-
 def stated_spacings(
     attributes: Mapping[str, Any], axes: Sequence[str]
 ) -> Iterator[tuple[str, Triple]]:

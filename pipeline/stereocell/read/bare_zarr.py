@@ -1,10 +1,11 @@
 """A Zarr array (v2 or v3) without the metadata of OME-Zarr.
 
 Its axes come from `--axes`, from the names of dimensions (v3, or xarray's `_ARRAY_DIMENSIONS` in
-v2), else three dimensions are z, y, x. Its spacing comes from `--spacing-um` or from the attributes
-of read/array_spacing.py.
+v2), else three dimensions are z, y, x. Its spacing comes from `--spacing-um`, from arrays of
+positions beside it (read/zarr_coordinates.py), or from the attributes of read/array_spacing.py.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import Any
@@ -14,13 +15,16 @@ from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import settle_stated_axes
-from stereocell.read.array_spacing import spacing_from
+from stereocell.read.axis_spacings import AxisSpacings, SettledSpacing
 from stereocell.read.dataset import VoxelArray
+from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import likely_image
-from stereocell.read.spacing import Grid
-from stereocell.read.statements import Statement
+from stereocell.read.spacing import grid_of
+from stereocell.read.statements import Statement, Trust
+from stereocell.read.value_scale import ignored_note
 from stereocell.read.zarr_collections import is_collection, ome_of
+from stereocell.read.zarr_coordinates import Beside, beside, named_dimensions
 from stereocell.read.zarr_store import files_of, notes_on_names, open_array, quiet
 from stereocell.read.zarr_values import with_values
 from stereocell.storage.library_errors import one_line
@@ -37,31 +41,58 @@ def read_array(location: Location, store: Store, path: str, *, axes: str = "") -
     """
     array = open_array(location, store, path)
     where = f"{location.shown}/{path}".rstrip("/")
-    names, axes_notes = settle_stated_axes(where, array.shape, axes, _named_axes(array))
-    voxels, value_notes = with_values(where, VoxelArray(array, names))
-    notes = (*notes_on_names([array]), *axes_notes, *value_notes)
+    around = beside(location, store, path, array)
+    names, axes_notes = settle_stated_axes(where, array.shape, axes, _named_axes(array, around))
+    valued, value_notes = with_values(where, VoxelArray(array, names))
+    found = _spacing(array, names, around)
+    stored = FlippedArray(valued.array, found.flips) if any(found.flips) else valued.array
+    voxels = VoxelArray(stored, names)
     if voxels.size("c") > MAX_CHANNELS:
         raise SourceError(
             f"{where}: axis c: found {voxels.size('c')}, expected at most {MAX_CHANNELS}"
         )
     unnamed = (None,) * voxels.size("c")
-    grid = Grid(voxels.shape, spacing_from(dict(array.attrs), names))
+    ignored = [ignored_note(of, attributes) for of, attributes in around.attributes]
     return Image(
-        (voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files_of(location, [path])
+        (voxels,),
+        (grid_of(voxels.shape, found.spacing_um, found.hint),),
+        unnamed,
+        unnamed,
+        1,
+        notes=(
+            *notes_on_names([array]),
+            *axes_notes,
+            *found.notes,
+            *value_notes,
+            *filter(None, ignored),
+        ),
+        files=(*files_of(location, [path]), *around.files),
     )
 
 
-def _named_axes(array: "zarr.Array[Any]") -> list[Statement]:
-    """Return the names of an array's dimensions, by each field that states them."""
-    fields = {
-        "dimension_names": getattr(array.metadata, "dimension_names", None),
-        "_ARRAY_DIMENSIONS": array.attrs.get("_ARRAY_DIMENSIONS"),
-    }
+def _named_axes(array: "zarr.Array[Any]", around: Beside) -> list[Statement]:
+    """Return the names of an array's dimensions, by each field that states them.
+
+    The `axis` of a dimension's positions goes before the name of the dimension.
+    """
+    axes = {one.name: one.axis for one in around.positions if one is not None and one.axis}
     return [
-        Statement(tuple(str(name).lower() for name in named), place)
-        for place, named in fields.items()
-        if isinstance(named, list | tuple) and named
+        Statement(tuple(axes.get(name, name.lower()) for name in named), place)
+        for place, named in named_dimensions(array).items()
     ]
+
+
+def _spacing(array: "zarr.Array[Any]", axes: Sequence[str], around: Beside) -> SettledSpacing:
+    """Return the spacing of an array and the directions of its axes, with notes."""
+    spacings = AxisSpacings(axes)
+    for dimension, one in enumerate(around.positions):
+        if one is not None:
+            size = array.shape[dimension]
+            spacings.add_positions(dimension, one.name, one.values, one.unit, size)
+    spacings.add_attributes(dict(array.attrs), "the array")
+    for of, attributes in around.attributes:
+        spacings.add_attributes(attributes, of, Trust.REPEATED)
+    return spacings.settled()
 
 
 def read_only_array(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.bdv_image import chosen_view, image_of
-from stereocell.read.bdv_registration import registered
+from stereocell.read.bdv_times import with_times
 from stereocell.read.bdv_xml import read_described
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
 from stereocell.read.image import MAX_CHANNELS, Image
@@ -62,27 +62,44 @@ def read_image(tree: Hdf5Tree, location: Location, *, series: int = 0, xml: str 
     described.require_views(tree.where, every, [int(name[1:]) for name in times])
     numbers, notes = chosen_view(tree.where, described, every, series, xml)
     setups = [name for name, number in zip(setups, every, strict=True) if number in numbers]
-    first = tree.find(f"/{times[0]}/{setups[0]}")
-    names = set(first) if isinstance(first, h5py.Group) else set()
-    count = next((n for n in range(_MAX_LEVELS) if str(n) not in names), _MAX_LEVELS)
-    if count == 0:
-        raise SourceError(
-            f"{tree.where}: /{times[0]}/{setups[0]}: found no level, expected 0/cells"
-        )
-    stated = _stated_levels(tree, f"/{setups[0]}/resolutions")
-    if stated > count:
-        raise SourceError(
-            f"{tree.where}: /{times[0]}/{setups[0]}: found {count} levels, expected {stated} as in "
-            f"/{setups[0]}/resolutions: a part is missing: copy it again"
-        )
+    points = [int(name[1:]) for name in times]
+    taken = described.taken(tree.where, numbers, points)
+    groups = [
+        [
+            f"/{t}/{s}" if (point, number) in taken else None
+            for number, s in zip(numbers, setups, strict=True)
+        ]
+        for point, t in zip(points, times, strict=True)
+    ]
+    first = next(group for row in groups for group in row if group is not None)
+    count = _count_levels(tree, first, setups[0])
     levels = [
-        [[_cells(tree, f"/{t}/{s}/{level}/cells") for s in setups] for t in times]
+        [
+            [None if group is None else _cells(tree, f"{group}/{level}/cells") for group in row]
+            for row in groups
+        ]
         for level in range(count)
     ]
     factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]
     image = image_of(tree.where, levels, factors, None, described.among(numbers))
-    image = registered(image, described, numbers, int(times[0][1:]))
+    image = with_times(tree.where, image, described, numbers, points)
     return replace(image, close=tree.close, files=tree.files, notes=(*notes, *image.notes))
+
+
+def _count_levels(tree: Hdf5Tree, group: str, setup: str) -> int:
+    """Return the number of levels of a view. Raises SourceError where some are missing."""
+    first = tree.find(group)
+    names = set(first) if isinstance(first, h5py.Group) else set()
+    count = next((n for n in range(_MAX_LEVELS) if str(n) not in names), _MAX_LEVELS)
+    if count == 0:
+        raise SourceError(f"{tree.where}: {group}: found no level, expected 0/cells")
+    stated = _stated_levels(tree, f"/{setup}/resolutions")
+    if stated > count:
+        raise SourceError(
+            f"{tree.where}: {group}: found {count} levels, expected {stated} as in "
+            f"/{setup}/resolutions: a part is missing: copy it again"
+        )
+    return count
 
 
 def _named(tree: Hdf5Tree, pattern: str) -> list[str]:

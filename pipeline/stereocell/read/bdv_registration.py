@@ -2,8 +2,9 @@
 
 A view has several transforms, of which the first is applied last. Together they lead from voxels
 (x, y, z) of level 0 to the world. The world's unit is that of `voxelSize`, or one voxel of its
-smallest size, as BigStitcher has it. A registration of the identity states nothing. A rotation or
-a shear is not applied, and a note says so: the view is read as it was acquired.
+smallest size, as BigStitcher has it. A registration without a scale, such as the identity or a
+mirror alone, states no spacing. A rotation or a shear is not applied, and a note says so: the view
+is read as it was acquired.
 
 References: https://imagej.net/plugins/bdv/, package mpicbg.spim.data.registration
 """
@@ -15,7 +16,7 @@ from itertools import permutations
 
 import numpy as np
 
-from stereocell.read.bdv_xml import Described, Matrix, Setup
+from stereocell.read.bdv_described import Described, Matrix, Setup
 from stereocell.read.image import Image
 from stereocell.read.spacing import Grid, Triple
 from stereocell.read.statements import Statement, Subject, Trust, settle
@@ -77,7 +78,7 @@ def taken_apart(matrix: Matrix) -> Parts | None:
 def registered(image: Image, described: Described, setups: Sequence[int], time: int) -> Image:
     """Return the image of some setups, which are channels, as their registration places it.
 
-    time  the number of the first time point
+    time  the number of the time point
     """
     own = described.setups.get(setups[0])
     matrix = described.registrations.get((time, setups[0]))
@@ -100,6 +101,8 @@ def _spacing(setup: Setup, parts: Parts) -> tuple[Triple | None, tuple[str, ...]
     """Return the spacing (z, y, x), um, and notes; None: no unit of length is stated."""
     if setup.spacing_um is None or setup.unit_um is None:
         return None, ()
+    if np.allclose(parts.scale, 1.0, atol=_SKEW):
+        return setup.spacing_um, ()
     unit = setup.unit_um
     if abs(min(parts.scale) - 1.0) <= _ALMOST:  # the world is one of voxels
         unit = min(setup.spacing_um)

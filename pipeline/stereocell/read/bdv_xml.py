@@ -5,109 +5,21 @@ References: https://imagej.net/plugins/bdv/index
 
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Set
 from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stereocell.model.errors import SourceError
-from stereocell.read.series import Candidate, candidate
+from stereocell.read.bdv_described import Described, Matrix, Setup
 from stereocell.read.spacing import Triple, um_per
 from stereocell.storage.location import is_own
 
 _MAX_FILES = 50  # most XML files of the folder that are looked into
 _MAX_BYTES = 16 << 20
 _MAX_TIMES = 100_000
-_OF_A_VIEW = ("tile", "angle", "illumination")  # attributes of which no two make one image
-_SHOWN = 8  # numbers in a message
 _RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?(?::(\d{1,9}))?")  # first-last:step
-
-
-Matrix = NDArray[np.float64]  # (4, 4) for columns, from voxels (x, y, z, 1) to the world
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """One channel of a view.
-
-    spacing_um  (z, y, x); None: not stated in a unit of length
-    unit_um     the unit of the voxel size in um; None: no unit of length
-    size        voxels (x, y, z); None: not stated
-    view        the tile, angle and illumination as pairs of name and number
-    """
-
-    name: str | None
-    spacing_um: Triple | None
-    unit_um: float | None = None
-    size: Triple | None = None
-    view: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Described:
-    """The setups of an XML by their numbers, and its time points; both empty without an XML.
-
-    registrations  by time point and setup, where they can be read
-    """
-
-    setups: Mapping[int, Setup]
-    times: tuple[int, ...] = ()
-    registrations: Mapping[tuple[int, int], Matrix] = field(default_factory=dict)
-
-    def views(self, setups: Sequence[int]) -> list[list[int]]:
-        """Return setups by tile, angle and illumination; those of a view are its channels."""
-        found: dict[tuple[tuple[str, str], ...], list[int]] = {}
-        for number in setups:
-            own = self.setups.get(number)
-            found.setdefault(own.view if own else (), []).append(number)
-        return list(found.values())
-
-    def candidate(self, view: Sequence[int]) -> Candidate:
-        """Return what a list says of a view."""
-        own = self.setups.get(view[0]) or Setup(None, None)
-        x, y, z = (int(size) for size in own.size or (1, 1, 1))
-        found = candidate(
-            (z, y, x),
-            channels=len(view),
-            times=max(len(self.times), 1),
-            spacing_um=own.spacing_um,
-        )
-        label = ", ".join([f"{name} {number}" for name, number in own.view] + [found.label])
-        return Candidate(label, found.voxels)
-
-    def among(self, setups: Sequence[int]) -> dict[int, Setup]:
-        """Return the setups by their place among those of a container."""
-        return {
-            place: self.setups[number]
-            for place, number in enumerate(setups)
-            if number in self.setups
-        }
-
-    def require_views(self, where: str, setups: Sequence[int], times: Sequence[int]) -> None:
-        """Raise SourceError where a container lacks setups or time points.
-
-        They are those of the XML, or without one all from the first to the last.
-        """
-        parts = (("setups", setups, tuple(self.setups)), ("time points", times, self.times))
-        for noun, found, listed in parts:
-            present, first, last = set(found), min(found), max(found)
-            # groups may be numbered up to 10^12, so that all numbers in between make no list
-            expected = sorted(set(listed)) if listed else range(first, last + 1)
-            size = len(expected) if listed else last - first + 1
-            count = len(present.intersection(expected)) if listed else len(present)
-            if count < size:
-                missing = (number for number in expected if number not in present)
-                shown = ", ".join(map(str, islice(missing, _SHOWN)))
-                more = ", ..." * (size - count > _SHOWN)
-                source = "in the XML" if listed else f"up to {max(found)}"
-                raise SourceError(
-                    f"{where}: found {count} of {size} {noun} {source}, missing "
-                    f"{shown}{more}, expected all of them: copy the container again"
-                )
 
 
 def read_described(path: str, xml: str = "") -> Described:
@@ -132,7 +44,8 @@ def read_described(path: str, xml: str = "") -> Described:
                 for node in root.findall("SequenceDescription/ViewSetups/ViewSetup")
                 if node.findtext("id", "").strip().isdecimal()
             }
-            return Described(setups, _times(root, setups), _registrations(root))
+            missing = _missing(root)
+            return Described(setups, _times(root, setups, missing), _registrations(root), missing)
     return Described({})
 
 
@@ -150,7 +63,7 @@ def _setup(root: ElementTree.Element, node: ElementTree.Element) -> Setup:
         _size(node.findtext("voxelSize/size", ""), unit),
         um_per(unit),
         _counts(node.findtext("size", "")),
-        tuple((key, attributes[key]) for key in _OF_A_VIEW if key in attributes),
+        attributes,
     )
 
 
@@ -181,7 +94,18 @@ def _registrations(root: ElementTree.Element) -> Mapping[tuple[int, int], Matrix
     return found
 
 
-def _times(root: ElementTree.Element, setups: Collection[int]) -> tuple[int, ...]:
+def _missing(root: ElementTree.Element) -> frozenset[tuple[int, int]]:
+    """Return the time point and setup of each view that was not taken."""
+    views = root.findall("SequenceDescription/MissingViews/MissingView")
+    pairs = [(view.get("timepoint", ""), view.get("setup", "")) for view in views]
+    return frozenset(
+        (int(time), int(setup)) for time, setup in pairs if time.isdecimal() and setup.isdecimal()
+    )
+
+
+def _times(
+    root: ElementTree.Element, setups: Collection[int], missing: Set[tuple[int, int]]
+) -> tuple[int, ...]:
     """Return the numbers of the time points, except those at which no view was taken."""
     node = root.find("SequenceDescription/Timepoints")
     if node is None:
@@ -197,11 +121,8 @@ def _times(root: ElementTree.Element, setups: Collection[int]) -> tuple[int, ...
             return ()
         low, high, step = int(found[1]), int(found[2] or found[1]), int(found[3] or 1)
         numbers.update(islice(range(low, high + 1, max(step, 1)), _MAX_TIMES))
-    absent = Counter(
-        view.get("timepoint", "")
-        for view in root.findall("SequenceDescription/MissingViews/MissingView")
-    )
-    return tuple(sorted(n for n in numbers if absent[str(n)] < len(setups)))
+    absent = Counter(time for time, _ in missing)
+    return tuple(sorted(n for n in numbers if absent[n] < len(setups)))
 
 
 def container_of(path: str) -> str | None:

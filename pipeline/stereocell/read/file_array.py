@@ -16,13 +16,16 @@ from nibabel.fileslice import fileslice
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
+from stereocell.read.dataset import StoredArray
 from stereocell.read.packed_stream import unpack
+from stereocell.read.statements import omission
 
 
 class FileArray:
     """Unpacked voxels of a file, the last axis fastest.
 
     offset  bytes before the first voxel
+    behind  bytes behind the last one
     """
 
     def __init__(
@@ -33,6 +36,7 @@ class FileArray:
         self.chunks: tuple[int, ...] = (*(1 for _ in shape[:-2]), *shape[-2:])
         self._path, self._offset = path, offset
         end, size = offset + math.prod(self.shape) * dtype.itemsize, os.path.getsize(path)
+        self.behind = size - end
         if end > size:
             raise SourceError(
                 f"{where}: found {size} bytes, expected at least {end} for {self.shape} of "
@@ -43,6 +47,31 @@ class FileArray:
         with open(self._path, "rb") as file:
             found = fileslice(file, key, self.shape, self.dtype, self._offset, "C")  # type: ignore[no-untyped-call]
         return cast("NDArray[Any]", found)
+
+
+def notes_on_rest(array: StoredArray) -> tuple[str, ...]:
+    """Return a note where a file holds more unpacked voxels than its header describes."""
+    if not isinstance(array, FileArray):
+        return ()
+    return rest_note(array.behind, array.shape, array.dtype.itemsize)
+
+
+def rest_note(behind: int, shape: Sequence[int], item_bytes: int) -> tuple[str, ...]:
+    """Return a note on bytes behind the voxels where they are as many as the smallest plane's.
+
+    behind      bytes behind the voxels
+    item_bytes  of one voxel
+    """
+    voxels = math.prod(shape) * item_bytes
+    if behind < voxels // max(shape):
+        return ()
+    return (
+        omission(
+            f"{behind:,} bytes behind the voxels, {behind / voxels:.0%} of as many as theirs",
+            "the header describes no more voxels",
+            "correct its sizes if there are more planes, points in time or channels",
+        ),
+    )
 
 
 class PackedArray:

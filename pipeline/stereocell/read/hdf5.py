@@ -2,7 +2,7 @@
 
 HDF5 itself has no convention for axes, voxel sizes and value scales. Known are the dimensions of
 read/hdf5_dimensions.py, the sizes of read/hdf5_spacing.py and the packed values of
-read/value_scale.py. Without names of axes three dimensions are z, y, x.
+read/hdf5_values.py. Without names of axes three dimensions are z, y, x.
 
 References: https://kreshuklab.github.io/plant-seg/, https://www.ilastik.org/documentation/
 """
@@ -19,10 +19,11 @@ from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.hdf5_dimensions import describe, require_plain
 from stereocell.read.hdf5_spacing import settle_spacing
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
+from stereocell.read.hdf5_values import value_attributes
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import grid_of
-from stereocell.read.value_scale import ATTRIBUTES, scaled
+from stereocell.read.value_scale import scaled
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -61,7 +62,7 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
     stored = Hdf5Array(dataset, where)
     statements = [one.names for one in described]
     names, axes_notes = settle_stated_axes(where, stored.shape, axes, statements)
-    attributes = {name: tree.attribute(dataset, name) for name in ATTRIBUTES}
+    attributes, scale_notes = value_attributes(tree, dataset)
     values, value_notes = scaled(where, stored, attributes)
     found = settle_spacing(tree, dataset, names, described)
     if any(found.flips):
@@ -75,7 +76,7 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
     grid = grid_of(array.shape, found.spacing_um, found.hint)
     return Image(
         (array,), (grid,), unnamed, unnamed, 1, tree.close,
-        notes=(*notes, *axes_notes, *found.notes, *value_notes), files=tree.files,
+        notes=(*notes, *axes_notes, *found.notes, *value_notes, *scale_notes), files=tree.files,
     )  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def describe(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
     """Return the dimensions by each convention that the file follows, best known first."""
     found = [
         _vigra(tree, dataset),
-        _scales(tree, dataset),
+        *_scales(tree, dataset),
         _labels(tree, dataset),
         _nexus(tree, dataset),
         _emd(tree, dataset),
@@ -91,13 +91,18 @@ def _labels(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
     return Described(Statement(labels, "DIMENSION_LABELS"))
 
 
-def _scales(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
+def _scales(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
+    """Return the dimensions by the first scale of each, then those by further scales."""
     scales = tree.scales(dataset)
     if not any(scales) or len(scales) != dataset.ndim:
-        return None
-    first = tuple(nodes[0] if nodes else None for nodes in scales)
-    names = tuple("" if node is None else _scale_name(tree, node) for node in first)
-    return Described(Statement(names, "the list of dimension scales"), first)
+        return []
+    every = [
+        tuple(nodes[rank] if rank < len(nodes) else None for nodes in scales)
+        for rank in range(max(map(len, scales)))
+    ]
+    names = tuple("" if node is None else _scale_name(tree, node) for node in every[0])
+    stated = Statement(names, "the list of dimension scales")
+    return [Described(stated, nodes) for nodes in every]
 
 
 def _scale_name(tree: Hdf5Tree, scale: h5py.Dataset) -> str:
@@ -121,7 +126,7 @@ def _nexus(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
         named = tuple(named[0].strip("[] ").replace(",", ":").split(":"))
     if len(named) != dataset.ndim:
         return None
-    scales = tuple(_beside(group, name.strip()) for name in named)
+    scales = tuple(dataset_beside(group, name.strip()) for name in named)
     return Described(Statement(tuple(name.strip() for name in named), place), scales)
 
 
@@ -129,14 +134,12 @@ def _emd(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
     group = dataset.parent
     if _EMD not in group.attrs and "dim1" not in group:
         return None
-    scales = tuple(_beside(group, f"dim{index + 1}") for index in range(dataset.ndim))
+    scales = tuple(dataset_beside(group, f"dim{index + 1}") for index in range(dataset.ndim))
     if any(one is None for one in scales):
         return None
-    names = [tree.attribute(one, "name") for one in scales if one is not None]
-    if not all(isinstance(name, str) for name in names):
-        return None
-    place = f"the list of names dim1 to dim{dataset.ndim}"
-    return Described(Statement(tuple(map(str, names)), place), scales)
+    stated = [tree.attribute(one, "name") for one in scales if one is not None]
+    names = tuple(name if isinstance(name, str) else "" for name in stated)
+    return Described(Statement(names, f"the list of names dim1 to dim{dataset.ndim}"), scales)
 
 
 def _arrays(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
@@ -153,7 +156,7 @@ def _velox(dataset: h5py.Dataset) -> Described | None:
 
 def _projections(dataset: h5py.Dataset) -> Described | None:
     """Return the axes of projections, beside which Data Exchange has their angles."""
-    angles = _beside(dataset.parent, "theta")
+    angles = dataset_beside(dataset.parent, "theta")
     if angles is None or dataset.ndim != 3 or angles.shape != dataset.shape[:1]:
         return None
     return Described(Statement(("theta", "y", "x"), "theta of Data Exchange"))
@@ -175,7 +178,7 @@ def _by_columns(dataset: h5py.Dataset) -> Described | None:
     return Described(Statement(names, reason, Trust.ASSUMED))
 
 
-def _beside(group: h5py.Group, name: str) -> h5py.Dataset | None:
+def dataset_beside(group: h5py.Group, name: str) -> h5py.Dataset | None:
     """Return a dataset of a group by its name; None: there is none in the file itself."""
     if not name or "/" in name or not isinstance(group.get(name, getlink=True), h5py.HardLink):
         return None

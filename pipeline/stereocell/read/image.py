@@ -26,6 +26,8 @@ class Image:
     notes          become Dataset's `remarks`
     files          paths or addresses of all files and folders that are read; empty: the source
     notes_at       returns more notes, about one time point; it may read that point's voxels
+    at_time        returns the image as one time point has it, where channels or spacing depend on
+                   the time; it is called once, before anything else uses the image
     """
 
     arrays: tuple[VoxelArray, ...]
@@ -45,6 +47,7 @@ class Image:
     notes: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     notes_at: Callable[[int], tuple[str, ...]] | None = None
+    at_time: Callable[["Image", int], "Image"] | None = None
 
 
 def printable(name: str) -> str:

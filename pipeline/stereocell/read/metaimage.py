@@ -20,7 +20,7 @@ import numpy as np
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray
-from stereocell.read.file_array import FileArray, PackedArray, unpack_array
+from stereocell.read.file_array import FileArray, PackedArray, notes_on_rest, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.metaimage_fields import (
     NAME,
@@ -30,6 +30,7 @@ from stereocell.read.metaimage_fields import (
     numbers,
     read_header,
     require_dimensions,
+    scale_notes,
     side_notes,
     unit_mm,
     value_notes,
@@ -66,6 +67,7 @@ def read_image(location: Location) -> Image:
     array = _array(location, fields, end, (*reversed(shape), samples[0]))
     axes = ("t", "k", "j", "i", "c") if len(shape) == 4 else ("k", "j", "i", "c")
     affine, notes = _affine(where, header, shape)
+    notes = (*notes, *notes_on_rest(array))
     image = place(where, array, axes, affine, "TransformMatrix").image(
         NAME, notes=notes, has_sides="TransformMatrix" in fields
     )
@@ -131,7 +133,9 @@ def _affine(
     per, unit_notes = unit_mm(fields)
     affine[:3] *= per
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
-    notes = [*header.notes, *unit_notes, *side_notes(fields, turned[:3, :3].T)]
+    axes = turned[:3, :3].T
+    notes = [*header.notes, *unit_notes, *side_notes(fields, axes)]
+    notes += scale_notes(spacing[:3], axes, per)
     return affine, (*notes, *value_notes(where, fields), *size_notes(lengths.tolist(), shape[:3]))
 
 

@@ -19,17 +19,22 @@ from mrcfile.utils import data_dtype_from_header
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.file_array import FileArray, PackedArray, unpack_array
+from stereocell.read.file_array import FileArray, PackedArray, notes_on_rest, unpack_array
 from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.image import Image
-from stereocell.read.mrc_statements import settle_sign, settle_spacing
+from stereocell.read.mrc_statements import (
+    STACK_OF_VOLUMES,
+    angle_notes,
+    settle_sign,
+    settle_spacing,
+    volumes_of,
+)
 from stereocell.read.spacing import Grid
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
 _HEADER = 1024  # bytes; an extended header of `nsymbt` follows
 _MAGIC = {b"\x1f\x8b": "gzip", b"BZ": "bzip2"}
-_STACK_OF_VOLUMES = 401  # space group
 
 
 def read_image(location: Location) -> Image:
@@ -52,15 +57,22 @@ def read_image(location: Location) -> Image:
     if sorted(order) != [1, 2, 3]:
         raise SourceError(f"{where}: MAPS, MAPR, MAPC: found {order}, expected 1, 2 and 3")
     group, sampling = int(header["ispg"]), int(header["mz"])
-    kind = {_STACK_OF_VOLUMES: "volumes"}.get(group, "images")
-    is_stack = group == _STACK_OF_VOLUMES or (group == 0 and sampling == 1)
+    count = volumes_of(header)
+    is_stack = count == 1 and (group == STACK_OF_VOLUMES or (group == 0 and sampling == 1))
+    kind = {STACK_OF_VOLUMES: "volumes"}.get(group, "images")
     notes = [f"the header says a stack of {kind}: taken for one volume"] if is_stack else []
+    if count > 1:
+        notes.append(
+            f"the header says a stack of {count} volumes of {sampling} sections (mz): --time "
+            "counts them"
+        )
+        shape = (count, sampling, *shape[1:])
     if dtype.itemsize == 1:
         is_signed, sign_notes = settle_sign(header)
         dtype = np.dtype(np.int8 if is_signed else np.uint8)
         notes += sign_notes
     spacing, spacing_notes = settle_spacing(header, extended, is_stack=is_stack)
-    notes += spacing_notes
+    notes += [*spacing_notes, *angle_notes(header)]
     array: StoredArray
     if packing:
         array = PackedArray(
@@ -68,7 +80,9 @@ def read_image(location: Location) -> Image:
         )
     else:
         array = FileArray(path, shape, dtype, offset, where)
+    notes += notes_on_rest(array)
     axes = tuple("xyz"[axis - 1] for axis in order)
+    axes = ("t", *axes) if count > 1 else axes
     voxels = VoxelArray(FlippedArray(array, [axis == "y" for axis in axes]), axes)
     grid = Grid(voxels.shape, spacing)
     return Image((voxels,), (grid,), (None,), (None,), 1, notes=tuple(notes))

@@ -23,6 +23,9 @@ _FIRST_OF_2014 = 20140  # first `nversion` of MRC2014
 _LARGEST_SIGNED = 127
 _AXES = "zyx"
 _SIGN = Subject("bytes of mode 0")
+_RIGHT_ANGLE = 90.0  # degrees
+_MIN_SKEW = 0.01  # degrees; a smaller difference is rounding
+STACK_OF_VOLUMES = 401  # space group
 
 
 def settle_spacing(
@@ -94,7 +97,32 @@ def _sizes(header: Any) -> list[int]:
     if sorted(order) != [1, 2, 3]:
         order = [1, 2, 3]
     stored = [int(header[name]) for name in ("nx", "ny", "nz")]
+    stored[2] //= volumes_of(header)
     return [stored[order.index(axis)] for axis in (3, 2, 1)]
+
+
+def volumes_of(header: Any) -> int:
+    """Return the number of volumes in a stack of them, one behind the other along z; else 1.
+
+    MRC2014 gives such a stack the space group 401 and the sections of one volume as `mz`.
+    """
+    sections, sampling = int(header["nz"]), int(header["mz"])
+    is_stack = int(header["ispg"]) == STACK_OF_VOLUMES and int(header["maps"]) in (0, 3)
+    if not is_stack or not 0 < sampling < sections or sections % sampling:
+        return 1
+    return sections // sampling
+
+
+def angle_notes(header: Any) -> tuple[str, ...]:
+    """Return a note where the axes of the cell are not at right angles; 0: not stated."""
+    angles = [float(header["cellb"][name]) for name in ("alpha", "beta", "gamma")]
+    if not any(angles) or all(abs(angle - _RIGHT_ANGLE) <= _MIN_SKEW for angle in angles):
+        return ()
+    shown = ", ".join(f"{angle:g}" for angle in angles)
+    return (
+        f"cell angles (cellb): found {shown} degrees, expected 90 each: the voxels are shown at "
+        "right angles, so the shape is sheared",
+    )
 
 
 def settle_sign(header: Any) -> tuple[bool, tuple[str, ...]]:

@@ -10,7 +10,6 @@ absent block is 0.
 References: https://github.com/saalfeldlab/n5 (the specification in its README)
 """
 
-import math
 import os
 import re
 import struct
@@ -23,18 +22,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
-from stereocell.read.array_axes import settle_axes
-from stereocell.read.array_spacing import spacing_of
+from stereocell.read.array_axes import settle_stated_axes
+from stereocell.read.bdv_described import Described
 from stereocell.read.bdv_image import chosen_view, grids_of, image_of
-from stereocell.read.bdv_registration import registered
-from stereocell.read.bdv_xml import Described, read_described
+from stereocell.read.bdv_times import with_times
+from stereocell.read.bdv_xml import read_described
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.n5_blocks import unpack_block
 from stereocell.read.n5_files import N5Files
+from stereocell.read.n5_statements import named_axes, order_note, settle_spacing
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import Triple
 from stereocell.read.stated_numbers import numbers_of
+from stereocell.read.value_scale import ignored_note, scaled
 from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
@@ -128,22 +129,15 @@ def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str 
         described = Described({})
         if location.is_local and number:
             described = read_described(os.path.dirname(location.source))
-        own = described.setups.get(int(number[1])) if number else None
-        placed = {
-            (time, 0): matrix
-            for (time, setup), matrix in described.registrations.items()
-            if number and setup == int(number[1])
-        }
-        alone = Described({0: own} if own else {}, described.times, placed)
-        return _container(files, [""], alone)
+        own = int(number[1]) if number else 0
+        return _container(files, {own: ""}, described.alone(own))
     if "dimensions" in files.attributes("setup0/timepoint0/s0"):
         numbers = files.numbered("setup")[:MAX_CHANNELS]
         if not numbers:
             numbers = list(range(_count(files, "setup{}/timepoint0/s0", MAX_CHANNELS)))
         described = read_described(location.source, xml) if location.is_local else Described({})
-        return _container(
-            files, [f"setup{number}/" for number in numbers], described, (series, xml)
-        )
+        folders = {number: f"setup{number}/" for number in numbers}
+        return _container(files, folders, described, (series, xml))
     found = files.datasets(_LISTED + 1)
     if len(found) == 1:
         return _pyramid(files, attributes, [(found[0], files.attributes(found[0]))], axes)
@@ -176,60 +170,74 @@ def _pyramid(
     axes: str,
 ) -> Image:
     arrays = [N5Array(files, path, attributes) for path, attributes in levels]
-    named = levels[0][1].get("axes", group.get("axes"))
-    listed = [str(a).lower() for a in reversed(named)] if isinstance(named, list) else []
-    names, notes = settle_axes(files.where, arrays[0].shape, axes, named=listed)
+    finest = levels[0][1]
+    shape = arrays[0].shape
+    stated = named_axes(finest, group)
+    names, notes = settle_stated_axes(files.where, shape, axes, stated)
     if any(len(array.shape) != len(names) for array in arrays):
         raise SourceError(f"{files.where}: levels: expected {len(names)} dimensions in each")
-    voxels = tuple(VoxelArray(array, names) for array in arrays)
+    valued = [scaled(files.where, array, finest) for array in arrays]
+    voxels = tuple(VoxelArray(array, names) for array, _ in valued)
     if (count := voxels[0].size("c")) > MAX_CHANNELS:
         raise SourceError(f"{files.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
-    finest = _spacing(levels[0][1], names) or _spacing(group, names)
+    spacing, spacing_notes = settle_spacing(finest, group, names)
     scales = [_factors(group, attributes, i, names) for i, (_, attributes) in enumerate(levels)]
-    grids = grids_of([v.shape for v in voxels], finest, scales)
+    grids = grids_of([v.shape for v in voxels], spacing, scales)
     unnamed = (None,) * count
     read = tuple(files.address(path) for path, _ in levels)
+    notes = (*notes, *order_note(stated, names, axes), *spacing_notes, *valued[0][1])
+    if ignored := ignored_note("the group", group):
+        notes = (*notes, ignored)
     return Image(voxels, grids, unnamed, unnamed, 1, notes=notes, files=read)
 
 
 def _container(
     files: N5Files,
-    setups: Sequence[str],
+    folders: Mapping[int, str],
     described: Described,
     view: tuple[int, str] = (0, ""),
 ) -> Image:
     """Return the image of a view in BigDataViewer's container: its setups are channels.
 
-    setups     the folders of the setups, each with a slash at its end
+    folders    the folders of the setups, by number, each with a slash at its end
     described  the setups and time points of the XML
     view       number of the view as the XML lists them, from 1 (0: the largest), and the path of
                the XML that the user named
     """
-    numbers = [int(setup[len("setup") : -1] or 0) for setup in setups]
-    times = files.numbered(f"{setups[0]}timepoint")[:_MAX_TIMES]
-    times = times or list(range(_count(files, f"{setups[0]}timepoint{{}}/s0", _MAX_TIMES)))
-    described.require_views(files.where, numbers, times)
-    if len(setups) > 1:
-        numbers, notes = chosen_view(files.where, described, numbers, *view)
-        setups = [f"setup{number}/" for number in numbers]
-    else:
-        notes = ()
-    levels = _levels(files, f"{setups[0]}timepoint{times[0]}")
+    times = sorted({time for folder in folders.values() for time in _times(files, folder)})
+    described.require_views(files.where, list(folders), times)
+    numbers, notes = chosen_view(files.where, described, list(folders), *view)
+    taken = described.taken(files.where, numbers, times)
+    first = min(taken, key=lambda one: (numbers.index(one[1]), one[0]))
+    setup, path = folders[first[1]], f"{folders[first[1]]}timepoint{first[0]}"
+    levels = _levels(files, path)
+
+    def view_of(time: int, number: int, level: int) -> N5Array | None:
+        if (time, number) not in taken:
+            return None
+        return _dataset(files, f"{folders[number]}timepoint{time}/s{level}")
+
     views = [
-        [[_dataset(files, f"{setup}timepoint{t}/s{index}") for setup in setups] for t in times]
+        [[view_of(time, number, index) for number in numbers] for time in times]
         for index in range(len(levels))
     ]
-    group = files.attributes(setups[0].rstrip("/"))
+    group = files.attributes(setup.rstrip("/"))
     if isinstance(factors := group.get("downsamplingFactors"), list) and len(factors) > len(levels):
         raise SourceError(
-            f"{files.where}: {setups[0]}: found {len(levels)} levels, expected {len(factors)} as "
+            f"{files.where}: {setup}: found {len(levels)} levels, expected {len(factors)} as "
             "downsamplingFactors: a part is missing: copy it again"
         )
-    stated = _spacing(files.attributes(f"{setups[0]}timepoint{times[0]}"), "zyx")
+    stated, more = settle_spacing(files.attributes(path), {}, "zyx")
     scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
     image = image_of(files.where, views, scales, stated, described.among(numbers))
-    image = registered(image, described, numbers, times[0])
-    return replace(image, notes=(*notes, *image.notes))
+    image = with_times(files.where, image, described, numbers, times)
+    return replace(image, notes=(*notes, *more, *image.notes))
+
+
+def _times(files: N5Files, folder: str) -> list[int]:
+    """Return the numbers of a setup's time points. At an address they are counted one by one."""
+    found = files.numbered(f"{folder}timepoint")[:_MAX_TIMES]
+    return found or list(range(_count(files, f"{folder}timepoint{{}}/s0", _MAX_TIMES)))
 
 
 def _dataset(files: N5Files, path: str) -> N5Array:
@@ -258,24 +266,6 @@ def _factors(
         along = dict(zip(reversed([a for a in axes if a in "zyx"]), found, strict=True))
     values = [along.get(axis, 0.0) for axis in "zyx"]
     return (values[0], values[1], values[2]) if min(values) > 0 else None
-
-
-def _spacing(attributes: Mapping[str, Any], axes: Sequence[str]) -> Triple | None:
-    """Return the spacing (z, y, x), um, of a level's or a group's attributes; None: not stated."""
-    transform = attributes.get("transform")  # COSEM's, axes slowest first
-    if isinstance(transform, Mapping) and isinstance(transform.get("scale"), list):
-        listed = transform.get("axes")
-        named = [str(axis) for axis in listed] if isinstance(listed, list) else []
-        if set("zyx") <= set(named) and math.prod(named.count(a) for a in "zyx") == 1:
-            return spacing_of(numbers_of(transform["scale"]), transform.get("units"), named)
-    sizes: Any = attributes.get("pixelResolution", attributes.get("resolution"))
-    unit: Any = None
-    if isinstance(sizes, Mapping):
-        sizes, unit = sizes.get("dimensions"), sizes.get("unit")
-    unit = unit or attributes.get("units", attributes.get("unit"))
-    if isinstance(unit, list):
-        unit = unit[::-1]
-    return spacing_of(numbers_of(sizes)[::-1], unit, axes)
 
 
 def _whole(where: str, attributes: Mapping[str, Any], name: str) -> list[int]:

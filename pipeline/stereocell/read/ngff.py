@@ -12,6 +12,7 @@ and affine matrices without rotation and shear.
 References: https://ngff.openmicroscopy.org, RFC-4 (orientation), RFC-5 (coordinate systems)
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,7 +28,25 @@ Placement = tuple[list[float] | None, list[float] | None]  # scale and translati
 _FIXED = ("t", "c", "z", "y", "x")  # axes of 0.1 and 0.2
 _WITHOUT_AXES = ("0.1", "0.2", "")
 _WITHOUT_SPACING = ("0.1", "0.2", "0.3")
+KNOWN = ("0.1", "0.2", "0.3", "0.4", "0.5", "0.6")
 _DEEPEST = 20  # most sequences within each other
+
+
+def version_of(ome: Mapping[str, Any]) -> str:
+    """Return the version that a group's attributes state; empty: they state none.
+
+    >>> version_of({"version": "0.5", "multiscales": [{}]}), version_of({})
+    ('0.5', '')
+    """
+    listed = ome.get("multiscales")
+    first = listed[0] if isinstance(listed, list) and listed else {}
+    own = first.get("version") if isinstance(first, Mapping) else None
+    return str(own or ome.get("version") or "")
+
+
+def is_known(version: str) -> bool:
+    """Return whether the metadata of a version are known; drafts of one, as `0.6.dev1`, too."""
+    return not version or any(re.match(rf"{re.escape(one)}(?![0-9])", version) for one in KNOWN)
 
 
 class NotAlongAxesError(ValueError):
@@ -78,7 +97,7 @@ def parse(where: str, ome: Mapping[str, Any]) -> Multiscale:
     where the metadata are of no version.
     """
     multiscale = ome["multiscales"][0]
-    version = str(multiscale.get("version") or ome.get("version") or "")
+    version = version_of(ome)
     datasets = list(multiscale["datasets"])
     paths = tuple(str(dataset["path"]) for dataset in datasets)
     axes, notes, system = _axes(multiscale, version)
@@ -101,7 +120,16 @@ def parse(where: str, ome: Mapping[str, Any]) -> Multiscale:
         tuple(_orientation(axis) for axis in axes),
         paths,
         placements,
-        (*notes, *_repeated(multiscale, placements, system)),
+        (*_newer(version), *notes, *_repeated(multiscale, placements, system)),
+    )
+
+
+def _newer(version: str) -> tuple[str, ...]:
+    if is_known(version):
+        return ()
+    return (
+        f"OME-Zarr {version:.20}: this version is not known, and read as {KNOWN[-1]} is: compare "
+        "axes and spacing with the program that wrote them",
     )
 
 

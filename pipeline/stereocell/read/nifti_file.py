@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from scipy.io.matlab import MatReadError
 
 from stereocell.model.errors import SourceError
-from stereocell.read.file_array import unpack_array
+from stereocell.read.file_array import rest_note, unpack_array
 from stereocell.read.packed_stream import unpack
 from stereocell.storage.library_errors import one_line, raise_if_short
 from stereocell.storage.location import Location, require_own
 
 MGH_ENDINGS = (".mgh", ".mgz", ".mgh.gz")
+_WHOLE = "a whole .nii, .nii.gz, .mgh or .mgz file, or a pair .hdr and .img"
 _MGH_HEADER = 90  # bytes that MGH states before the voxels; the rest is padding
 _MAX_OFFSET = 1 << 28  # bytes of header and extensions; gzip must unpack them before the voxels
 FAULTS = (
@@ -74,10 +75,7 @@ def open_image(location: Location) -> Any:
             return image
     except FAULTS as error:
         raise_if_short(error, location.shown)
-        raise SourceError(
-            f"{location.shown}: {_cause(error)}, expected a whole .nii, .nii.gz, .mgh or .mgz "
-            "file, or a pair .hdr and .img"
-        ) from None
+        raise SourceError(f"{location.shown}: {_cause(error)}") from None
 
 
 def _open_mgh(path: str) -> Any:
@@ -95,10 +93,15 @@ def _open_mgh(path: str) -> Any:
 
 
 def _cause(error: BaseException) -> str:
-    """Return the reason why nibabel can't open a file, as far as it names a field."""
+    """Return the reason why nibabel can't open a file, as far as it names a field, and a way."""
     if isinstance(error, nibabel.spatialimages.HeaderDataError) and "intercept" in str(error):
-        return "scl_inter: found no finite number beside a scl_slope"
-    return "not readable as NIfTI"
+        return f"scl_inter: found no finite number beside a scl_slope, expected {_WHOLE}"
+    if isinstance(error, ValueError) and "w2 should be positive" in str(error):
+        return (
+            "quatern_b, quatern_c, quatern_d: found squares whose sum is over 1, expected those of "
+            "a rotation: set qform_code to 0 to read the voxels by pixdim alone"
+        )
+    return f"not readable as NIfTI, expected {_WHOLE}"
 
 
 def _require_own_pair(location: Location) -> None:
@@ -119,8 +122,10 @@ def files_of(image: Any) -> set[str]:
     return {name for name in held if os.path.exists(name)}
 
 
-def require_whole(image: Any, where: str) -> None:
-    """Raise SourceError where an unpacked file ends before its voxels, or where a pair's packed
+def require_whole(image: Any, where: str) -> tuple[str, ...]:
+    """Return a note on bytes behind the voxels.
+
+    Raises SourceError where an unpacked file ends before its voxels, or where a pair's packed
     header is damaged. Packed voxels are checked when they are read.
     """
     name, data = image.file_map["image"].filename, image.dataobj
@@ -132,7 +137,7 @@ def require_whole(image: Any, where: str) -> None:
         ):
             unpack(file, 0, "gzip", most_behind=_MAX_OFFSET)
     if _is_packed(name):
-        return
+        return ()
     shape = tuple(map(int, data.shape))  # NumPy's integers would overflow
     end, size = data.offset + math.prod(shape) * data.dtype.itemsize, os.path.getsize(name)
     if end > size:
@@ -140,6 +145,9 @@ def require_whole(image: Any, where: str) -> None:
             f"{where}: found {size} bytes, expected at least {end} for {shape} of "
             f"{data.dtype.name} (the file is cut short)"
         )
+    if isinstance(image, nibabel.freesurfer.mghformat.MGHImage):
+        return ()  # its parameters of the scan follow
+    return rest_note(size - end, shape, data.dtype.itemsize)
 
 
 def _is_packed(name: str) -> bool:

@@ -53,7 +53,7 @@ def stated_place(image: Any, where: str) -> Stated:
         (name, np.asarray(form, float))
         for name, form, code in (
             ("sform", header.get_sform(), int(header["sform_code"])),
-            ("qform", header.get_qform(), int(header["qform_code"])),
+            ("qform", _qform(header), int(header["qform_code"])),
         )
         if code
     ]
@@ -72,16 +72,29 @@ def stated_place(image: Any, where: str) -> Stated:
     return Stated(affine, bool(forms), (*notes, *_plausible(image, affine), *_axis_notes(header)))
 
 
+def _qform(header: Any) -> Affine:
+    """Return the affine of qform; NaN where its quaternion is no rotation, or damaged."""
+    try:
+        return np.asarray(header.get_qform(), float)
+    except ValueError:
+        return np.full((4, 4), np.nan)
+
+
 def value_notes(image: Any) -> tuple[str, ...]:
-    """Return a note where the header states an intercept that a slope of 0 turns off."""
+    """Return a note where the header states an intercept that no slope goes with.
+
+    NIfTI scales no values where the slope is 0; programs write NaN for that as well.
+    """
     if not isinstance(image, nibabel.nifti1.Nifti1Pair):
         return ()
     stored = stored_header(image)
     slope, intercept = float(stored["scl_slope"]), float(stored["scl_inter"])
-    if slope or not np.isfinite(intercept) or not intercept:
+    is_scaled = np.isfinite(slope) and slope != 0
+    if is_scaled or not np.isfinite(intercept) or not intercept:
         return ()
     return (
-        f"values: scl_slope 0 states that they are not scaled: scl_inter {intercept:g} is left out",
+        f"values: scl_slope {slope:g} states that they are not scaled: scl_inter {intercept:g} is "
+        "left out",
     )
 
 

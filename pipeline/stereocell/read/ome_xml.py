@@ -8,15 +8,15 @@ References: https://docs.openmicroscopy.org/ome-model/latest/ome-xml/
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
 from xml.etree import ElementTree
 
-from stereocell.model.color import linear_color
-from stereocell.model.emission_color import color_of_light
+from stereocell.model.emission_color import color_of_channel, color_of_light
 from stereocell.model.errors import SourceError
 from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
 
+_HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
+_DEFAULT_COLOR = -1  # opaque white
 _DEFAULT_UNIT = "\u00b5m"  # unit of PhysicalSizeX, Y and Z, where the file names none
 
 
@@ -32,6 +32,14 @@ class OmeImage:
     spacing_um: PartialTriple
     names: tuple[str | None, ...]
     colors: tuple[Color | None, ...]
+
+
+def is_ome(description: str) -> bool:
+    """Whether the description of a TIFF file is OME-XML, whole or not."""
+    text = description.strip("\ufeff\0 \t\r\n")
+    head = text[:_HEAD]
+    is_named = text.endswith("OME>") or "<OME" in head or "openmicroscopy.org" in head
+    return text.startswith("<") and is_named
 
 
 def parse(text: str, where: str) -> ElementTree.Element:
@@ -74,9 +82,37 @@ def files_of(root: ElementTree.Element) -> Iterator[str]:
     return (uuid.get("FileName", "") for uuid in uuids_of(root) if uuid.get("FileName"))
 
 
-def pixels_of(root: ElementTree.Element, index: int = 0) -> ElementTree.Element | None:
-    """Return the Pixels of an image, the first by default; None: there are none."""
-    image = next(islice(_children(root, "Image"), index, None), None)
+def count_images(root: ElementTree.Element) -> int:
+    """Return the number of images."""
+    return sum(1 for _ in _children(root, "Image"))
+
+
+def only_image(root: ElementTree.Element, index: int) -> ElementTree.Element:
+    """Return OME-XML of one image: a copy without the others and without their annotations.
+
+    The image at `index` is the first one of the copy. There is none where the index is too large.
+    """
+    images = list(_children(root, "Image"))
+    kept = images[index] if 0 <= index < len(images) else None
+    foreign = {name for image in images if image is not kept for name in _annotations_of(image)}
+    foreign -= _annotations_of(kept) if kept is not None else set()
+    found = ElementTree.Element(root.tag, root.attrib)
+    found.extend(child for child in root if child is kept or _local(child) != "Image")
+    for place, child in enumerate(found):
+        if _local(child) == "StructuredAnnotations":
+            own = ElementTree.Element(child.tag, child.attrib)
+            own.extend(one for one in child if one.get("ID") not in foreign)
+            found[place] = own
+    return found
+
+
+def _annotations_of(image: ElementTree.Element) -> set[str | None]:
+    return {one.get("ID") for one in image.iter() if _local(one) == "AnnotationRef"}
+
+
+def pixels_of(root: ElementTree.Element) -> ElementTree.Element | None:
+    """Return the Pixels of the first image; None: there are none."""
+    image = next(_children(root, "Image"), None)
     return None if image is None else next(_children(image, "Pixels"), None)
 
 
@@ -107,10 +143,7 @@ def modulos_of(root: ElementTree.Element) -> list[ElementTree.Element]:
     An annotation counts for all images where no image refers to it.
     """
     images = list(_children(root, "Image"))
-    refers = [
-        {one.get("ID") for one in image.iter() if _local(one) == "AnnotationRef"}
-        for image in images
-    ]
+    refers = [_annotations_of(image) for image in images]
     found = []
     for annotation in (one for one in root.iter() if _local(one) == "XMLAnnotation"):
         name = annotation.get("ID")
@@ -177,11 +210,12 @@ def _spacing(pixels: ElementTree.Element, where: str) -> PartialTriple:
 def _color(channel: ElementTree.Element, where: str) -> Color | None:
     """Return the colour, which OME holds as a signed 32-bit number of R, G, B and A.
 
-    Where it states none, that of the light.
+    Where it states none, that of the light. White is the default of OME-XML, which programs write
+    where they know none, so the light counts more.
     """
-    given = channel.get("Color")
+    given, nm, dye = channel.get("Color"), _emission_nm(channel), channel.get("Fluor", "")
     if given is None:
-        return _emitted(channel)
+        return color_of_light(nm, dye)
     try:
         number = int(given)
         red, green, blue, _ = (number & 0xFFFFFFFF).to_bytes(4, "big")
@@ -189,14 +223,17 @@ def _color(channel: ElementTree.Element, where: str) -> Color | None:
         raise SourceError(
             f"{where}: OME-XML: Channel Color: found {given!r:.40}, expected a whole number"
         ) from None
-    return linear_color((red, green, blue))
+    by_light = color_of_light(nm, dye) if number == _DEFAULT_COLOR else None
+    return by_light or color_of_channel((red, green, blue), nm, dye)
 
 
-def _emitted(channel: ElementTree.Element) -> Color | None:
-    """Return the colour of the light that a channel took, by its wavelength or its dye."""
-    given, dye = channel.get("EmissionWavelength"), channel.get("Fluor", "")
-    is_nm = channel.get("EmissionWavelengthUnit", "nm") == "nm"
-    return color_of_light(given if is_nm else None, dye)
+def _emission_nm(channel: ElementTree.Element) -> float | None:
+    """Return the wavelength of the light that a channel took, nm; None: not stated."""
+    per = um_per(channel.get("EmissionWavelengthUnit", "nm"))
+    try:
+        return None if per is None else float(channel.get("EmissionWavelength", "")) * per * 1000
+    except ValueError:
+        return None
 
 
 def _children(element: ElementTree.Element, name: str) -> Iterator[ElementTree.Element]:

@@ -15,6 +15,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
+from xml.etree import ElementTree
 
 import zarr
 from zarr.abc.store import Store
@@ -22,18 +23,17 @@ from zarr.abc.store import Store
 from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import bare_zarr, ngff
+from stereocell.read.bioformats2raw import Converted, converted_of, settled_grids
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.label_notes import notes_of_ngff
+from stereocell.read.modulo import listed, split
 from stereocell.read.ngff import Multiscale
 from stereocell.read.ngff_sides import with_sides
-from stereocell.read.ngff_statements import (
-    converted_of,
-    dimension_names,
-    settled_axes,
-    settled_spacing,
-)
-from stereocell.read.spacing import Grid, Triple
+from stereocell.read.ngff_statements import dimension_names, settled_axes
+from stereocell.read.series import lines
+from stereocell.read.spacing import Grid, PartialTriple, grid_of
+from stereocell.read.value_scale import ignored_note
 from stereocell.read.zarr_collections import (
     ZarrTree,
     describe_group,
@@ -44,6 +44,7 @@ from stereocell.read.zarr_collections import (
     part_of,
     series_of,
 )
+from stereocell.read.zarr_coordinates import beside, notes_beside_scale
 from stereocell.read.zarr_store import (
     GuardedStore,
     files_of,
@@ -59,16 +60,32 @@ from stereocell.storage.location import Location
 _MAX_LEVELS = 64  # most levels of the pyramid
 
 
-def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> Image:
+def read_image(location: Location, *, axes: str = "", series: int = 0) -> Image:
     """Return the first multiscale image of a group, or a bare array (bare_zarr.py).
 
     The group may be a container of series, if it holds one image.
 
-    axes     the user's `--axes`, for a bare array
-    is_part  it is the one image of a container, and no container itself
+    axes    the user's `--axes`, for a bare array
+    series  of the images that lie along a further axis of the OME-XML beside it; 0: the first
 
     Raises SourceError where there is no image, or where there are several groups of images;
-    UsageError where `axes` doesn't fit.
+    UsageError where `axes` doesn't fit or there is no such series.
+    """
+    image, root = _read(location, axes)
+    return split(location.shown, image, root, series)
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each image along a further axis. Raises SourceError."""
+    return lines(listed(*_read(location, "")))
+
+
+def _read(
+    location: Location, axes: str, *, is_part: bool = False
+) -> tuple[Image, ElementTree.Element | None]:
+    """Return the image as it is stored, and the OME-XML beside it, if it describes the image.
+
+    is_part  it is the one image of a container, and no container itself
     """
     where = location.shown
     with quiet(), one_line(where, "the group of one OME-Zarr image, or a Zarr array"):
@@ -76,12 +93,12 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
         guard = GuardedStore(store, location)
         node = zarr.open(guard, mode="r")
     if isinstance(node, zarr.Array):
-        if not axes and (image := image_of_level(location)):
+        if not axes and (whole := image_of_level(location)):
             raise SourceError(
-                f"{where}: found a level of an OME-Zarr image, expected the image, as {image} "
+                f"{where}: found a level of an OME-Zarr image, expected the image, as {whole} "
                 "(--level picks the level), or its axes by --axes"
             )
-        return bare_zarr.read_array(location, store, "", axes=axes)
+        return bare_zarr.read_array(location, store, "", axes=axes), None
     metadata = node.metadata
     attributes = metadata.attributes
     ome = attributes.get("ome", attributes)
@@ -92,30 +109,47 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
     if not isinstance(multiscales, list) or not multiscales:
         series = series_of(ome, tree)
         if len(series) == 1 and not is_part:
-            return read_image(part_of(location, series[0]), axes=axes, is_part=True)
+            return _read(part_of(location, series[0]), axes, is_part=True)
         if multiscales is None and not is_collection(ome):
             only = bare_zarr.read_only_array(location, store, node, axes=axes)
             if only is not None:
-                return only
+                return only, None
         raise SourceError(
             f"{where}: no multiscales: {describe_group(ome, series, tree)}; expected the "
             "attribute `multiscales` of an image"
         )
-    with one_line(f"{where}: multiscales[0]", "axes, datasets and scales as OME-Zarr 0.1 to 0.6"):
-        multiscale = ngff.parse(where, ome)
+    converted = converted_of(location)
+    image = _image(tree, store, ome, axes, converted)
+    if ignored := ignored_note("the image's group", attributes):
+        image = replace(image, notes=(*image.notes, ignored))
+    is_described = converted is not None and converted.shape == image.arrays[0].shape
+    return image, converted.root if converted is not None and is_described else None
+
+
+def _image(
+    tree: ZarrTree,
+    store: Store,
+    ome: Mapping[str, Any],
+    axes: str,
+    converted: Converted | None,
+) -> Image:
+    """Return the first multiscale image of a group's OME attributes. Raises SourceError."""
+    location, where = tree.location, tree.location.shown
+    multiscale = _parsed(tree, ome)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
             f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
             f"a level, and at most {_MAX_LEVELS}"
         )
-    levels, notes = _levels(location, store, multiscale, axes, metadata.zarr_format)
+    levels, notes = _levels(location, store, multiscale, axes, tree.zarr_format)
     missing = [axis for axis in "zyx" if axis not in levels[0].axes]
     if missing:
         raise SourceError(
             f"{where}: one plane (2D): a volume needs at least 2 planes: no axis {missing[0]} "
             f"among {', '.join(levels[0].axes)}"
         )
-    grids, more, files = _grids(location, multiscale, levels)
+    grids, more = _grids(multiscale, levels, converted)
+    files = () if converted is None else (converted.path,)
     sided = with_sides(levels, grids, [_of_axis(multiscale, axis) for axis in "zyx"])
     omero = ome.get("omero", {})
     channels = omero.get("channels", []) if isinstance(omero, Mapping) else omero
@@ -125,15 +159,40 @@ def read_image(location: Location, *, axes: str = "", is_part: bool = False) -> 
         sided.grids,
         titles,
         colors,
-        len(multiscales),
+        len(ome["multiscales"]),
         files=(*files_of(location, multiscale.paths), *files),
         placement=sided.placement,
         has_sides=sided.has_sides,
         acquired=sided.acquired,
-        notes=(*multiscale.notes, *notes, *more, *sided.notes, *notes_on_labels(tree)),
+        notes=(
+            *multiscale.notes,
+            *notes,
+            *more,
+            *sided.notes,
+            *_position_notes(tree, store, multiscale.paths[0], levels[0], grids[0]),
+            *notes_on_labels(tree),
+        ),
         labels=labels_evidence(ome, location),
         objects=notes_of_ngff(ome.get("image-label")),
     )
+
+
+def _parsed(tree: ZarrTree, ome: Mapping[str, Any]) -> Multiscale:
+    """Return the metadata of the first image. Raises SourceError, of other versions with a way."""
+    where = tree.location.shown
+    version, titled = ngff.version_of(ome), where
+    expected = "axes, datasets and scales as OME-Zarr 0.1 to 0.6"
+    if not ngff.is_known(version):
+        with quiet(), one_line(where, "a group whose arrays can be listed"):
+            group = zarr.open_group(tree.store, mode="r", zarr_format=tree.zarr_format)
+            path = next((name for name, node in group.members() if isinstance(node, zarr.Array)), 0)
+        titled = f"{where}: OME-Zarr {version:.20}, a version that is not known"
+        expected += (
+            f"; {where.rstrip('/')}/{path} --axes zyx --spacing-um z,y,x reads the voxels of an "
+            "array as they are stored"
+        )
+    with one_line(f"{titled}: multiscales[0]", expected):
+        return ngff.parse(where, ome)
 
 
 def _levels(
@@ -172,19 +231,28 @@ def _levels(
 
 
 def _grids(
-    location: Location, image: Multiscale, levels: tuple[VoxelArray, ...]
-) -> tuple[tuple[Grid, ...], tuple[str, ...], tuple[str, ...]]:
-    """Return the levels' grids, notes, and the file beside the image that they come from."""
+    image: Multiscale, levels: tuple[VoxelArray, ...], converted: Converted | None
+) -> tuple[tuple[Grid, ...], tuple[str, ...]]:
+    """Return the levels' grids, and notes on the OME-XML beside the image."""
     hint = "" if image.places_voxels else f"{image.title} states none"
-    grids = [
+    grids = tuple(
         replace(_grid(level, image, scale, shift), hint=hint)
         for level, (scale, shift) in zip(levels, image.placements, strict=True)
-    ]
-    converted = converted_of(location)
-    if converted is None:
-        return tuple(grids), (), ()
-    grids[0], notes = settled_spacing(grids[0], converted, levels[0])
-    return tuple(grids), notes, (converted.path,)
+    )
+    return (grids, ()) if converted is None else settled_grids(grids, converted, levels[0])
+
+
+def _position_notes(
+    tree: ZarrTree, store: Store, path: str, level: VoxelArray, grid: Grid
+) -> tuple[str, ...]:
+    """Return notes on positions beside the finest level on this machine that disagree with it."""
+    stored: Any = level.array
+    while not isinstance(stored, zarr.Array):
+        stored = stored.stored
+    if not tree.location.is_local:
+        return ()
+    found = beside(tree.location, store, path, stored)
+    return notes_beside_scale(found.positions, level.axes, grid.spacing_um)
 
 
 def _of_axis(image: Multiscale, axis: str) -> str:
@@ -197,22 +265,24 @@ def _grid(
     scale: Sequence[float] | None,
     shift: Sequence[float] | None,
 ) -> Grid:
-    spacing = None if scale is None else _spatial(image.names, image.units, scale)
     # A scale without a unit is no length: writers that lack the spacing state 1.0.
-    is_placed = shift is not None and spacing is not None
-    offset = _spatial(image.names, image.units, shift or ()) if is_placed else None
-    return Grid(level.shape, spacing, offset)
+    spacing = _spatial(image.names, image.units, scale)
+    grid = grid_of(level.shape, spacing)
+    if shift is None or grid.spacing_um is None:
+        return grid
+    z, y, x = (length or 0.0 for length in _spatial(image.names, image.units, shift))
+    return replace(grid, offset_um=(z, y, x))
 
 
 def _spatial(
-    axes: tuple[str, ...], units: tuple[float | None, ...], values: Sequence[float]
-) -> Triple | None:
+    axes: tuple[str, ...], units: tuple[float | None, ...], values: Sequence[float] | None
+) -> PartialTriple:
+    """Return lengths (z, y, x), um; None: not stated, or without a unit of length."""
     picked = []
     for axis in "zyx":
         unit = units[axes.index(axis)]
-        if unit is None:
-            return None
-        picked.append(values[axes.index(axis)] * unit)
+        is_length = unit is not None and values is not None
+        picked.append(values[axes.index(axis)] * unit if is_length else None)
     z, y, x = picked
     return z, y, x
 

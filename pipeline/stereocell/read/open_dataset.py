@@ -14,6 +14,7 @@ from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
 from stereocell.read.image import Image, printable
 from stereocell.read.inverted_array import InvertedArray
 from stereocell.read.level_spacing import settle_levels
+from stereocell.read.plausible_size import ratio_notes
 from stereocell.read.readers import find_reader
 from stereocell.read.remarks import cast_note
 from stereocell.read.spacing import Triple, levels_of
@@ -59,9 +60,10 @@ def open(
     location, reader = find_reader(source)
     with library_boundary(location.shown, f"{reader.name} that is whole"):
         image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
-        if dark:
-            image = _inverted(image)
         try:
+            image = _at_time(location.shown, image, time)
+            if dark:
+                image = _inverted(image)
             return _dataset(location, image, time, spacing_um)
         except BaseException:
             if image.close is not None:
@@ -74,18 +76,16 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     finest = image.arrays[0]
     _check_arrays(where, image)
     grids, level_notes = settle_levels(image.grids)
-    if not 0 <= time < finest.size("t"):
-        raise UsageError(
-            f"{where}: --time: found {time}, expected 0 to {finest.size('t') - 1} "
-            f"(the source holds {finest.size('t')} time points)"
-        )
+    levels = levels_of(grids, spacing_um, where)
+    if spacing_um is None:
+        level_notes += ratio_notes(levels[0].spacing_um, image.acquired.axis)
     given = [printable(name or "") for name in image.names]
     channels = map(ChannelInfo, _unique(given), image.colors, map(bool, given))
     return Dataset(
         source=location.source,
         name=image.title or printable(location.name) or "dataset",
         dtype=built_dtype(finest.array.dtype) or np.dtype(finest.array.dtype),
-        levels=levels_of(grids, spacing_um, where),
+        levels=levels,
         channels=tuple(channels),
         time_points=finest.size("t"),
         time=time,
@@ -109,6 +109,17 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         objects=image.objects,
         offset_um=image.grids[0].offset_um or (0.0, 0.0, 0.0),
     )
+
+
+def _at_time(where: str, image: Image, time: int) -> Image:
+    """Return an image as one time point has it. Raises UsageError for a time that isn't there."""
+    count = image.arrays[0].size("t")
+    if not 0 <= time < count:
+        raise UsageError(
+            f"{where}: --time: found {time}, expected 0 to {count - 1} "
+            f"(the source holds {count} time points)"
+        )
+    return image if image.at_time is None else image.at_time(image, time)
 
 
 def _inverted(image: Image) -> Image:

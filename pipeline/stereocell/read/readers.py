@@ -4,6 +4,7 @@ No key of a result follows this module: the reader that is found here is named i
 """
 
 import os
+import zipfile
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -15,6 +16,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.file_kind import require_kind
 from stereocell.read.foreign_files import bare_voxels_words, foreign_words
 from stereocell.read.image import Image, printable
+from stereocell.storage.archives import ARCHIVE_SUFFIXES
 from stereocell.storage.contents import contents_of
 from stereocell.storage.first_bytes import SHARED, identify
 from stereocell.storage.kinds import Kind
@@ -27,6 +29,11 @@ _SURFACES = (
 )
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp")  # which are planes of a folder
 _FOLDERS = ("planes", "dicom")  # formats of folders whose files may have any name
+_DICOM_ORDER = (
+    "images before phases, projections and localizers, larger series first; then images as "
+    "acquired before derived ones, in phase and water before opposed phase and fat, then lower "
+    "echo times, b-values and energies"
+)
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 
 
@@ -36,6 +43,7 @@ class Reader:
 
     title       the format's usual name
     has_series  one source may hold several images: `read_image(location, series=1)`
+    order       a sentence on the order of its images; empty: the source's own
     has_pattern names of files tell what they hold: `read_image(location, pattern="a_z{z}.tif")`
     has_axes    a source may not name its axes: `read_image(location, axes="czyx")`
     is_remote   it is read from an address, too
@@ -44,6 +52,7 @@ class Reader:
     module: str
     title: str
     has_series: bool = False
+    order: str = ""
     has_pattern: bool = False
     has_axes: bool = False
     is_remote: bool = False
@@ -69,7 +78,9 @@ class Reader:
 
 
 READERS = {
-    "ome-zarr": Reader("stereocell.read.ome_zarr", "OME-Zarr", has_axes=True, is_remote=True),
+    "ome-zarr": Reader(
+        "stereocell.read.ome_zarr", "OME-Zarr", has_series=True, has_axes=True, is_remote=True
+    ),
     "tiff": Reader("stereocell.read.tiff", "TIFF", has_series=True, has_axes=True, is_remote=True),
     "planes": Reader(
         "stereocell.read.planes",
@@ -77,7 +88,9 @@ READERS = {
         has_series=True,
         has_pattern=True,
     ),
-    "dicom": Reader("stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True),
+    "dicom": Reader(
+        "stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True, order=_DICOM_ORDER
+    ),
     "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze"),
     "mgh": Reader("stereocell.read.mgh", "MGH (FreeSurfer)"),
     "ims": Reader("stereocell.read.ims", "Imaris"),
@@ -173,6 +186,11 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     return lines
 
 
+def series_order(source: str | Path) -> str:
+    """Return a sentence on the order of `list_series`; empty: that of the source itself."""
+    return find_reader(source)[1].order
+
+
 def _unknown(location: Location) -> SourceError:
     """Return the error of a source of no known format, which says what it is instead."""
     last = location.parts[-1].lower() if location.parts else ""
@@ -191,6 +209,11 @@ def _unknown(location: Location) -> SourceError:
                 "folder of its planes"
             )
         found += f": found {content}"
+    if last.endswith(ARCHIVE_SUFFIXES) and zipfile.is_zipfile(location.path):
+        return SourceError(
+            f"{location.shown}: found a zip archive without a Zarr group, expected OME-Zarr: unzip "
+            "it, and name the file or folder in it"
+        )
     formats = ", ".join(reader.title for reader in READERS.values())
     if found.endswith(")"):  # the way out is the message, so the list would hide it
         formats = "OME-Zarr, TIFF, DICOM, NIfTI, HDF5 and others that are read"

@@ -9,6 +9,7 @@ whose type has the other one.
 References: CF conventions 1.11, sections 2.5.1 and 8.1; NetCDF Users Guide, attribute conventions.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +23,7 @@ from stereocell.read.rescale import dtype_for, rescale
 from stereocell.read.stated_numbers import number_of, numbers_of
 
 _FILLS = ("_FillValue", "missing_value")
+_SEPARATORS = re.compile(r"[,;\s]+")
 ATTRIBUTES = (
     *("scale_factor", "add_offset", "_Unsigned"),
     *(*_FILLS, "valid_range", "valid_min", "valid_max"),
@@ -51,6 +53,12 @@ class ValueScale:
         """Whether some stored values stand for no measurement."""
         return bool(self.missing) or self.low > -np.inf or self.high < np.inf
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether the stored numbers are the values."""
+        is_same = (self.slope, self.intercept) == (1.0, 0.0) and self.signed is None
+        return is_same and not self.has_gaps
+
 
 def scaled(
     where: str, array: StoredArray, attributes: Mapping[str, Any]
@@ -62,10 +70,24 @@ def scaled(
     Raises SourceError where a stated factor is no finite number.
     """
     scale = scale_of(where, np.dtype(array.dtype), attributes)
-    is_plain = (scale.slope, scale.intercept) == (1.0, 0.0) and scale.signed is None
-    if is_plain and not scale.has_gaps:
+    if scale.is_plain:
         return array, scale.notes
     return ScaledArray(array, scale), scale.notes
+
+
+def ignored_note(of: str, attributes: Mapping[str, Any]) -> str:
+    """Return a sentence on factors among the attributes of a group; empty: there are none.
+
+    CF defines them for the array that they stand on, so those of a group are not applied.
+    """
+    stated = {name: attributes.get(name) for name in ("scale_factor", "add_offset")}
+    named = [f"{name} {value}"[:40] for name, value in stated.items() if value is not None]
+    if not named:
+        return ""
+    return (
+        f"values: {' and '.join(named)} of {of} are not applied: they count only among the "
+        "attributes of the array itself"
+    )
 
 
 def scale_of(where: str, stored: np.dtype[Any], attributes: Mapping[str, Any]) -> ValueScale:
@@ -118,6 +140,8 @@ def _gaps(
         found = _stored_values(stored, scale, attributes.get(name))
         if found := tuple(value for value in found if np.isfinite(value)):
             fills[name] = found
+        elif _is_unread(attributes.get(name)):
+            notes.append(f"values: {name} is {_shown(attributes[name])}, no number: it is not used")
     missing = tuple(dict.fromkeys(value for values in fills.values() for value in values))
     if stored.kind in "iu" and scale.slope > 0 and missing == (_least(stored, scale),) == (0.0,):
         missing, fills = (), {}  # 0 of unsigned numbers is the smallest value anyway
@@ -171,15 +195,29 @@ def _limits(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float
 
 def _stored_values(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float, ...]:
     """Return an attribute's numbers in the sign of the voxels; empty: it states none."""
-    if value is None or isinstance(value, str | bytes):
-        return ()
-    numbers = np.ravel(np.asarray(value))
+    numbers = np.ravel(np.asarray(() if value is None else value))
+    if numbers.dtype.kind in "SUO":  # numbers as texts, such as "-9999" or "0, 4095"
+        return tuple(numbers_of(_SEPARATORS.split(" ".join(map(_text, numbers)).strip("[]() "))))
     if scale.signed is not None and numbers.dtype == stored:
         numbers = numbers.view(_resigned(stored, scale))
     try:
         return tuple(number_of(number) for number in numbers)
     except (TypeError, ValueError):
         return ()
+
+
+def _is_unread(value: Any) -> bool:
+    """Return whether an attribute that should be a number is another text."""
+    texts = [_text(one) for one in np.ravel(np.asarray(value))] if value is not None else []
+    return any(texts) and not numbers_of(texts)
+
+
+def _shown(value: Any) -> str:
+    return repr(", ".join(_text(one) for one in np.ravel(np.asarray(value))))[:40]
+
+
+def _text(value: Any) -> str:
+    return str(value.decode("utf-8", "replace") if isinstance(value, bytes) else value).strip()
 
 
 def _least(stored: np.dtype[Any], scale: ValueScale) -> float:
@@ -199,37 +237,40 @@ class ScaledArray:
     def __init__(self, array: StoredArray, scale: ValueScale) -> None:
         self.shape, self.chunks = tuple(array.shape), tuple(array.chunks)
         self._array, self._scale = array, scale
-        self._stored = _resigned(np.dtype(array.dtype), scale)
-        is_float = self._stored.kind == "f"  # such a fill value was rounded as the voxels were
-        kind = self._stored.type if is_float else float
-        self._missing = [kind(value) for value in scale.missing]
-        self.dtype = self._values_dtype()
+        self.dtype = dtype_of_values(np.dtype(array.dtype), scale)
 
     @property
     def stored(self) -> StoredArray:
         """The array as it is stored."""
         return self._array
 
-    def _values_dtype(self) -> np.dtype[Any]:
-        scale, stored = self._scale, self._stored
-        if scale.has_gaps or stored.kind not in "iu":
-            return np.dtype(np.float64 if stored.itemsize > 4 else np.float32)
-        if (scale.slope, scale.intercept) == (1.0, 0.0):
-            return stored
-        limits = np.iinfo(stored)
-        return dtype_for([(float(limits.min), float(limits.max), scale.slope, scale.intercept)])
-
     def __getitem__(self, key: Any) -> NDArray[Any]:
-        scale = self._scale
-        stored = np.asarray(self._array[key])
-        if stored.dtype != self._stored:
-            stored = stored.view(self._stored)
-        if stored.dtype.kind == "b":
-            stored = stored.astype(np.uint8)
-        values = rescale(stored, scale.slope, scale.intercept, self.dtype)
-        if not scale.has_gaps:
-            return values
-        is_gap = (stored < scale.low) | (stored > scale.high)
-        for missing in self._missing:
-            is_gap |= stored == missing
-        return np.where(is_gap, values.dtype.type(np.nan), values)
+        return values_of(np.asarray(self._array[key]), self._scale, self.dtype)
+
+
+def dtype_of_values(stored: np.dtype[Any], scale: ValueScale) -> np.dtype[Any]:
+    """Return the dtype of the values of stored numbers."""
+    stored = _resigned(stored, scale)
+    if scale.has_gaps or stored.kind not in "iu":
+        return np.dtype(np.float64 if stored.itemsize > 4 else np.float32)
+    if (scale.slope, scale.intercept) == (1.0, 0.0):
+        return stored
+    limits = np.iinfo(stored)
+    return dtype_for([(float(limits.min), float(limits.max), scale.slope, scale.intercept)])
+
+
+def values_of(stored: NDArray[Any], scale: ValueScale, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return the values of stored numbers in `dtype`; NaN where there is no measurement."""
+    signed = _resigned(stored.dtype, scale)
+    if stored.dtype != signed:
+        stored = stored.view(signed)
+    if stored.dtype.kind == "b":
+        stored = stored.astype(np.uint8)
+    values = rescale(stored, scale.slope, scale.intercept, dtype)
+    if not scale.has_gaps:
+        return values
+    is_gap = (stored < scale.low) | (stored > scale.high)
+    kind = signed.type if signed.kind == "f" else float  # a float's fill value was rounded as well
+    for missing in scale.missing:
+        is_gap |= stored == kind(missing)
+    return np.where(is_gap, values.dtype.type(np.nan), values)

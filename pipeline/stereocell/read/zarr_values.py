@@ -36,7 +36,7 @@ def value_attributes(array: Any) -> dict[str, Any]:
     stated = dict(array.attrs)
     found = {name: stated.get(name) for name in ATTRIBUTES}
     if isinstance(text := found[_FILL], str):
-        found[_FILL] = _decoded(text)
+        found[_FILL] = value if (value := _decoded(text)) is not None else text
     is_xarrays = "_ARRAY_DIMENSIONS" in stated and array.metadata.zarr_format == 2
     if found[_FILL] is None and is_xarrays and array.fill_value:
         found[_FILL] = array.fill_value

@@ -159,6 +159,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "iso_value": appearance.iso_value,
                 "level": None if appearance.level is None else appearance.level.words,
                 "reason": appearance.surface_reason,
+                "near": "" if given_level(facts.plan, channel) else found.near_levels,
                 "confidence": appearance.iso_confidence,
                 "repair": found.repair,
                 "thinned": found.thinning(facts.plan),

@@ -78,6 +78,7 @@ def libraries_of(*makers: ModuleType | str) -> dict[str, str]:
     found: dict[str, str] = {}
     for maker in makers:
         found |= dict(_reach(_name(maker), ())[1])
+    keep_sources()
     return {name: version for name, version in found.items() if version != ABSENT}
 
 

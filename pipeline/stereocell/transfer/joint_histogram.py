@@ -126,15 +126,17 @@ def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[
     return result
 
 
-def sample_boxes(region: Box, limit: int) -> list[Box]:
+def sample_boxes(region: Box, limit: int, largest: tuple[int, int, int] = SAMPLE_EDGE) -> list[Box]:
     """Return boxes of a region with at most about `limit` voxels in all: all of it, or blocks.
 
     Blocks stand evenly along each axis, from end to end, as far as the limit goes.
+
+    largest  voxels (z, y, x) of a block
     """
     shape = region.shape
     if np.prod(shape, dtype=np.int64) <= limit:
         return [region]
-    edge = [min(n, e) for n, e in zip(shape, SAMPLE_EDGE, strict=True)]
+    edge = [min(n, e) for n, e in zip(shape, largest, strict=True)]
     room = [n / e for n, e in zip(shape, edge, strict=True)]
     wanted = limit / float(np.prod(edge, dtype=np.int64))
     share = min(1.0, (wanted / float(np.prod(room))) ** (1 / 3))

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pydicom
@@ -11,55 +10,9 @@ import SimpleITK
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
+from support.dicom_kinds import AFFINE, SHAPE, added, image_type, private, write_kind
 from support.dicom_reading import whole
 from support.dicom_series import Change, grid, setting, write_enhanced, write_series
-
-SHAPE = (10, 12, 14)
-AFFINE = grid(shape=SHAPE, spacing=(3.0, 2.0, 2.2))
-
-
-def image_type(*words: str) -> Change:
-    return setting(ImageType=["ORIGINAL", "PRIMARY", *words])
-
-
-def private(group: int, creator: str, element: int, vr: str, value: Any) -> Change:
-    def change(ds: pydicom.Dataset) -> None:
-        ds.private_block(group, creator, create=True).add_new(element, vr, value)
-
-    return change
-
-
-def write_kind(
-    folder: Path,
-    add: float,
-    change: Change,
-    *,
-    indices: Iterable[float] = range(10),
-    modality: str = "MR",
-    first_number: int = 1,
-) -> None:
-    """Write slices of series 1.2.3 whose values are the scene's, and `add`."""
-
-    def changed(ds: pydicom.Dataset) -> None:
-        ds.InstanceNumber += first_number - 1
-        change(ds)
-
-    write_series(
-        folder / f"{add:g}",
-        AFFINE,
-        SHAPE,
-        indices=indices,
-        series="1.2.3",
-        intercept=add,
-        change=changed,
-        modality=modality,
-    )
-
-
-def added(folder: Path, series: int = 0, time: int = 0) -> float:
-    """Return the constant that the read volume has above the scene, which is 0 at its edge."""
-    return float(whole(read.open(folder, series=series, time=time)).min())
-
 
 PARTS: dict[str, tuple[Change, Change]] = {
     "Siemens": (image_type("P", "ND"), image_type("M", "ND")),

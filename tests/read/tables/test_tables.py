@@ -110,7 +110,47 @@ def test_a_column_with_many_words_holds_categories(tmp_path: Path) -> None:
     cells = ["1", "2", "tumour", "stroma", "3", "tumour", "tumour"]
     text = "label,zone\n" + "".join(f"{i},{cell}\n" for i, cell in enumerate(cells, start=1))
     (zone,) = read_table(csv(tmp_path, text), "", (), "cells").columns
-    assert (zone.texts, notes(tmp_path, text)) == (tuple(cells), "")
+    told = "column 'zone': 3 of 7 cells are numbers, others are words, as 'tumour': read as texts"
+    assert (zone.texts, notes(tmp_path, text)) == (tuple(cells), told)
+
+
+@pytest.mark.parametrize(("share", "is_number"), [(0.45, True), (0.55, False)])
+def test_up_to_half_of_the_cells_may_be_words_where_numbers_have_fractions(
+    tmp_path: Path, share: float, is_number: bool
+) -> None:
+    cells = ["missing" if i < share * 20 else f"{i}.5" for i in range(20)]
+    text = "label,area\n" + "".join(f"{i},{cell}\n" for i, cell in enumerate(cells, start=1))
+    (area,) = read_table(csv(tmp_path, text), "", (), "cells").columns
+    assert (area.numbers is not None) is is_number
+    assert ("'missing' (9)" if is_number else "9 of 20 cells are numbers") in notes(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("unit", "mark"), [(" %", "."), ("%", ","), ("\u00b5m", "."), (" um\u00b2", ",")]
+)
+def test_a_unit_after_each_number_is_left_out_and_noted(
+    tmp_path: Path, unit: str, mark: str
+) -> None:
+    text = f"label;a\n1;12{mark}5{unit}\n2;3{mark}25{unit}\n3;\n4;7{mark}0{unit}\n5;n/a\n"
+    expected = [12.5, 3.25, np.nan, 7, np.nan]
+    assert numbers(tmp_path, text)["a"] == pytest.approx(expected, nan_ok=True)
+    told = f"column 'a': the unit {unit.strip()!r} after the numbers is left out"
+    assert told in notes(tmp_path, text)
+
+
+def test_a_number_that_often_stands_for_missing_values_is_named(tmp_path: Path) -> None:
+    told = "column 'a': -9999 in 2 cells is read as a number"
+    assert told in notes(tmp_path, "label,a\n1,-9999\n2,3\n3,-9999\n")
+    assert notes(tmp_path, "label,depth\n1,-9999\n2,-9000\n3,-200\n") == ""
+
+
+def test_numbers_of_several_units_stay_texts_and_are_noted(tmp_path: Path) -> None:
+    text = "label,a\n1,12 um\n2,3 mm\n3,5 um\n"
+    (column,) = read_table(csv(tmp_path, text), "", (), "cells").columns
+    assert column.texts == ("12 um", "3 mm", "5 um")
+    assert "the numbers have several units ('um', 'mm'): read as texts" in notes(tmp_path, text)
+    wells = "label,well\n1,1A\n2,2B\n3,3A\n"  # names that begin with a digit are no numbers
+    assert notes(tmp_path, wells) == ""
 
 
 @pytest.mark.parametrize(
@@ -150,7 +190,10 @@ def test_a_mark_that_other_cells_do_not_explain_is_noted(tmp_path: Path) -> None
     text = 'label,count\n1,"1,234"\n2,"5,678"\n'
     assert numbers(tmp_path, text)["count"] == [1234, 5678]
     assert "a point (1,234 is 1234) is assumed, as no other cell" in notes(tmp_path, text)
-    assert notes(tmp_path, "label;word;a\n1;x, y;1.234\n2;z;5.678\n") == ""
+    text = "label;word;a\n1;x, y;1.234\n2;z;5.678\n"
+    assert numbers(tmp_path, text)["a"] == [1.234, 5.678]
+    assert "'a': not stated, a point (1.234 is 1.234) is assumed" in notes(tmp_path, text)
+    assert notes(tmp_path, "label;a;b\n1;1.234;0.5\n2;5.678;1.5\n") == ""
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig", "cp1252"])
@@ -415,6 +458,39 @@ def test_a_table_of_parquet(tmp_path: Path) -> None:
         parquet(tmp_path, id=pa.array([], pa.int64()), a=pa.array([], pa.string())), "", (), "c"
     )
     assert (len(empty.labels), empty.columns[0].texts) == (0, ())
+
+
+def test_numbers_that_parquet_stores_as_texts_are_read_as_numbers_and_noted(tmp_path: Path) -> None:
+    place = parquet(
+        tmp_path,
+        label=pa.array([1, 2, 3, 4]),
+        area=pa.array(["1.5", "#DIV/0!", None, "7"]),
+        comma=pa.array(["1,5", "2,25", "3,5", "4"]),
+        cluster=pa.array(["0", "1", "0", "1"]).dictionary_encode(),
+        none=pa.array(["NA", None, "-", ""]),
+    )
+    table = read_table(place, "", (), "cells")
+    area, comma, cluster, none = table.columns
+    np.testing.assert_array_equal(area.numbers, [1.5, np.nan, np.nan, 7])
+    np.testing.assert_array_equal(comma.numbers, [1.5, 2.25, 3.5, 4])
+    assert cluster.texts == ("0", "1", "0", "1")
+    assert none.texts == ("", "", "-", "")
+    told = " ".join(table.notes)
+    assert "numbers stored as texts are read as numbers: 'area', 'comma'" in told
+    assert "area: '#DIV/0!' (1), empty (1)" in told
+
+
+def test_numbers_that_anndata_stores_as_texts_are_read_as_numbers_and_noted(tmp_path: Path) -> None:
+    place = anndata(tmp_path / "a" / "t.h5ad", "h5ad", "dense")
+    with h5py.File(place, "r+") as file:
+        obs = file["obs"]
+        obs.create_dataset("size", data=["1.5", "n.d.", "3", "4"], dtype=h5py.string_dtype())
+        obs["size"].attrs["encoding-type"] = "string-array"
+        obs.attrs["column-order"] = ["id", "region", "type", "ok", "size"]
+    table = read_table(str(place), "", (), "cells")
+    size = next(column for column in table.columns if column.name == "size")
+    np.testing.assert_array_equal(size.numbers, [1.5, np.nan, 3])
+    assert "numbers stored as texts are read as numbers: 'size'" in table.notes
 
 
 def test_parquet_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

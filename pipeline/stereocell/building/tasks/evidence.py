@@ -28,6 +28,7 @@ from stereocell.isosurface.options import CRITERIA
 from stereocell.model.image_plane import back_of_three, first_of_three, slices_first
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
 from stereocell.storage.json_files import write_sealed
 
 
@@ -58,11 +59,14 @@ def measure_evidence(task: EvidenceTask) -> TileEvidence:
     reach = denoising_reach(task.smoothing_um, spacing, axis)
     z, y, x = (r + h for r, h in zip(reach, back_of_three(HALO, axis), strict=True))
     window = task.box.grown((z, y, x), task.region)
-    volume = dataset.read(task.channel, window, task.level)
-    own = [
-        slice(a - start, b - start)
-        for a, b, start in zip(task.box.start, task.box.stop, window.start, strict=True)
-    ]
+    return evidence_of(task, dataset.read(task.channel, window, task.level), window)
+
+
+def evidence_of(task: EvidenceTask, volume: Volume, window: Box) -> TileEvidence:
+    """Return a tile's evidence, of the volume that was read in a window around it."""
+    spacing, axis = volume.spacing_um, volume.slice_axis
+    reach = denoising_reach(task.smoothing_um, spacing, axis)
+    own = task.box.slices_in(window)
     voxels = slices_first(volume.voxels, axis)
     background = None
     if task.background is not None:

@@ -5,7 +5,7 @@ echoes. The kind tells them apart (read/dicom/split_kinds.py). Words for the use
 tables here and never from the file, whose texts may identify a patient.
 
 References: DICOM PS3.3 C.7.6.1.1.2 (Image Type), C.8.3.1.1.1 (MR), C.8.13.3.1 (Complex Image
-Component), C.8.16.2.1.3 (Volume Based Calculation Technique), C.8.15.3 (CT).
+Component), C.8.16.2.1.3 (Volume Based Calculation Technique), C.8.15.3 (CT), C.8.9.1 (PET).
 """
 
 import re
@@ -69,21 +69,34 @@ _ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (
             r"ADC.*|EADC|FA|DIFFUSION MAP|(T1|T2|T2\*|T2STAR|R2|R2\*|DENSITY) MAP|[TR][12]_?MAP"
             r"|CBF|CBV|RCBF|RCBV|MTT|TTP|TMAX|PERFUSION MAP|STD_DEVIATION|EFF_ATOMIC_NUM"
-            r"|ELECTRON_DENSITY|MAT_(SPECIFIC|REMOVED|FRACTIONAL|VALUE_BASED)",
+            r"|ELECTRON_DENSITY|MAT_(SPECIFIC|REMOVED|FRACTIONAL|VALUE_BASED)"
+            r"|FF|PDFF|(FAT|WATER)_FRAC(TION)?|[TR]2_?STAR(_MAP)?",
             "parametric map",
         ),
     )
 )
-# words of ImageType that name a contrast
+# words of ImageType that name a contrast, the one that is shown first at the top
 _CONTRASTS = {
     **dict.fromkeys(("W", "WATER"), "water"),
-    **dict.fromkeys(("F", "FAT"), "fat"),
     **dict.fromkeys(("IN_PHASE", "INPHASE", "IP"), "in phase"),
     **dict.fromkeys(("OUT_PHASE", "OPP_PHASE", "OPPOSED_PHASE", "OP"), "opposed phase"),
+    **dict.fromkeys(("F", "FAT"), "fat"),
     **dict.fromkeys(("UNI",), "uniform"),
     "INV1": "first inversion",
     "INV2": "second inversion",
     "VMI": "virtual monoenergetic",
+}
+# contrast -> rank; an image without such a word has 0. In phase and uniform images look like
+# conventional ones and come first. The others are computed from them, or show less.
+_CONTRAST_RANKS = {
+    "in phase": 0,
+    "uniform": 0,
+    "water": 1,
+    "virtual monoenergetic": 1,
+    "second inversion": 1,
+    "opposed phase": 2,
+    "first inversion": 2,
+    "fat": 3,
 }
 _FRAME_TYPES = (
     "MRImageFrameTypeSequence",
@@ -105,6 +118,7 @@ KIND_TAGS: list[Any] = [
     "ComplexImageComponent",
     "VolumeBasedCalculationTechnique",
     "ConvolutionKernel",
+    "CorrectedImage",
     "KVP",
     "MonoenergeticEnergyEquivalent",
     "ContrastBolusAgent",
@@ -128,10 +142,11 @@ class FrameKind:
 
     part             of a complex signal: a name above
     role             a key of _RANKS; empty: an image as it was acquired
-    contrast_words   contrasts that ImageType names, for the user
+    contrasts        contrasts that ImageType names, for the user: keys of _CONTRAST_RANKS
     image_type       ImageType, compared and never shown
     kernel           ConvolutionKernel, shown only in the form of a maker's code
     has_agent        a contrast agent is stated
+    is_attenuation_corrected  of PET, by CorrectedImage
     energy_kev       of a virtual monoenergetic image
     echo_time, inversion_time, trigger_time  ms
     temporal, cardiac, acquisition  number of the point in time, of the cardiac phase (%), of the
@@ -140,10 +155,11 @@ class FrameKind:
 
     part: str = ""
     role: str = ""
-    contrast_words: str = ""
+    contrasts: tuple[str, ...] = ()
     image_type: tuple[str, ...] = ()
     kernel: str = ""
     has_agent: bool = False
+    is_attenuation_corrected: bool | None = None
     kvp: float | None = None
     energy_kev: float | None = None
     b_value: float | None = None
@@ -158,12 +174,17 @@ class FrameKind:
 
     @property
     def rank(self) -> int:
-        """Lower ranks are shown first: images and magnitudes have 0."""
-        return max(
-            _PART_RANKS.get(self.part, 0),
-            _RANKS[self.role],
-            int(self.image_type[:1] == ("DERIVED",)),
-        )
+        """Lower ranks are shown first: images and magnitudes have 0.
+
+        Water and fat are computed from the echoes, so that DERIVED doesn't make them lesser images.
+        """
+        is_derived = self.image_type[:1] == ("DERIVED",) and not self.contrasts
+        return max(_PART_RANKS.get(self.part, 0), _RANKS[self.role], int(is_derived))
+
+    @property
+    def contrast_rank(self) -> int:
+        """Among equal `rank`, lower ones are shown first: in phase, water, opposed phase, fat."""
+        return min((_CONTRAST_RANKS[word] for word in self.contrasts), default=0)
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -187,10 +208,11 @@ def kind_of(header: Any, groups: Sequence[Any]) -> FrameKind:
     return FrameKind(
         part=_part(header, groups, words) if is_mr else "",
         role=_role(header, groups, words),
-        contrast_words=", ".join(dict.fromkeys(_CONTRASTS[w] for w in words if w in _CONTRASTS)),
+        contrasts=tuple(dict.fromkeys(_CONTRASTS[w] for w in words if w in _CONTRASTS)),
         image_type=words,
         kernel=kernel,
         has_agent=bool(_has_agent(header, groups)),
+        is_attenuation_corrected=_is_attenuation_corrected(header),
         kvp=number("CTXRayDetailsSequence", "KVP"),
         energy_kev=number("MultienergyCTCharacteristicsSequence", "MonoenergeticEnergyEquivalent"),
         b_value=_b_value(header, groups) if is_mr else None,
@@ -274,6 +296,16 @@ def _has_agent(header: Any, groups: Sequence[Any]) -> bool:
         return bool(agent) and agent not in ("NONE", "NO", "WITHOUT", "N/A")
     except DICOM_FAULTS:
         return False
+
+
+def _is_attenuation_corrected(header: Any) -> bool | None:
+    """Return whether PET's CorrectedImage names the correction; None: it is not stated."""
+    try:
+        words = header.get("CorrectedImage") or ()
+        words = (words,) if isinstance(words, str) else tuple(words)
+        return "ATTN" in [str(word).strip().upper() for word in words] if words else None
+    except DICOM_FAULTS:
+        return None
 
 
 def _b_value(header: Any, groups: Sequence[Any]) -> float | None:

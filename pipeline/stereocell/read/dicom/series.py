@@ -7,7 +7,8 @@ each place are points in time (read/dicom/points_in_time.py); a point that lacks
 of its own. Of other frames at one place the first by instance number is taken.
 
 Series are in the order of their best stacks, images before phases, projections and localizers, and
-so are the stacks of a series.
+so are the stacks of a series. Larger series come first; of equal ones, images as acquired, and the
+contrast that looks like a conventional image: in phase, water, opposed phase, fat.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stereocell.model.counted import agreeing, counted
 from stereocell.read.anatomical_axes import plane_name
 from stereocell.read.dicom.contradictions import geometry_notes
 from stereocell.read.dicom.frame import Frame
@@ -42,7 +44,7 @@ class Stack:
     layout   the planes' grid; None: they make no volume, and `problem` gives the reason
     notes    changes and omissions, a sentence each
     words    what separates it from other stacks of the series, such as `magnitude`
-    order    sorts it among those
+    order    sorts it among those: rank of its kind, rank of its contrast, places of other values
     """
 
     times: tuple[tuple[Frame, ...], ...]
@@ -113,7 +115,8 @@ def is_other_kind(other: Stack, stack: Stack) -> bool:
 
 def _sorted(stacks: Sequence[Stack]) -> tuple[Stack, ...]:
     def own(stack: Stack) -> tuple[object, ...]:
-        return (stack.rank, -stack.voxels, stack.order, stack.first.file, stack.first.index)
+        kind = stack.order[:2]
+        return (kind, -stack.voxels, stack.order, stack.first.file, stack.first.index)
 
     best: dict[bytes, Stack] = {}
     for stack in sorted(stacks, key=lambda s: (s.layout is None, own(s))):
@@ -123,7 +126,7 @@ def _sorted(stacks: Sequence[Stack]) -> tuple[Stack, ...]:
         leader = best[stack.first.series]
         side = leader.rank if leader.rank >= _SIDE else 0
         total = -leader.voxels * len(leader.times)
-        place = (side, total, leader.first.file, leader.first.index)
+        place = (side, total, leader.order[:2], leader.first.file, leader.first.index)
         return (stack.layout is None, stack.first.segmentation is not None, place, own(stack))
 
     return tuple(sorted(stacks, key=key))
@@ -145,16 +148,18 @@ def _stacks(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> l
     near = SAME_PLACE * min(group.spacing)
     points = find_points(_places(group), normal, near, are_equal)
     kind = group.frames[0].kind
-    words = (*kind.words, *group.words)
+    words = (*kind.words, *_contrasts(group), *group.words)
     notes = [*group.notes, *neighbours]
     slices = 1 + max(frame.tile for frame in group.frames)
     if slices > 1:
         notes.append(f"mosaics of {slices} slices in one image: taken apart")
     notes += _time_notes(points)
-    stacks = [_stack(points.whole, group, notes, words, (kind.rank, *group.order))]
+    stacks = [
+        _stack(points.whole, group, notes, words, (kind.rank, kind.contrast_rank, *group.order))
+    ]
     for place, point in enumerate(points.incomplete):
         rest = f"incomplete point in time {len(points.whole) + place + 1}"
-        order = (_LAST, *group.order, place)
+        order = (_LAST, kind.contrast_rank, *group.order, place)
         stacks.append(_stack((point,), group, [], (*words, rest), order))
     return stacks
 
@@ -185,22 +190,34 @@ def _stack(
     return Stack(times, layout, "", found, words, order)
 
 
+def _contrasts(group: Group) -> tuple[str, ...]:
+    """Return the contrasts that all frames share and that `group.words` doesn't name already."""
+    shared = {frame.kind.contrasts for frame in group.frames}
+    named = ", ".join(group.words)
+    return tuple(w for w in next(iter(shared)) if w not in named) if len(shared) == 1 else ()
+
+
 def _time_notes(points: Points) -> list[str]:
     """Return what is said of frames that are in no whole point in time."""
     if points.duplicates:
-        what = "not all with the same pixels as" if points.differ else "with the same pixels as"
+        what = "the same pixels as"
+        if points.differ:
+            what = agreeing(points.duplicates, "other pixels than", "not all the same pixels as")
         return [
-            f"{points.duplicates} duplicate slices, {what} the one that is taken: the first by "
-            "instance number"
+            f"{counted(points.duplicates, 'duplicate slice')} with {what} the one that is taken: "
+            "the first by instance number"
         ]
     if not points.incomplete:
         return []
     total, places = len(points.whole) + len(points.incomplete), len(points.whole[0])
     counts = ", ".join(str(len(point)) for point in points.incomplete[:4])
     more = ", ..." if len(points.incomplete) > 4 else ""
-    found = f"{len(points.incomplete)} of {total} points in time ({points.attribute})"
+    lacking = len(points.incomplete)
+    found = f"{lacking} of {total} points in time ({points.attribute})"
     reason = f"slices are missing ({counts}{more} of {places} are there)"
-    return [omission(found, reason, "each is a series of `--series list`")]
+    return [
+        omission(found, reason, f"{agreeing(lacking, 'it', 'each')} is a series of `--series list`")
+    ]
 
 
 def _places(group: Group) -> list[list[Frame]]:

@@ -31,6 +31,7 @@ _MAX_RUNS = 8  # most runs of instance numbers; more are numbers in no order
 _KERNEL = re.compile(
     r"[A-Z][a-z]?\d{1,3}[a-z]?|FC\d\d|Y?[A-E]|STANDARD|SOFT|DETAIL|CHEST|LUNG|BONE(PLUS)?|EDGE"
 )
+_SHARP = re.compile(r"DETAIL|CHEST|LUNG|BONE(PLUS)?|EDGE")  # GE's kernels that sharpen edges
 _NUMBER_MOST = 9999  # larger numbers of acquisitions are not shown: they may be dates
 
 
@@ -58,16 +59,32 @@ def _measured(form: str) -> Callable[[Any, int], str]:
     return lambda value, _: "" if value is None else form.format(value)
 
 
+def _kernel_of(frame: Frame) -> tuple[bool, str]:
+    """Return a value that sorts soft kernels first, as the numbers of other makers' codes do."""
+    kernel = frame.kind.kernel
+    return _SHARP.fullmatch(kernel) is not None, kernel
+
+
 def _kernel_words(value: Any, place: int) -> str:
-    if not value:
+    _, kernel = value
+    if not kernel:
         return "no kernel stated"
-    return f"kernel {value}" if _KERNEL.fullmatch(value) else f"kernel no. {place + 1}"
+    return f"kernel {kernel}" if _KERNEL.fullmatch(kernel) else f"kernel no. {place + 1}"
+
+
+def _correction_of(frame: Frame) -> int | None:
+    is_corrected = frame.kind.is_attenuation_corrected
+    return None if is_corrected is None else int(not is_corrected)
+
+
+def _correction_words(value: Any, _: int) -> str:
+    return {0: "attenuation corrected", 1: "not attenuation corrected"}.get(value, "")
 
 
 def _type_words(value: Any, place: int) -> str:
-    contrast, origin, _ = value
-    if contrast:
-        return str(contrast)
+    contrasts, origin, _ = value
+    if contrasts:
+        return ", ".join(contrasts)
     return f"{origin.lower() or 'unknown'} image type no. {place + 1}"
 
 
@@ -76,15 +93,16 @@ def _acquisition_words(value: Any, place: int) -> str:
     return f"acquisition {value:g}" if is_shown else f"acquisition no. {place + 1}"
 
 
-def _type_of(frame: Frame) -> tuple[str, str, tuple[str, ...]]:
+def _type_of(frame: Frame) -> tuple[tuple[str, ...], str, tuple[str, ...]]:
     words = frame.kind.image_type
     origin = words[0] if words and words[0] in ("ORIGINAL", "DERIVED") else ""
-    return frame.kind.contrast_words, origin, words
+    return frame.kind.contrasts, origin, words
 
 
 _ACQUISITION = Property(_kind("acquisition"), _acquisition_words, is_time=True)
 PROPERTIES = (
-    Property(_kind("kernel"), _kernel_words),
+    Property(_kernel_of, _kernel_words),
+    Property(_correction_of, _correction_words),
     Property(_kind("energy_kev"), _measured("{:g} keV"), 0.01),
     Property(_kind("kvp"), _measured("{:g} kV"), 0.01),
     Property(

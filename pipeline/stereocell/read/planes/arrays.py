@@ -49,6 +49,7 @@ class StackArray:
     """Files that are each a stack, (t, c, z, y, x).
 
     shape  in voxels
+    dtype  holds the values of all files
     open_  returns the image of the file at (t, c); of several channels inside it (`inner`), c
            counts these
     """
@@ -77,7 +78,8 @@ class StackArray:
         file, inside = (0, channel) if self._inner else (channel, 0)
         with self._lock:
             image = self._image((time, file))
-            return image.arrays[0].stored_window(0, inside, box)
+            window = image.arrays[0].stored_window(0, inside, box)
+        return window.astype(self.dtype, copy=False)
 
     def _image(self, index: _Index) -> Image:
         if index in self._images:

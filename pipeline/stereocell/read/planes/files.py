@@ -1,4 +1,4 @@
-"""One file of a folder of planes: what its head says, and its pixels."""
+"""One file of a folder of planes: its head and its pixels, by its format."""
 
 import os
 import struct
@@ -11,13 +11,12 @@ import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pillow
-from tifffile import TiffFile
 
 from stereocell.model.errors import SourceError
-from stereocell.read.spacing import PartialTriple
-from stereocell.read.tiff.open_file import open_tiff, require_pages
+from stereocell.read.planes.head import Head
+from stereocell.read.planes.tiff_head import tiff_head
+from stereocell.read.tiff.open_file import open_tiff
 from stereocell.read.tiff.orientation import turn_by, turn_of, turned_pixels
-from stereocell.read.tiff.stated import stated_by
 from stereocell.storage.first_bytes import HEAD_BYTES, describe
 from stereocell.storage.library_errors import collected_log, one_line
 from stereocell.storage.location import Location
@@ -31,32 +30,6 @@ _TAIL = 1024  # bytes in which a PNG ends; some programs add a few of their own
 _PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; 3: a palette
 _EXIF_ORIENTATION = 274  # of TIFF and EXIF alike
 _SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
-
-
-@dataclass(frozen=True, slots=True)
-class Head:
-    """What a file holds.
-
-    shape    rows, columns, samples (colour and alpha; 1: grey)
-    pages    more than one: the file is a stack, or no plane
-    spacing_um  (z, y, x), um, as far as it is stated
-    z_um     where the plane lies along z, um; None: not stated
-    note     how the pixels are turned, for the user; empty: they are not
-    """
-
-    shape: tuple[int, int, int]
-    dtype: np.dtype[Any]
-    pages: int = 1
-    spacing_um: PartialTriple = (None, None, None)
-    z_um: float | None = None
-    note: str = ""
-
-    @property
-    def words(self) -> str:
-        """Size and dtype, for messages."""
-        rows, columns, samples = self.shape
-        colour = f", {samples} samples a pixel" if samples > 1 else ""
-        return f"{columns} x {rows} pixels of {self.dtype.name}{colour}"
 
 
 def read_head(path: str, named: str) -> Head:
@@ -77,42 +50,9 @@ def _kind(path: str) -> str:
     return next(kind for kind, endings in _ENDINGS.items() if lower.endswith(endings))
 
 
-def _open(path: str, stack: ExitStack) -> TiffFile:
-    return open_tiff(Location(path, True), stack)
-
-
-def _tiff_head(path: str, named: str) -> Head:
-    with ExitStack() as stack:
-        tiff = _open(path, stack)
-        page, pages = tiff.pages.first, len(tiff.pages)
-        if page.dtype is None:
-            raise SourceError(f"{named}: found pixels of no known type, expected numbers")
-        if tiff.is_stk or tiff.is_lsm:
-            pages = 2  # one directory may hold a stack
-        if pages == 1:
-            require_pages(named, tiff, [page], 1)
-            described = (tiff.imagej_metadata or {}) if tiff.is_imagej else {}
-            images = described.get("images", 1)  # of ImageJ's one directory over 4 GB
-            pages = images if isinstance(images, int) else 1
-        plane = (tiff.metaseries_metadata or {}).get("PlaneInfo", {}) if tiff.is_metaseries else {}
-        z_um = plane.get("z-position")
-        turn, notes = turn_of(page)
-        sizes, spacing = (0, page.imagelength, page.imagewidth), stated_by(tiff).spacing_um
-        _, rows, columns = (sizes[axis] for axis in turn.order)
-        z, y, x = (spacing[axis] for axis in turn.order)
-        return Head(
-            (rows, columns, page.samplesperpixel),
-            np.dtype(page.dtype),
-            pages,
-            (z, y, x),
-            float(z_um) if isinstance(z_um, int | float) else None,
-            "".join(notes),
-        )
-
-
 def _tiff_plane(path: str, named: str) -> NDArray[Any]:
     with ExitStack() as stack:
-        page = _open(path, stack).pages.first
+        page = open_tiff(Location(path, True), stack).pages.first
         pixels = page.asarray()
         is_planar = page.samplesperpixel > 1 and page.planarconfig == 2
         pixels = np.moveaxis(pixels, 0, -1) if is_planar else pixels
@@ -175,7 +115,7 @@ def _pillow_head(path: str, named: str) -> Head:
     if mode not in _SAMPLES:
         raise SourceError(f"{named}: found pixels of kind {mode}, expected grey or RGB")
     shape = (rows, columns, _SAMPLES[mode])
-    return Head(shape, np.dtype(np.uint8), note="".join(notes))
+    return Head(shape, np.dtype(np.uint8), notes=notes)
 
 
 def _pillow_plane(path: str, named: str) -> NDArray[Any]:
@@ -199,7 +139,7 @@ class _Format:
 
 
 _FORMATS = {
-    "tiff": _Format(_tiff_head, _tiff_plane),
+    "tiff": _Format(tiff_head, _tiff_plane),
     "png": _Format(_png_head, _png_plane),
     "jpeg": _Format(_jpeg_head, _pillow_plane),
     "bmp": _Format(_bmp_head, _pillow_plane),

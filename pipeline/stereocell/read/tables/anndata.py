@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.stated_numbers import number_of
+from stereocell.read.tables.number_texts import read_stored_texts
 from stereocell.read.tables.table import (
     MAX_NAMES,
     MAX_ROWS,
@@ -88,17 +89,24 @@ def read_anndata(root: Node, where: str, key: str, wanted: tuple[str, ...], labe
     places = [genes.index(name) for name in taken if name not in own]
     size = (len(keys), len(genes))
     numbers = _columns_of(matrix, where, size, places) if matrix is not None and places else None
-    columns = []
+    columns: dict[str, TableColumn] = {}
+    plain: dict[str, tuple[str, ...]] = {}
     for name in taken:
         if name in own:
-            values = _series(_found(obs, name), f"{where}: obs/{clean(name):.60}")
+            node = _found(obs, name)
+            values = _series(node, f"{where}: obs/{clean(name):.60}")
             _require_rows(where, name, values, len(keys))
-            columns.append(_column(clean(name) or "column", values, kept))
+            columns[name] = _column(clean(name) or "column", values, kept)
+            if columns[name].texts and node.attribute("encoding-type") != "categorical":
+                plain[columns[name].name] = columns[name].texts or ()
         elif numbers is not None:
             column = numbers[:, places.index(genes.index(name))]
-            columns.append(TableColumn(name, column[kept], None))
+            columns[name] = TableColumn(name, column[kept], None)
+    reading = read_stored_texts(plain)
+    read_again = {column.name: column for column in reading.columns}
     held = [str(value) for value, keep in zip(keys, kept, strict=True) if keep]
-    return Table(where, chosen, keys_of(where, chosen, held), tuple(columns), left_out)
+    made = tuple(read_again.get(column.name, column) for column in columns.values())
+    return Table(where, chosen, keys_of(where, chosen, held), made, left_out, reading.notes)
 
 
 def _found(group: Node, name: str) -> Node:

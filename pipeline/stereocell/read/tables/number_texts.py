@@ -16,11 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.read.statements import Statement, Subject, Trust, settle
+from stereocell.read.tables.cell_units import without_unit
 from stereocell.read.tables.table import MISSING, TableColumn, word_of
 
 POINT, COMMA = ".", ","
+_SEMICOLON = ";"  # separates cells where a comma is the decimal mark
 _MOST_WORDS = 5  # different words that may stand among numbers; error values don't count
 _MOST_SHARE = 0.25  # of the cells with something in them, that may be such words
+_MOST_SHARE_OF_FRACTIONS = 0.5  # the same where a number has a fraction: categories have none
+_MIXED = 0.25  # share of numbers in a column of texts from which on a note counts them
 _SHOWN = 4  # words, or columns, that a note lists
 _EXPONENT = r"([eE][+-]?[0-9]+)?"
 _PLAIN = {
@@ -41,6 +45,7 @@ _NO_NUMBER = re.compile(
     r"#.*|[-+]?1\.#.*|-+|\.+|\?+|[\u2013\u2014]|[+-]?inf(inity)?|[+-]nan|n\.?d\.?"
 )
 _NAMES = {POINT: "point", COMMA: "comma"}
+_MARKERS = (-999.0, -9999.0, -99999.0)  # numbers that programs write for a missing value
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,19 +63,42 @@ def read_columns(named: Mapping[str, Sequence[str]], separator: str) -> Reading:
     separator  the mark between cells
     """
     columns, missing, notes, grouped = [], {}, [], ""
-    conventions = _conventions(named, separator)
-    for name, texts in named.items():
+    bare = {name: without_unit(name, texts) for name, texts in named.items()}
+    notes += [note for _, note in bare.values() if note]
+    conventions = _conventions({name: texts for name, (texts, _) in bare.items()}, separator)
+    for name, (texts, _) in bare.items():
         mark, note = conventions[name]
         numbers, words = _numbers(texts, mark)
         if _are_numbers(numbers, words):
             columns.append(TableColumn(name, numbers, None))
             missing[name] = words
             notes += [note] if note else []
+            notes += _marker_notes(name, numbers)
             grouped = grouped or _grouped_note(texts, mark)
         else:
-            columns.append(TableColumn(name, None, tuple(map(word_of, texts))))
+            columns.append(TableColumn(name, None, tuple(map(word_of, named[name]))))
+            notes += _mixed_notes(name, numbers, words)
     notes += [grouped] if grouped else []
     return Reading(tuple(columns), (*_missing_notes(missing), *notes))
+
+
+def read_stored_texts(named: Mapping[str, Sequence[str]]) -> Reading:
+    """Return columns that a file with types of its own stores as texts, numbers where they are."""
+    reading = read_columns(named, "")
+    holds = [
+        column.numbers is not None and bool(np.isfinite(column.numbers).any())
+        for column in reading.columns
+    ]
+    columns = [
+        column if is_number else TableColumn(column.name, None, tuple(map(word_of, texts)))
+        for column, is_number, texts in zip(reading.columns, holds, named.values(), strict=True)
+    ]
+    found = [
+        repr(one.name)[:60] for one, is_number in zip(columns, holds, strict=True) if is_number
+    ]
+    more = f" and {len(found) - _SHOWN} more" * (len(found) > _SHOWN)
+    notes = [f"numbers stored as texts are read as numbers: {', '.join(found[:_SHOWN])}{more}"]
+    return Reading(tuple(columns), (*notes * bool(found), *reading.notes))
 
 
 def decimal_mark(texts: Sequence[str], separator: str) -> str:
@@ -80,21 +108,23 @@ def decimal_mark(texts: Sequence[str], separator: str) -> str:
 
 def _conventions(named: Mapping[str, Sequence[str]], separator: str) -> dict[str, tuple[str, str]]:
     """Return each column's decimal mark, and a note where another one would fit its cells too."""
-    if not any(COMMA in "\n".join(texts) for texts in named.values()):
+    has_comma = any(COMMA in "\n".join(texts) for texts in named.values())
+    if not has_comma and separator != _SEMICOLON:
         return dict.fromkeys(named, (POINT, ""))
     found = {name: _marks_of(texts) for name, texts in named.items()}
     of_table = Counter(next(iter(marks)) for marks, _ in found.values() if len(marks) == 1)
     conventions = {}
     for name, (marks, example) in found.items():
         mark = next(iter(marks)) if marks else ""
-        note = ""
+        note, is_doubtful = "", False
         if not mark and of_table and example:
             mark = of_table.most_common(1)[0][0]
             reason = "as in other columns of the table"
         elif not mark and example:
             mark = POINT if separator == COMMA or POINT in example else COMMA
             reason = "as no other cell tells them apart"
-        if not marks and example and not mark == POINT in example:
+            is_doubtful = separator == _SEMICOLON or mark not in example
+        if not marks and example and (is_doubtful or mark not in example):
             note = _ambiguous(name, example, mark, reason)
         conventions[name] = mark or POINT, note
     return conventions
@@ -184,8 +214,35 @@ def _are_numbers(numbers: NDArray[np.float64], words: Counter[str]) -> bool:
         has_errors = any(word.lower() not in MISSING for word in words)
         return not has_errors or bool(np.isfinite(numbers).any())
     filled = len(numbers) - sum(words[word] for word in words if word.lower() in MISSING)
-    is_few = len(others) <= _MOST_WORDS and sum(others.values()) <= _MOST_SHARE * filled
-    return is_few and bool(np.isfinite(numbers).any())
+    finite = numbers[np.isfinite(numbers)]
+    most = _MOST_SHARE_OF_FRACTIONS if (finite % 1 != 0).any() else _MOST_SHARE
+    is_few = len(others) <= _MOST_WORDS and sum(others.values()) <= most * filled
+    return is_few and bool(len(finite))
+
+
+def _marker_notes(name: str, numbers: NDArray[np.float64]) -> Iterator[str]:
+    """Yield a note on a number that stands for missing values in many files."""
+    finite = numbers[np.isfinite(numbers)]
+    for marker in _MARKERS:
+        count = int((finite == marker).sum())
+        if count and finite.min() == marker and not ((finite < 0) & (finite > marker)).any():
+            cells = f"{count:,} cells" if count > 1 else "1 cell"
+            yield (
+                f"column {name!r:.60}: {marker:g} in {cells} is read as a number: empty the cells "
+                "if it means that a value is missing"
+            )
+
+
+def _mixed_notes(name: str, numbers: NDArray[np.float64], words: Counter[str]) -> Iterator[str]:
+    """Yield a note on a column of texts with many numbers among its cells."""
+    filled = len(numbers) - sum(words[word] for word in words if word.lower() in MISSING)
+    count = int(np.isfinite(numbers).sum())
+    if count and count >= _MIXED * filled:
+        word = next(word for word, _ in words.most_common() if word.lower() not in MISSING)
+        yield (
+            f"column {name!r:.60}: {count:,} of {filled:,} cells are numbers, others are words, as "
+            f"{word!r:.40}: read as texts"
+        )
 
 
 def _means_missing(word: str) -> bool:

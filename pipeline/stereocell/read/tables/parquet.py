@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read import extras
+from stereocell.read.tables.number_texts import read_stored_texts
 from stereocell.read.tables.table import (
     MAX_NAMES,
     MAX_ROWS,
@@ -109,8 +110,14 @@ def _read(parquet: Any, source: BinaryIO, request: _Request) -> Table:
             found.append(_numbers(column) if kinds[name] == _NUMBER else _words(column))
     if len(keys) != rows:
         raise SourceError(f"{where}: found {len(keys)} rows, expected {rows} as it states")
-    columns = tuple(_column(name, kinds[name], found) for name, found in parts.items())
-    return Table(where, chosen, keys_of(where, chosen, keys), columns, left_out)
+    columns = {name: _column(name, kinds[name], found) for name, found in parts.items()}
+    plain = {
+        name: columns[name].texts or () for name in taken if _is_plain_text(schema.field(name).type)
+    }
+    reading = read_stored_texts(plain)
+    columns |= dict(zip(plain, reading.columns, strict=True))
+    labels = keys_of(where, chosen, keys)
+    return Table(where, chosen, labels, tuple(columns.values()), left_out, reading.notes)
 
 
 _NUMBER, _TEXT = "number", "text"
@@ -125,6 +132,12 @@ def _kind(type_: Any) -> str:
         return _NUMBER
     is_text = types.is_string(held) or types.is_large_string(held) or types.is_temporal(held)
     return _TEXT if is_text else ""
+
+
+def _is_plain_text(type_: Any) -> bool:
+    """Return whether a column holds texts that are neither categories nor times."""
+    types = import_module("pyarrow.types")
+    return bool(types.is_string(type_) or types.is_large_string(type_))
 
 
 def _require_small(stated: Any, request: _Request, names: set[str]) -> None:

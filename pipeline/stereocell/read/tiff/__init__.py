@@ -15,7 +15,8 @@ from tifffile import TiffFile
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
 from stereocell.read.image import Image
-from stereocell.read.series import Candidate, candidate, choose, lines
+from stereocell.read.modulo import listed, split
+from stereocell.read.series import lines
 from stereocell.read.tiff.companion import (
     Described,
     companion_at,
@@ -23,8 +24,8 @@ from stereocell.read.tiff.companion import (
     first_of_set,
     is_companion,
 )
-from stereocell.read.tiff.modulo import listed, split
 from stereocell.read.tiff.ome import read_ome
+from stereocell.read.tiff.ome_images import choose_image, list_images
 from stereocell.read.tiff.ome_set import settle_files
 from stereocell.read.tiff.open_file import open_tiff, refuse_short
 from stereocell.read.tiff.plain import kind_of, read_plain
@@ -34,24 +35,20 @@ from stereocell.storage.location import Location
 logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are raised here
 _OME_NAMES = (".ome.tif", ".ome.tiff", ".ome.tf2", ".ome.tf8", ".ome.btf")
 _BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's words
-_HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
 
 
 def read_image(location: Location, axes: str = "", series: int = 0) -> Image:
-    """Return the first image of the file.
+    """Return one image of the file.
 
     axes    of those longer than 1, slowest first, as `zcyx`; empty: the file's own
-    series  of the images that lie along a further axis of OME-XML (modulo.py); 0: the first
+    series  of the images of OME-XML (ome_images.py, modulo.py); 0: the largest
 
     Raises SourceError where the file can't be read as an image, UsageError where it has another
     number of axes or no such image.
     """
-    image, root = _read(location, axes)
+    image, root, part = _read(location, axes, series)
     try:
-        if root is None:
-            choose(location.shown, [_whole(image)], series or 1)
-            return image
-        return split(location.shown, image, root, series)
+        return split(location.shown, image, root, part)
     except BaseException:
         if image.close is not None:
             image.close()
@@ -59,49 +56,58 @@ def read_image(location: Location, axes: str = "", series: int = 0) -> Image:
 
 
 def list_series(location: Location) -> tuple[str, ...]:
-    """Return a line for each image along a further axis. Raises SourceError."""
-    image, root = _read(location, "")
+    """Return a line for each image, also along further axes. Raises SourceError."""
+    with ExitStack() as stack, collected_log("tifffile"):
+        described = _open(location, stack)[2]
+        if described is not None and ome_xml.count_images(described.root) > 1:
+            with one_line(location.shown, "an OME-XML with whole numbers as sizes"):
+                return lines(list_images(location, described.root))
+    image, root, _ = _read(location, "", 0)
     if image.close is not None:
         image.close()
-    return lines([_whole(image)] if root is None else listed(image, root))
+    return lines(listed(image, root))
 
 
-def _whole(image: Image) -> Candidate:
-    finest = image.arrays[0]
-    return candidate(
-        finest.shape,
-        channels=finest.size("c"),
-        times=finest.size("t"),
-        spacing_um=image.grids[0].spacing_um,
-    )
-
-
-def _read(location: Location, axes: str) -> tuple[Image, ElementTree.Element | None]:
-    """Return the image as it is stored, and the root of its OME-XML; None: it has none."""
+def _open(location: Location, stack: ExitStack) -> tuple[Location, TiffFile, Described | None]:
+    """Return the file of a source, open, with its OME-XML; None: it has none."""
     given = location.source if is_companion(location) else ""
     if given:
         location = first_of_set(location)
-    where = location.shown
+    tiff = open_tiff(location, stack)
+    with one_line(location.shown, "a TIFF file, whole"):
+        text = tiff.pages.first.description
+    if not given and not ome_xml.is_ome(text):
+        return location, tiff, None
+    return location, tiff, _described(location, tiff, text, given)
+
+
+def _read(
+    location: Location, axes: str, series: int
+) -> tuple[Image, ElementTree.Element | None, int]:
+    """Return the image as it is stored, its OME-XML, and the series of its parts.
+
+    The OME-XML is None where the file has none.
+    """
     stack = ExitStack()
     try:
         with collected_log("tifffile") as log:
-            tiff = open_tiff(location, stack)
-            with one_line(where, "a TIFF file, whole"):
-                text = tiff.pages.first.description
-            if not given and not _is_ome(text):
+            location, tiff, described = _open(location, stack)
+            if described is None:
                 image = read_plain(location, tiff, stack, axes)
                 _require_pages_read(location, tiff, log)
-                return _with_note(location, image), None
-            described = _described(location, tiff, text, given)
-            root, text, beside = described.root, described.text, described.path
-            is_changed, notes = settle_files(location, root, is_companion=bool(beside))
+                return _with_note(location, image), None, series
+            chosen = choose_image(location, described.root, series)
+            text, beside = described.text, described.path
+            is_changed, notes = settle_files(location, chosen.root, is_companion=bool(beside))
+            is_changed = is_changed or chosen.root is not described.root
             if is_changed:
-                text = ElementTree.tostring(root, encoding="unicode")
+                text = ElementTree.tostring(chosen.root, encoding="unicode")
             if beside or is_changed:
                 tiff = open_tiff(location, stack, omexml=text)
-            image = read_ome(location, tiff, stack, root=root, text=text, log=log, axes=axes)
+            image = read_ome(location, tiff, stack, chosen=chosen, text=text, log=log, axes=axes)
             files = (*image.files, *([beside] if beside else []))
-            return replace(image, files=files, notes=(*notes, *image.notes)), root
+            image = replace(image, files=files, notes=(*chosen.notes, *notes, *image.notes))
+            return image, chosen.root, chosen.series
     except BaseException:
         stack.close()
         raise
@@ -128,13 +134,6 @@ def _require_pages_read(location: Location, tiff: TiffFile, log: Sequence[str]) 
         found = _BEYOND.search(message)
         if found:
             refuse_short(location.shown, tiff.filehandle.size, int(found[1]))
-
-
-def _is_ome(description: str) -> bool:
-    text = description.strip("\ufeff\0 \t\r\n")
-    head = text[:_HEAD]
-    is_named = text.endswith("OME>") or "<OME" in head or "openmicroscopy.org" in head
-    return text.startswith("<") and is_named
 
 
 def _with_note(location: Location, image: Image) -> Image:

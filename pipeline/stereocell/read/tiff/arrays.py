@@ -13,7 +13,7 @@ from stereocell.read.array_axes import given_axes
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Color
 
-_RGB, _PALETTE, _WHITE_IS_ZERO = 2, 3, 0  # TIFF tag PhotometricInterpretation
+_RGB, _PALETTE, WHITE_IS_ZERO = 2, 3, 0  # TIFF tag PhotometricInterpretation
 RGB_NAMES = ("Red", "Green", "Blue")
 RGB_COLORS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # linear
 
@@ -100,7 +100,7 @@ def notes_of(page: TiffPage) -> tuple[str, ...]:
     """Return what is made of values that stand for something else, a sentence each."""
     if page.photometric == _PALETTE and _is_coloured(page):
         return ("the file has a palette: its numbers are built, not the palette's colours",)
-    if page.photometric == _WHITE_IS_ZERO:
+    if page.photometric == WHITE_IS_ZERO:
         return ("the file says that 0 is white: built as stored, so that 0 is dark",)
     return ()
 

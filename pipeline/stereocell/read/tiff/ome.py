@@ -22,18 +22,21 @@ from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.ome_depth import settle_depth
 from stereocell.read.ome_xml import OmeImage
 from stereocell.read.spacing import Grid, grid_of
+from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.read.tiff.arrays import (
     array_of,
     require_depth,
     samples_as_channels,
     with_given_axes,
 )
+from stereocell.read.tiff.ome_images import Chosen
 from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
-from stereocell.read.tiff.ome_planes import settle_depth
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.read.tiff.orientation import turn_of
+from stereocell.read.tiff.stated import tag_notes
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -41,6 +44,8 @@ from stereocell.storage.location import Location
 _MAX_SIDE = 10_000_000  # voxels along an axis
 _MAX_LEVELS = 64  # of the pyramid
 _SUB_IFDS = 330  # TIFF tag SubIFDs: offsets of a page's coarser levels
+_VALUE_TYPE = Subject("type of the voxels")
+_NUMPY_NAMES = {"float": "float32", "double": "float64", "bit": "bool"}  # by OME-XML's names
 _CLAIM = re.compile(r"""\b(Size[XYZCT]|PlaneCount|IFD)\s*=\s*["']\s*(\d+)""")
 
 
@@ -49,20 +54,20 @@ def read_ome(
     tiff: TiffFile,
     stack: ExitStack,
     *,
-    root: ElementTree.Element,
+    chosen: Chosen,
     text: str,
     log: Sequence[str],
     axes: str,
 ) -> Image:
-    """Return the first image of an open file.
+    """Return the chosen image of an open file.
 
-    root, text  the OME-XML, of the file or of the one beside it
-    log         grows by tifffile's messages
-    axes        of those longer than 1, slowest first; empty: as the OME-XML has them
+    text    the OME-XML with the chosen image alone, of the file or of the one beside it
+    log     grows by tifffile's messages
+    axes    of those longer than 1, slowest first; empty: as the OME-XML has them
 
     Raises SourceError where it can't be read as an image.
     """
-    where = location.shown
+    where, root = location.shown, chosen.root
     with one_line(where, "an OME-TIFF file, whole, with its OME-XML"):
         _check_claims(where, tiff, text)
         tiff.is_ome = True
@@ -81,8 +86,10 @@ def read_ome(
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
     image, depth_notes = _with_depth(image, root)
     _, turn_notes = turn_of(series.keyframe, is_applied=False)
-    described = (*depth_notes, *turn_notes)
-    notes = (*image.notes, *described, *_undescribed(tiff), *note_absent(pages))
+    _, y, x = images[0].spacing_um
+    size_notes = tag_notes(tiff, (y, x), "PhysicalSize of the OME-XML")
+    described = (*size_notes, *depth_notes, *turn_notes, *_type_notes(root, series.keyframe))
+    notes = (*image.notes, *described, *_undescribed(tiff, chosen.others), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
 
 
@@ -90,8 +97,20 @@ def _with_depth(image: Image, root: ElementTree.Element) -> tuple[Image, tuple[s
     """Return the image with the depth of its voxels by the most trusted field, and notes."""
     finest = image.grids[0]
     z, y, x = finest.spacing_um or finest.partial_um
-    depth, notes = settle_depth(root, z)
+    stated = [] if z is None else [Statement(z, "PhysicalSizeZ")]
+    depth, notes = settle_depth(root, stated)
     return replace(image, grids=(grid_of(finest.shape, (depth, y, x)), *image.grids[1:])), notes
+
+
+def _type_notes(root: ElementTree.Element, page: TiffPage) -> tuple[str, ...]:
+    """Return a note where the OME-XML and the tags of the pages state different voxels."""
+    pixels = ome_xml.pixels_of(root)
+    name = "" if pixels is None else pixels.get("Type", "")
+    if not name or page.dtype is None:
+        return ()
+    tags = Statement(page.dtype.name, "the TIFF header")
+    xml = Statement(_NUMPY_NAMES.get(name, name), "Type of Pixels", Trust.REPEATED)
+    return settle(_VALUE_TYPE, [tags, xml]).notes
 
 
 def _require_planes(
@@ -106,10 +125,14 @@ def _require_planes(
     require_alike(location, levels[0])
 
 
-def _undescribed(tiff: TiffFile) -> tuple[str, ...]:
-    """Return a note on pages of the files that belong to no image of the OME-XML."""
+def _undescribed(tiff: TiffFile, others: int) -> tuple[str, ...]:
+    """Return a note on pages of the files that belong to no image of the OME-XML.
+
+    others  planes of other images
+    """
     pages = [page for one in tiff.series for page in one.pages if page is not None]
-    described, total = len(pages), sum(len(file.pages) for file in {page.parent for page in pages})
+    described = len(pages) + others
+    total = sum(len(file.pages) for file in {page.parent for page in pages})
     if total <= described:
         return ()
     return (
@@ -161,7 +184,7 @@ def _image(
         ),
         names or (*first.names[:count], *unnamed),
         colors or (*first.colors[:count], *unnamed),
-        len(images),
+        1,
         stack.close,
         notes=notes,
     )

@@ -33,9 +33,10 @@ from stereocell.read.tiff.open_file import (
     require_series,
 )
 from stereocell.read.tiff.orientation import turn_of
+from stereocell.read.tiff.page_tags import require_same_tags
 from stereocell.read.tiff.stated import Stated, stated_by
 from stereocell.read.turn import turned_image
-from stereocell.read.value_scale import ScaledArray, ValueScale
+from stereocell.read.value_scale import ScaledArray
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -65,6 +66,8 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
     with one_line(where, _EXPECTED):
         for level in series.levels:
             require_series(where, tiff, level)
+            if location.is_local:  # at an address each directory would be one more request
+                require_same_tags(where, tiff, level.pages)
         arrays = [array_of(series, index) for index in range(len(series.levels))]
         page = series.keyframe
         stated = stated_by(tiff)
@@ -112,14 +115,10 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
 
 
 def _calibrated(arrays: list[VoxelArray], stated: Stated) -> tuple[list[VoxelArray], list[str]]:
-    """Return arrays of the values that ImageJ shows, and notes."""
-    if stated.calibration is None:
-        return arrays, list(stated.notes)
-    intercept, slope = stated.calibration
-    scale = ValueScale(slope=slope, intercept=intercept)
-    return [VoxelArray(ScaledArray(level.array, scale), level.axes) for level in arrays], list(
-        stated.notes
-    )
+    """Return arrays of the values that the file's scale defines, and notes."""
+    if not stated.values.is_plain:
+        arrays = [VoxelArray(ScaledArray(one.array, stated.values), one.axes) for one in arrays]
+    return arrays, list(stated.notes)
 
 
 def _are_planes(found: Sequence[TiffPageSeries]) -> bool:

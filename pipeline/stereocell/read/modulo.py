@@ -1,4 +1,4 @@
-"""Angles, wavelengths, lifetimes or phases that OME-TIFF stores along z, channels or time.
+"""Angles, wavelengths, lifetimes or phases that OME-XML describes along z, channels or time.
 
 The annotation `ModuloAlongZ` says that the planes along z are those of several angles. They are
 images of their own, never slices of one stack. Wavelengths along C are channels, and stay so.
@@ -10,7 +10,7 @@ of one stack are more alike.
 References: https://docs.openmicroscopy.org/ome-model/latest/developers/6d-7d-and-8d-storage.html
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -26,6 +26,7 @@ from stereocell.read.image import Image
 from stereocell.read.series import Candidate, candidate, choose
 
 _MOST = 10_000  # most values of one axis
+_LONGEST = 20  # characters of a type or a label that a message shows
 _COMPARED = 8  # pairs of planes that are compared
 _PLURALS = {"phase": "phases", "lambda": "wavelengths", "lifetime": "lifetimes"}
 
@@ -55,15 +56,21 @@ def modulos_of(root: ElementTree.Element) -> list[Modulo]:
     found = []
     for node in ome_xml.modulos_of(root):
         axis = node.tag.rpartition("}")[2].removeprefix("ModuloAlong").lower()
-        kind = (node.get("Type") or node.get("TypeDescription") or "value").strip().lower()[:20]
+        kind = _kind(node)
         labels = _labels(node)
         if axis in ("z", "c", "t") and len(labels) > 1:
             found.append(Modulo(axis, kind, labels))
     return found
 
 
+def _kind(node: ElementTree.Element) -> str:
+    """Return the type of a further axis; the type `other` is explained by TypeDescription."""
+    stated = [node.get(name, "").strip().lower() for name in ("Type", "TypeDescription")]
+    return next((one for one in stated if one not in ("", "other")), "value")[:_LONGEST]
+
+
 def _labels(node: ElementTree.Element) -> tuple[str, ...]:
-    texts = [(child.text or "").strip()[:20] for child in node]
+    texts = [(child.text or "").strip()[:_LONGEST] for child in node]
     if texts:
         return tuple(texts)
     try:
@@ -78,18 +85,20 @@ def _labels(node: ElementTree.Element) -> tuple[str, ...]:
     return tuple(f"{start + index * step:g} {unit}".strip() for index in range(count))
 
 
-def split(where: str, image: Image, root: ElementTree.Element, series: int) -> Image:
+def split(where: str, image: Image, root: ElementTree.Element | None, series: int) -> Image:
     """Return one of the images that lie along further axes, with notes.
 
+    root    of the OME-XML; None: there is none
     series  from 1, as `candidates` lists them; 0: the first
 
     Raises UsageError where there is no such image.
     """
-    parts = [one for one in modulos_of(root) if not _are_channels(one)]
-    listed = [one for one in parts if image.arrays[0].size(one.axis) % len(one.labels) == 0]
-    others = [one for one in parts if one not in listed]
+    listed = _parts_of(image, root)
     choices = candidates(image, listed)
     index, _ = choose(where, choices, series or 1)
+    if root is None:
+        return image
+    others = [one for one in modulos_of(root) if one not in listed and not _are_channels(one)]
     notes = [
         f"ModuloAlong{one.axis.upper()} states {one.counted}, by which "
         f"{image.arrays[0].size(one.axis)} planes along {one.axis} can't be divided: not split"
@@ -125,19 +134,30 @@ def candidates(image: Image, parts: Sequence[Modulo]) -> list[Candidate]:
     return [Candidate(", ".join([*names, found.label]), found.voxels) for names in named]
 
 
-def listed(image: Image, root: ElementTree.Element) -> list[Candidate]:
+def listed(image: Image, root: ElementTree.Element | None) -> list[Candidate]:
     """Return the images of a file that `split` chooses from."""
-    parts = [one for one in modulos_of(root) if not _are_channels(one)]
-    return candidates(
-        image, [one for one in parts if image.arrays[0].size(one.axis) % len(one.labels) == 0]
-    )
+    return candidates(image, _parts_of(image, root))
+
+
+def parts_along(root: ElementTree.Element, sizes: Mapping[str, int]) -> list[Modulo]:
+    """Return the further axes of the first image that separate images.
+
+    sizes  of the image along z, c and t
+    """
+    found = [one for one in modulos_of(root) if not _are_channels(one)]
+    return [one for one in found if sizes[one.axis] % len(one.labels) == 0]
+
+
+def _parts_of(image: Image, root: ElementTree.Element | None) -> list[Modulo]:
+    sizes = {axis: image.arrays[0].size(axis) for axis in "zct"}
+    return [] if root is None else parts_along(root, sizes)
 
 
 def _are_channels(one: Modulo) -> bool:
     return one.axis == "c" and one.kind == "lambda"
 
 
-class _PartAlong:
+class PartAlong:
     """Every n-th index of one axis of an array, or a run of them."""
 
     def __init__(self, array: StoredArray, axis: int, start: int, step: int, count: int) -> None:
@@ -145,6 +165,18 @@ class _PartAlong:
         self.shape = (*array.shape[:axis], count, *array.shape[axis + 1 :])
         self.chunks = (*array.chunks[:axis], 1, *array.chunks[axis + 1 :])
         self.dtype = array.dtype
+
+    @property
+    def stored(self) -> StoredArray:
+        """The array as it is stored."""
+        return self._array
+
+    def stored_spans(self, spans: Sequence[Sequence[range]]) -> list[list[range]]:
+        """Return ranges of indices along each axis as ranges of the stored array."""
+        found = [list(ranges) for ranges in spans]
+        places = [self._start + self._step * at for one in spans[self._axis] for at in one]
+        found[self._axis] = [range(place, place + 1) for place in places]
+        return found
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
         wanted = list(key)
@@ -169,7 +201,7 @@ def _part(image: Image, one: Modulo, place: int, *, is_interleaved: bool) -> Ima
     start, step = (place, len(one.labels)) if is_interleaved else (place * count, 1)
     arrays = tuple(
         VoxelArray(
-            _PartAlong(level.array, level.axes.index(one.axis), start, step, count), level.axes
+            PartAlong(level.array, level.axes.index(one.axis), start, step, count), level.axes
         )
         for level in image.arrays
     )

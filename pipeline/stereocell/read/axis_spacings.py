@@ -1,0 +1,145 @@
+"""The voxel spacing and the directions of an array's axes, collected from all that states them.
+
+Positions along an axis go before attributes, since they are written plane by plane. Positions that
+descend turn their axis round: stored as they are, the volume would be its mirror image. Readers of
+HDF5, Zarr and N5 add what their files state; `settled` compares it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.read.array_spacing import stated_spacings
+from stereocell.read.coordinates import Steps, steps_of
+from stereocell.read.spacing import PartialTriple, um_per
+from stereocell.read.statements import Statement, Subject, Trust, settle
+
+MAX_POSITIONS = 1_000_000  # longest list of positions that is read
+
+
+@dataclass(frozen=True, slots=True)
+class SettledSpacing:
+    """The spacing (z, y, x), um, None where it is not stated, and the axes that run backwards.
+
+    hint  steps of positions that have no unit of length, for the message about a missing spacing
+    """
+
+    spacing_um: PartialTriple
+    flips: tuple[bool, ...]
+    notes: tuple[str, ...]
+    hint: str = ""
+
+
+class AxisSpacings:
+    """Statements of the voxel spacing of one array.
+
+    axes  of the array, slowest first
+    """
+
+    def __init__(self, axes: Sequence[str]) -> None:
+        self.axes = tuple(axes)
+        self._stated: dict[str, list[Statement]] = {axis: [] for axis in "zyx"}
+        self._flips = [False] * len(self.axes)
+        self._notes: list[str] = []
+        self._hints: list[str] = []
+
+    def add(self, axis: str, spacing_um: float, place: str, trust: Trust = Trust.STATED) -> None:
+        """Add the spacing along an axis; other axes than z, y and x are left out."""
+        if axis in self._stated:
+            self._stated[axis].append(Statement(float(spacing_um), place, trust))
+
+    def add_all(self, spacing_um: Sequence[float], place: str, trust: Trust = Trust.STATED) -> None:
+        """Add the spacing (z, y, x)."""
+        for axis, value in zip("zyx", spacing_um, strict=True):
+            self.add(axis, value, place, trust)
+
+    def add_attributes(
+        self, attributes: Mapping[str, Any], of: str, trust: Trust = Trust.STATED
+    ) -> None:
+        """Add the spacings that attributes of the array, or of a group around it, state.
+
+        of  the array or the group, for notes
+        """
+        for name, spacing in stated_spacings(attributes, self.axes):
+            self.add_all(spacing, f"{name} of {of}", trust)
+            z, y, x = spacing
+            if z == y != x:
+                self._notes.append(
+                    f"voxel spacing: {name} of {of} gives z and y the same spacing and x another "
+                    "one, as if it were listed in another order than the axes: --spacing-um z,y,x "
+                    "replaces it"
+                )
+
+    def add_positions(
+        self, dimension: int, name: str, positions: NDArray[np.float64], unit: str, count: int
+    ) -> None:
+        """Add the positions of the `count` voxels along a dimension of the array.
+
+        name  of the list of positions, for notes
+        """
+        if self.axes[dimension] not in self._stated:
+            return
+        steps = steps_of(positions, count)
+        if steps is None:
+            self._add_odd(name, positions, count)
+            return
+        self._flips[dimension] |= steps.mean < 0
+        self._notes += _notes_on(steps, name, f" {unit:.20}" if unit else "")
+        size = abs(steps.mean)
+        if (per := um_per(unit)) is not None:
+            place = f"the list of positions {name}"
+            self.add(self.axes[dimension], size * per, place, Trust.MEASURED)
+        else:
+            why = f"in {unit:.20}" if unit else "without a unit"
+            self._hints.append(f"positions of {name} have steps of {size:.5g} {why}")
+
+    def _add_odd(self, name: str, positions: NDArray[np.float64], count: int) -> None:
+        """Note positions that are as many as voxels, and neither rise nor fall throughout.
+
+        Positions that are all equal are those of a netCDF dimension without a variable.
+        """
+        found = np.ravel(positions)
+        if count > 1 and len(found) in (count, count + 1) and (found != found[0]).any():
+            rest = "hold no number at some voxels"
+            if np.isfinite(found).all():
+                rest = "neither rise nor fall throughout"
+            self._notes.append(
+                f"positions of {name} {rest}: they are not used, so neighbouring planes may lie "
+                "in another order than the specimen's"
+            )
+
+    def settled(self) -> SettledSpacing:
+        """Return the most trusted spacing along each axis, and notes on contradictions."""
+        z, y, x = (self._choose(axis) for axis in "zyx")
+        notes, hints = dict.fromkeys(self._notes), dict.fromkeys(self._hints)
+        return SettledSpacing((z, y, x), tuple(self._flips), tuple(notes), ", ".join(hints))
+
+    def _choose(self, axis: str) -> float | None:
+        if not self._stated[axis]:
+            return None
+        subject = Subject(
+            f"voxel spacing along {axis}", "um", remedy="--spacing-um z,y,x replaces it"
+        )
+        settled = settle(subject, self._stated[axis])
+        self._notes += settled.notes
+        return settled.number
+
+
+def _notes_on(steps: Steps, name: str, shown: str) -> list[str]:
+    """Return sentences on positions that descend or are uneven.
+
+    shown  the unit with a space before it; empty: none
+    """
+    notes = []
+    if steps.mean < 0:
+        notes.append(f"positions of {name} descend: that axis is turned round, so that they rise")
+    if not steps.is_even:
+        notes.append(
+            f"positions of {name} are uneven: found steps of {steps.least:.5g} to "
+            f"{steps.largest:.5g}{shown}: their mean, {abs(steps.mean):.5g}, is used for all, so "
+            "the shape is distorted; interpolate the volume at even positions for its true shape"
+        )
+    return notes

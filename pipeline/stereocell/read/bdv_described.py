@@ -1,0 +1,165 @@
+"""The setups of a BigDataViewer container as its XML states them, and the views that they make.
+
+A view is an image of its own. It has one tile, angle and illumination, and its setups are its
+channels.
+
+References: https://imagej.net/plugins/bdv/index
+"""
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, field
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.series import Candidate, candidate
+from stereocell.read.spacing import Triple
+
+_OF_A_VIEW = ("tile", "angle", "illumination")  # attributes of which no two make one image
+_OF_A_CHANNEL = ("channel", "displaysettings")  # attributes that may differ within one image
+_CHANNEL = "channel"
+_SHOWN = 8  # numbers in a message
+
+Matrix = NDArray[np.float64]  # (4, 4) for columns, from voxels (x, y, z, 1) to the world
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """One channel of a view.
+
+    spacing_um  (z, y, x); None: not stated in a unit of length
+    unit_um     the unit of the voxel size in um; None: no unit of length
+    size        voxels (x, y, z); None: not stated
+    attributes  all attributes, number by name, such as the tile, the channel and a user's own
+    """
+
+    name: str | None
+    spacing_um: Triple | None
+    unit_um: float | None = None
+    size: Triple | None = None
+    attributes: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """The setups of an XML by their numbers, and its time points; both empty without an XML.
+
+    registrations  by time point and setup, where they can be read
+    missing        pairs of time point and setup of which no image was taken
+    """
+
+    setups: Mapping[int, Setup]
+    times: tuple[int, ...] = ()
+    registrations: Mapping[tuple[int, int], Matrix] = field(default_factory=dict)
+    missing: Set[tuple[int, int]] = frozenset()
+
+    def views(self, setups: Sequence[int]) -> list[list[int]]:
+        """Return setups by tile, angle, illumination and own attributes.
+
+        The setups of a view are its channels, so two setups of one channel are two views. An own
+        attribute counts where setups of one channel differ in it; else it describes the channel.
+        """
+        found: dict[tuple[object, ...], list[int]] = {}
+        repeated = self._repeated(setups)
+        names = self._view_names(setups)
+        for number in setups:
+            key = self._values(number, names)
+            found.setdefault((*key, number) if number in repeated else key, []).append(number)
+        return list(found.values())
+
+    def _repeated(self, setups: Sequence[int]) -> set[int]:
+        """Return the setups of which an earlier one has the same attributes and channel."""
+        found: dict[tuple[object, ...], int] = {}
+        names = [*self._view_names(setups), _CHANNEL]
+        stated = [number for number in setups if _CHANNEL in self._attributes(number)]
+        first = [found.setdefault(self._values(number, names), number) for number in stated]
+        return {number for number, other in zip(stated, first, strict=True) if number != other}
+
+    def _attributes(self, number: int) -> Mapping[str, str]:
+        own = self.setups.get(number)
+        return own.attributes if own is not None else {}
+
+    def _values(self, number: int, names: Sequence[str]) -> tuple[object, ...]:
+        own = self._attributes(number)
+        return tuple(own.get(name) for name in names)
+
+    def _view_names(self, setups: Sequence[int]) -> list[str]:
+        """Return the names of the attributes that separate views."""
+        every = dict.fromkeys(name for number in setups for name in self._attributes(number))
+        own = [name for name in every if name not in (*_OF_A_VIEW, *_OF_A_CHANNEL)]
+        names = [name for name in _OF_A_VIEW if name in every]
+        for name in own:
+            values: dict[tuple[object, ...], set[object]] = {}
+            for number in setups:
+                key = self._values(number, [*names, _CHANNEL])
+                values.setdefault(key, set()).add(self._attributes(number).get(name))
+            if any(len(one) > 1 for one in values.values()):
+                names.append(name)
+        return names
+
+    def candidate(self, view: Sequence[int]) -> Candidate:
+        """Return what a list says of a view."""
+        own = self.setups.get(view[0]) or Setup(None, None)
+        x, y, z = (int(size) for size in own.size or (1, 1, 1))
+        found = candidate(
+            (z, y, x),
+            channels=len(view),
+            times=max(len(self.times), 1),
+            spacing_um=own.spacing_um,
+        )
+        every = sorted(self.setups)
+        names = [name for name in self._view_names(every) if name in own.attributes]
+        shown = [f"{name:.20} {own.attributes[name]:.20}" for name in names]
+        shown += [f"setup {number}" for number in view if number in self._repeated(every)]
+        label = ", ".join([*shown, found.label])
+        return Candidate(label, found.voxels)
+
+    def alone(self, setup: int) -> "Described":
+        """Return what the XML states about one setup."""
+        own = {setup: self.setups[setup]} if setup in self.setups else {}
+        placed = {key: one for key, one in self.registrations.items() if key[1] == setup}
+        missing = frozenset(key for key in self.missing if key[1] == setup)
+        return Described(own, self.times, placed, missing)
+
+    def among(self, setups: Sequence[int]) -> dict[int, Setup | None]:
+        """Return some setups by their numbers; None: the XML has no such setup."""
+        return {number: self.setups.get(number) for number in setups}
+
+    def taken(
+        self, where: str, setups: Sequence[int], times: Sequence[int]
+    ) -> set[tuple[int, int]]:
+        """Return the pairs of time point and setup that are not listed as missing.
+
+        Raises SourceError where all are listed.
+        """
+        found = {(t, s) for t in times for s in setups if (t, s) not in self.missing}
+        if not found:
+            raise SourceError(
+                f"{where}: found no view of this image, since MissingViews of the XML lists all; "
+                "expected another --series"
+            )
+        return found
+
+    def require_views(self, where: str, setups: Sequence[int], times: Sequence[int]) -> None:
+        """Raise SourceError where a container lacks setups or time points.
+
+        They are those of the XML, or without one all from the first to the last.
+        """
+        parts = (("setups", setups, tuple(self.setups)), ("time points", times, self.times))
+        for noun, found, listed in parts:
+            present, first, last = set(found), min(found), max(found)
+            # groups may be numbered up to 10^12, so that all numbers in between make no list
+            expected = sorted(set(listed)) if listed else range(first, last + 1)
+            size = len(expected) if listed else last - first + 1
+            count = len(present.intersection(expected)) if listed else len(present)
+            if count < size:
+                missing = (number for number in expected if number not in present)
+                shown = ", ".join(map(str, islice(missing, _SHOWN)))
+                more = ", ..." * (size - count > _SHOWN)
+                source = "in the XML" if listed else f"up to {max(found)}"
+                raise SourceError(
+                    f"{where}: found {count} of {size} {noun} {source}, missing "
+                    f"{shown}{more}, expected all of them: copy the container again"
+                )

@@ -1,0 +1,59 @@
+"""The depth of voxels by the positions of the planes, compared with the stated depth."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+from stereocell.read.statements import Statement, Subject, Trust, settle
+
+_EVEN = 0.1  # largest difference of a step from the mean, as its share: rounding, and a drive's
+_TOLERANCE = 0.01  # relative difference of two depths that needs no note
+_MOST_APART = 50.0  # a larger ratio of two depths is one of units
+_SUBJECT = Subject(
+    "voxel spacing along z", "um", _TOLERANCE, remedy="--spacing-um z,y,x replaces it"
+)
+
+
+def settle_places(
+    places: Mapping[int, float], stated: Sequence[Statement], field: str, *, has_unit: bool
+) -> tuple[float | None, tuple[str, ...]]:
+    """Return the depth of a voxel, um, and notes; None: no field states one.
+
+    places    where planes lie along z, um, by their numbers
+    stated    the depth as other fields state it, in um, the most trusted first
+    field     the name of the field that states the places
+    has_unit  whether it is in a stated unit of length; else um are assumed
+    """
+    settled = settle(_SUBJECT, stated) if stated else None
+    stated_um, own = (None, ()) if settled is None else (settled.number, settled.notes)
+    numbers = sorted(places)
+    if len(numbers) < 2 or max(places.values()) == min(places.values()):
+        return stated_um, own
+    if stated_um is not None and stated_um <= 0:
+        stated_um = None
+    steps = [(places[b] - places[a]) / (b - a) for a, b in pairwise(numbers)]
+    if min(steps) <= 0 <= max(steps):
+        note = f"the planes' {field} rises and falls: not compared with the voxel spacing"
+        return stated_um, (*own, note)
+    if not has_unit and stated_um is None:
+        return None, ()
+    first, last = places[numbers[0]], places[numbers[-1]]
+    step, sizes = abs(last - first) / (numbers[-1] - numbers[0]), [abs(one) for one in steps]
+    is_even = max(sizes) - step <= _EVEN * step and step - min(sizes) <= _EVEN * step
+    notes = []
+    if last < first:
+        notes.append(
+            f"the planes' {field} falls from {first:.5g} to {last:.5g} um: the planes are read in "
+            "the order of the file"
+        )
+    if not is_even:
+        notes.append(
+            f"the planes' {field} is uneven: steps of {min(sizes):.4g} to {max(sizes):.4g} um"
+        )
+    if stated_um is None:
+        return step, (*notes, f"voxel spacing along z: {step:.5g} um by the planes' {field}")
+    is_near = 1 / _MOST_APART < step / stated_um < _MOST_APART
+    trust = Trust.MEASURED if is_even and is_near and has_unit else Trust.REPEATED
+    place = f"{field} of the planes" + " (um are assumed)" * (not has_unit)
+    settled = settle(_SUBJECT, [*stated, Statement(step, place, trust)])
+    is_other = settled.chosen.place == place and settled.notes
+    return (step if is_other else stated_um), (*notes, *settled.notes)
