@@ -13,7 +13,7 @@ from stereocell.model.channel import OpacityPoints, SurfaceLevel
 from stereocell.model.lattice_field import LatticeField
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
 from stereocell.transfer.opacity import (
-    AT_SURFACE,
+    AT_SURFACE_OF_MAGNITUDES,
     MAX_SHIFT,
     NAMES,
     NEAR_SURFACE,
@@ -226,7 +226,7 @@ def test_the_even_counts_of_an_edge_are_no_noise_above_the_surface() -> None:
     functions = make_transfer_functions(
         (1e6 * (air + edge)).astype(np.int64), 34 / 255, has_magnitudes=True
     )
-    assert functions["default"][2] == (round(34 / 255, 4), AT_SURFACE)
+    assert functions["default"][2] == (round(34 / 255, 4), AT_SURFACE_OF_MAGNITUDES)
 
 
 def test_where_noise_ends_far_below_the_surface_what_is_between_shows() -> None:

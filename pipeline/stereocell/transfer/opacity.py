@@ -18,11 +18,12 @@ FOOT = 0.95  # share of the level from which opacity rises at the latest: no ste
 # Share of the way from the background to the surface's level at which opacity starts. The volume
 # then begins a quarter of a voxel before the surface, and both have one silhouette.
 NEAR_SURFACE = 0.8
-AT_SURFACE, IN_BODY = (
-    0.18,
-    0.45,
-)  # opacity a voxel at the surface's level, and where the body is bright
+AT_SURFACE = 0.18  # opacity a voxel at the surface's level ...
+IN_BODY = 0.45  # ... and where the body is bright
 BRIGHT = 0.3  # share of the window above the level over which a body becomes bright
+# The same of magnitudes, as of MR. A cut through them shows tissues by their opacity, which has to
+# rise over all of their values.
+AT_SURFACE_OF_MAGNITUDES, BRIGHT_OF_MAGNITUDES = 0.12, 0.5
 # Share of the window between the start of a body's opacity and its surface: 36 HU by the presets
 # of CT. Values rise by more within a voxel of the edge, and a step of the opacity would be jagged.
 BELOW_BODY = 0.012
@@ -65,7 +66,8 @@ def make_transfer_functions(
         below = histogram[: int(level * bins)] if has_magnitudes and has_surface else None
         rise = _rise(level, _foot(level, median, has_surface=has_surface), below, bins)
     floor, top, bright = rise
-    at_top = AT_SURFACE + (IN_BODY - AT_SURFACE) * (top - level) / (bright - level)
+    start = AT_SURFACE_OF_MAGNITUDES if has_magnitudes else AT_SURFACE
+    at_top = start + (IN_BODY - start) * (top - level) / (bright - level)
     soft = floor if is_calibrated and has_surface else 0.6 * floor
     functions = {
         "default": _points((floor, 0.0), (top, at_top), (bright, IN_BODY), (1.0, 0.6)),
@@ -113,7 +115,8 @@ def _rise(
     below the level, unless the counts still fall steeply there: then a part of the air lies above
     the level, which the surface leaves out as specks, and the volume has to, too.
     """
-    bright = max(level + BRIGHT * (1 - level), level + 0.02)
+    share = BRIGHT if below is None else BRIGHT_OF_MAGNITUDES
+    bright = max(level + share * (1 - level), level + 0.02)
     if below is not None:
         floor = max(floor, min(_end_of_noise(below) / bins, FOOT * level))
         beyond = level + _noise_beyond(below) / bins

@@ -24,9 +24,10 @@ from stereocell.read.acquired import Acquired, turned_places
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.beside import or_one_of
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.dicom.frame import Frame, NoPlaneError
+from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.header import SEGMENTATION, is_dicom, read_frames
 from stereocell.read.dicom.label_stack import stack_labels
+from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.scale_notes import reaches_air, scale_notes
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels

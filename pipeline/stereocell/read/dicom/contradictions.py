@@ -88,8 +88,9 @@ def _thickness_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str,
     thickness, distance = float(np.median(found)), float(np.median(layout.gaps_mm))
     if distance > _GAP * thickness:
         return (
-            f"slices are {thickness:.4g} mm thick (SliceThickness) and {distance:.4g} mm apart: "
-            f"{1 - thickness / distance:.0%} of the volume was not imaged, and is interpolated",
+            f"slices are {thickness:.4g} mm thick (SliceThickness) and {distance:.4g} mm apart "
+            f"({_POSITION}): {1 - thickness / distance:.0%} of the distance lies in gaps between "
+            "slices, of which nothing was imaged",
         )
     if thickness > _OVERLAP * distance:
         return (

@@ -40,8 +40,8 @@ def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
     for frame in frames:
         encoding = frame.encoding
         if encoding.bits:
-            ends = [encoding.slope * value + encoding.intercept for value in encoding.stored_range]
-            reach = min(reach, *ends)
+            low, high, slope, intercept = encoding.values_range
+            reach = min(reach, slope * low + intercept, slope * high + intercept)
         else:
             reach = -float("inf")
     if reach > _AIR_HU:
@@ -93,7 +93,9 @@ def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
             notes.append(
                 f"{name} differs among the images ({low:.4g} to {high:.4g}): each has its own"
             )
-    without = sum(not frame.scale.has_rescale for frame in frames)
+    if by_table := sum(encoding.table is not None for encoding in encodings):
+        notes.append(f"values of {by_table} of {len(frames)} images are by ModalityLUTSequence")
+    without = sum(not f.scale.has_rescale and f.encoding.table is None for f in frames)
     if 0 < without < len(frames):
         notes.append(
             f"{without} of {len(frames)} images {agreeing(without, 'states', 'state')} no rescale: "

@@ -53,9 +53,7 @@ def image_of_planes(files: VolumeFiles, notes: list[str]) -> Image:
     one_stack = [heads[0, 0, n] for n in range(len(volume.planes))]
     depth, depth_notes = settle_depth_of_planes(one_stack, z)
     log = find_log(files.location.source, files.name((0, 0, 0)))
-    numbers = volume.planes
-    step = numbers[1] - numbers[0] if numbers[1:] else 1
-    spacing, log_notes = with_log((depth, y, x), log, step)
+    spacing, log_notes = with_log((depth, y, x), log, volume.planes)
     image = files.image(array, spacing, channels, [*notes, *size_notes, *depth_notes, *log_notes])
     return replace(image, files=(*files.paths, *([log.path] if log else [])))
 
