@@ -266,3 +266,30 @@ def test_a_resolution_that_seems_to_be_in_another_order_is_told(tmp_path: Path) 
     dataset = read.open(tmp_path / "a.h5")
     assert dataset.levels[0].spacing_um == pytest.approx((0.25, 0.25, 0.6))
     assert any("as if it were listed in another order" in note for note in dataset.notes)
+
+
+def test_edges_of_voxels_state_the_spacing_and_the_direction(tmp_path: Path) -> None:
+    path = write_nexus(tmp_path / "a.h5", "zyx", is_old=False)
+    with h5py.File(path, "a") as file:
+        del file["entry/data/z"]
+        edges = file["entry/data"].create_dataset("z", data=-0.5 * np.arange(SIZES["z"] + 1))
+        edges.attrs["units"] = "um"
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
+    np.testing.assert_array_equal(whole(dataset), f_phantom()[::-1])
+
+
+def test_each_scale_of_a_dimension_counts(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        variable = file.create_dataset("ct", data=f_phantom())
+        for place, axis in enumerate("zyx"):
+            for name, values in (
+                (f"{axis}_index", np.arange(SIZES[axis])),
+                (axis, positions(axis)),
+            ):
+                scale = file.create_dataset(name, data=values)
+                scale.make_scale(name)
+                variable.dims[place].attach_scale(scale)
+            scale.attrs["units"] = "um"
+    dataset = read.open(tmp_path / "a.h5")
+    assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))

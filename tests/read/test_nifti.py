@@ -306,3 +306,15 @@ def test_values_on_a_surface_are_told_as_such(tmp_path: Path) -> None:
     nibabel.save(gifti, tmp_path / "LEFT.SURF.gii")
     with pytest.raises(SourceError, match="a surface"):
         read.open(tmp_path / "LEFT.SURF.gii")
+
+
+def test_several_values_at_each_voxel_are_refused_in_the_field_s_words(tmp_path: Path) -> None:
+    affine = np.diag([2.0, 2, 2, 1])
+    colors = np.zeros((4, 5, 6), [("R", "u1"), ("G", "u1"), ("B", "u1")])
+    nibabel.save(nibabel.Nifti1Image(colors, affine), tmp_path / "a.nii")
+    with pytest.raises(SourceError, match="datatype: found colours, expected whole or real"):
+        read.open(tmp_path / "a.nii")
+    vectors = np.zeros((4, 5, 6, 1, 3), np.float32)
+    nibabel.save(nibabel.Nifti1Image(vectors, affine), tmp_path / "b.nii")
+    with pytest.raises(SourceError, match="3 values at each voxel: save one of them alone"):
+        read.open(tmp_path / "b.nii")

@@ -124,3 +124,25 @@ def test_a_fill_value_written_as_text_marks_gaps(tmp_path: Path) -> None:
     dataset = read.open(write(tmp_path / "b.zarr", voxels=voxels, missing_value="none"))
     assert any("missing_value is 'none', no number" in note for note in dataset.notes)
     np.testing.assert_array_equal(whole(dataset), voxels)
+
+
+def test_positions_beside_an_image_of_ome_zarr_are_compared_with_its_scale(tmp_path: Path) -> None:
+    um = tuple(SPACING.values())
+    path = write(tmp_path / "a.zarr", y=positions("y")[::-1], z=positions("z") * 2)
+    axes = [{"name": axis, "type": "space", "unit": "micrometer"} for axis in "zyx"]
+    scale = [{"type": "scale", "scale": um}]
+    image = {
+        "version": "0.4",
+        "axes": axes,
+        "datasets": [{"path": "ct", "coordinateTransformations": scale}],
+    }
+    zarr.open_group(path, mode="a").attrs["multiscales"] = [image]
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(um)
+    np.testing.assert_array_equal(whole(dataset), f_phantom())
+    told = "; ".join(dataset.notes)
+    assert "along z: scale states 0.5 um, the list of positions z states 1 um: scale is" in told
+    assert "positions of y beside the image descend" in told
+    write(tmp_path / "b.zarr")
+    zarr.open_group(tmp_path / "b.zarr", mode="a").attrs["multiscales"] = [image]
+    assert read.open(tmp_path / "b.zarr").notes == ()

@@ -102,7 +102,7 @@ class AxisSpacings:
         Positions that are all equal are those of a netCDF dimension without a variable.
         """
         found = np.ravel(positions)
-        if count > 1 and len(found) == count and (found != found[0]).any():
+        if count > 1 and len(found) in (count, count + 1) and (found != found[0]).any():
             rest = "hold no number at some voxels"
             if np.isfinite(found).all():
                 rest = "neither rise nor fall throughout"

@@ -31,7 +31,8 @@ class Steps:
 def steps_of(positions: NDArray[np.float64] | Sequence[float], count: int) -> Steps | None:
     """Return the steps between the positions of `count` voxels.
 
-    positions  one for each voxel, or the first two alone, as EMD has it for even steps
+    positions  one for each voxel, or one more, of the voxels' edges as NeXus has them, or the
+               first two alone, as EMD has it for even steps
 
     None: there are no such positions, or they neither rise nor fall throughout.
 
@@ -39,7 +40,7 @@ def steps_of(positions: NDArray[np.float64] | Sequence[float], count: int) -> St
     Steps(mean=-1.5, least=1.0, largest=2.0)
     """
     found = np.asarray(positions, np.float64).ravel()
-    if count < 2 or len(found) not in (2, count) or not np.isfinite(found).all():
+    if count < 2 or len(found) not in (2, count, count + 1) or not np.isfinite(found).all():
         return None
     steps = np.diff(found)
     if not ((steps > 0).all() or (steps < 0).all()):

@@ -53,7 +53,7 @@ def describe(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
     """Return the dimensions by each convention that the file follows, best known first."""
     found = [
         _vigra(tree, dataset),
-        _scales(tree, dataset),
+        *_scales(tree, dataset),
         _labels(tree, dataset),
         _nexus(tree, dataset),
         _emd(tree, dataset),
@@ -91,13 +91,18 @@ def _labels(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
     return Described(Statement(labels, "DIMENSION_LABELS"))
 
 
-def _scales(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
+def _scales(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
+    """Return the dimensions by the first scale of each, then those by further scales."""
     scales = tree.scales(dataset)
     if not any(scales) or len(scales) != dataset.ndim:
-        return None
-    first = tuple(nodes[0] if nodes else None for nodes in scales)
-    names = tuple("" if node is None else _scale_name(tree, node) for node in first)
-    return Described(Statement(names, "the list of dimension scales"), first)
+        return []
+    every = [
+        tuple(nodes[rank] if rank < len(nodes) else None for nodes in scales)
+        for rank in range(max(map(len, scales)))
+    ]
+    names = tuple("" if node is None else _scale_name(tree, node) for node in every[0])
+    stated = Statement(names, "the list of dimension scales")
+    return [Described(stated, nodes) for nodes in every]
 
 
 def _scale_name(tree: Hdf5Tree, scale: h5py.Dataset) -> str:

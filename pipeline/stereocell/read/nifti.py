@@ -11,6 +11,7 @@ References: NIfTI-1 Data Format, https://nifti.nimh.nih.gov/nifti-1/;
 https://surfer.nmr.mgh.harvard.edu/fswiki/FsTutorial/MghFormat
 """
 
+import math
 import os
 from functools import partial
 from typing import Any
@@ -57,10 +58,16 @@ def read_image(location: Location) -> Image:
     header = image.header
     shape = tuple(int(n) for n in header.get_data_shape())
     if len(shape) < 3 or any(n != 1 for n in shape[4:]) or min(shape) < 1:
-        raise SourceError(f"{where}: dim: found {shape}, expected x, y, z, or x, y, z, t")
+        several = math.prod(shape[4:])
+        inner = f", {several} values at each voxel: save one of them alone" * (several > 1)
+        raise SourceError(f"{where}: dim: found {shape}, expected x, y, z, or x, y, z, t{inner}")
     stored = header.get_data_dtype()
     if stored.kind not in "iuf":
-        raise SourceError(f"{where}: datatype: found {stored}, expected whole or real numbers")
+        found = {"c": "complex numbers", "V": "colours"}.get(stored.kind, str(stored))
+        raise SourceError(
+            f"{where}: datatype: found {found}, expected whole or real numbers: save one part of "
+            "them, such as magnitude or red, alone"
+        )
     dtype = _dtype(stored, image.dataobj.slope, image.dataobj.inter)
     is_nifti = isinstance(image, nibabel.nifti1.Nifti1Pair)
     place = stated_place(image, where)

@@ -25,6 +25,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.file_array import FileArray, PackedArray, notes_on_rest, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.nrrd_segments import segments_of
 from stereocell.read.nrrd_statements import (
     axis_lengths,
     kind_notes,
@@ -79,6 +80,7 @@ def read_image(location: Location) -> Image:
     to_lps, files = _to_lps(where, fields), _files(location, fields)
     factors, unit_notes = units_um(fields, at, is_patient=to_lps is not None)
     spatial = directions[at] * factors  # um
+    labels, objects = segments_of(fields)
     notes = (
         *length_notes(fields, shape, directions, at),
         *kind_notes(fields, at),
@@ -93,7 +95,10 @@ def read_image(location: Location) -> Image:
         grid = grid_of((z, y, x), _spacing(spatial))
         unnamed = (None,) * count
         notes = (*notes, *_turned(fields, directions[at]))
-        return Image((voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files)
+        return Image(
+            (voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files,
+            labels=labels, objects=objects,
+        )  # fmt: skip
     affine = np.eye(4)
     affine[:3, :3] = to_lps @ spatial.T / 1000.0
     origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
@@ -103,7 +108,7 @@ def read_image(location: Location) -> Image:
     image = place(where, array, axes, affine, "space directions").image(
         NAME, notes=notes, has_sides=_names_sides(fields)
     )
-    return replace(image, files=files)
+    return replace(image, files=files, labels=labels, objects=objects)
 
 
 def _header(location: Location) -> tuple[Mapping[str, Any], int]:

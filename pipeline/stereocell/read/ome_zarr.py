@@ -32,7 +32,7 @@ from stereocell.read.ngff import Multiscale
 from stereocell.read.ngff_sides import with_sides
 from stereocell.read.ngff_statements import dimension_names, settled_axes
 from stereocell.read.series import lines
-from stereocell.read.spacing import Grid, Triple
+from stereocell.read.spacing import Grid, PartialTriple, grid_of
 from stereocell.read.value_scale import ignored_note
 from stereocell.read.zarr_collections import (
     ZarrTree,
@@ -44,6 +44,7 @@ from stereocell.read.zarr_collections import (
     part_of,
     series_of,
 )
+from stereocell.read.zarr_coordinates import beside, notes_beside_scale
 from stereocell.read.zarr_store import (
     GuardedStore,
     files_of,
@@ -118,7 +119,7 @@ def _read(
             "attribute `multiscales` of an image"
         )
     converted = converted_of(location)
-    found = _image(tree, store, ome, _parsed(where, ome, node), axes, converted)
+    found = _image(tree, store, ome, axes, converted)
     if ignored := ignored_note("the image's group", attributes):
         found = replace(found, notes=(*found.notes, ignored))
     is_described = converted is not None and converted.shape == found.arrays[0].shape
@@ -129,12 +130,12 @@ def _image(
     tree: ZarrTree,
     store: Store,
     ome: Mapping[str, Any],
-    multiscale: Multiscale,
     axes: str,
     converted: Converted | None,
 ) -> Image:
     """Return the first multiscale image of a group's OME attributes. Raises SourceError."""
     location, where = tree.location, tree.location.shown
+    multiscale = _parsed(tree, ome)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
             f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
@@ -168,6 +169,7 @@ def _image(
             *notes,
             *more,
             *sided.notes,
+            *_position_notes(tree, store, multiscale.paths[0], levels[0], grids[0]),
             *notes_on_labels(tree),
         ),
         labels=labels_evidence(ome, location),
@@ -175,12 +177,14 @@ def _image(
     )
 
 
-def _parsed(where: str, ome: Mapping[str, Any], group: zarr.Group) -> Multiscale:
+def _parsed(tree: ZarrTree, ome: Mapping[str, Any]) -> Multiscale:
     """Return the metadata of the first image. Raises SourceError, of other versions with a way."""
+    where = tree.location.shown
     version, titled = ngff.version_of(ome), where
     expected = "axes, datasets and scales as OME-Zarr 0.1 to 0.6"
     if not ngff.is_known(version):
         with quiet(), one_line(where, "a group whose arrays can be listed"):
+            group = zarr.open_group(tree.store, mode="r", zarr_format=tree.zarr_format)
             path = next((name for name, node in group.members() if isinstance(node, zarr.Array)), 0)
         titled = f"{where}: OME-Zarr {version:.20}, a version that is not known"
         expected += (
@@ -238,6 +242,19 @@ def _grids(
     return (grids, ()) if converted is None else settled_grids(grids, converted, levels[0])
 
 
+def _position_notes(
+    tree: ZarrTree, store: Store, path: str, level: VoxelArray, grid: Grid
+) -> tuple[str, ...]:
+    """Return notes on positions beside the finest level on this machine that disagree with it."""
+    stored: Any = level.array
+    while not isinstance(stored, zarr.Array):
+        stored = stored.stored
+    if not tree.location.is_local:
+        return ()
+    found = beside(tree.location, store, path, stored)
+    return notes_beside_scale(found.positions, level.axes, grid.spacing_um)
+
+
 def _of_axis(image: Multiscale, axis: str) -> str:
     return image.orientations[image.names.index(axis)] if axis in image.names else ""
 
@@ -248,22 +265,24 @@ def _grid(
     scale: Sequence[float] | None,
     shift: Sequence[float] | None,
 ) -> Grid:
-    spacing = None if scale is None else _spatial(image.names, image.units, scale)
     # A scale without a unit is no length: writers that lack the spacing state 1.0.
-    is_placed = shift is not None and spacing is not None
-    offset = _spatial(image.names, image.units, shift or ()) if is_placed else None
-    return Grid(level.shape, spacing, offset)
+    spacing = _spatial(image.names, image.units, scale)
+    grid = grid_of(level.shape, spacing)
+    if shift is None or grid.spacing_um is None:
+        return grid
+    z, y, x = (length or 0.0 for length in _spatial(image.names, image.units, shift))
+    return replace(grid, offset_um=(z, y, x))
 
 
 def _spatial(
-    axes: tuple[str, ...], units: tuple[float | None, ...], values: Sequence[float]
-) -> Triple | None:
+    axes: tuple[str, ...], units: tuple[float | None, ...], values: Sequence[float] | None
+) -> PartialTriple:
+    """Return lengths (z, y, x), um; None: not stated, or without a unit of length."""
     picked = []
     for axis in "zyx":
         unit = units[axes.index(axis)]
-        if unit is None:
-            return None
-        picked.append(values[axes.index(axis)] * unit)
+        is_length = unit is not None and values is not None
+        picked.append(values[axes.index(axis)] * unit if is_length else None)
     z, y, x = picked
     return z, y, x
 

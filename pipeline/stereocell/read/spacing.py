@@ -173,7 +173,8 @@ def _check(grids: tuple[Grid, ...], where: str) -> None:
         if any(b > a for a, b in zip(finer.shape, coarser.shape, strict=True)):
             raise SourceError(
                 f"{where}: shape (z, y, x) of level {index}: found {coarser.shape}, "
-                f"expected at most level {index - 1}'s {finer.shape}"
+                f"expected at most level {index - 1}'s {finer.shape}, as the finest level is "
+                "listed first"
             )
 
 

@@ -18,7 +18,10 @@ from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
 from stereocell.read.axis_spacings import MAX_POSITIONS
+from stereocell.read.coordinates import steps_of
 from stereocell.read.dataset import VoxelArray
+from stereocell.read.spacing import Triple, um_per
+from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.read.zarr_store import GuardedStore, files_of, open_array, open_store, quiet
 from stereocell.read.zarr_values import with_values
 from stereocell.read.zarr_zip import is_zipped
@@ -81,6 +84,41 @@ def beside(location: Location, store: Store, path: str, array: "zarr.Array[Any]"
         tuple((group.title, group.attributes) for group in groups),
         tuple(dict.fromkeys(files)),
     )
+
+
+def notes_beside_scale(
+    positions: Sequence[Positions | None], axes: Sequence[str], spacing_um: Triple | None
+) -> tuple[str, ...]:
+    """Return notes on positions that disagree with the scale of an image, which is taken.
+
+    axes        of the array, slowest first
+    spacing_um  (z, y, x), by the scale; None: not stated
+    """
+    notes: list[str] = []
+    for axis, one in zip(axes, positions, strict=False):
+        steps = None if one is None else steps_of(one.values, len(one.values))
+        if one is None or steps is None or axis not in tuple("zyx"):
+            continue
+        if steps.mean < 0:
+            notes.append(
+                f"positions of {one.name} beside the image descend, and its scale rises: the "
+                "voxels are read as stored, so the volume may be mirrored"
+            )
+        if not steps.is_even:
+            notes.append(
+                f"positions of {one.name} beside the image are uneven: found steps of "
+                f"{steps.least:.5g} to {steps.largest:.5g}: its scale is used"
+            )
+        if spacing_um is not None and (per := um_per(one.unit)) is not None:
+            subject = Subject(
+                f"voxel spacing along {axis}", "um", remedy="--spacing-um z,y,x replaces it"
+            )
+            place = f"the list of positions {one.name}"
+            stated = Statement(spacing_um["zyx".index(axis)], "scale")
+            notes += settle(
+                subject, [stated, Statement(abs(steps.mean) * per, place, Trust.REPEATED)]
+            ).notes
+    return tuple(notes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ import re
 from contextlib import ExitStack
 from dataclasses import replace
 
+from stereocell.model.counted import counted
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.beside import or_one_of, others_in
 from stereocell.read.image import Image
@@ -88,7 +89,8 @@ def list_series(location: Location) -> tuple[str, ...]:
     """Return a line for each group of files, as `--series` counts them. Raises SourceError."""
     groups = groups_of(_places(location, in_natural_order(list_images(location)), "")[0])
     return tuple(
-        f"{i:3d}  {group[0].group or 'all files'}: {len(group)} files, as {group[0].path!r:.100}"
+        f"{i:3d}  {group[0].group or 'all files'}: {counted(len(group), 'file')}, as "
+        f"{group[0].path!r:.100}"
         for i, group in enumerate(groups, start=1)
     )
 

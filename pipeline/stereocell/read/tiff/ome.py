@@ -36,7 +36,7 @@ from stereocell.read.tiff.ome_images import Chosen
 from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.read.tiff.orientation import turn_of
-from stereocell.read.tiff.stated import sizes_by_tags
+from stereocell.read.tiff.stated import tag_notes
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -46,9 +46,6 @@ _MAX_LEVELS = 64  # of the pyramid
 _SUB_IFDS = 330  # TIFF tag SubIFDs: offsets of a page's coarser levels
 _VALUE_TYPE = Subject("type of the voxels")
 _NUMPY_NAMES = {"float": "float32", "double": "float64", "bit": "bool"}  # by OME-XML's names
-_INCH_UM = 25_400.0
-_SCREEN_DPI = (72, 96, 100, 150, 200, 300, 600, 1200)
-_TAG_TOLERANCE = 0.01  # relative; the tags are fractions of whole numbers, some of them small
 _CLAIM = re.compile(r"""\b(Size[XYZCT]|PlaneCount|IFD)\s*=\s*["']\s*(\d+)""")
 
 
@@ -88,9 +85,10 @@ def read_ome(
         arrays = with_given_axes(where, arrays, axes)
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
     image, depth_notes = _with_depth(image, root)
-    depth_notes += _tag_notes(tiff, image.grids[0])
     _, turn_notes = turn_of(series.keyframe, is_applied=False)
-    described = (*depth_notes, *turn_notes, *_type_notes(root, series.keyframe))
+    _, y, x = images[0].spacing_um
+    size_notes = tag_notes(tiff, (y, x), "PhysicalSize of the OME-XML")
+    described = (*size_notes, *depth_notes, *turn_notes, *_type_notes(root, series.keyframe))
     notes = (*image.notes, *described, *_undescribed(tiff, chosen.others), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
 
@@ -113,25 +111,6 @@ def _type_notes(root: ElementTree.Element, page: TiffPage) -> tuple[str, ...]:
     tags = Statement(page.dtype.name, "the TIFF header")
     xml = Statement(_NUMPY_NAMES.get(name, name), "Type of Pixels", Trust.REPEATED)
     return settle(_VALUE_TYPE, [tags, xml]).notes
-
-
-def _tag_notes(tiff: TiffFile, grid: Grid) -> tuple[str, ...]:
-    """Return a note for each axis whose PhysicalSize the tags of the resolution contradict.
-
-    A resolution of screens and printers is stated for any image, and is not compared.
-    """
-    notes: list[str] = []
-    own = grid.spacing_um or grid.partial_um
-    for axis, stated, by_tag in zip("zyx", own, sizes_by_tags(tiff), strict=True):
-        if stated is None or by_tag is None or round(_INCH_UM / by_tag) in _SCREEN_DPI:
-            continue
-        name = axis.upper()
-        subject = Subject(
-            f"voxel spacing along {axis}", "um", _TAG_TOLERANCE, "--spacing-um z,y,x replaces it"
-        )
-        repeated = Statement(by_tag, f"the tag {name}Resolution", Trust.REPEATED)
-        notes += settle(subject, [Statement(stated, f"PhysicalSize{name}"), repeated]).notes
-    return tuple(notes)
 
 
 def _require_planes(
