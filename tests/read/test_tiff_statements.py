@@ -136,21 +136,6 @@ def test_a_calibration_of_imagej_is_applied(
     assert all(told in note for note in notes)
 
 
-@pytest.mark.parametrize(
-    ("per_cm", "unit", "is_noted"),
-    [((20_000, 25_000), "CENTIMETER", True), ((40_000, 50_000), "CENTIMETER", False),
-     ((72 / 2.54, 72 / 2.54), "CENTIMETER", False), ((300, 300), "INCH", False)],
-)  # fmt: skip
-def test_the_resolution_of_the_tags_is_compared_with_the_physical_size(
-    tmp_path: Path, per_cm: tuple[float, float], unit: str, is_noted: bool
-) -> None:
-    path = write_ome(tmp_path / "a.ome.tif", BODY, resolution=per_cm, resolutionunit=unit)
-    dataset = read.open(path)
-    assert dataset.levels[0].spacing_um == pytest.approx(UM)
-    found = [note for note in dataset.notes if "Resolution states" in note]
-    assert len(found) == 2 * is_noted
-
-
 def test_a_negative_depth_of_imagej_is_a_depth(tmp_path: Path) -> None:
     path = tmp_path / "a.tif"
     metadata = {"axes": "ZYX", "spacing": -0.5, "unit": "um"}
