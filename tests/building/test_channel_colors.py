@@ -123,3 +123,9 @@ def test_a_stated_colour_is_kept_unless_an_earlier_channel_has_it() -> None:
     assert first == green
     assert second == PALETTE[1]
     assert _chosen(["a"], [green], modality="MR") == [green]
+
+
+def test_a_black_channel_has_another_colour() -> None:
+    assert _chosen(["a", "GFP"], [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]) == [
+        PALETTE[0], color_of_name("GFP"),
+    ]  # fmt: skip

@@ -84,6 +84,25 @@ def test_a_level_that_no_tile_is_sure_of_is_unsure(tmp_path: Path) -> None:
     assert channel.appearance.surface == "unsure"
 
 
+def test_a_haze_around_far_brighter_bodies_is_unsure_and_their_level_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As stain in the cytoplasm around a confocal nucleus."""
+    shape, spacing, rng = (16, 80, 80), (5.0, 2.0, 2.0), np.random.default_rng(4)
+    cell = phantoms.blurred_ball(shape, spacing, (40.0, 80.0, 80.0), 30.0, 2.0)
+    nucleus = phantoms.blurred_ball(shape, spacing, (40.0, 80.0, 80.0), 16.0, 2.0)
+    noise = rng.normal(0, 8, shape)
+    voxels = (50 + 400 * cell + 20_000 * nucleus + noise).round().clip(0).astype(np.uint16)
+    (channel,) = _surveyed(tmp_path, voxels).values()
+    assert channel.appearance.surface == "unsure"
+    assert "may be a haze around brighter bodies" in channel.appearance.surface_reason
+    inner = channel.ladder[1].value
+    assert inner == pytest.approx(10_000, rel=0.3)
+    assert f"{inner:.5g} (" in channel.near_levels
+    told = capsys.readouterr().err
+    assert told.count(f"{inner:.5g} (") >= 2  # by plan, and by units
+
+
 DATA = data_folder()
 SHEET = None if DATA is None else next(DATA.glob("brain_cells_2ch/*.tif"), None)
 

@@ -1,7 +1,7 @@
 """Small volumes of sources that no constant was chosen on; their truth is another method's.
 
 They lie in the folder `level_corpus` of STEREOCELL_DATA, one NPZ each: `voxels` (z, y, x), `truth`
-(bool; empty: nobody marked it), `spacing_um`. The README there names licences and truths.
+(bool; empty: nobody marked it), `spacing_um`. collect.py makes them, and names sources and truths.
 """
 
 from collections.abc import Iterator

@@ -61,7 +61,7 @@ def look_at(case: Case) -> Sight:
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     noise = NoiseSample()
-    noise.add(slices_first(voxels, axis), darkest)
+    noise.add(slices_first(voxels, axis), float(voxels.min()))
     max_shift = find_max_shift(noise.deviation(), SurfaceOptions().max_shift, None)
     scale, scale_above, above, under = Scale.of(voxels, padding), None, field, None
     if case.kind == "microscopy":

@@ -7,7 +7,7 @@ import pytest
 
 from corpus.real import real_cases
 from corpus.sight import look_at
-from stereocell.isosurface.level import Level, shown_of
+from stereocell.isosurface.level import Level, bodies_in_haze, shown_of
 
 # contrast five times the noise, slopes of a blur of 2.5 voxels, in no valley
 CLEAR = Level(
@@ -69,3 +69,16 @@ def test_a_coarse_mr_of_a_trunk_keeps_its_skin() -> None:
     assert outer not in sight.found.clear
     inside = sight.values > outer.value
     assert 2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()) > 0.95
+
+
+@pytest.mark.parametrize(
+    ("times", "dip", "is_haze"),
+    [(30.0, 0.3, True), (9.0, 0.3, False), (30.0, 1.0, False)],
+)
+def test_a_level_around_bodies_far_brighter_than_it_may_be_a_haze(
+    times: float, dip: float, is_haze: bool
+) -> None:
+    """As bodies count those that have a peak of their own, and not a tail of bright voxels."""
+    bodies = replace(CLEAR, value=2000.0, inside=50 + times * CLEAR.contrast, dip=dip)
+    assert bodies_in_haze(CLEAR, [CLEAR, bodies]) == (bodies if is_haze else None)
+    assert bodies_in_haze(bodies, [CLEAR, bodies]) is None

@@ -15,6 +15,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
 from support.array_files import SIZE_UM, write_czi, write_lif
+from support.dicom_series import write_f_nifti
 from support.nd2_files import write_nd2
 from support.phantoms import f_phantom
 
@@ -345,7 +346,9 @@ def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
     assert "is a folder" in refusal(tmp_path / f"b.{suffix}")
 
 
-def test_a_format_of_one_image_has_no_series(tiny_zarr_05: Path) -> None:
-    assert "CZI, LIF, ND2, a file for" in refusal(tiny_zarr_05, series=2)
-    with pytest.raises(UsageError, match="--series list: found OME-Zarr, expected"):
-        read.list_series(tiny_zarr_05)
+def test_a_format_of_one_image_has_no_series(tmp_path: Path) -> None:
+    path = tmp_path / "a.nii"
+    write_f_nifti(path, f_phantom(), SIZE_UM)
+    assert "CZI, LIF, ND2, a file for" in refusal(path, series=2)
+    with pytest.raises(UsageError, match="--series list: found NIfTI or Analyze, expected"):
+        read.list_series(path)

@@ -221,7 +221,7 @@ def test_a_dicomdir_s_references_are_not_followed(home: Path) -> None:
     for source in (alone, alone / "DICOMDIR"):
         assert "no DICOM image" in refusal(source)
     directory.save_as(home / "s" / "DICOMDIR", enforce_file_format=True)
-    assert read.open(home / "s").notes == ("files left out: 1 without pixels",)
+    assert read.open(home / "s").notes == ("file left out: 1 without pixels",)
 
 
 @pytest.mark.parametrize("name", ["x.ome.tif", "x.nii", "x.nii.gz", "x.dcm", "x.zarr"])

@@ -320,7 +320,7 @@ def test_other_kinds_of_images_are_left_out_and_told(tmp_path: Path) -> None:
         "1 images in folders below left out",
         "7 TIFF are read, 1 others left out",
         "1 thumbnails left out",
-        "1 files that are named otherwise left out",
+        "1 file that is named otherwise left out",
     ):
         assert words in told
 

@@ -23,6 +23,7 @@ from pydicom.uid import (
     JPEGBaseline8Bit,
     JPEGLosslessSV1,
     MRImageStorage,
+    PositronEmissionTomographyImageStorage,
     generate_uid,
 )
 
@@ -35,7 +36,11 @@ BODIES = (
     ((2.0, 14.0, 12.0), 3.5, 700.0),
 )
 BRIGHTEST = BODIES[0][0]
-_CLASSES = {"MR": MRImageStorage, "CT": CTImageStorage}
+_CLASSES = {
+    "MR": MRImageStorage,
+    "CT": CTImageStorage,
+    "PT": PositronEmissionTomographyImageStorage,
+}
 _ENHANCED = {"MR": EnhancedMRImageStorage, "CT": EnhancedCTImageStorage}
 
 

@@ -25,11 +25,13 @@ def write_nd2(
     *,
     is_packed: bool = False,
     without: Collection[int] = (),
+    lights: Mapping[int, float] | None = None,
 ) -> dict[int, int]:
     """Write a file, and return the place of each frame's chunk.
 
     tpzcyx   voxels (t, p, z, c, y, x); a frame holds all channels of a plane
     without  frames that are left out, as an acquisition that ended early leaves them out
+    lights   emission, nm, of channels that then have no colour of their own
     """
     times, positions, depth, channels, height, width = tpzcyx.shape
     step, _, side = spacing_um
@@ -44,6 +46,10 @@ def write_nd2(
         f"a{i}": plane | {"sDescription": name, "uiColor": color}
         for i, (name, color) in enumerate((("DAPI", 0xFF0000), ("GFP", 0x00FF00))[:channels])
     }
+    for i, nm in (lights or {}).items():
+        emission = {"uiCount": 1, "pPoint": {"Point0": {"dTValue": 1.0, "dWavelength": nm}}}
+        lit = {"pFluorescentProbe": probe | {"m_EmissionSpectrum": emission}}
+        planes[f"a{i}"] = plane | lit | {"sDescription": f"marker {i}", "uiColor": 0}
     picture = {"uiCount": channels, "sPlaneNew": planes}
     chunks = {
         b"ImageAttributesLV!": {

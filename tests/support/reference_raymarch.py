@@ -261,6 +261,21 @@ def _classify(block: Block, intensities: Values, voxels: Values) -> tuple[Values
     return color / whole[:, None], 1 - clear, shares / whole
 
 
+def _contrast(block: Block) -> Values:
+    """Return the factor (channels, 1) to the gradients by which each channel is shaded.
+
+    A table whose opacity reaches half of its most within less than 0.12 of the intensities has
+    boundaries that cross few of them: they count for more, three times at most.
+    """
+    factors = []
+    for alphas in block.tables[:, :, 3]:
+        first, half = int(np.argmax(alphas > 0)), int(np.argmax(2 * alphas >= alphas.max()))
+        is_plain = alphas.max() == 0 or alphas[0] > 0
+        rise = (half - first + 1) / (ENTRIES - 1)
+        factors.append(1.0 if is_plain else float(np.clip(0.12 / rise, 1.0, 3.0)))
+    return np.array(factors)[:, np.newaxis]
+
+
 def _shade(
     block: Block,
     points: Values,
@@ -279,9 +294,10 @@ def _shade(
     that is as on the face.
     """
     h = float(block.spacing_um().min())
+    weights = shares * _contrast(block)
     gradient = np.zeros(points.shape)
     for side in itertools.product((-1.0, 1.0), repeat=3):
-        value = (block.intensities(points + h * np.array(side)) * shares).sum(axis=0)
+        value = (block.intensities(points + h * np.array(side)) * weights).sum(axis=0)
         gradient += 0.25 * value[:, None] * np.array(side)
     steepness = np.linalg.norm(gradient, axis=1)
     flat = steepness < FLAT_STEP

@@ -17,6 +17,7 @@ from stereocell.model.modality import TRACER_MODALITIES
 Color = tuple[float, float, float]
 AMBER = (1.0, 0.6, 0.24)  # linear RGB of tracers of PET and SPECT: the lightest part of a heat map
 WARM_GREY = (0.62, 0.58, 0.52)  # linear RGB of the only channel of a volume
+_BLACK = 0.01  # linear RGB; a colour with no lighter part can't be seen on a dark ground
 NEAR = 12.0  # distance in CIELab below which two colours are hard to tell apart when lit
 
 
@@ -34,7 +35,7 @@ def choose_colors(
         wanted = [stated, _of_modality(place, modality), color_of_name(name)]
         wanted += [WARM_GREY if is_alone and not modality else None]
         wanted += [PALETTE[(place + step) % len(PALETTE)] for step in range(len(PALETTE))]
-        colors = [color for color in wanted if color is not None]
+        colors = [color for color in wanted if color is not None and max(color) > _BLACK]
         chosen.append(next((one for one in colors if not _is_near(one, chosen)), colors[0]))
     return chosen
 

@@ -14,7 +14,7 @@ from stereocell.building.survey_file import TileIso
 from stereocell.building.tasks.window import Window
 from stereocell.building.vessel_levels import choose_connected, find_vessel_levels
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
-from stereocell.isosurface.level import Level
+from stereocell.isosurface.level import Level, bodies_in_haze
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.isosurface.options import (
     ADAPTIVE,
@@ -164,6 +164,12 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
         return f"it lies above the display window, which ends at {highest:.5g}"
     if all(tile.confidence is None for tile in tiles):
         return "no tile by itself has enough voxels on both sides of it"
+    if bodies := bodies_in_haze(level, found.levels.ladder):
+        return (
+            f"it may be a haze around brighter bodies, whose level, {bodies.value:.5g}, has "
+            f"{bodies.contrast / level.contrast:.0f} times its contrast and {bodies.share:.2%} of "
+            "the voxels inside"
+        )
     return ""
 
 

@@ -73,6 +73,17 @@ def color_of_name(name: str) -> Color | None:
     return None if nm is None else color_of_wavelength(nm)
 
 
+def color_of_channel(
+    rgb: tuple[int, int, int] | None, nm: float | str | None, dye: str = ""
+) -> Color | None:
+    """Return the colour, linear RGB, that a file states, else that of its light.
+
+    rgb  0 to 255 each; None: not stated. Black counts as not stated: it can't be seen, and is what
+         some programs write for none
+    """
+    return color_of_light(nm, dye) if rgb is None or not any(rgb) else linear_color(rgb)
+
+
 def color_of_light(nm: float | str | None, dye: str = "") -> Color | None:
     """Return the colour, linear RGB, of a stated wavelength in nm, or else of a stated dye."""
     try:

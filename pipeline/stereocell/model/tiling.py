@@ -29,6 +29,13 @@ class Box:
         z, y, x = (slice(a, b) for a, b in zip(self.start, self.stop, strict=True))
         return z, y, x
 
+    def slab(self, axis: int, start: int, stop: int) -> "Box":
+        """Return the part of the box between two planes across an axis."""
+        starts, stops = list(self.start), list(self.stop)
+        starts[axis], stops[axis] = start, stop
+        (z0, y0, x0), (z1, y1, x1) = starts, stops
+        return Box((z0, y0, x0), (z1, y1, x1))
+
     def slices_in(self, window: "Box") -> tuple[slice, slice, slice]:
         """Return the box as indices of an array that covers `window`."""
         start, stop, first = self.start, self.stop, window.start

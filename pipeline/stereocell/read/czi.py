@@ -19,8 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.model.color import linear_color
-from stereocell.model.emission_color import color_of_light
+from stereocell.model.emission_color import color_of_channel
 from stereocell.model.errors import SourceError
 from stereocell.read import extras
 from stereocell.read.czi_file import CziFacts, CziFile, Rectangle
@@ -208,15 +207,15 @@ def _channels(
         display = shown.get(node.get("Id"))
         text = node.findtext("Color") or (display.findtext("Color") if display is not None else "")
         light = node.findtext("EmissionWavelength"), node.findtext("Fluor") or ""
-        colors.append(_color(text or "") or color_of_light(*light))
+        colors.append(color_of_channel(_color(text or ""), *light))
     lacking = [None] * (count - len(names))
     return (*names, *lacking), (*colors, *lacking)
 
 
-def _color(text: str) -> Color | None:
-    """Return linear RGB of `#AARRGGBB` or `#RRGGBB`."""
+def _color(text: str) -> tuple[int, int, int] | None:
+    """Return R, G and B of `#AARRGGBB` or `#RRGGBB`."""
     match = re.fullmatch(r"#(?:[0-9a-fA-F]{2})?([0-9a-fA-F]{6})", text.strip())
     if match is None:
         return None
     red, green, blue = bytes.fromhex(match[1])
-    return linear_color((red, green, blue))
+    return red, green, blue

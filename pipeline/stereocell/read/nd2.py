@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.model.color import linear_color
-from stereocell.model.emission_color import color_of_light
+from stereocell.model.emission_color import color_of_channel
 from stereocell.model.errors import SourceError
 from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
@@ -172,7 +171,6 @@ def _channels(nd2: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Color
     for one in stated:
         color = getattr(one.channel, "color", None)
         rgb = (color.r, color.g, color.b) if color is not None else None
-        light = color_of_light(getattr(one.channel, "emissionLambdaNm", None))
-        colors.append(linear_color(rgb) if rgb else light)
+        colors.append(color_of_channel(rgb, getattr(one.channel, "emissionLambdaNm", None)))
     lacking = [None] * (count - len(names))
     return (*names, *lacking), (*colors, *lacking)

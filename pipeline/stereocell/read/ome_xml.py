@@ -10,13 +10,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from stereocell.model.color import linear_color
-from stereocell.model.emission_color import color_of_light
+from stereocell.model.emission_color import color_of_channel, color_of_light
 from stereocell.model.errors import SourceError
 from stereocell.read.image import Color
 from stereocell.read.spacing import PartialTriple, um_per
 
 _HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
+_DEFAULT_COLOR = -1  # opaque white
 _DEFAULT_UNIT = "\u00b5m"  # unit of PhysicalSizeX, Y and Z, where the file names none
 
 
@@ -210,11 +210,12 @@ def _spacing(pixels: ElementTree.Element, where: str) -> PartialTriple:
 def _color(channel: ElementTree.Element, where: str) -> Color | None:
     """Return the colour, which OME holds as a signed 32-bit number of R, G, B and A.
 
-    Where it states none, that of the light.
+    Where it states none, that of the light. White is the default of OME-XML, which programs write
+    where they know none, so the light counts more.
     """
-    given = channel.get("Color")
+    given, nm, dye = channel.get("Color"), _emission_nm(channel), channel.get("Fluor", "")
     if given is None:
-        return _emitted(channel)
+        return color_of_light(nm, dye)
     try:
         number = int(given)
         red, green, blue, _ = (number & 0xFFFFFFFF).to_bytes(4, "big")
@@ -222,14 +223,17 @@ def _color(channel: ElementTree.Element, where: str) -> Color | None:
         raise SourceError(
             f"{where}: OME-XML: Channel Color: found {given!r:.40}, expected a whole number"
         ) from None
-    return linear_color((red, green, blue))
+    by_light = color_of_light(nm, dye) if number == _DEFAULT_COLOR else None
+    return by_light or color_of_channel((red, green, blue), nm, dye)
 
 
-def _emitted(channel: ElementTree.Element) -> Color | None:
-    """Return the colour of the light that a channel took, by its wavelength or its dye."""
-    given, dye = channel.get("EmissionWavelength"), channel.get("Fluor", "")
-    is_nm = channel.get("EmissionWavelengthUnit", "nm") == "nm"
-    return color_of_light(given if is_nm else None, dye)
+def _emission_nm(channel: ElementTree.Element) -> float | None:
+    """Return the wavelength of the light that a channel took, nm; None: not stated."""
+    per = um_per(channel.get("EmissionWavelengthUnit", "nm"))
+    try:
+        return None if per is None else float(channel.get("EmissionWavelength", "")) * per * 1000
+    except ValueError:
+        return None
 
 
 def _children(element: ElementTree.Element, name: str) -> Iterator[ElementTree.Element]:

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stereocell.model.counted import agreeing, counted
+
 REGULAR = 0.02  # share of the median gap: an even gap deviates by no more (rounded positions)
 DRIFT = 0.05  # pixels over the whole stack: planes that drift less are not shifted
 SAME_PLACE = 0.02  # pixels: planes at a smaller distance count as one place
@@ -82,8 +84,9 @@ class StackLayout:
             shown = ", ".join(f"{gap:.4g}" for gap in wide[:6]) + (", ..." if len(wide) > 6 else "")
             total = len(self.gaps_mm) + 1 + self.missing
             notes.append(
-                f"{self.missing} missing slices of {total} ({self.missing / total:.1%}), gaps of "
-                f"{shown} mm among slices {spacing:.4g} mm apart: interpolated"
+                f"{counted(self.missing, 'missing slice')} of {total} "
+                f"({self.missing / total:.1%}), {agreeing(len(wide), 'a gap', 'gaps')} of {shown} "
+                f"mm among slices {spacing:.4g} mm apart: interpolated"
             )
         if self.tilt_deg:
             notes.append(
@@ -129,10 +132,11 @@ def lay_out(
     if gaps.min() <= SAME_PLACE * min(pixel_spacing_mm):
         raise NoStackError("slices lie beside each other in one plane, expected one over the other")
     count, is_even = _count_planes(gaps)
-    if count > 2 * len(positions):
+    lost = count - len(positions)
+    if lost > len(positions):
         raise NoStackError(
-            f"{count - len(positions)} of {count} slices are missing (gaps of {gaps.min():.4g} to "
-            f"{gaps.max():.4g} mm), expected fewer than there are"
+            f"{lost} of {count} slices {agreeing(lost, 'is', 'are')} missing (gaps of "
+            f"{gaps.min():.4g} to {gaps.max():.4g} mm), expected fewer than there are"
         )
     spacing = local[-1, 0] / (count - 1)
     places = local / np.array([spacing, *pixel_spacing_mm])

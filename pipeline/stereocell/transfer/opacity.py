@@ -15,6 +15,15 @@ NAMES = ("default", "soft", "sharp", "surface")
 THRESHOLD = "threshold"  # name of the function of channels that have a threshold
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
+# Share of the way from the background to the surface's level at which opacity starts. The volume
+# then begins a quarter of a voxel before the surface, and both have one silhouette.
+NEAR_SURFACE = 0.8
+AT_SURFACE = 0.18  # opacity a voxel at the surface's level ...
+IN_BODY = 0.45  # ... and where the body is bright
+BRIGHT = 0.3  # share of the window above the level over which a body becomes bright
+# The same of magnitudes, as of MR. A cut through them shows tissues by their opacity, which has to
+# rise over all of their values.
+AT_SURFACE_OF_MAGNITUDES, BRIGHT_OF_MAGNITUDES = 0.12, 0.5
 # Share of the window between the start of a body's opacity and its surface: 36 HU by the presets
 # of CT. Values rise by more within a voxel of the edge, and a step of the opacity would be jagged.
 BELOW_BODY = 0.012
@@ -55,12 +64,13 @@ def make_transfer_functions(
         rise = _rise_of_body(level)
     else:
         below = histogram[: int(level * bins)] if has_magnitudes and has_surface else None
-        rise = _rise(level, median, below, bins)
+        rise = _rise(level, _foot(level, median, has_surface=has_surface), below, bins)
     floor, top, bright = rise
-    at_top = 0.12 + (0.45 - 0.12) * (top - level) / (bright - level)
+    start = AT_SURFACE_OF_MAGNITUDES if has_magnitudes else AT_SURFACE
+    at_top = start + (IN_BODY - start) * (top - level) / (bright - level)
     soft = floor if is_calibrated and has_surface else 0.6 * floor
     functions = {
-        "default": _points((floor, 0.0), (top, at_top), (bright, 0.45), (1.0, 0.6)),
+        "default": _points((floor, 0.0), (top, at_top), (bright, IN_BODY), (1.0, 0.6)),
         "soft": _points((soft, 0.0), (level, 0.04), (1.0, 0.2)),
         "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
         "surface": _points(
@@ -83,22 +93,30 @@ def _rise_of_body(level: float) -> tuple[float, float, float]:
     return max(level - BELOW_BODY, 0.5 * level), level, min(level + SOLID_BODY, 0.99)
 
 
+def _foot(level: float, median: float, *, has_surface: bool) -> float:
+    """Return where opacity starts above the median, since most voxels are background.
+
+    Near the level of a surface; half-way to that of a channel without one, where faint structure
+    is to show.
+    """
+    way = NEAR_SURFACE if has_surface else 0.5
+    return min(max(median + way * (level - median), way * level), 0.9 * level)
+
+
 def _rise(
-    level: float, median: float, below: NDArray[np.int64] | None, bins: int
+    level: float, floor: float, below: NDArray[np.int64] | None, bins: int
 ) -> tuple[float, float, float]:
     """Return where opacity starts, where it is that of the level, and where the body is bright.
 
+    floor  where opacity starts at the earliest
     below  int64, voxel counts below the surface of magnitudes; None: values are none
 
-    Opacity starts half-way between the median, since most voxels are background, and the level.
     Noise of magnitudes would be dust in front of a surface: opacity starts where it ends. That is
     below the level, unless the counts still fall steeply there: then a part of the air lies above
-    the level, which the surface leaves out as specks, and the volume has to, too. (The background
-    of fluorescence has structure, and a foot so steep would show the steps of rays: of the
-    brain-cells stack 35 instead of over 40 dB.)
+    the level, which the surface leaves out as specks, and the volume has to, too.
     """
-    floor = min(max(0.5 * (median + level), 0.5 * level), 0.9 * level)
-    bright = max(level + 0.5 * (1 - level), level + 0.02)
+    share = BRIGHT if below is None else BRIGHT_OF_MAGNITUDES
+    bright = max(level + share * (1 - level), level + 0.02)
     if below is not None:
         floor = max(floor, min(_end_of_noise(below) / bins, FOOT * level))
         beyond = level + _noise_beyond(below) / bins

@@ -228,7 +228,7 @@ def test_files_cut_short_are_left_out_and_their_gap_is_told(tmp_path: Path) -> N
     paths = series(tmp_path / "s")
     paths[2].write_bytes(paths[2].read_bytes()[:-500])
     notes = read.open(tmp_path / "s").notes
-    assert any(f"1 missing slices of {len(paths)} (" in note for note in notes)
+    assert any(f"1 missing slice of {len(paths)} (" in note for note in notes)
     assert any("1 cut short" in note for note in notes)
 
 
@@ -262,7 +262,7 @@ def test_files_without_preamble_are_read(tmp_path: Path) -> None:
 def test_files_that_others_may_not_stay_for_are_passed_by(tmp_path: Path) -> None:
     series(tmp_path / "s")
     os.mkfifo(tmp_path / "s" / "pipe")  # opening it would wait for ever
-    assert read.open(tmp_path / "s").notes == ("files left out: 1 not DICOM",)
+    assert read.open(tmp_path / "s").notes == ("file left out: 1 not DICOM",)
 
 
 def test_a_folder_of_another_format_is_told_by_what_it_holds(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ CONTRADICTIONS: dict[str, tuple[Change, str]] = {
         by_number("SliceLocation", lambda n: 1.25 * n),
         "ImagePositionPatient states 2.5 mm, SliceLocation states 1.25 mm",
     ),
-    "thin slices": (setting(SliceThickness=1.0), "60% of the volume was not imaged"),
+    "thin slices": (setting(SliceThickness=1.0), "60% of the distance lies in gaps"),
     "thick slices": (setting(SliceThickness=20.0), "neighbouring slices overlap"),
     "detector": (
         setting(ImagerPixelSpacing=[3.0, 3.3]),
@@ -39,7 +39,7 @@ CONTRADICTIONS: dict[str, tuple[Change, str]] = {
     ),
     "order of locations": (
         by_number("SliceLocation", lambda n: 2.5 * (n + (n == 4) - (n == 5))),
-        "SliceLocation states another one (1 of 9 steps lead back)",
+        "SliceLocation states another one (1 of 9 steps leads back)",
     ),
     "gantry": (
         setting(GantryDetectorTilt=20.0),

@@ -22,7 +22,7 @@ import { drawEyes } from "../gpu/offscreen_target";
 import { ScreenPass } from "../gpu/screen_pass";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
 import { brickCounts } from "../volumes/skip_bricks";
-import { ENTRIES } from "../volumes/transfer_luts";
+import { ENTRIES, edgeContrast } from "../volumes/transfer_luts";
 import { tablesInto } from "../volumes/transfer_table_2d";
 import { DenoiseAndTone, type Marched } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
@@ -179,6 +179,9 @@ export class Tracer {
       appearances.map(({ table2d }) => table2d),
     );
     uniforms.uMedium.value = this.medium;
+    appearances.forEach((each, c) => {
+      uniforms.uContrast.value.setComponent(c, edgeContrast(each.table));
+    });
     uniforms.uMajorants.value = this.majorantTexture;
     uniforms.uBrick.value.setScalar(this.brick);
     this.restart();

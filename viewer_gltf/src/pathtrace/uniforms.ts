@@ -79,6 +79,7 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
     uAnisotropy: { value: 0 },
     uSurface: { value: 0 },
     uShine: { value: 0 },
+    uContrast: { value: new Vector4(1, 1, 1, 1) },
     uGloss: { value: GLOSS },
     uOcclusionReach: { value: 1 },
     uMostLight: { value: MAX_LIGHT },

@@ -95,9 +95,10 @@ export const ROOM_NUMBERS = {
 
 /** Numbers of the post-processing. */
 export const POST_NUMBERS = {
+  /** At the start a specimen is as bright as its surfaces are, whose light has no tone map. */
   exposure: {
     label: "Exposure",
-    start: 0,
+    start: -0.5,
     limits: [-4, 4],
     text: stops,
     about: "One stop more is twice as bright.",

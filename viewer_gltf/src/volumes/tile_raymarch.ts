@@ -48,7 +48,7 @@ import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 import { brickCounts } from "./skip_bricks";
 import { textureCorners } from "./texture_space";
 import type { Packed } from "./tile_texture";
-import { ENTRIES, opacities } from "./transfer_luts";
+import { ENTRIES, edgeContrast, opacities } from "./transfer_luts";
 import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
 /** Most steps of a ray while anything moves, for any size of the volume and any number of tiles. */
@@ -214,6 +214,7 @@ export class TileMarch {
         uVoxel: { value: voxel },
         uMinStep: { value: voxel },
         uFloor: { value: new Vector4(1, 1, 1, 1) },
+        uContrast: { value: new Vector4(1, 1, 1, 1) },
         uWindowLow: { value: new Vector4() },
         uWindowHigh: { value: new Vector4(1, 1, 1, 1) },
         uBrickSlack: { value: 0 },
@@ -384,6 +385,7 @@ export class TileMarch {
       (uniforms.uColor.value as Vector3[])[c].set(...color);
       uniforms.uInDisc.value[c] = isInDisc;
       uniforms.uFloor.value.setComponent(c, floorOf(table));
+      uniforms.uContrast.value.setComponent(c, edgeContrast(table));
       uniforms.uWindowLow.value.setComponent(c, low);
       uniforms.uWindowHigh.value.setComponent(c, high);
       const row = rows.subarray(c * table.length, (c + 1) * table.length);

@@ -59,3 +59,21 @@ export function lookUpTable(
 export function opacities(table: Uint8Array): Uint8Array<ArrayBuffer> {
   return Uint8Array.from({ length: ENTRIES }, (_, i) => table[4 * i + 3]);
 }
+
+/** Rise of opacity, as a share of all intensities, of an edge that is shaded as it is. */
+const GENTLE_RISE = 0.12;
+const MOST_CONTRAST = 3;
+
+/**
+ * Factor to the gradients that a table's edges are shaded by. An edge that crosses the whole rise of the
+ * opacity is a boundary, however few of all intensities it crosses: the skin of a CT is one.
+ */
+export function edgeContrast(table: Uint8Array): number {
+  const alphas = opacities(table);
+  const most = Math.max(...alphas);
+  const first = alphas.findIndex((alpha) => alpha > 0);
+  if (most === 0 || alphas[0] > 0) return 1;
+  const half = alphas.findIndex((alpha) => 2 * alpha >= most);
+  const rise = (half - first + 1) / (ENTRIES - 1);
+  return Math.min(MOST_CONTRAST, Math.max(1, GENTLE_RISE / rise));
+}

@@ -1,50 +1,48 @@
 /**
- * A scene looks like one thing as surfaces, marched, and path-traced.
+ * A scene looks like one thing as surfaces at each level of detail, marched, path-traced, and in slices.
  * STEREOCELL_FORM_BUNDLES holds the bundles of tests/support/form_scenes.py, joined by ":".
  */
+import { createHash } from "node:crypto";
+import { readFile } from "node:fs/promises";
+import { join } from "node:path";
 import { describe, expect, it } from "vitest";
+import { placeIn, sliceFrames } from "../../src/math/slice_frame";
+import type { Vec3 } from "../../src/math/vec3";
+import { framingDistance, place } from "../../src/render/placement";
+import { ERROR_TARGET_PX } from "../../src/surfaces/surface_set";
 import { type Picture, type Pixel, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
-import { prepareStand } from "../support/browser/stand";
+import { prepareStand, type Stand } from "../support/browser/stand";
 import { colorDifference, toLab } from "../support/color_difference";
+import { overlap, type Silhouette, silhouetteOf } from "../support/silhouette";
 
 const BUNDLES = (process.env.STEREOCELL_FORM_BUNDLES ?? "")
   .split(":")
   .filter((path) => path !== "");
-/**
- * Least intersection over union of two silhouettes. Of fluorescence the volume begins half-way between
- * background and surface, so that faint structure shows, and reaches a voxel beyond the surface.
- */
-const MIN_OVERLAP = (bundle: string) => (bundle.includes("fluorescence") ? 0.85 : 0.94);
+/** Least intersection over union of two silhouettes. */
+const MIN_OVERLAP = 0.95;
+/** The same of a level that the page shows only where the object is a few pixels large. */
+const MIN_OVERLAP_FROM_AFAR = 0.8;
 /** Largest difference of mean colours (CIEDE2000). */
 const MAX_DELTA_E = 8;
-/** Samples of a traced picture from which on it is its own, and the denoiser smooths the rest. */
-const SAMPLES = 5;
+/**
+ * Samples of a traced picture from which on it is its own, and the denoiser smooths the rest; and those
+ * with which the grain at its rim is gone, too.
+ */
+const SAMPLES = [5, 20] as const;
 const PATIENT = { timeout: 120_000 };
+const FIELD_OF_VIEW_DEG = 40;
+/** Thickness, in voxels, of the slab of a volume that is compared with a slice. */
+const SLAB_VOXELS = 1;
+const VOXELS_ACROSS = 63;
+/** Brightness, of 255, of a pixel that the rim of a cut covers by half. */
+const RIM = 56;
 
-/** The largest part of the colour of the room's background, of 255, and a little. */
-const DARK = 24;
+let pictures = 0;
 
-type Silhouette = readonly boolean[];
+type TilesetNode = { geometricError: number; children?: TilesetNode[] };
 
-/** Pixels of which the object covers at least half, by the light of those that it covers whole. */
-function silhouetteOf(picture: Picture): Silhouette {
-  const light: number[] = [];
-  for (let y = 0; y < picture.height; y++) {
-    for (let x = 0; x < picture.width; x++) light.push(Math.max(...picture.at(x, y)));
-  }
-  const shown = light.filter((v) => v > DARK).sort((a, b) => a - b);
-  const half = (DARK + shown[Math.floor(shown.length / 2)]) / 2;
-  return light.map((v) => v > half);
-}
-
-function overlap(a: Silhouette, b: Silhouette): number {
-  const both = a.filter((inside, i) => inside && b[i]).length;
-  const either = a.filter((inside, i) => inside || b[i]).length;
-  return both / either;
-}
-
-/** Over the pixels that show the object in both pictures. */
+/** The means over the pixels that show the object in both pictures. */
 function meansOf(pictures: readonly Picture[]): readonly Pixel[] {
   const silhouettes = pictures.map(silhouetteOf);
   const { width } = pictures[0];
@@ -58,29 +56,137 @@ function meansOf(pictures: readonly Picture[]): readonly Pixel[] {
   });
 }
 
-describeInChromium("one scene in three forms", () => {
+function expectAlike(surface: Picture, picture: Picture, name: string, least = MIN_OVERLAP): void {
+  const shared = overlap(silhouetteOf(surface), silhouetteOf(picture));
+  const [a, b] = meansOf([surface, picture]).map(toLab);
+  expect.soft(shared, `${name}: silhouette`).toBeGreaterThan(least);
+  expect.soft(colorDifference(a, b), `${name}: colour`).toBeLessThan(MAX_DELTA_E);
+}
+
+async function pictureOf(stand: Stand, mode: string, link = ""): Promise<Picture> {
+  // an address that differs in its end alone opens no page anew
+  const query = `&mode=${mode}&quality=high&picture=${pictures++}`;
+  await stand.open(`${query}#v=1&cut=none${link}`);
+  await stand.viewer.settled();
+  return takePicture(stand.viewer.page);
+}
+
+/** The traced picture, clear enough to have the silhouette of `surface`, or as clear as we wait for. */
+async function tracedLike(stand: Stand, surface: Picture): Promise<Picture> {
+  let picture = await pictureOf(stand, "traced");
+  const samples = async () => (await stand.viewer.snapshot()).traced.samples;
+  for (const least of SAMPLES) {
+    await expect.poll(samples, PATIENT).toBeGreaterThan(least);
+    picture = await takePicture(stand.viewer.page);
+    if (overlap(silhouetteOf(surface), silhouetteOf(picture)) > MIN_OVERLAP) break;
+  }
+  return picture;
+}
+
+/** The edge of a pixel in the plane through the specimen's middle, um. */
+function pixelSize(stand: Stand, { width, height }: Picture): number {
+  const { scale, size } = place(stand.manifest.specimen.bounds_um);
+  const fov_rad = (FIELD_OF_VIEW_DEG * Math.PI) / 180;
+  const away_um = framingDistance(size, fov_rad, width / height) / scale;
+  return (2 * Math.tan(fov_rad / 2) * away_um) / height;
+}
+
+/** A cut's rim faces sideways and is dark: whatever the lamp leaves visible is the object. */
+function thresholded(picture: Picture): Silhouette {
+  return Array.from({ length: picture.width * picture.height }, (_, i) => {
+    const pixel = picture.at(i % picture.width, Math.floor(i / picture.width));
+    return Math.max(...pixel) > RIM;
+  });
+}
+
+/** Serve a tileset without the levels that are finer than `coarser` levels above the finest. */
+async function keepCoarser(stand: Stand, path: string, coarser: number): Promise<void> {
+  const tileset = JSON.parse(await readFile(join(stand.bundle, path), "utf8"));
+  const chain: TilesetNode[] = [];
+  for (let at: TilesetNode | undefined = tileset.root.children[0]; at; at = at.children?.[0]) {
+    chain.push(at);
+  }
+  delete chain[chain.length - 1 - coarser].children;
+  const body = JSON.stringify(tileset);
+  const sha256 = createHash("sha256").update(body).digest("hex");
+  const [channel, ...others] = stand.manifest.channels;
+  const channels = [{ ...channel, tileset: { path, bytes: body.length, sha256 } }, ...others];
+  const manifest = JSON.stringify({ ...stand.manifest, channels });
+  stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
+  stand.host.overrides.set("/bundle/manifest.json", { status: 200, body: manifest });
+}
+
+describeInChromium("one scene in all forms", () => {
   if (BUNDLES.length === 0) it.skip("needs STEREOCELL_FORM_BUNDLES");
 
   describe.each(BUNDLES)("of %s", (bundle) => {
     const stand = prepareStand({ bundle, viewport: { width: 640, height: 300 }, pixelRatio: 0.8 });
 
-    const pictureOf = async (mode: string): Promise<Picture> => {
-      await stand.open(`&mode=${mode}&quality=high#v=1&cut=none`);
-      await stand.viewer.settled();
-      const samples = async () => (await stand.viewer.snapshot()).traced.samples;
-      if (mode === "traced") await expect.poll(samples, PATIENT).toBeGreaterThan(SAMPLES);
-      return takePicture(stand.viewer.page);
-    };
+    it("has one silhouette and one colour as surface and as volume", async () => {
+      const surface = await pictureOf(stand, "off");
+      expectAlike(surface, await pictureOf(stand, "all"), "marched");
+      expectAlike(surface, await tracedLike(stand, surface), "traced");
+    });
 
-    it("has one silhouette and one colour", async () => {
-      const surface = await pictureOf("off");
-      const forms = { marched: await pictureOf("all"), traced: await pictureOf("traced") };
-      for (const [name, picture] of Object.entries(forms)) {
-        const shared = overlap(silhouetteOf(surface), silhouetteOf(picture));
-        expect(shared, `${name}: silhouette`).toBeGreaterThan(MIN_OVERLAP(bundle));
-        const [a, b] = meansOf([surface, picture]).map(toLab);
-        expect(colorDifference(a, b), `${name}: colour`).toBeLessThan(MAX_DELTA_E);
+    it("has them at each level of detail that the page would show at this distance", async () => {
+      const { tileset, distances } = stand.manifest.channels[0];
+      if (tileset === null || distances === undefined) throw new Error("the scene has no surface");
+      const finest = await pictureOf(stand, "off");
+      const pixel_um = pixelSize(stand, finest);
+      for (let level = 1; level < distances.length; level++) {
+        await keepCoarser(stand, tileset.path, level);
+        const isShownHere = distances[level].largest_um <= ERROR_TARGET_PX * pixel_um;
+        const least = isShownHere ? MIN_OVERLAP : MIN_OVERLAP_FROM_AFAR;
+        expectAlike(finest, await pictureOf(stand, "off"), `level ${level}`, least);
       }
+    });
+
+    it("is cut by a slice where its volume is", async () => {
+      const { bounds_um, sides } = stand.manifest.specimen;
+      const { center } = place(bounds_um);
+      const voxel_um = (bounds_um.max[0] - bounds_um.min[0]) / VOXELS_ACROSS;
+      const half = (SLAB_VOXELS / 2) * voxel_um;
+      const [min, max] = [bounds_um.min, bounds_um.max].map((corner) => [...corner]);
+      [min[2], max[2]] = [center[2] - half, center[2] + half];
+      const { id } = stand.manifest.channels[0];
+      const link = `&box=${[...min, ...max].join(",")}&l=${id}:tsharp`;
+      const slab = await pictureOf(stand, "all", link);
+      const found = thresholded(slab);
+
+      const frames = sliceFrames({ point: center, turn_deg: [0, 0, 0] }, bounds_um, sides ?? null);
+      const index = frames.findIndex(({ normal }) => Math.abs(normal[2]) > 0.99);
+      await stand.open("&mode=off&quality=high#v=1&cut=none&slices=on");
+      await stand.viewer.settled();
+      const { width, height, values } = await stand.viewer.page.evaluate((at) => {
+        const canvas = document.querySelector<HTMLCanvasElement>(`[data-slice="${at}"] canvas`);
+        const context = canvas?.getContext("2d");
+        if (canvas == null || context == null) throw new Error("no picture of the slice");
+        const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+        const values = Array.from(data).filter((_, i) => i % 4 === 0);
+        return { width: canvas.width, height: canvas.height, values };
+      }, index);
+      const level = 255 * (stand.manifest.channels[0].iso_normalized ?? 0);
+      const perPixel = pixelSize(stand, slab);
+      const sliced: Silhouette = found.map((_, i) => {
+        const right = ((i % slab.width) + 0.5 - slab.width / 2) * perPixel;
+        const down = (Math.floor(i / slab.width) + 0.5 - slab.height / 2) * perPixel;
+        const point: Vec3 = [center[0] + right, center[1] - down, center[2]];
+        const { x, y } = placeIn(frames[index], point);
+        const [column, row] = [Math.floor(x * width), Math.floor(y * height)];
+        const isInside = column >= 0 && column < width && row >= 0 && row < height;
+        return isInside && values[row * width + column] >= level;
+      });
+      // the handles of the cut, which are blue, lie over the picture
+      const isSeen = (i: number) => {
+        const [r, , b] = slab.at(i % slab.width, Math.floor(i / slab.width));
+        return b <= r + 4;
+      };
+      const seen = found.flatMap((_, i) => (isSeen(i) ? [i] : []));
+      const shared = overlap(
+        seen.map((i) => found[i]),
+        seen.map((i) => sliced[i]),
+      );
+      expect(shared, "slice: silhouette").toBeGreaterThan(MIN_OVERLAP);
     });
   });
 });

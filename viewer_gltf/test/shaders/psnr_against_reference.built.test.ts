@@ -18,12 +18,18 @@ const REAL = process.env.STEREOCELL_REAL_BUNDLE;
 const FIELD_OF_VIEW_DEG = 40;
 const VIEWPORT = { width: 360, height: 240 };
 const MIN_DB = 40;
+/** Pictures of a view at rest after which their mean is clear. */
+const GATHERED = 20;
 
 /** Show these channels alone, as volumes everywhere, from the front; how near that comes, in dB. */
 async function hold(stand: Stand, channels: readonly string[]) {
   // the reference has no shadows
-  await stand.open(`&mode=all&quality=high#v=1&depth=0&c=${channels.join(",")}`);
+  await stand.open(`&mode=all&quality=auto#v=1&depth=0&c=${channels.join(",")}`);
   await stand.viewer.settled();
+  // a picture at rest is the mean of many, whose samples lie between each other's
+  const frames = () => stand.viewer.page.evaluate(() => window.stereocell?.frames ?? 0);
+  const first = await frames();
+  await expect.poll(frames, { timeout: 60_000 }).toBeGreaterThan(first + GATHERED);
   const folder = await mkdtemp(join(tmpdir(), "stereocell-psnr-"));
   const picture = join(folder, "picture.png");
   const stage = stand.viewer.page.locator(".stage canvas");

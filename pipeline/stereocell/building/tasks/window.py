@@ -22,7 +22,7 @@ from stereocell.isosurface.level_evidence import (
     find_padding,
 )
 from stereocell.isosurface.level_histogram import Scale
-from stereocell.model.image_plane import first_of_three, slices_back, slices_first
+from stereocell.model.image_plane import back_of_three, first_of_three, slices_back, slices_first
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
 from stereocell.storage.json_files import write_sealed
@@ -32,6 +32,7 @@ from stereocell.transfer.channel_statistics import ChannelStatistics, find_stati
 from stereocell.transfer.joint_histogram import (
     COLUMNS,
     FINE_ROWS,
+    SAMPLE_EDGE,
     STEEPEST,
     count_joint,
     sample_boxes,
@@ -106,29 +107,25 @@ def measure_window(task: StatisticsTask) -> Window:
     while level + 1 < len(dataset.levels) and _voxels(task, dataset, level) > SURVEY_VOXELS:
         level += 1
     box = _region_at(task, dataset, level)
+    spacing, axis = dataset.levels[level].spacing_um, dataset.slice_axis(level)
     step = -(-int(np.prod(box.shape, dtype=np.int64)) // SURVEY_VOXELS)
-    planes = range(box.start[0], box.stop[0], step)
-    voxels = np.concatenate(
-        [
-            dataset.read(
-                task.channel, Box((z, *box.start[1:]), (z + 1, *box.stop[1:])), level
-            ).voxels
-            for z in planes
-        ]
+    slices = (
+        [box.slab(axis, k, k + 1) for k in range(box.start[axis], box.stop[axis], step)]
         if step > 1
-        else [dataset.read(task.channel, box, level).voxels]
+        else [box]
+    )
+    voxels = np.concatenate(
+        [dataset.read(task.channel, each, level).voxels for each in slices], axis
     )
     surface = task.settings.surface
     mask = _mask_of([voxels] if level == task.level else _blocks(task, dataset))
     # a mask's ground is even, and no padding
-    darkest = float(voxels.min()) if mask is None else None
-    spacing, axis = dataset.levels[level].spacing_um, dataset.slice_axis(level)
-    reach = denoising_reach(float(surface.smoothing_um), spacing, axis)
-    if step > 1:
-        reach = (0, *reach[1:])
-    padding = slices_back(
-        find_padding(slices_first(voxels, axis), darkest, first_of_three(reach, axis)), axis
+    least = darkest = float(voxels.min()) if mask is None else None
+    across, rows, columns = first_of_three(
+        denoising_reach(float(surface.smoothing_um), spacing, axis), axis
     )
+    reach = (0 if step > 1 else across, rows, columns)
+    padding = slices_back(find_padding(slices_first(voxels, axis), darkest, reach), axis)
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, background = Scale.of(voxels, padding), None
@@ -144,16 +141,17 @@ def measure_window(task: StatisticsTask) -> Window:
         )
     holder = None
     if task.finds_holder:
-        z, y, x = spacing
-        holder = find_holder(voxels, (step * z, y, x), task.region)
+        between, *in_plane = first_of_three(spacing, axis)
+        apart = back_of_three((step * between, *in_plane), axis)
+        holder = find_holder(voxels, apart, task.region)
     scale_above = None if background is None else scale.above(background)
     del padding
     statistics = find_statistics(
         voxels, task.settings.window, background=background, window=task.window
     )
-    if len(voxels) < task.region.shape[0] and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
+    if voxels.shape != task.region.shape and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
         statistics = replace(statistics, values=_count_values(task, dataset, statistics.window))
-    suggested, noise = _look_closely(task, dataset, statistics.window, darkest)
+    suggested, noise = _look_closely(task, dataset, statistics.window, least)
     statistics = replace(statistics, suggested=suggested)
     shift = find_max_shift(noise, task.max_shift, mask) if task.max_shift > 0 else None
     return Window(statistics, Counting(scale, scale_above, darkest, mask), holder, shift)
@@ -182,21 +180,27 @@ def _look_closely(
 
     Coarser levels have softer edges and less noise.
 
-    darkest  the value of padding; None: there is none
+    darkest  the least value, whose even runs have no noise to measure; None: nothing is left out
     """
-    spacing, axis = dataset.levels[task.level].spacing_um, dataset.slice_axis(task.level)
+    axis = dataset.slice_axis(task.level)
+    spacing = first_of_three(dataset.levels[task.level].spacing_um, axis)
     fine, noise = np.zeros((FINE_ROWS, COLUMNS), np.int64), NoiseSample()
     for voxels in _blocks(task, dataset):
-        noise.add(slices_first(voxels, axis), darkest)
+        turned = np.ascontiguousarray(slices_first(voxels, axis))
+        noise.add(turned, darkest)
         fine += count_joint(
-            to_eight_bits(voxels, window), spacing, gradient_max=STEEPEST, rows=FINE_ROWS
+            to_eight_bits(turned, window),
+            spacing,
+            gradient_max=STEEPEST,
+            rows=FINE_ROWS,
         )
     return suggest(fine, spacing_um=spacing), noise.deviation()
 
 
 def _blocks(task: StatisticsTask, dataset: Dataset) -> Iterator[NDArray[Any]]:
     """Yield blocks (z, y, x) spread over the region, of the level that is built."""
-    for box in sample_boxes(task.region, JOINT_VOXELS):
+    largest = back_of_three(SAMPLE_EDGE, dataset.slice_axis(task.level))
+    for box in sample_boxes(task.region, JOINT_VOXELS, largest):
         around = box.grown((1, 1, 1), task.region)
         yield dataset.read(task.channel, around, task.level).voxels
 

@@ -18,14 +18,16 @@ import numpy as np
 import pydicom
 from numpy.typing import NDArray
 
+from stereocell.model.counted import agreeing, counted
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.acquired import Acquired, turned_places
 from stereocell.read.anatomical_axes import Canonical, canonical_of
 from stereocell.read.beside import or_one_of
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.dicom.frame import Frame, NoPlaneError
+from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.header import SEGMENTATION, is_dicom, read_frames
 from stereocell.read.dicom.label_stack import stack_labels
+from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.scale_notes import reaches_air, scale_notes
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels
@@ -35,7 +37,7 @@ from stereocell.read.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
-from stereocell.read.series import counted, numbers_of
+from stereocell.read.series import numbers_of
 from stereocell.read.spacing import Grid
 from stereocell.read.statements import omission
 from stereocell.read.whole_array import WholeArray
@@ -44,6 +46,7 @@ from stereocell.storage.location import Location, first_bytes, is_own
 
 _INSTEAD = "expected the image that it was drawn on"
 _MOST_KINDS = 4  # most kinds of images that notes name
+_COPIES = "copies of others"
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
@@ -241,11 +244,14 @@ def _find(location: Location) -> Found:
             left_out[str(error)] += 1
             ways.append(error.way_out)
     compare = partial(_are_equal, paths, location.shown)
+    twice = set()
     for earlier, frame in copies:  # one image stored twice; with other pixels it is another image
         if earlier.position == frame.position and compare(earlier, frame):
-            left_out["copies of others"] += 1
+            twice.add(frame.file)
         else:
             frames[f"{frame.file} {frame.index} {frame.tile}".encode()] = frame
+    if twice:
+        left_out[_COPIES] = len(twice)
     if not frames:
         other = next((path for path in files if not is_dicom(path)), None)
         if other is not None and (what := identify(first_bytes(str(other)))).is_known:
@@ -352,18 +358,27 @@ def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
         omission(
             f"{counted(other.frames, 'image')} of the same series "
             f"({', '.join(other.words) or 'plain'})",
-            "they are of another kind",
-            f"--series {place} builds them" if other.layout is not None else other.problem,
+            agreeing(other.frames, "it is", "they are") + " of another kind",
+            f"--series {place} builds {agreeing(other.frames, 'it', 'them')}"
+            if other.layout is not None
+            else other.problem,
         )
         for place, other in enumerate(found.stacks, start=1)
         if is_other_kind(other, stack)
     ]
-    more = (f"{len(kinds) - _MOST_KINDS} more kinds of images are in `--series list`",)
-    return (choice, *kinds[:_MOST_KINDS], *(more if len(kinds) > _MOST_KINDS else ()))
+    rest = len(kinds) - _MOST_KINDS
+    if rest <= 0:
+        return (choice, *kinds)
+    more = counted(rest, "more kind of images is", "more kinds of images are")
+    return (choice, *kinds[:_MOST_KINDS], f"{more} in `--series list`")
 
 
 def _left_out(reasons: Counter[str]) -> tuple[str, ...]:
     if not reasons:
         return ()
-    listed = ", ".join(f"{count} {reason}" for reason, count in sorted(reasons.items()))
-    return (f"files left out: {listed}",)
+    listed = ", ".join(_counted_files(count, reason) for reason, count in sorted(reasons.items()))
+    return (f"{agreeing(reasons.total(), 'file', 'files')} left out: {listed}",)
+
+
+def _counted_files(count: int, reason: str) -> str:
+    return "1 copy of another" if (count, reason) == (1, _COPIES) else f"{count} {reason}"

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.counted import agreeing
 from stereocell.read.dicom.frame import Frame
 from stereocell.read.plane_stack import REGULAR, StackLayout, normal_of
 from stereocell.read.statements import Statement, Subject, Trust, settle
@@ -87,8 +88,9 @@ def _thickness_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str,
     thickness, distance = float(np.median(found)), float(np.median(layout.gaps_mm))
     if distance > _GAP * thickness:
         return (
-            f"slices are {thickness:.4g} mm thick (SliceThickness) and {distance:.4g} mm apart: "
-            f"{1 - thickness / distance:.0%} of the volume was not imaged, and is interpolated",
+            f"slices are {thickness:.4g} mm thick (SliceThickness) and {distance:.4g} mm apart "
+            f"({_POSITION}): {1 - thickness / distance:.0%} of the distance lies in gaps between "
+            "slices, of which nothing was imaged",
         )
     if thickness > _OVERLAP * distance:
         return (
@@ -122,7 +124,9 @@ def _order_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
             continue
         back = int(min((steps < 0).sum(), (steps > 0).sum()))
         if back:
-            text = f"another one ({back} of {len(steps)} steps lead back)"
+            text = (
+                f"another one ({back} of {len(steps)} steps {agreeing(back, 'leads', 'lead')} back)"
+            )
             statements.append(Statement(text, name, Trust.REPEATED))
     return settle(_ORDER, statements).notes
 

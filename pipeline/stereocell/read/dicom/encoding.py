@@ -7,9 +7,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from stereocell.read.dicom.frame import Encoding, NoPlaneError
+from stereocell.read.dicom.frame import Encoding
 from stereocell.read.dicom.frame_offsets import is_dose
 from stereocell.read.dicom.header_values import find_value
+from stereocell.read.dicom.modality_table import table_of
+from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.segmentation import FRACTIONAL
 from stereocell.read.dicom.value_scale import ValueScale
 
@@ -42,8 +44,9 @@ def encoding_of(
     if not 1 <= bits <= high_bit + 1 <= allocated:
         raise NoPlaneError(f"of {bits} bits up to bit {high_bit} of {allocated}")
     signed = bool(header.get("PixelRepresentation") or 0)
+    padding, table = _padding(header), table_of(header)
     return Encoding(
-        allocated, bits, high_bit, signed, is_inverted, slope, intercept, _padding(header)
+        allocated, bits, high_bit, signed, is_inverted, slope, intercept, padding, table
     )
 
 

@@ -3,20 +3,12 @@
 from dataclasses import dataclass
 
 from stereocell.read.dicom.frame_kind import FrameKind
+from stereocell.read.dicom.modality_table import ModalityTable
 from stereocell.read.dicom.segmentation import Segmentation
 from stereocell.read.dicom.stated import Stated
 from stereocell.read.dicom.value_scale import ValueScale
 
 Vector = tuple[float, float, float]
-
-
-class NoPlaneError(Exception):
-    """A file holds no usable plane; the text gives the reason without the file's values.
-
-    way_out  what the file is, and what to name or to export instead; empty: nothing is known
-    """
-
-    way_out = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +19,7 @@ class Encoding:
     is_inverted     MONOCHROME1: the lowest value is the brightest
     padding         lowest and highest stored value outside the image, before the inversion;
                     None: the header names none
+    table           grey values by ModalityLUTSequence, in the place of slope and intercept
 
     References: DICOM PS3.3 C.7.6.3 (Image Pixel module).
     """
@@ -39,6 +32,15 @@ class Encoding:
     slope: float = 1.0
     intercept: float = 0.0
     padding: tuple[int, int] | None = None
+    table: ModalityTable | None = None
+
+    @property
+    def values_range(self) -> tuple[float, float, float, float]:
+        """The lowest and highest number, and slope and intercept that make grey values of it."""
+        if self.table is not None:
+            return (*self.table.ends, 1.0, 0.0)
+        low, high = self.stored_range
+        return float(low), float(high), self.slope, self.intercept
 
     @property
     def stored_range(self) -> tuple[int, int]:

@@ -75,12 +75,12 @@ _ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
     )
 )
-# words of ImageType that name a contrast
+# words of ImageType that name a contrast, the one that is shown first at the top
 _CONTRASTS = {
     **dict.fromkeys(("W", "WATER"), "water"),
-    **dict.fromkeys(("F", "FAT"), "fat"),
     **dict.fromkeys(("IN_PHASE", "INPHASE", "IP"), "in phase"),
     **dict.fromkeys(("OUT_PHASE", "OPP_PHASE", "OPPOSED_PHASE", "OP"), "opposed phase"),
+    **dict.fromkeys(("F", "FAT"), "fat"),
     **dict.fromkeys(("UNI",), "uniform"),
     "INV1": "first inversion",
     "INV2": "second inversion",

@@ -13,7 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.counted import agreeing, counted
 from stereocell.read.dicom.frame import Frame, Vector
+from stereocell.read.dicom.rounded_positions import restore_positions
 from stereocell.read.dicom.split_kinds import split_kinds
 from stereocell.read.plane_stack import SAME_PLACE, NoStackError, lay_out
 
@@ -150,6 +152,8 @@ def find_groups(frames: Iterable[Frame]) -> list[Group]:
     whole = _join_references([group for alike in groups.values() for group in alike])
     found = [part for group in whole for part in _parts(group)]
     for group in found:
+        group.frames, notes = restore_positions(group.frames, _axes(group)[0])
+        group.notes += notes
         group.straighten()
     return found
 
@@ -251,8 +255,9 @@ def describe_neighbours(group: Group, groups: Sequence[Group]) -> tuple[str, ...
     images = sum(len(other.frames) for other in among)
     apart = sorted({word for other in among for word in group.differences(other)})
     return (
-        f"{images} more images of the same series lie among these and are not built: another "
-        f"{', '.join(apart)} (`--series list` shows them)",
+        counted(images, "more image of the same series lies", "more images of the same series lie")
+        + f" among these and {agreeing(images, 'is', 'are')} not built: another "
+        f"{', '.join(apart)} (`--series list` shows {agreeing(images, 'it', 'them')})",
     )
 
 

@@ -20,7 +20,7 @@ from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
 from stereocell.read.dicom.encoding import encoding_of
-from stereocell.read.dicom.frame import Frame, NoPlaneError, Vector
+from stereocell.read.dicom.frame import Frame, Vector
 from stereocell.read.dicom.frame_kind import KIND_TAGS, FrameKind, kind_of
 from stereocell.read.dicom.frame_offsets import (
     frame_offsets,
@@ -29,6 +29,7 @@ from stereocell.read.dicom.frame_offsets import (
 )
 from stereocell.read.dicom.header_values import find_value, first_item
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
+from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.segmentation import (
     LABELMAP,
     Segmentation,
@@ -164,8 +165,6 @@ def _frames(
     colours = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
     if int(header.get("SamplesPerPixel") or 1) != 1 or colours not in grey:
         raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
-    if "ModalityLUTSequence" in header:
-        raise NoPlaneError("of values by a modality table, not by rescale slope and intercept")
     shared = first_item(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     is_mask = segmentation is not None

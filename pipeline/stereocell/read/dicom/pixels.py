@@ -23,7 +23,7 @@ def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:
     encodings = {frame.encoding for frame in frames}
     if any(encoding.bits == 0 for encoding in encodings):
         return np.dtype(np.float32)
-    return dtype_for((*e.stored_range, e.slope, e.intercept) for e in encodings)
+    return dtype_for(encoding.values_range for encoding in encodings)
 
 
 def decode(
@@ -63,7 +63,7 @@ def decode(
                             frame, encoding = frames[place], frames[place].encoding
                             values = _plane_of(whole, frame)
                             raw = unpack_bits(values, encoding)
-                            planes[place] = rescale(raw, encoding.slope, encoding.intercept, dtype)
+                            planes[place] = _grey_values(raw, encoding, dtype)
                             if has_padding:
                                 mask = is_padding(values, raw, encoding)
                                 padding.add(place, planes[place], mask)
@@ -75,6 +75,18 @@ def decode(
                 ) from None
     padding.fill(planes)
     return planes
+
+
+def _grey_values(raw: NDArray[Any], encoding: Encoding, dtype: np.dtype[Any]) -> NDArray[Any]:
+    if encoding.table is not None:
+        low, high = encoding.stored_range
+        values: NDArray[Any] = encoding.table.apply(
+            low + high - raw if encoding.is_inverted else raw
+        )
+        if encoding.is_inverted:  # the table is for the numbers as they are stored
+            values = int(sum(encoding.table.ends)) - values.astype(np.int64)
+        return values.astype(dtype)
+    return rescale(raw, encoding.slope, encoding.intercept, dtype)
 
 
 def _plane_of(whole: NDArray[Any], frame: Frame) -> NDArray[Any]:

@@ -6,6 +6,7 @@ leave it open the values decide.
 
 from collections.abc import Callable, Sequence
 
+from stereocell.model.counted import agreeing
 from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.value_scale import HOUNSFIELD
 from stereocell.read.statements import Statement, Subject, Trust, settle
@@ -39,8 +40,8 @@ def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
     for frame in frames:
         encoding = frame.encoding
         if encoding.bits:
-            ends = [encoding.slope * value + encoding.intercept for value in encoding.stored_range]
-            reach = min(reach, *ends)
+            low, high, slope, intercept = encoding.values_range
+            reach = min(reach, slope * low + intercept, slope * high + intercept)
         else:
             reach = -float("inf")
     if reach > _AIR_HU:
@@ -92,10 +93,13 @@ def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
             notes.append(
                 f"{name} differs among the images ({low:.4g} to {high:.4g}): each has its own"
             )
-    without = sum(not frame.scale.has_rescale for frame in frames)
+    if by_table := sum(encoding.table is not None for encoding in encodings):
+        notes.append(f"values of {by_table} of {len(frames)} images are by ModalityLUTSequence")
+    without = sum(not f.scale.has_rescale and f.encoding.table is None for f in frames)
     if 0 < without < len(frames):
         notes.append(
-            f"{without} of {len(frames)} images state no rescale: their stored values are taken"
+            f"{without} of {len(frames)} images {agreeing(without, 'states', 'state')} no rescale: "
+            f"{agreeing(without, 'its', 'their')} stored values are taken"
         )
     mapped = next((frame for frame in frames if frame.scale.real_world is not None), None)
     if mapped is None or mapped.scale.real_world is None:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stereocell.model.counted import agreeing, counted
 from stereocell.read.anatomical_axes import plane_name
 from stereocell.read.dicom.contradictions import geometry_notes
 from stereocell.read.dicom.frame import Frame
@@ -199,19 +200,24 @@ def _contrasts(group: Group) -> tuple[str, ...]:
 def _time_notes(points: Points) -> list[str]:
     """Return what is said of frames that are in no whole point in time."""
     if points.duplicates:
-        what = "not all with the same pixels as" if points.differ else "with the same pixels as"
+        what = "the same pixels as"
+        if points.differ:
+            what = agreeing(points.duplicates, "other pixels than", "not all the same pixels as")
         return [
-            f"{points.duplicates} duplicate slices, {what} the one that is taken: the first by "
-            "instance number"
+            f"{counted(points.duplicates, 'duplicate slice')} with {what} the one that is taken: "
+            "the first by instance number"
         ]
     if not points.incomplete:
         return []
     total, places = len(points.whole) + len(points.incomplete), len(points.whole[0])
     counts = ", ".join(str(len(point)) for point in points.incomplete[:4])
     more = ", ..." if len(points.incomplete) > 4 else ""
-    found = f"{len(points.incomplete)} of {total} points in time ({points.attribute})"
+    lacking = len(points.incomplete)
+    found = f"{lacking} of {total} points in time ({points.attribute})"
     reason = f"slices are missing ({counts}{more} of {places} are there)"
-    return [omission(found, reason, "each is a series of `--series list`")]
+    return [
+        omission(found, reason, f"{agreeing(lacking, 'it', 'each')} is a series of `--series list`")
+    ]
 
 
 def _places(group: Group) -> list[list[Frame]]:

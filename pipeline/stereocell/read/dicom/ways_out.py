@@ -101,7 +101,7 @@ _REASONS = (
     ),
     ("deflated", "export the images uncompressed (Explicit VR Little Endian)"),
     (
-        "of values by a modality table",
+        "of values by a damaged modality table",
         "export the images with RescaleSlope and RescaleIntercept",
     ),
     ("cut short", "copy the files again"),

@@ -135,5 +135,7 @@ def _places(
             "files, or tell the names by --pattern"
         )
     if len(places) < len(paths):
-        notes.append(f"{len(paths) - len(places)} files that are named otherwise left out")
+        others = len(paths) - len(places)
+        are = "files that are" if others > 1 else "file that is"
+        notes.append(f"{others} {are} named otherwise left out")
     return places, notes

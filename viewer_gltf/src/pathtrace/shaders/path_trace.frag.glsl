@@ -41,6 +41,7 @@ uniform int uScatters;  // a path is scattered so many times at most ...
 uniform vec3 uBeyond;  // ... and meets this radiance then
 uniform float uAnisotropy;  // Henyey-Greenstein g
 uniform float uSurface;  // 0..1: how readily a gradient makes a surface
+uniform vec4 uContrast;  // factor to the gradients of each channel
 uniform float uShine;  // 0..1: reflection of a surface seen straight on, in 8 % of it
 uniform float uGloss;  // exponent of its lobe
 uniform float uOcclusionReach;  // um
@@ -92,7 +93,7 @@ vec3 withoutZeros(vec3 dir) {
 Scatter chooseScatter(vec3 p, vec3 dir, vec3 albedo, out vec3 weight) {
   Scatter s = Scatter(PHASE, vec3(0.0), vec3(0.0));
   weight = albedo;
-  vec3 gradient = gradientAt(uTexLow + p * uTexPerUm, uTexPerUm, vec4(1.0));
+  vec3 gradient = gradientAt(uTexLow + p * uTexPerUm, uTexPerUm, uContrast);
   float steepness = length(gradient);
   // Kroes et al., equation 9, with the gradient's share of the whole range
   float isSurface = 1.0 - exp(-25.0 * uSurface * uSurface * uSurface * steepness);

@@ -15,6 +15,7 @@ uniform vec3 uTexels;  // of mip level 0
 uniform float uVoxel;  // um: the opacities of the transfer functions hold for a path this long
 uniform float uMinStep;  // um
 uniform vec4 uFloor;  // intensities of each channel up to which its table shows nothing
+uniform vec4 uContrast;  // factor to the gradients of each channel, by which they are shaded
 #ifdef MAXIMUM
 uniform vec4 uWindowLow;  // intensities of each channel that are dark ...
 uniform vec4 uWindowHigh;  // ... and bright
@@ -230,7 +231,9 @@ void main() {
         if (s.a > 0.0) {
 #ifndef UNLIT  // for the benchmark, whose peers are timed without their light
           vec3 gradient = -face;
-          if (t >= uVoxel || face == vec3(0.0)) gradient = gradientAt(p, texPerUm, shares);
+          if (t >= uVoxel || face == vec3(0.0)) {
+            gradient = gradientAt(p, texPerUm, uContrast * shares);
+          }
           s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
 #endif
           sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);

@@ -1,0 +1,29 @@
+import { describe, expect, it } from "vitest";
+import { ENTRIES, edgeContrast } from "./transfer_luts";
+
+/** A table whose opacity rises evenly from one entry to another, and stays. */
+function risingTable(from: number, to: number): Uint8Array {
+  const table = new Uint8Array(4 * ENTRIES);
+  for (let i = 0; i < ENTRIES; i++) {
+    table[4 * i + 3] = 200 * Math.min(1, Math.max(0, (i - from) / (to - from)));
+  }
+  return table;
+}
+
+describe("the contrast that edges are shaded by", () => {
+  it("is none where opacity rises gently", () => {
+    expect(edgeContrast(risingTable(60, 200))).toBe(1);
+  });
+
+  it("grows as opacity rises within fewer intensities, three times at most", () => {
+    const some = edgeContrast(risingTable(60, 90));
+    expect(some).toBeGreaterThan(1.5);
+    expect(edgeContrast(risingTable(60, 75))).toBeGreaterThan(some);
+    expect(edgeContrast(risingTable(60, 61))).toBe(3);
+  });
+
+  it("is none of a table that shows everything, or nothing", () => {
+    expect(edgeContrast(new Uint8Array(4 * ENTRIES).fill(255))).toBe(1);
+    expect(edgeContrast(new Uint8Array(4 * ENTRIES))).toBe(1);
+  });
+});
