@@ -158,6 +158,38 @@ def test_names_of_a_field_that_disagree_are_reported_and_read_as_itk_does(
     np.testing.assert_allclose(dataset.placement, expected.placement)
 
 
+def test_a_field_that_is_there_twice_is_reported_and_read_as_itk_does(tmp_path: Path) -> None:
+    path = write_meta(tmp_path / "a.mha", "ElementSpacing = 1 1 2", "ElementSpacing = 1 1 5")
+    dataset = read.open(path)
+    spacing_um = tuple(1000 * mm for mm in sitk.ReadImage(str(path)).GetSpacing())
+    assert sorted(dataset.levels[0].spacing_um) == sorted(spacing_um) == [1000, 1000, 5000]
+    (note,) = [note for note in dataset.notes if note.startswith("field ElementSpacing")]
+    assert "its last line states 1, 1, 5, an earlier line states 1, 1, 2" in note
+
+
+def test_a_field_that_is_there_twice_with_one_value_needs_no_note(tmp_path: Path) -> None:
+    lines = ("TransformMatrix = 1 0 0 0 1 0 0 0 1", "ElementSpacing = 1 1 2")
+    assert read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1.0 1 2")).notes == ()
+
+
+def test_a_spacing_that_nrrd_states_twice_is_refused(tmp_path: Path) -> None:
+    lines = ("space: LPS", "spacings: 1 1 2", "spacings: 1 1 5")
+    with pytest.raises(SourceError, match="spacings"):
+        read.open(write_nrrd(tmp_path / "a.nrrd", *lines))
+
+
+def test_a_scale_in_the_matrix_is_reported_and_followed_as_itk_does(tmp_path: Path) -> None:
+    lines = ("TransformMatrix = 2 0 0 0 2 0 0 0 2", "ElementSpacing = 1 1 2")
+    path = write_meta(tmp_path / "a.mha", *lines)
+    dataset = read.open(path)
+    image = sitk.ReadImage(str(path))
+    origin, end = (image.TransformIndexToPhysicalPoint(at) for at in ((0, 0, 0), (0, 0, 1)))
+    assert max(dataset.levels[0].spacing_um) == 1000 * (end[2] - origin[2]) == 4000
+    (note,) = spacing_notes(dataset)
+    assert "TransformMatrix times ElementSpacing states 2, 2, 4 mm" in note
+    assert "ElementSpacing alone states 1, 1, 2 mm" in note
+
+
 def test_names_of_a_field_that_agree_need_no_note(tmp_path: Path) -> None:
     lines = ("TransformMatrix = 1 0 0 0 1 0 0 0 1", "Rotation = 1.0 0 0 0 1 0 0 0 1")
     lines += ("ElementSpacing = 1 1 1", "ElementSize = 1.0 1.0 1.0")

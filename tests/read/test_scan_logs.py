@@ -47,6 +47,12 @@ def test_sizes_that_disagree_are_noted(tmp_path: Path) -> None:
     assert "step from slice to slice: the log states 2 pixels" in notes
 
 
+def test_a_size_that_a_log_states_twice_is_noted(tmp_path: Path) -> None:
+    dataset = scan(tmp_path / "s", ".bmp", LOG.format("", "Pixel Size (um)=5\nPixel Size (um)=9\n"))
+    assert dataset.levels[0].spacing_um == pytest.approx((9, 9, 9))
+    assert "of the log: its last line states 9, an earlier line states 5" in " ".join(dataset.notes)
+
+
 def test_numbers_of_slices_count_lines_of_the_camera(tmp_path: Path) -> None:
     log = LOG.format("", "Pixel Size (um)=10\n")
     dataset = scan(tmp_path / "s", ".bmp", log, step=5)

@@ -283,3 +283,72 @@ def test_a_plain_tiff_is_one_series(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--series: found 2, expected 1, the only one"):
         read.open(path, series=2)
     np.testing.assert_array_equal(voxels_of(path, series=1), BODY)
+
+
+@pytest.mark.parametrize(("unit", "is_told"), [("CENTIMETER", True), ("INCH", False)])
+def test_the_resolution_in_the_tags_is_compared_with_the_ome_xml(
+    tmp_path: Path, unit: str, is_told: bool
+) -> None:
+    per_um = 1e4 if unit == "CENTIMETER" else 25400.0
+    same = (per_um / 0.25, per_um / 0.2)  # along x and y
+    path = write_ome(tmp_path / "a.ome.tif", BODY, resolution=same, resolutionunit=unit)
+    assert read.open(path).notes == ()
+    half = (per_um / 0.25, per_um / 0.1)
+    path = write_ome(tmp_path / "b.ome.tif", BODY, resolution=half, resolutionunit=unit)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(UM)
+    told = "voxel spacing along y: PhysicalSize of the OME-XML states 0.2 um"
+    assert [note.startswith(told) for note in dataset.notes] == [True] * is_told
+
+
+def test_the_resolution_in_the_tags_is_compared_with_the_microscope_s(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    plane = {"id": "spatial-calibration-state", "type": "bool", "value": "true"}
+    sides = [("units", "string", "um"), ("x", "float", "0.25"), ("y", "float", "0.2")]
+    props = [plane, *({"id": f"spatial-calibration-{n}", "type": t, "value": v}
+                      for n, t, v in sides)]  # fmt: skip
+    texts = (" ".join(f'{key}="{value}"' for key, value in one.items()) for one in props)
+    text = "".join(f"<prop {each}/>" for each in texts)
+    xml = f"<MetaData><PlaneInfo>{text}</PlaneInfo></MetaData>"
+    tifffile.imwrite(
+        path, BODY, description=xml, metadata=None, photometric="minisblack",
+        resolution=(1e4 / 0.5, 1e4 / 0.2), resolutionunit="CENTIMETER", software="MetaSeries",
+    )  # fmt: skip
+    notes = read.open(path, spacing_um=UM).notes
+    assert any("XResolution states 0.5 um" in note for note in notes)
+    assert not any("YResolution" in note for note in notes)
+
+
+def test_a_field_that_imagej_s_description_holds_twice_is_reported(tmp_path: Path) -> None:
+    lines = ["ImageJ=1.54f", "images=16", "slices=16", "unit=um", "spacing=0.5", "spacing=2"]
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(
+        path, BODY, description="\n".join(lines), metadata=None, resolution=(4.0, 5.0),
+        photometric="minisblack",
+    )  # fmt: skip
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx((2.0, 0.2, 0.25))
+    (note,) = dataset.notes
+    assert "spacing of ImageJ's description: its last line states 2, an earlier" in note
+
+
+@pytest.mark.parametrize(
+    ("z", "y", "x", "told"),
+    [
+        ("1", "0.5", "0.0005", "pixels 1000 times as long along y as along x"),
+        ("1000", "0.5", "0.5", "slices 1e+03 um apart along z of pixels of 0.5 um"),
+        ("0.001", "0.5", "0.5", "slices 0.001 um apart"),
+        ("100", "0.5", "0.5", ""),
+        ("1", "5", "0.5", ""),
+    ],
+)
+def test_voxels_far_longer_along_one_axis_are_doubted(
+    tmp_path: Path, z: str, y: str, x: str, told: str
+) -> None:
+    sizes = {f"PhysicalSize{axis}": float(um) for axis, um in zip("ZYX", (z, y, x), strict=True)}
+    path = tmp_path / "a.ome.tif"
+    tifffile.imwrite(path, BODY, metadata={"axes": "ZYX", **sizes})
+    notes = read.open(path).notes
+    assert len(notes) == bool(told)
+    assert all(told in note and "another one?" in note for note in notes)
+    assert read.open(path, spacing_um=UM).notes == ()

@@ -30,6 +30,7 @@ from stereocell.read.metaimage_fields import (
     numbers,
     read_header,
     require_dimensions,
+    scale_notes,
     side_notes,
     unit_mm,
     value_notes,
@@ -132,7 +133,9 @@ def _affine(
     per, unit_notes = unit_mm(fields)
     affine[:3] *= per
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
-    notes = [*header.notes, *unit_notes, *side_notes(fields, turned[:3, :3].T)]
+    axes = turned[:3, :3].T
+    notes = [*header.notes, *unit_notes, *side_notes(fields, axes)]
+    notes += scale_notes(spacing[:3], axes, per)
     return affine, (*notes, *value_notes(where, fields), *size_notes(lengths.tolist(), shape[:3]))
 
 

@@ -1,11 +1,13 @@
 """The fields of a MetaImage header that are read, under all their names, and what they contradict.
 
 A place, a matrix, a size and the byte order each have synonyms. Where several are there, the one is
-taken that ITK takes, which SimpleITK's reading of such files showed.
+taken that ITK takes, which SimpleITK's reading of such files showed. ITK also takes the last line
+of a field that is there twice, and keeps the scale of a matrix whose rows are longer than 1.
 
 References: https://itk.org/Wiki/ITK/MetaIO/Documentation
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
+from stereocell.read.repeated_fields import settle_repeats
 from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
@@ -56,7 +59,7 @@ def read_header(location: Location) -> Header:
     """Return the header of a file. Raises SourceError where it has no end."""
     with one_line(location.shown, f"a {NAME} file"), open(location.path, "rb") as file:
         content = file.read(_MAX_HEADER)
-    stated: dict[str, str] = {}
+    stated: list[tuple[str, str]] = []
     end = 0
     for line in content.splitlines(keepends=True):
         end += len(line)
@@ -64,11 +67,12 @@ def read_header(location: Location) -> Header:
         if not mark:
             break
         name = key.strip()
-        if name in _READ and name not in stated:
-            stated[name] = value.strip()
+        if name in _READ:
+            stated.append((name, value.strip()))
         if name == "ElementDataFile":
-            fields = {name: text for name, text in stated.items() if name not in _FIELD_OF}
-            return Header(fields, end, _settle_names(stated, fields))
+            texts, notes = settle_repeats(stated)
+            fields = {name: text for name, text in texts.items() if name not in _FIELD_OF}
+            return Header(fields, end, (*notes, *_settle_names(texts, fields)))
     raise SourceError(
         f"{location.shown}: header: no ElementDataFile in {len(content)} bytes, "
         f"expected {NAME} (.mha, .mhd)"
@@ -116,6 +120,29 @@ def unit_mm(fields: dict[str, str]) -> tuple[float, tuple[str, ...]]:
     reason = f"since DistanceUnits {text!r:.20} is none of mm, um and cm"
     subject = Subject("unit of length", remedy="--spacing-um z,y,x replaces it")
     return 1.0, settle(subject, [Statement("mm", reason, Trust.ASSUMED)]).notes
+
+
+def scale_notes(
+    spacing: Sequence[float], axes: NDArray[np.float64], mm_per_unit: float
+) -> tuple[str, ...]:
+    """Return a note where the matrix has a scale, which multiplies the spacing.
+
+    axes  (3, 3): a column for each stored axis
+    """
+    lengths = np.linalg.norm(axes, axis=0) * spacing * mm_per_unit
+    if not np.isfinite(lengths).all() or not lengths.all():
+        return ()
+    subject = Subject(
+        "voxel spacing along the stored axes", "mm", remedy="--spacing-um z,y,x replaces it"
+    )
+    own = tuple(float(size) * mm_per_unit for size in spacing)
+    scaled = "TransformMatrix times ElementSpacing"
+    statements = [
+        Statement(tuple(lengths.tolist()), scaled),
+        Statement(own, "ElementSpacing alone", Trust.REPEATED),
+    ]
+    notes = settle(subject, statements).notes
+    return tuple(f"{note} (ITK places voxels so)" for note in notes)
 
 
 def side_notes(fields: dict[str, str], axes: NDArray[np.float64]) -> tuple[str, ...]:

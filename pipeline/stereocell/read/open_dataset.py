@@ -14,6 +14,7 @@ from stereocell.read.dataset import ChannelInfo, Dataset, VoxelArray
 from stereocell.read.image import Image, printable
 from stereocell.read.inverted_array import InvertedArray
 from stereocell.read.level_spacing import settle_levels
+from stereocell.read.plausible_size import ratio_notes
 from stereocell.read.readers import find_reader
 from stereocell.read.remarks import cast_note
 from stereocell.read.spacing import Triple, levels_of
@@ -75,13 +76,16 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     finest = image.arrays[0]
     _check_arrays(where, image)
     grids, level_notes = settle_levels(image.grids)
+    levels = levels_of(grids, spacing_um, where)
+    if spacing_um is None:
+        level_notes += ratio_notes(levels[0].spacing_um, image.acquired.axis)
     given = [printable(name or "") for name in image.names]
     channels = map(ChannelInfo, _unique(given), image.colors, map(bool, given))
     return Dataset(
         source=location.source,
         name=image.title or printable(location.name) or "dataset",
         dtype=built_dtype(finest.array.dtype) or np.dtype(finest.array.dtype),
-        levels=levels_of(grids, spacing_um, where),
+        levels=levels,
         channels=tuple(channels),
         time_points=finest.size("t"),
         time=time,

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stereocell.read.planes.files import join
+from stereocell.read.repeated_fields import settle_repeats
 from stereocell.read.spacing import PartialTriple
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
@@ -32,12 +33,14 @@ class ScanLog:
     statements  on the size of a pixel, um
     step        pixels from slice to slice
     sections    number of slices that were written; None: not stated
+    notes       fields that the log states twice
     """
 
     path: str
     statements: tuple[Statement, ...]
     step: float
     sections: int | None = None
+    notes: tuple[str, ...] = ()
 
 
 def find_log(folder: str, image: str) -> ScanLog | None:
@@ -84,7 +87,13 @@ def with_log(
     sizes = (pixel * step.number, pixel, pixel)
     z, y, x = (own if own is not None else size for own, size in zip(stated_um, sizes, strict=True))
     told = f"the voxel size is that of the scanner's log: {pixel:g} um"
-    return (z, y, x), [told, *settled.notes, *step.notes, *_missing_slices(log, len(slices))]
+    return (z, y, x), [
+        told,
+        *log.notes,
+        *settled.notes,
+        *step.notes,
+        *_missing_slices(log, len(slices)),
+    ]
 
 
 def _missing_slices(log: ScanLog, slices: int) -> list[str]:
@@ -98,7 +107,7 @@ def _missing_slices(log: ScanLog, slices: int) -> list[str]:
 def _read(path: str) -> ScanLog:
     with open(path, encoding="latin-1", errors="replace") as file:
         text = file.read(_MAX_BYTES)
-    section, numbers = "", {}
+    section, lines = "", []
     for line in text.splitlines():
         found = _LINE.fullmatch(line)
         if found is None:
@@ -106,7 +115,15 @@ def _read(path: str) -> ScanLog:
         if found["section"] is not None:
             section = found["section"].strip().lower()
         elif (number := _positive(found["value"])) is not None:
-            numbers[section, found["key"].strip().lower()] = number
+            key = (section, found["key"].strip().lower())
+            if key in (*_SIZES, _STEP):
+                lines.append((_named(key), str(number)))
+    texts, notes = settle_repeats(lines, "the log")
+    numbers = {
+        key: float(texts[_named(key)])
+        for key in (*_SIZES, _STEP, _SECTIONS)
+        if _named(key) in texts
+    }
     statements = [
         Statement(numbers[key], f"[{key[0].capitalize()}] of the log", trust)
         for key, trust in _SIZES.items()
@@ -117,8 +134,14 @@ def _read(path: str) -> ScanLog:
         path,
         tuple(statements),
         numbers.get(_STEP, 1.0),
-        round(sections) if sections is not None else None,
+        sections=round(sections) if sections is not None else None,
+        notes=notes,
     )
+
+
+def _named(key: tuple[str, str]) -> str:
+    """Return a field with its section, as the log has them."""
+    return f"[{key[0].capitalize()}] {key[1]}"
 
 
 def _positive(text: str) -> float | None:

@@ -36,6 +36,7 @@ from stereocell.read.tiff.ome_images import Chosen
 from stereocell.read.tiff.ome_pages import require_alike, require_described, require_files
 from stereocell.read.tiff.open_file import MAX_PLANES, files_of, note_absent, require_pages
 from stereocell.read.tiff.orientation import turn_of
+from stereocell.read.tiff.stated import tag_notes
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -85,7 +86,9 @@ def read_ome(
     image = _image(where, images, arrays, page=series.keyframe, stack=stack)
     image, depth_notes = _with_depth(image, root)
     _, turn_notes = turn_of(series.keyframe, is_applied=False)
-    described = (*depth_notes, *turn_notes, *_type_notes(root, series.keyframe))
+    _, y, x = images[0].spacing_um
+    size_notes = tag_notes(tiff, (y, x), "PhysicalSize of the OME-XML")
+    described = (*size_notes, *depth_notes, *turn_notes, *_type_notes(root, series.keyframe))
     notes = (*image.notes, *described, *_undescribed(tiff, chosen.others), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))
 

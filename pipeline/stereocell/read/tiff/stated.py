@@ -16,14 +16,22 @@ from tifffile import TiffFile
 
 from stereocell.model.color import linear_color
 from stereocell.read.image import Color
+from stereocell.read.repeated_fields import settle_repeats
 from stereocell.read.spacing import PartialTriple, um_per
 from stereocell.read.stated_numbers import number_of
+from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.read.tiff.gdal import gdal_scale
 from stereocell.read.value_scale import ValueScale
 
 _CENTIMETRE = 3  # TIFF tag ResolutionUnit
 _ESCAPED = re.compile(r"\\u([0-9A-Fa-f]{4})")
 _MAX_NAME = 60  # characters; longer texts are no names of channels
+# fields of ImageJ's description that are read
+_IMAGEJ_FIELDS = {
+    "spacing", "unit", "xunit", "yunit", "zunit", "images", "channels", "slices", "frames",
+    "c0", "c1", "cf", "vunit",
+}  # fmt: skip
+_PIXEL = Subject("voxel spacing", "um", 0.01, "--spacing-um z,y,x replaces it")
 _STRAIGHT, _UNCALIBRATED = 0, (20, 21)  # kinds of ImageJ's functions, as `cf` has them
 _NOTHING: PartialTriple = (None, None, None)
 
@@ -56,14 +64,32 @@ def stated_by(tiff: TiffFile) -> Stated:
     else:
         stated = Stated()
     z, y, x = stated.spacing_um
+    notes = tag_notes(tiff, (y, x), "the program's metadata") if not tiff.is_imagej else ()
     if y is None and x is None:
         _, y, x = _by_tags(tiff)
-    stated = replace(stated, spacing_um=(z, y, x))
+    stated = replace(stated, spacing_um=(z, y, x), notes=(*stated.notes, *notes))
     by_gdal = gdal_scale(tiff.pages.first)
     if not by_gdal.notes:
         return stated
     values = by_gdal if stated.values.is_plain else stated.values
     return replace(stated, values=values, notes=(*stated.notes, *by_gdal.notes))
+
+
+def tag_notes(
+    tiff: TiffFile, pixel_um: tuple[float | None, float | None], place: str
+) -> tuple[str, ...]:
+    """Compare the pixel (y, x) that metadata state with the tags, where they are per centimetre.
+
+    place  of `pixel_um`, for notes
+    """
+    notes: list[str] = []
+    _, *by_tags = _by_tags(tiff)
+    for axis, own, tag in zip("yx", pixel_um, by_tags, strict=True):
+        if own and tag:
+            name = f"the TIFF tag {axis.upper()}Resolution"
+            statements = [Statement(own, place), Statement(tag, name, Trust.REPEATED)]
+            notes += settle(replace(_PIXEL, name=f"{_PIXEL.name} along {axis}"), statements).notes
+    return tuple(notes)
 
 
 def _imagej(tiff: TiffFile) -> Stated:
@@ -78,8 +104,15 @@ def _imagej(tiff: TiffFile) -> Stated:
     luts = meta.get("LUTs")
     colors = tuple(_lut_color(lut) for lut in luts) if isinstance(luts, list) else ()
     values, notes = _imagej_calibration(meta)
-    notes += _label_notes(meta)
+    notes += (*_label_notes(meta), *_repeat_notes(tiff))
     return Stated((z, y, x), _imagej_names(meta), colors, hint, values, notes)
+
+
+def _repeat_notes(tiff: TiffFile) -> tuple[str, ...]:
+    """Return a note for each field of ImageJ's description with lines that disagree."""
+    pairs = (line.partition("=") for line in tiff.pages.first.description.splitlines())
+    known = [(key.strip(), text.strip()) for key, _, text in pairs if key.strip() in _IMAGEJ_FIELDS]
+    return settle_repeats(known, "ImageJ's description")[1]
 
 
 def _imagej_calibration(meta: Mapping[str, Any]) -> tuple[ValueScale, tuple[str, ...]]:
