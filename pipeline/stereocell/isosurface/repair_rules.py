@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 from stereocell.isosurface.components import find_components
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.thin_structures import count_thin
+from stereocell.model.lattice import Step
 from stereocell.model.settings import AUTO
 from stereocell.model.spacing import Spacing
 
@@ -37,6 +39,8 @@ class ComponentSums:
     """Sums over a tile's connected components: over all of them, and over those the rule keeps.
 
     voxels, largest  of all components, specks included; of the largest
+    large_voxels     of all components but specks
+    thin_voxels      those of them that are too thin for the planes that carry the surface
     """
 
     count: int
@@ -47,10 +51,15 @@ class ComponentSums:
     kept_diagonal_um: float
     voxels: int
     largest: int
+    large_voxels: int
+    thin_voxels: int
 
 
 def sum_components(
-    inside: NDArray[np.bool_], spacing_um: Spacing, min_diagonal_um: float
+    inside: NDArray[np.bool_],
+    spacing_um: Spacing,
+    min_diagonal_um: float,
+    step: Step = (1, 1, 1),
 ) -> ComponentSums:
     """Return the sums over the connected components of {field > iso-value}.
 
@@ -58,13 +67,14 @@ def sum_components(
     spacing_um       (z, y, x)
     min_diagonal_um  smaller components are left out: noise has more of them than a tile has bodies,
                      so they would decide the means
+    step             voxels (z, y, x) between planes that carry the surface
     """
     components = find_components(inside, spacing_um, 26)
     large = components.diagonal_um >= min_diagonal_um
     faces, diagonal = components.faces()[large], components.diagonal_um[large]
     voxels, largest = int(components.voxels.sum()), int(components.voxels.max(initial=0))
     if not len(faces):
-        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest)
+        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest, 0, 0)
     kept = (faces >= SHARE * faces.mean()) & (diagonal >= SHARE * diagonal.mean())
     return ComponentSums(
         len(faces),
@@ -75,6 +85,8 @@ def sum_components(
         float(diagonal[kept].sum()),
         voxels,
         largest,
+        int(components.voxels[large].sum()),
+        0 if step == (1, 1, 1) else count_thin(components.mask_of(large), step),
     )
 
 
