@@ -1,5 +1,6 @@
 """How a surface covers the source's voxels above its level, beside what filters removed of them."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy import ndimage
 from skimage.measure import marching_cubes
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.surface_cover import REMEDY
 from stereocell.building.unit_files import cover_of, load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.cover import measure_cover
@@ -107,10 +109,25 @@ def test_a_surface_that_loses_sheets_says_so_everywhere(
     sheets = above[:, :, 40:].sum()
     assert cover.missing == pytest.approx(sheets / above.sum(), abs=0.03)  # and the ball's skin
     assert f"its surface leaves out {cover.missing:.0%} of the source's voxels" in units
+    assert REMEDY in " ".join(units.split())
     assert cover.words in deep
     titles = {remark.title: remark.lines for remark in find_remarks(gather(OutFolder(out)))}
     (lines,) = (lines for title, lines in titles.items() if "leaves out more than 5%" in title)
     assert cover.words in lines[0]
+
+
+@pytest.mark.slow
+def test_the_remedy_that_the_note_names_keeps_thin_sheets_and_specks(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = re.findall(r"[a-z_]+ = [0-9.]+", REMEDY)
+    remedy = tmp_path / "remedy.toml"
+    remedy.write_text("\n".join(["[surface]", *settings]))
+    assert len(settings) == 3
+    level = ("--iso-value", f"Channel0={LEVEL:g}", "--config", str(remedy))
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--grid", "1x1", *level]) == 0
+    assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
+    assert "leaves out" not in capsys.readouterr().err
 
 
 @pytest.mark.slow

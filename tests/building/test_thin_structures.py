@@ -9,11 +9,15 @@ import trimesh
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.settings import load as load_settings
 from stereocell.building.survey_file import read_survey
 from stereocell.building.unit_files import cover_of, load_lods, load_record
 from stereocell.cli.__main__ import main
+from stereocell.filters.denoise import denoise
+from stereocell.filters.noise import NoiseSample, find_max_shift
 from stereocell.meshes.validity import find_defects
 from stereocell.model.unit import Cover
+from stereocell.model.volume import Volume
 from support.meshes import welded
 
 SIDE, SPACING_MM = 64, 0.6
@@ -88,6 +92,25 @@ def test_plates_of_one_voxel_stay_on_any_plane(
     said = " ".join(capsys.readouterr().err.split())
     assert "too thin for planes 1400 um apart (surface.grid_um)" in said
     assert "all planes carry its surface" in said
+
+
+@pytest.mark.parametrize("preset", ["ct", "ct-bone"])
+def test_thin_bone_in_noisy_coarse_voxels_passes_the_filters_of_ct_presets(preset: str) -> None:
+    """Lines of a voxel of 200 to 900 HU above tissue, as ribs are in voxels of 3 mm."""
+    rng = np.random.default_rng(0)
+    voxels = np.full((24, 96, 96), TISSUE)
+    for column in range(6, 92, 5):
+        z = np.clip(np.cumsum(rng.integers(-1, 2, 80)) + rng.integers(6, 18), 2, 21)
+        voxels[z, np.arange(8, 88), column] = TISSUE + rng.uniform(200, 900, 80)
+    voxels += rng.normal(0, 29, voxels.shape)
+    sample = NoiseSample()
+    sample.add(voxels)
+    surface = load_settings(preset, None, flags={}).surface
+    shift = find_max_shift(sample.deviation(), surface.max_shift, None)
+    found = denoise(Volume(voxels.astype(np.float32), (3000.0, 3000.0, 3000.0)), 3000.0, shift)
+    bone = voxels > 300
+    assert bone.sum() > 1000
+    assert (found > 300)[bone].mean() > 0.95
 
 
 @pytest.mark.slow
