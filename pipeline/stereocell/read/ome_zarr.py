@@ -329,11 +329,13 @@ def _spatial(
     axes: tuple[str, ...], units: tuple[float | None, ...], values: Sequence[float] | None
 ) -> PartialTriple:
     """Return lengths (z, y, x), um; None: not stated, or without a unit of length."""
-    picked = []
+    picked: list[float | None] = []
     for axis in "zyx":
         unit = units[axes.index(axis)]
-        is_length = unit is not None and values is not None
-        picked.append(values[axes.index(axis)] * unit if is_length else None)
+        if unit is None or values is None:
+            picked.append(None)
+        else:
+            picked.append(values[axes.index(axis)] * unit)
     z, y, x = picked
     return z, y, x
 

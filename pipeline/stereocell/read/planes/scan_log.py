@@ -116,7 +116,7 @@ def _read(path: str) -> ScanLog:
             section = found["section"].strip().lower()
         elif (number := _positive(found["value"])) is not None:
             key = (section, found["key"].strip().lower())
-            if key in (*_SIZES, _STEP):
+            if key in (*_SIZES, _STEP, _SECTIONS):
                 lines.append((_named(key), str(number)))
     texts, notes = settle_repeats(lines, "the log")
     numbers = {
