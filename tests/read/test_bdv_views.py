@@ -228,7 +228,7 @@ def test_setups_of_one_channel_are_not_overlaid(tmp_path: Path) -> None:
 def test_setups_without_an_xml_are_channels_with_a_note(tmp_path: Path, kind: str) -> None:
     write(tmp_path, [{"body": BODY, "tile": 0}, {"body": BODY, "tile": 1}], kind=kind).unlink()
     source = tmp_path / ("a.h5" if kind == "hdf5" else "a.n5")
-    with pytest.raises(SourceError, match="BigDataViewer's XML has it, which is not beside"):
+    with pytest.raises(SourceError, match="states it in an XML, and none lies beside"):
         read.open(source)
     dataset = read.open(source, spacing_um=(0.5, 0.2, 0.2))
     assert "whether they are tiles, angles or channels" in dataset.notes[0]
@@ -273,6 +273,42 @@ def test_channels_that_are_registered_apart_are_noted(tmp_path: Path) -> None:
     dataset = read.open(write(tmp_path, setups))
     assert len(dataset.channels) == 2
     assert any("differ by up to 3 voxels" in note for note in dataset.notes)
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "n5"])
+def test_levels_that_one_channel_lacks_are_left_out(tmp_path: Path, kind: str) -> None:
+    setups = [{"body": BODY, "channel": channel} for channel in (0, 1)]
+    path = write(tmp_path, setups, kind=kind)
+    half = BODY[::2, ::2, ::2]
+    if kind == "hdf5":
+        with h5py.File(tmp_path / "a.h5", "a") as file:
+            file["t00000/s00/1/cells"] = half.astype(np.int16)
+            del file["s00/resolutions"]
+            file["s00/resolutions"] = [[1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]
+    else:
+        write_n5(tmp_path / "a.n5" / "setup0" / "timepoint0" / "s1", half)
+    dataset = read.open(path)
+    assert (len(dataset.levels), len(dataset.channels)) == (1, 2)
+    assert any("left out: 1 of 2 levels of detail" in note for note in dataset.notes)
+
+
+@pytest.mark.parametrize(
+    ("loader", "way_out"),
+    [
+        ('<zarr type="relative">a.ome.zarr</zarr>', "name an image in it, as a.ome.zarr/IMAGE"),
+        ("<files/>", "name the image files themselves"),
+    ],
+)
+def test_other_containers_are_refused_with_a_way_out(
+    tmp_path: Path, loader: str, way_out: str
+) -> None:
+    path = write(tmp_path, [{"body": BODY}])
+    (tmp_path / "a.ome.zarr").mkdir()
+    (tmp_path / "a.ome.zarr" / ".zgroup").write_text('{"zarr_format": 2}')
+    text = path.read_text("utf-8").replace('<file type="relative">a.h5</file>', loader)
+    path.write_text(text, "utf-8")
+    with pytest.raises(SourceError, match=way_out):
+        read.open(path)
 
 
 def test_a_registration_without_a_unit_is_a_hint(tmp_path: Path) -> None:

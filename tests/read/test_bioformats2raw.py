@@ -42,7 +42,8 @@ def container(folder: Path, voxels: list[Any], pixels: list[str], annotations: s
     (folder / "OME").mkdir()
     (folder / "OME" / "METADATA.ome.xml").write_text(
         f'<OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06">{images}'
-        f"<StructuredAnnotations>{annotations}</StructuredAnnotations></OME>"
+        f"<StructuredAnnotations>{annotations}</StructuredAnnotations></OME>",
+        "utf-8",
     )
     return folder
 

@@ -154,6 +154,21 @@ def test_a_czi_of_rgb_or_of_one_plane_is_refused(tmp_path: Path) -> None:
 # LIF
 
 
+def test_lif_whose_planes_were_taken_downwards_is_noted(tmp_path: Path) -> None:
+    path = write_lif(tmp_path / "a.lif", {"a": ("ZYX", f_phantom())})
+    assert read.open(path).notes == ()
+    upwards, downwards = (
+        f'DimID="3" NumberOfElements="16" Origin="0" Length="{length}"'.encode("utf-16-le")
+        for length in ("7.5e-06", "-7.5e-6")
+    )
+    content = path.read_bytes()
+    assert upwards in content
+    path.write_bytes(content.replace(upwards, downwards))
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert "place along z falls from 0 to -7.5 um" in dataset.notes[0]
+
+
 @pytest.mark.parametrize("axes", ["TCZYX", "CTZYX", "TZCYX", "YCTZX"])
 def test_lif_has_its_axes_names_and_colours(tmp_path: Path, axes: str) -> None:
     tczyx = five(f_phantom())

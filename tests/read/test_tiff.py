@@ -112,7 +112,7 @@ def test_labels_of_slices_are_no_names(tmp_path: Path, labels: list[str]) -> Non
         ({"unit": "um"}, "--spacing-um z,0.25,0.2"),
         ({"unit": "pixel", "spacing": 2.0}, "voxel size: not found with a unit of length"),
         ({"spacing": 2.0}, "voxel size: not found with a unit of length"),
-        ({"unit": "um", "spacing": -2.0}, "voxel size z of level 0: found -2 um"),
+        ({"unit": "um", "spacing": 0.0}, "voxel size z of level 0: found 0 um"),
     ],
 )
 def test_imagej_s_spacing_in_part(tmp_path: Path, metadata: dict[str, Any], told: str) -> None:

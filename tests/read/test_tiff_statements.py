@@ -136,6 +136,25 @@ def test_a_calibration_of_imagej_is_applied(
     assert all(told in note for note in notes)
 
 
+def test_a_negative_depth_of_imagej_is_a_depth(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    metadata = {"axes": "ZYX", "spacing": -0.5, "unit": "um"}
+    tifffile.imwrite(path, BODY, imagej=True, resolution=(4.0, 5.0), metadata=metadata)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx((0.5, 0.2, 0.25))
+    assert "ImageJ states -0.5 um" in dataset.notes[0]
+
+
+def test_pages_of_another_type_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    with tifffile.TiffWriter(path) as writer:
+        for z, plane in enumerate(BODY):
+            page = plane if z < 8 else (plane // 8).astype(np.uint8)
+            writer.write(page, metadata=None, photometric="minisblack")
+    notes = read.open(path, spacing_um=UM).notes
+    assert any("8 of 16 pages" in note and "uint8" in note for note in notes)
+
+
 def test_labels_that_name_channels_among_the_slices_are_noted(tmp_path: Path) -> None:
     labels = [f"c:{c}/2 z:{z}/8 - a.nd2" for z in range(1, 9) for c in (1, 2)]
     for given, is_told in ((labels, True), ([f"z:{z}/16" for z in range(16)], False)):

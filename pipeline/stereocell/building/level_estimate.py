@@ -49,6 +49,7 @@ SHARE, BOUNDS = 1 / 12, (1_200_000, 3_000_000)
 LEAST = 200_000  # voxels of one channel, however many there are
 MARGIN = 0.1  # of a confidence by blocks: an estimate below the bound by less is not called unsure
 MAX_CHANNELS = 12  # channels that are looked at
+PASSES = 3  # that find the background; all six find nearly the same levels
 BLOCK = (12, 40, 40)  # voxels (slice, row, column) of a block
 
 
@@ -142,6 +143,7 @@ def _window(
             spacing_um=spacing,
             block_um=float(surface.background_um),
             padding=padding if padding.any() else None,
+            passes=PASSES,
         )
     statistics = find_statistics(
         voxels, task.settings.window, background=background, window=task.window

@@ -36,6 +36,7 @@ def find_background(
     spacing_um: Spacing,
     block_um: float,
     padding: NDArray[np.bool_] | None = None,
+    passes: int = PASSES,
 ) -> LatticeField:
     """Return the background of a channel, in voxel values.
 
@@ -44,6 +45,7 @@ def find_background(
     spacing_um  (z, y, x), of the region's level
     block_um    aim for the edge of a block; knots lie at the blocks' centres and at the ends
     padding     bool (z, y, x), voxels of the field that take no part; None: all do
+    passes      fewer are enough for an estimate
     """
     blocks = [
         max(1, min(n, ceil(size * step / block_um - 0.25)))
@@ -56,7 +58,7 @@ def find_background(
     z, y, x = (tuple((a + b - 1) / 2 for a, b in pairwise(edge.tolist())) for edge in edges)
     inner = np.zeros(blocks)
     found = LatticeField((z, y, x), inner)
-    for _ in range(PASSES):
+    for _ in range(passes):
         knots = np.full(blocks, np.nan)
         for place in product(*(range(count) for count in blocks)):
             sides = [(int(e[i]), int(e[i + 1])) for e, i in zip(edges, place, strict=True)]

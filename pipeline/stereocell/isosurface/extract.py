@@ -14,9 +14,6 @@ algorithm", IEEE LDAV 2015. doi:10.1109/LDAV.2015.7348069
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
 from stereocell.kernels.gradients import move_off_zero
 from stereocell.kernels.slopes import find_downhill
@@ -143,6 +140,11 @@ def _least_on_plane(
 
 def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Return points (x, y, z) in lattice units and triangles of values = 0."""
+    # VTK takes a tenth of a second to import, and a plan extracts no surface
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+
     image = vtkImageData()
     image.SetDimensions(*values.shape[::-1])
     scalars = np.ascontiguousarray(values).ravel()  # VTK borrows the array, which must stay alive

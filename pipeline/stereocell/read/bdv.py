@@ -40,7 +40,8 @@ def _container_of(location: Location) -> Location:
         named = container_of(location.path)
     if named is None:
         raise SourceError(
-            f"{where}: ImageLoader: found no file of HDF5 or N5, expected one beside the XML"
+            f"{where}: ImageLoader: found no file of HDF5 or N5, expected one beside the XML; name "
+            "the image files themselves, or save them again as HDF5 in BigStitcher"
         )
     path = os.path.join(os.path.dirname(os.path.realpath(location.path)), named)
     field = f"{where}: ImageLoader {named!r:.200}"
@@ -52,6 +53,11 @@ def _container_of(location: Location) -> Location:
     if not os.path.isdir(path):
         require_own(path, [location.folder], named=field)  # a pipe would block
     container = Location.of(path)
+    if os.path.isdir(path) and container.format == "ome-zarr":
+        raise SourceError(
+            f"{field}: found OME-Zarr, expected HDF5 (.h5) or N5 (.n5); name an image in it, as "
+            f"{named}/IMAGE, or save it again as HDF5 in BigStitcher"
+        )
     if not os.path.exists(path) or container.format not in _READERS:
         raise SourceError(f"{field}: not found, expected HDF5 (.h5) or N5 beside the XML")
     require_kind(container, "" if container.format == "n5" else container.format, "HDF5")

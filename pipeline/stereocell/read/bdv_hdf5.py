@@ -7,6 +7,7 @@ References: https://imagej.net/plugins/bdv/index
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
-from stereocell.read.bdv_image import chosen_view, image_of
+from stereocell.read.bdv_image import chosen_view, common_levels, image_of
 from stereocell.read.bdv_times import with_times
 from stereocell.read.bdv_xml import read_described
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
@@ -71,8 +72,7 @@ def read_image(tree: Hdf5Tree, location: Location, *, series: int = 0, xml: str 
         ]
         for point, t in zip(points, times, strict=True)
     ]
-    first = next(group for row in groups for group in row if group is not None)
-    count = _count_levels(tree, first, setups[0])
+    count, level_notes = _common_levels(tree, groups, setups)
     levels = [
         [
             [None if group is None else _cells(tree, f"{group}/{level}/cells") for group in row]
@@ -83,7 +83,24 @@ def read_image(tree: Hdf5Tree, location: Location, *, series: int = 0, xml: str 
     factors = [_factors(tree, f"/{setups[0]}/resolutions", level) for level in range(count)]
     image = image_of(tree.where, levels, factors, None, described.among(numbers))
     image = with_times(tree.where, image, described, numbers, points)
-    return replace(image, close=tree.close, files=tree.files, notes=(*notes, *image.notes))
+    return replace(
+        image, close=tree.close, files=tree.files, notes=(*notes, *level_notes, *image.notes)
+    )
+
+
+def _common_levels(
+    tree: Hdf5Tree, groups: Sequence[Sequence[str | None]], setups: Sequence[str]
+) -> tuple[int, tuple[str, ...]]:
+    """Return the number of levels that all setups have, and a note where some have more.
+
+    groups  of the views, by time and then by setup; None: a missing view
+    """
+    counts = []
+    for place, setup in enumerate(setups):
+        group = next((row[place] for row in groups if row[place]), None)
+        if group is not None:
+            counts.append(_count_levels(tree, group, setup))
+    return common_levels(counts)
 
 
 def _count_levels(tree: Hdf5Tree, group: str, setup: str) -> int:

@@ -12,11 +12,12 @@ from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Image
 from stereocell.read.series import choose
 from stereocell.read.spacing import Grid, Triple
-from stereocell.read.statements import Statement, Subject, Trust, settle
+from stereocell.read.statements import Statement, Subject, Trust, omission, settle
 
 # The views of one level, by time and then by setup, each (z, y, x). None: the view is missing.
 Views = Sequence[Sequence[StoredArray | None]]
 _REMEDY = "--spacing-um z,y,x replaces it"
+_NO_XML = "BigDataViewer states it in an XML, and none lies beside the container"
 _TOLERANCE = 5e-3  # relative difference of two spacings that needs no note
 
 
@@ -73,7 +74,7 @@ def image_of(
     spacing_um, notes = _spacing(setups, stated_um)
     notes = (*notes, *_size_notes(setups, arrays[0].shape), *_setup_notes(setups))
     names = tuple(setup.name if setup is not None else None for setup in setups.values())
-    hint = "" if any(setups.values()) else "BigDataViewer's XML has it, which is not beside"
+    hint = "" if any(setups.values()) else _NO_XML
     return Image(
         tuple(arrays),
         grids_of([array.shape for array in arrays], spacing_um, factors, hint),
@@ -98,6 +99,18 @@ def chosen_view(
     if notes and not xml:
         notes = (f"{notes[0]} (--series needs the name of the XML)",)
     return views[index], notes
+
+
+def common_levels(counts: Sequence[int]) -> tuple[int, tuple[str, ...]]:
+    """Return the number of levels that all setups have, and a note where some have more.
+
+    counts  of the setups' levels
+    """
+    fewest, most = min(counts), max(counts)
+    if fewest == most:
+        return fewest, ()
+    found = f"{most - fewest} of {most} levels of detail"
+    return fewest, (omission(found, f"some setups have {fewest} alone"),)
 
 
 def grids_of(

@@ -19,6 +19,7 @@ from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
+from stereocell.read.plane_positions import falling_notes
 from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
@@ -186,6 +187,9 @@ def _image(where: str, image: Any, notes: tuple[str, ...], stack: ExitStack) -> 
         notes = (*notes, *_memory_notes(where, image))
     if (count := array.size("c")) > MAX_CHANNELS:
         raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+    places = np.asarray(image.coords.get("Z", ()), float) * _UM_PER_METER
+    if len(places) > 1:
+        notes = (*notes, *falling_notes("place along z", float(places[0]), float(places[-1])))
     names, colors = _channels(image, count)
     grid = Grid(array.shape, _spacing(image))
     return Image((array,), (grid,), names, colors, 1, stack.close, notes=notes)

@@ -13,7 +13,7 @@ References: https://github.com/saalfeldlab/n5 (the specification in its README)
 import os
 import re
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import settle_stated_axes
 from stereocell.read.bdv_described import Described
-from stereocell.read.bdv_image import chosen_view, grids_of, image_of
+from stereocell.read.bdv_image import chosen_view, common_levels, grids_of, image_of
 from stereocell.read.bdv_times import with_times
 from stereocell.read.bdv_xml import read_described
 from stereocell.read.dataset import VoxelArray
@@ -208,9 +208,8 @@ def _container(
     described.require_views(files.where, list(folders), times)
     numbers, notes = chosen_view(files.where, described, list(folders), *view)
     taken = described.taken(files.where, numbers, times)
-    first = min(taken, key=lambda one: (numbers.index(one[1]), one[0]))
-    setup, path = folders[first[1]], f"{folders[first[1]]}timepoint{first[0]}"
-    levels = _levels(files, path)
+    levels, level_notes = _common_levels(files, folders, numbers, taken)
+    first, path = numbers[0], levels[0][0].rpartition("/")[0]
 
     def view_of(time: int, number: int, level: int) -> N5Array | None:
         if (time, number) not in taken:
@@ -221,17 +220,41 @@ def _container(
         [[view_of(time, number, index) for number in numbers] for time in times]
         for index in range(len(levels))
     ]
-    group = files.attributes(setup.rstrip("/"))
-    if isinstance(factors := group.get("downsamplingFactors"), list) and len(factors) > len(levels):
-        raise SourceError(
-            f"{files.where}: {setup}: found {len(levels)} levels, expected {len(factors)} as "
-            "downsamplingFactors: a part is missing: copy it again"
-        )
+    group = files.attributes(folders[first].rstrip("/"))
     stated, more = settle_spacing(files.attributes(path), {}, "zyx")
     scales = [_factors(group, attributes, i, "zyx") for i, (_, attributes) in enumerate(levels)]
     image = image_of(files.where, views, scales, stated, described.among(numbers))
     image = with_times(files.where, image, described, numbers, times)
-    return replace(image, notes=(*notes, *more, *image.notes))
+    return replace(image, notes=(*notes, *level_notes, *more, *image.notes))
+
+
+def _common_levels(
+    files: N5Files,
+    folders: Mapping[int, str],
+    numbers: Sequence[int],
+    taken: Collection[tuple[int, int]],
+) -> tuple[list[tuple[str, Mapping[str, Any]]], tuple[str, ...]]:
+    """Return the levels of the first setup that all setups have, and notes.
+
+    taken  the views that are there, as pairs of time point and setup
+
+    Raises SourceError where a setup lacks levels that its attributes count.
+    """
+    every = []
+    for number in numbers:
+        times = [time for time, setup in taken if setup == number]
+        if not times:
+            continue
+        levels = _levels(files, f"{folders[number]}timepoint{min(times)}")
+        factors = files.attributes(folders[number].rstrip("/")).get("downsamplingFactors")
+        if isinstance(factors, list) and len(factors) > len(levels):
+            raise SourceError(
+                f"{files.where}: {folders[number]}: found {len(levels)} levels, expected "
+                f"{len(factors)} as downsamplingFactors: a part is missing: copy it again"
+            )
+        every.append(levels)
+    fewest, notes = common_levels([len(levels) for levels in every])
+    return every[0][:fewest], notes
 
 
 def _times(files: N5Files, folder: str) -> list[int]:

@@ -168,11 +168,11 @@ def _read(
         )
     converted = converted_of(location)
     one = {**ome, "multiscales": [multiscales[index]]}
-    image = replace(_image(tree, store, one, axes, converted), images=len(multiscales))
+    found = replace(_image(tree, store, one, axes, converted), images=len(multiscales))
     if ignored := ignored_note("the image's group", attributes):
-        image = replace(image, notes=(*image.notes, ignored))
-    is_described = converted is not None and converted.shape == image.arrays[0].shape
-    return image, converted.root if converted is not None and is_described else None
+        found = replace(found, notes=(*found.notes, ignored))
+    is_described = converted is not None and converted.shape == found.arrays[0].shape
+    return found, converted.root if converted is not None and is_described else None
 
 
 def _image(

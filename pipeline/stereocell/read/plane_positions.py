@@ -13,6 +13,16 @@ _SUBJECT = Subject(
 )
 
 
+def falling_notes(field: str, first_um: float, last_um: float) -> tuple[str, ...]:
+    """Return a note where planes were taken downwards, so that a volume may be a mirror image."""
+    if last_um >= first_um:
+        return ()
+    return (
+        f"the planes' {field} falls from {first_um:.5g} to {last_um:.5g} um: the planes are read "
+        "in the order of the file",
+    )
+
+
 def settle_places(
     places: Mapping[int, float], stated: Sequence[Statement], field: str, *, has_unit: bool
 ) -> tuple[float | None, tuple[str, ...]]:
@@ -39,12 +49,7 @@ def settle_places(
     first, last = places[numbers[0]], places[numbers[-1]]
     step, sizes = abs(last - first) / (numbers[-1] - numbers[0]), [abs(one) for one in steps]
     is_even = max(sizes) - step <= _EVEN * step and step - min(sizes) <= _EVEN * step
-    notes = []
-    if last < first:
-        notes.append(
-            f"the planes' {field} falls from {first:.5g} to {last:.5g} um: the planes are read in "
-            "the order of the file"
-        )
+    notes = list(falling_notes(field, first, last))
     if not is_even:
         notes.append(
             f"the planes' {field} is uneven: steps of {min(sizes):.4g} to {max(sizes):.4g} um"

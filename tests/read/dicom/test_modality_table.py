@@ -1,68 +1,137 @@
-"""Values by ModalityLUTSequence, compared with pydicom's own."""
+"""Values that a Modality LUT gives: pydicom's own function says which."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pydicom
 import pytest
+from pydicom.dataset import Dataset
 from pydicom.pixels import apply_modality_lut
-from pydicom.sequence import Sequence
+from pydicom.uid import ImplicitVRLittleEndian
 
 from stereocell import read
 from stereocell.model.errors import SourceError
+from support.dicom_kinds import AFFINE, SHAPE
 from support.dicom_reading import whole
-from support.dicom_series import grid, write_series
-
-SHAPE = (6, 12, 14)
-AFFINE = grid(shape=SHAPE, spacing=(5.0, 4.0, 4.0))
-ENTRIES = (np.sqrt(np.arange(600)) * 1000).astype(np.uint16)
+from support.dicom_series import write_series
 
 
-def with_table(first: int, kind: str, count: int = len(ENTRIES)) -> Any:
-    """Return a change that replaces the rescale by a table whose data have a VR."""
-
-    def change(ds: pydicom.Dataset) -> None:
-        del ds.RescaleSlope, ds.RescaleIntercept
-        item = pydicom.Dataset()
-        signed = "SS" if ds.PixelRepresentation else "US"
-        item.add_new("LUTDescriptor", signed, [count, first, 16])
-        item.ModalityLUTType = "US"
-        data: Any = ENTRIES.tobytes() if kind == "OW" else ENTRIES.tolist()
-        item.add_new("LUTData", kind, data)
-        ds.ModalityLUTSequence = Sequence([item])
-
-    return change
+def table(values: Any, first: int = 0, depth: int = 16, vr: str = "US") -> list[Dataset]:
+    """Return the sequence of one table."""
+    item = Dataset()
+    count = len(values) % (1 << 16)
+    item.add_new("LUTDescriptor", "SS" if first < 0 else "US", [count, first, depth])
+    item.ModalityLUTType = "US"
+    data = np.asarray(values, "<u2")
+    item.add_new("LUTData", vr, data.tobytes() if vr == "OW" else data.tolist())
+    return [item]
 
 
-@pytest.mark.parametrize("kind", ["US", "OW"])
-@pytest.mark.parametrize(("first", "dtype"), [(0, np.uint16), (-40, np.int16), (300, np.uint16)])
-def test_values_are_those_of_the_table(tmp_path: Path, kind: str, first: int, dtype: Any) -> None:
-    paths = write_series(tmp_path / "s", AFFINE, SHAPE, dtype=dtype, change=with_table(first, kind))
-    expected = []
+def rising(top: int = 1100, step: int = 3) -> Any:
+    return np.arange(top) * step % 40000
+
+
+def write(folder: Path, change: Callable[[Dataset], None], **options: Any) -> list[Path]:
+    return write_series(folder, AFFINE, SHAPE, slope=None, change=change, **options)
+
+
+def greys_of_pydicom(paths: list[Path]) -> list[int]:
+    """Return the sorted values of all slices."""
+    datasets = [pydicom.dcmread(path) for path in paths]
+    return sorted(int(v) for ds in datasets for v in apply_modality_lut(ds.pixel_array, ds).flat)
+
+
+@pytest.mark.parametrize("vr", ["US", "OW"])
+@pytest.mark.parametrize("first", [0, -5, 40])
+def test_the_table_gives_the_values(tmp_path: Path, vr: str, first: int) -> None:
+    def change(ds: Dataset) -> None:
+        ds.ModalityLUTSequence = table(rising(), first, vr=vr)
+
+    paths = write(tmp_path, change, dtype=np.int16)
+    dataset = read.open(tmp_path)
+    assert sorted(whole(dataset).ravel().tolist()) == greys_of_pydicom(paths)
+    assert any("of 10 images are by a table (ModalityLUTSequence)" in n for n in dataset.notes)
+
+
+def test_a_table_for_each_slice_is_applied_to_its_slice(tmp_path: Path) -> None:
+    def change(ds: Dataset) -> None:
+        ds.ModalityLUTSequence = table(rising(step=ds.InstanceNumber))
+
+    paths = write(tmp_path, change)
+    dataset = read.open(tmp_path)
+    assert sorted(whole(dataset).ravel().tolist()) == greys_of_pydicom(paths)
+    assert any("by a table of its own" in note for note in dataset.notes)
+
+
+def test_a_file_of_implicit_vr_is_read_alike(tmp_path: Path) -> None:
+    def change(ds: Dataset) -> None:
+        ds.ModalityLUTSequence = table(rising(), vr="OW")
+
+    paths = write(tmp_path, change)
+    explicit = whole(read.open(tmp_path))
     for path in paths:
         ds = pydicom.dcmread(path)
-        expected.append(apply_modality_lut(ds.pixel_array, ds))
-    dataset = read.open(tmp_path / "s")
-    found = whole(dataset)
-    assert sorted(found.ravel()) == sorted(np.concatenate(expected).ravel())
-    assert any("values of 6 of 6 images are by ModalityLUTSequence" in n for n in dataset.notes)
+        ds.file_meta.TransferSyntaxUID = ImplicitVRLittleEndian
+        ds.save_as(path, implicit_vr=True)
+    assert np.array_equal(whole(read.open(tmp_path)), explicit)
 
 
-def test_a_table_for_inverted_images_is_for_the_numbers_as_stored(tmp_path: Path) -> None:
-    for photometric in ("MONOCHROME1", "MONOCHROME2"):
-        write_series(
-            tmp_path / photometric, AFFINE, SHAPE, dtype=np.uint16, photometric=photometric,
-            change=with_table(0, "US"),
-        )  # fmt: skip
-    inverted, plain = (
-        whole(read.open(tmp_path / name)).astype(int) for name in ("MONOCHROME1", "MONOCHROME2")
+def test_a_table_of_65536_entries_states_0_of_them(tmp_path: Path) -> None:
+    def change(ds: Dataset) -> None:
+        ds.ModalityLUTSequence = table(np.arange(1 << 16)[::-1].copy(), vr="OW")
+
+    paths = write(tmp_path, change, dtype=np.uint16)
+    assert sorted(whole(read.open(tmp_path)).ravel().tolist()) == greys_of_pydicom(paths)
+
+
+def test_inverted_images_are_inverted_after_the_table(tmp_path: Path) -> None:
+    def change(ds: Dataset) -> None:
+        ds.ModalityLUTSequence = table(rising())
+
+    paths = write(tmp_path, change, photometric="MONOCHROME1")
+    expected = sorted(65535 - value for value in greys_of_pydicom(paths))
+    assert sorted(whole(read.open(tmp_path)).ravel().tolist()) == expected
+
+
+def test_the_table_is_used_beside_a_rescale_and_the_note_says_so(tmp_path: Path) -> None:
+    def change(ds: Dataset) -> None:
+        ds.ModalityLUTSequence = table(rising())
+        if ds.InstanceNumber == 3:
+            ds.RescaleSlope, ds.RescaleIntercept = 2, -1000
+
+    paths = write(tmp_path, change)
+    dataset = read.open(tmp_path)
+    assert sorted(whole(dataset).ravel().tolist()) == greys_of_pydicom(paths)
+    assert any("1 of 10 images states RescaleSlope and" in note for note in dataset.notes)
+
+
+def test_a_ct_by_a_table_has_no_hounsfield_units(tmp_path: Path) -> None:
+    def change(ds: Dataset) -> None:
+        ds.ModalityLUTSequence = table(rising())
+
+    write(tmp_path, change, modality="CT")
+    assert any("states no Hounsfield units" in note for note in read.open(tmp_path).notes)
+
+
+def test_an_empty_sequence_is_no_table(tmp_path: Path) -> None:
+    write_series(
+        tmp_path / "s", AFFINE, SHAPE, change=lambda ds: setattr(ds, "ModalityLUTSequence", [])
     )
-    np.testing.assert_array_equal(inverted, int(ENTRIES.min()) + int(ENTRIES.max()) - plain)
+    assert read.open(tmp_path / "s").levels[0].shape == (12, 10, 14)
 
 
-def test_a_table_that_lacks_entries_is_refused(tmp_path: Path) -> None:
-    change = with_table(0, "US", count=len(ENTRIES) + 5)
-    write_series(tmp_path / "s", AFFINE, SHAPE, dtype=np.uint16, change=change)
-    with pytest.raises(SourceError, match="6 of values by a damaged modality table"):
-        read.open(tmp_path / "s")
+@pytest.mark.parametrize("fault", ["short", "no data", "depth"])
+def test_a_damaged_table_is_refused_with_a_way_out(tmp_path: Path, fault: str) -> None:
+    def change(ds: Dataset) -> None:
+        ds.ModalityLUTSequence = table(rising(), depth=8 if fault == "depth" else 16)
+        item = ds.ModalityLUTSequence[0]
+        if fault == "short":
+            item.LUTDescriptor = [2000, 0, 16]
+        if fault == "no data":
+            del item.LUTData
+
+    write(tmp_path, change)
+    with pytest.raises(SourceError, match=r"modality table that is damaged.*RescaleSlope"):
+        read.open(tmp_path)

@@ -115,6 +115,7 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
         notes=(
             *_choice(found, stack, series),
+            *stack.elsewhere,
             *stack.notes,
             *values,
             *_left_out(found.left_out),

@@ -1,4 +1,4 @@
-"""Read how a DICOM frame's values are stored: bits, sign, rescale, padding.
+"""Read how a DICOM frame's values are stored: bits, sign, rescale or table, padding.
 
 References: DICOM PS3.3 C.7.6.3 (Image Pixel module), C.7.5.1.1.2 (Pixel Padding).
 """
@@ -10,7 +10,7 @@ from typing import Any
 from stereocell.read.dicom.frame import Encoding
 from stereocell.read.dicom.frame_offsets import is_dose
 from stereocell.read.dicom.header_values import find_value
-from stereocell.read.dicom.modality_table import table_of
+from stereocell.read.dicom.modality_table import ModalityTable, ModalityTableError, table_of
 from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.segmentation import FRACTIONAL
 from stereocell.read.dicom.value_scale import ValueScale
@@ -37,6 +37,9 @@ def encoding_of(
     if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:
         raise NoPlaneError("of values that no rescale slope gives")
     allocated = int(header.get("BitsAllocated") or 0)
+    table = _table(header)
+    if is_float and table is not None:
+        raise NoPlaneError("of a modality table for floats")
     if is_float:
         return Encoding(allocated, 0, 0, True, False, slope, intercept)
     bits = int(header.get("BitsStored") or allocated)
@@ -44,10 +47,19 @@ def encoding_of(
     if not 1 <= bits <= high_bit + 1 <= allocated:
         raise NoPlaneError(f"of {bits} bits up to bit {high_bit} of {allocated}")
     signed = bool(header.get("PixelRepresentation") or 0)
-    padding, table = _padding(header), table_of(header)
+    padding = _padding(header)
+    if table is not None:
+        slope, intercept = 1.0, 0.0
     return Encoding(
         allocated, bits, high_bit, signed, is_inverted, slope, intercept, padding, table
     )
+
+
+def _table(header: Any) -> ModalityTable | None:
+    try:
+        return table_of(header)
+    except ModalityTableError as error:
+        raise NoPlaneError(str(error)) from None
 
 
 def _padding(header: Any) -> tuple[int, int] | None:

@@ -13,13 +13,13 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """The map from a stored value to a grey value: bits, sign, then slope * value + intercept.
+    """The map from a stored to a grey value: bits, sign, then slope * value + intercept or a table.
 
     bits, high_bit  of the value inside its container of `allocated` bits; 0 bits: floats
     is_inverted     MONOCHROME1: the lowest value is the brightest
     padding         lowest and highest stored value outside the image, before the inversion;
                     None: the header names none
-    table           grey values by ModalityLUTSequence, in the place of slope and intercept
+    table           gives the grey values in place of slope and intercept; None: there is none
 
     References: DICOM PS3.3 C.7.6.3 (Image Pixel module).
     """
@@ -35,12 +35,12 @@ class Encoding:
     table: ModalityTable | None = None
 
     @property
-    def values_range(self) -> tuple[float, float, float, float]:
-        """The lowest and highest number, and slope and intercept that make grey values of it."""
+    def grey_ends(self) -> tuple[float, float]:
+        """The grey values between which all lie that this many bits can become."""
         if self.table is not None:
-            return (*self.table.ends, 1.0, 0.0)
-        low, high = self.stored_range
-        return float(low), float(high), self.slope, self.intercept
+            return self.table.grey_range(is_inverted=self.is_inverted)
+        low, high = (self.slope * value + self.intercept for value in self.stored_range)
+        return low, high
 
     @property
     def stored_range(self) -> tuple[int, int]:

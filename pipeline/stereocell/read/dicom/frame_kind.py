@@ -59,7 +59,7 @@ _ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"(.* )?(PROT|DOSE|DOSE[ _]?(INFO|REPORT)|CSA REPORT|PROTOCOL)", "dose or protocol sheet"),
         (r"SCREEN ?SAVE|SCREENSHOT|SCREEN ?CAPTURE", "screen save"),
         (r"(.* )?(VRT|SSD|3D RENDERING|VOLUME_RENDER|SURFACE_RENDER|RENDERED)", "rendering"),
-        (r"(.* )?(MINIP|MIN_IP|MIN IP)|MINIMUM", "minimum intensity projection"),
+        (r"(.* )?(MINIP|MIN_IP|MIN IP|MNIP)|MINIMUM", "minimum intensity projection"),
         (r"(.*[ _])?(MIP|MAX_IP)( .*|_.*)?|MAXIMUM", "maximum intensity projection"),
         (r"PROJECTION( IMAGE)?", "projection"),
         (r"(.* )?(MPR|CURVED_MPR|REFORMATTED|CSAPARALLEL|CPR)( .*)?", "reformatted"),
@@ -75,12 +75,12 @@ _ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
     )
 )
-# words of ImageType that name a contrast, the one that is shown first at the top
+# words of ImageType that name a contrast
 _CONTRASTS = {
     **dict.fromkeys(("W", "WATER"), "water"),
+    **dict.fromkeys(("F", "FAT"), "fat"),
     **dict.fromkeys(("IN_PHASE", "INPHASE", "IP"), "in phase"),
     **dict.fromkeys(("OUT_PHASE", "OPP_PHASE", "OPPOSED_PHASE", "OP"), "opposed phase"),
-    **dict.fromkeys(("F", "FAT"), "fat"),
     **dict.fromkeys(("UNI",), "uniform"),
     "INV1": "first inversion",
     "INV2": "second inversion",
@@ -112,6 +112,7 @@ _B_VALUES = (
     (0x2001, 0x03, "PHILIPS IMAGING", "FL"),
     (0x0065, 0x09, "IMAGE PRIVATE HEADER", "FD"),
 )
+_SEQUENCE_B = re.compile(r"[*]?ep_b(\d{1,5})(#.*|t)?")  # Siemens's SequenceName, as `ep_b1000#2`
 _GE_B_STEP = 1_000_000_000  # GE adds a multiple of it to some b-values
 KIND_TAGS: list[Any] = [
     "ImageType",
@@ -124,6 +125,7 @@ KIND_TAGS: list[Any] = [
     "ContrastBolusAgent",
     "ContrastBolusAgentSequence",
     "DiffusionBValue",
+    "SequenceName",
     "EchoTime",
     "EchoNumbers",
     "InversionTime",
@@ -132,6 +134,7 @@ KIND_TAGS: list[Any] = [
     "TemporalPositionIdentifier",
     "NominalPercentageOfCardiacPhase",
     "TriggerTime",
+    "FrameReferenceTime",
     *(tag for group, element, *_ in (_GE_PART, *_B_VALUES) for tag in private_tags(group, element)),
 ]
 
@@ -148,7 +151,7 @@ class FrameKind:
     has_agent        a contrast agent is stated
     is_attenuation_corrected  of PET, by CorrectedImage
     energy_kev       of a virtual monoenergetic image
-    echo_time, inversion_time, trigger_time  ms
+    echo_time, inversion_time, trigger_time, reference_time  ms
     temporal, cardiac, acquisition  number of the point in time, of the cardiac phase (%), of the
                      acquisition
     """
@@ -171,6 +174,7 @@ class FrameKind:
     temporal: float | None = None
     cardiac: float | None = None
     trigger_time: float | None = None
+    reference_time: float | None = None
 
     @property
     def rank(self) -> int:
@@ -185,6 +189,11 @@ class FrameKind:
     def contrast_rank(self) -> int:
         """Among equal `rank`, lower ones are shown first: in phase, water, opposed phase, fat."""
         return min((_CONTRAST_RANKS[word] for word in self.contrasts), default=0)
+
+    @property
+    def is_diffusion(self) -> bool:
+        """Whether images at one place may be directions or b-values of diffusion."""
+        return bool(self.b_value) or "DIFFUSION" in self.image_type
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -236,6 +245,7 @@ def kind_of(header: Any, groups: Sequence[Any]) -> FrameKind:
         trigger_time=_first_of(
             number(cardiac, "NominalCardiacTriggerDelayTime"), number("", "TriggerTime")
         ),
+        reference_time=number("", "FrameReferenceTime"),
     )
 
 
@@ -313,4 +323,7 @@ def _b_value(header: Any, groups: Sequence[Any]) -> float | None:
     for private in _B_VALUES:
         if found is None:
             found = private_number(header, *private)
+    if found is None:
+        named = _SEQUENCE_B.fullmatch(find_text(header, groups, "", "SequenceName"))
+        found = float(named[1]) if named else None
     return None if found is None else found % _GE_B_STEP

@@ -240,23 +240,42 @@ def _parts(group: Group) -> list[Group]:
 
 def describe_neighbours(group: Group, groups: Sequence[Group]) -> tuple[str, ...]:
     """Return a sentence, or none, about other stacks of the series between a group's planes."""
-    if len(group.frames) < 2:
-        return ()
-    among = [
+    among = [other for other in _others(group, groups) if group.interleaves(other)]
+    return _describe(group, among, "among")
+
+
+def describe_elsewhere(group: Group, groups: Sequence[Group]) -> tuple[str, ...]:
+    """Return a sentence, or none, about other stacks of the series beside a group's planes."""
+    beside = [
+        other
+        for other in _others(group, groups)
+        if other.frames[0].kind.words == group.frames[0].kind.words and not group.interleaves(other)
+    ]
+    return _describe(group, beside, "beside")
+
+
+def _others(group: Group, groups: Sequence[Group]) -> list[Group]:
+    """Return the stacks of the series that differ in an attribute, not only in their kind."""
+    first = group.frames[0]
+    if len(group.frames) < 2 or first.segmentation is not None:
+        return []
+    return [
         other
         for other in groups
         if other is not group
-        and group.differences(other)  # other kinds of frames are listed apart
-        and other.frames[0].series == group.frames[0].series
-        and group.interleaves(other)
+        and other.frames[0].series == first.series
+        and group.differences(other)
     ]
-    if not among:
+
+
+def _describe(group: Group, others: Sequence[Group], where: str) -> tuple[str, ...]:
+    if not others:
         return ()
-    images = sum(len(other.frames) for other in among)
-    apart = sorted({word for other in among for word in group.differences(other)})
+    images = sum(len(other.frames) for other in others)
+    apart = sorted({word for other in others for word in group.differences(other)})
     return (
         counted(images, "more image of the same series lies", "more images of the same series lie")
-        + f" among these and {agreeing(images, 'is', 'are')} not built: another "
+        + f" {where} these and {agreeing(images, 'is', 'are')} not built: another "
         f"{', '.join(apart)} (`--series list` shows {agreeing(images, 'it', 'them')})",
     )
 

@@ -28,6 +28,7 @@ from stereocell.read.dicom.frame_offsets import (
     place_first,
 )
 from stereocell.read.dicom.header_values import find_value, first_item
+from stereocell.read.dicom.modality_table import TABLE_TAGS
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.segmentation import (
@@ -67,7 +68,6 @@ _TAGS: list[Any] = [
     "AnatomicalOrientationType",
     "RescaleSlope",
     "RescaleIntercept",
-    "ModalityLUTSequence",
     "SegmentSequence",
     "SegmentationType",
     "SegmentsOverlap",
@@ -81,6 +81,7 @@ _TAGS: list[Any] = [
     *KIND_TAGS,
     *STATED_TAGS,
     *SCALE_TAGS,
+    *TABLE_TAGS,
 ]
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _NO_PLACE = "without a place in the patient"

@@ -1,6 +1,7 @@
 """Decode the pixels of DICOM frames: codec, bits, sign, MONOCHROME1, rescale, padding."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,10 @@ def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:
     encodings = {frame.encoding for frame in frames}
     if any(encoding.bits == 0 for encoding in encodings):
         return np.dtype(np.float32)
-    return dtype_for(encoding.values_range for encoding in encodings)
+    return dtype_for(
+        (*e.stored_range, e.slope, e.intercept) if e.table is None else (*e.grey_ends, 1.0, 0.0)
+        for e in encodings
+    )
 
 
 def decode(
@@ -63,7 +67,7 @@ def decode(
                             frame, encoding = frames[place], frames[place].encoding
                             values = _plane_of(whole, frame)
                             raw = unpack_bits(values, encoding)
-                            planes[place] = _grey_values(raw, encoding, dtype)
+                            planes[place] = _grey_values(values, raw, encoding, dtype)
                             if has_padding:
                                 mask = is_padding(values, raw, encoding)
                                 padding.add(place, planes[place], mask)
@@ -77,22 +81,24 @@ def decode(
     return planes
 
 
-def _grey_values(raw: NDArray[Any], encoding: Encoding, dtype: np.dtype[Any]) -> NDArray[Any]:
-    if encoding.table is not None:
-        low, high = encoding.stored_range
-        values: NDArray[Any] = encoding.table.apply(
-            low + high - raw if encoding.is_inverted else raw
-        )
-        if encoding.is_inverted:  # the table is for the numbers as they are stored
-            values = int(sum(encoding.table.ends)) - values.astype(np.int64)
-        return values.astype(dtype)
-    return rescale(raw, encoding.slope, encoding.intercept, dtype)
-
-
 def _plane_of(whole: NDArray[Any], frame: Frame) -> NDArray[Any]:
     """Return the pixels of a plane: of a mosaic one slice, a view."""
     row, column = frame.corner
     return whole[row : row + frame.rows, column : column + frame.columns]
+
+
+def _grey_values(
+    values: NDArray[Any], raw: NDArray[Any], encoding: Encoding, dtype: np.dtype[Any]
+) -> NDArray[Any]:
+    """Return grey values, by the table or by slope and intercept.
+
+    values  in their containers
+    raw     the same, unpacked and inverted as `encoding` states
+    """
+    if encoding.table is None:
+        return rescale(raw, encoding.slope, encoding.intercept, dtype)
+    stored = unpack_bits(values, replace(encoding, is_inverted=False))
+    return encoding.table.apply(stored, is_inverted=encoding.is_inverted).astype(dtype)
 
 
 def unpack_bits(values: NDArray[Any], encoding: Encoding) -> NDArray[Any]:

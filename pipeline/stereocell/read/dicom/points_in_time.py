@@ -25,8 +25,9 @@ _NUMBERED = (
     ("cardiac", "NominalPercentageOfCardiacPhase"),
     ("trigger_time", "TriggerTime"),
     ("acquisition", "AcquisitionNumber"),
+    ("reference_time", "FrameReferenceTime"),
 )
-_BY_NUMBER = "InstanceNumber"
+BY_NUMBER = "InstanceNumber"
 _LEAST_OF_RUN = 0.5  # least share of the slices in a run of instance numbers that is a point
 
 
@@ -89,7 +90,7 @@ def _by_runs(places: Sequence[Place], normal: NDArray[np.float64], near_mm: floa
     if len(runs) < 2 or min(map(len, runs)) < _LEAST_OF_RUN * len(places):
         return None
     numbered = [[(index_of[id(frame)], frame) for frame in run] for run in runs]
-    return _sorted_out(numbered, len(places), _BY_NUMBER)
+    return _sorted_out(numbered, len(places), BY_NUMBER)
 
 
 def _by_rank(places: Sequence[Place]) -> Points | None:
@@ -102,7 +103,7 @@ def _by_rank(places: Sequence[Place]) -> Points | None:
         [(index, place[rank]) for index, place in enumerate(places) if len(place) > rank]
         for rank in range(most)
     ]
-    return _sorted_out(ranks, len(places), _BY_NUMBER)
+    return _sorted_out(ranks, len(places), BY_NUMBER)
 
 
 def _sorted_out(

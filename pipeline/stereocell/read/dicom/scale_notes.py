@@ -28,6 +28,11 @@ _PET_UNITS = {
     "NONE": "without unit (Units NONE)",
 }
 
+_DOSE_UNITS = {
+    "GY": "in gray (DoseUnits GY)",
+    "RELATIVE": "relative to a reference (DoseUnits RELATIVE)",
+}
+
 
 def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
     """Return whether the values of a CT are Hounsfield units.
@@ -40,11 +45,7 @@ def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
     reach = 0.0
     for frame in frames:
         encoding = frame.encoding
-        if encoding.bits:
-            low, high, slope, intercept = encoding.values_range
-            reach = min(reach, slope * low + intercept, slope * high + intercept)
-        else:
-            reach = -float("inf")
+        reach = min(reach, *encoding.grey_ends) if encoding.bits else -float("inf")
     if reach > _AIR_HU:
         return False
     if all(f.scale.has_rescale and f.encoding.intercept <= _AIR_HU for f in frames):
@@ -81,12 +82,36 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
     if first.modality == "PT":
         unit = _PET_UNITS.get(first.scale.units, "of an unknown unit (no Units)")
         notes.append(f"PET values are {unit}")
+    if first.modality == "RTDOSE":
+        notes.append(_dose_note(first))
     if first.scale.philips is not None:
         notes.append(
             f"Philips states a scale slope of {first.scale.philips:.4g} (2005,100e) as well, which "
             "is not applied: values compare within this series alone"
         )
     return tuple(notes)
+
+
+def _dose_note(first: Frame) -> str:
+    if not first.scale.has_rescale and first.encoding.slope == 1:
+        return "dose values are as they are stored, in no unit: DoseGridScaling is not stated"
+    return f"dose values are {_DOSE_UNITS.get(first.scale.units, 'of an unknown unit')}"
+
+
+def _table_notes(frames: Sequence[Frame], tables: int) -> list[str]:
+    """Return notes on values that a table gives, and on a rescale that the same file states."""
+    with_table = sum(frame.encoding.table is not None for frame in frames)
+    own = " of its own" if tables > 1 else ""
+    notes = [
+        f"values of {with_table} of {len(frames)} images are by a table{own} (ModalityLUTSequence)"
+    ]
+    both = sum(frame.encoding.table is not None and frame.scale.has_rescale for frame in frames)
+    if both:
+        notes.append(
+            f"{both} of {len(frames)} images {agreeing(both, 'states', 'state')} RescaleSlope and "
+            "RescaleIntercept beside the table: the table is used"
+        )
+    return notes
 
 
 def _other_kinds(frames: Sequence[Frame]) -> list[str]:
@@ -107,14 +132,16 @@ def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
             notes.append(
                 f"{name} differs among the images ({low:.4g} to {high:.4g}): each has its own"
             )
-    if by_table := sum(encoding.table is not None for encoding in encodings):
-        notes.append(f"values of {by_table} of {len(frames)} images are by ModalityLUTSequence")
     without = sum(not f.scale.has_rescale and f.encoding.table is None for f in frames)
     if 0 < without < len(frames):
         notes.append(
             f"{without} of {len(frames)} images {agreeing(without, 'states', 'state')} no rescale: "
             f"{agreeing(without, 'its', 'their')} stored values are taken"
         )
+    tables = {encoding.table for encoding in encodings if encoding.table is not None}
+    if tables:
+        notes += _table_notes(frames, len(tables))
+        return notes
     mapped = next((frame for frame in frames if frame.scale.real_world is not None), None)
     if mapped is None or mapped.scale.real_world is None:
         return notes

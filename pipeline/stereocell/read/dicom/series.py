@@ -21,8 +21,13 @@ from stereocell.read.anatomical_axes import plane_name
 from stereocell.read.dicom.contradictions import geometry_notes
 from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.frame_kind import LOCALIZER
-from stereocell.read.dicom.group_frames import Group, describe_neighbours, find_groups
-from stereocell.read.dicom.points_in_time import AreEqual, Points, find_points
+from stereocell.read.dicom.group_frames import (
+    Group,
+    describe_elsewhere,
+    describe_neighbours,
+    find_groups,
+)
+from stereocell.read.dicom.points_in_time import BY_NUMBER, AreEqual, Points, find_points
 from stereocell.read.plane_stack import (
     SAME_PLACE,
     NoStackError,
@@ -45,6 +50,7 @@ class Stack:
     notes    changes and omissions, a sentence each
     words    what separates it from other stacks of the series, such as `magnitude`
     order    sorts it among those: rank of its kind, rank of its contrast, places of other values
+    elsewhere  a sentence on other images of the series that lie beside these; empty: there are none
     """
 
     times: tuple[tuple[Frame, ...], ...]
@@ -53,6 +59,7 @@ class Stack:
     notes: tuple[str, ...]
     words: tuple[str, ...] = ()
     order: tuple[int, ...] = ()
+    elsewhere: tuple[str, ...] = ()
 
     @property
     def first(self) -> Frame:
@@ -100,7 +107,7 @@ def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ..
     """
     groups = find_groups(frames)
     stacks = [
-        stack
+        replace(stack, elsewhere=describe_elsewhere(group, groups))
         for group in groups
         for stack in _stacks(group, are_equal, describe_neighbours(group, groups))
     ]
@@ -207,8 +214,17 @@ def _time_notes(points: Points) -> list[str]:
             f"{counted(points.duplicates, 'duplicate slice')} with {what} the one that is taken: "
             "the first by instance number"
         ]
+    notes = []
+    if points.attribute == BY_NUMBER:
+        is_diffusion = points.whole[0][0].kind.is_diffusion
+        what = "directions or b-values of diffusion" if is_diffusion else "points in time"
+        images = len(points.whole) + len(points.incomplete)
+        notes.append(
+            f"{images} images at a place: {BY_NUMBER} alone tells them apart, {what} are assumed; "
+            "--time picks one"
+        )
     if not points.incomplete:
-        return []
+        return notes
     total, places = len(points.whole) + len(points.incomplete), len(points.whole[0])
     counts = ", ".join(str(len(point)) for point in points.incomplete[:4])
     more = ", ..." if len(points.incomplete) > 4 else ""
@@ -216,7 +232,10 @@ def _time_notes(points: Points) -> list[str]:
     found = f"{lacking} of {total} points in time ({points.attribute})"
     reason = f"slices are missing ({counts}{more} of {places} are there)"
     return [
-        omission(found, reason, f"{agreeing(lacking, 'it', 'each')} is a series of `--series list`")
+        *notes,
+        omission(
+            found, reason, f"{agreeing(lacking, 'it', 'each')} is a series of `--series list`"
+        ),
     ]
 
 

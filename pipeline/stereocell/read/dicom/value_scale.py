@@ -24,11 +24,30 @@ _RESCALE = "PixelValueTransformationSequence"
 _MAPPING = "RealWorldValueMappingSequence"
 HOUNSFIELD = "HU"
 UNKNOWN_KIND = "unknown"  # stands for free text, which notes must not quote
-# Units of PET
-_UNITS = "CNTS", "CPS", "PROPCNTS", "PROPCPS", "BQML", "GML", "CM2ML", "1CM", "PCNT", "NONE"
+# Units of PET, and DoseUnits
+_UNITS = (
+    "CNTS",
+    "CPS",
+    "PROPCNTS",
+    "PROPCPS",
+    "BQML",
+    "GML",
+    "CM2ML",
+    "1CM",
+    "PCNT",
+    "NONE",
+    "GY",
+    "RELATIVE",
+)
 _TYPES = (HOUNSFIELD, "US", "OD", "PCT", "MGML", "HU_MOD", "Z_EFF", "ED", "EDW")  # RescaleType
 _PHILIPS = (0x2005, 0x0E, "PHILIPS MR IMAGING DD 001", "FL")  # the scale slope
-SCALE_TAGS: list[Any] = ["RescaleType", "Units", _MAPPING, *private_tags(*_PHILIPS[:2])]
+SCALE_TAGS: list[Any] = [
+    "RescaleType",
+    "Units",
+    "DoseUnits",
+    _MAPPING,
+    *private_tags(*_PHILIPS[:2]),
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +56,7 @@ class ValueScale:
 
     has_rescale  RescaleSlope and RescaleIntercept are stated
     kind         RescaleType, one of the standard's terms; UNKNOWN_KIND: another; empty: none
-    units        of PET, one of the standard's terms; empty: another, or none
+    units        of PET or a dose, one of the standard's terms; empty: another, or none
     real_world   slope and intercept of the only RealWorldValueMapping; None: there is none
     philips      Philips's scale slope
     """
@@ -54,7 +73,10 @@ def scale_of(header: Any, groups: Sequence[Any]) -> ValueScale:
     slope = find_number(header, groups, _RESCALE, "RescaleSlope")
     intercept = find_number(header, groups, _RESCALE, "RescaleIntercept")
     kind = find_text(header, groups, _RESCALE, "RescaleType").upper()
+    if header.get("ModalityLUTSequence"):
+        kind = str(first_item(header.ModalityLUTSequence).get("ModalityLUTType") or "").upper()
     units = find_text(header, groups, "", "Units").upper()
+    units = units or find_text(header, groups, "", "DoseUnits").upper()
     return ValueScale(
         has_rescale=slope is not None or intercept is not None,
         kind=_kind(kind),

@@ -58,7 +58,7 @@ _CLASSES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             "a radiograph is a projection through the body: name the folder of a CT or an MR",
         ),
         (
-            r"Ultrasound",
+            r"Ultrasound|US Volume",
             "ultrasound without places has no known geometry: export a volume with "
             "ImagePositionPatient, or planes as TIFF or PNG with --spacing-um z,y,x",
         ),
@@ -101,7 +101,7 @@ _REASONS = (
     ),
     ("deflated", "export the images uncompressed (Explicit VR Little Endian)"),
     (
-        "of values by a damaged modality table",
+        "of a modality table",
         "export the images with RescaleSlope and RescaleIntercept",
     ),
     ("cut short", "copy the files again"),

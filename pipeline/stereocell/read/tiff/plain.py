@@ -76,7 +76,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         if series.kind == "ndtiff":
             files += (index_of(location),)
         notes = _undescribed(tiff, found)
-    notes += [] if series.kind == "lsm" else _left_out(len(found) - 1)  # LSM: its thumbnail
+    notes += [] if series.kind == "lsm" else _left_out(found, series)  # LSM: its thumbnail
     arrays, more = _at_first_place(arrays)
     notes += more
     if axes:
@@ -135,10 +135,20 @@ def _are_planes(found: Sequence[TiffPageSeries]) -> bool:
     )  # fmt: skip
 
 
-def _left_out(others: int) -> list[str]:
+def _left_out(found: Sequence[TiffPageSeries], chosen: TiffPageSeries) -> list[str]:
+    """Return a note on the images that are not built; it names one that is as large, if any is."""
+    others = [one for one in found if one is not chosen]
     if not others:
         return []
-    return [f"{others} other image{'s' * (others > 1)} in the file left out: the largest is built"]
+    count = f"{len(others)} other image{'s' * (len(others) > 1)} in the file left out"
+    alike = [one for one in others if one.size == chosen.size]
+    if not alike:
+        return [f"{count}: the largest is built"]
+    pages = sum(len(one.pages) for one in others)
+    return [
+        f"{count} ({pages} of {pages + len(chosen.pages)} pages): the first of the largest is "
+        f"built, {kind_of(chosen)}, and not {kind_of(alike[0])}"
+    ]
 
 
 def _undescribed(tiff: TiffFile, found: Sequence[TiffPageSeries]) -> list[str]:

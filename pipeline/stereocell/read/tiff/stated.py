@@ -33,6 +33,8 @@ _IMAGEJ_FIELDS = {
 }  # fmt: skip
 _PIXEL = Subject("voxel spacing", "um", 0.01, "--spacing-um z,y,x replaces it")
 _STRAIGHT, _UNCALIBRATED = 0, (20, 21)  # kinds of ImageJ's functions, as `cf` has them
+_INCH_UM = 25_400.0
+_SCREEN_DPI = (72, 96, 100, 150, 200, 300, 600, 1200)  # of screens and printers
 _NOTHING: PartialTriple = (None, None, None)
 
 
@@ -81,11 +83,13 @@ def tag_notes(
     """Compare the pixel (y, x) that metadata state with the tags, where they are per centimetre.
 
     place  of `pixel_um`, for notes
+
+    A resolution of screens and printers is stated for any image, and is not compared.
     """
     notes: list[str] = []
     _, *by_tags = _by_tags(tiff)
     for axis, own, tag in zip("yx", pixel_um, by_tags, strict=True):
-        if own and tag:
+        if own and tag and round(_INCH_UM / tag) not in _SCREEN_DPI:
             name = f"the TIFF tag {axis.upper()}Resolution"
             statements = [Statement(own, place), Statement(tag, name, Trust.REPEATED)]
             notes += settle(replace(_PIXEL, name=f"{_PIXEL.name} along {axis}"), statements).notes
@@ -100,11 +104,18 @@ def _imagej(tiff: TiffFile) -> Stated:
         per = dict.fromkeys("zyx", um_per("cm"))
     y, x = (_over(per[axis], _resolution(tiff, axis)) for axis in "yx")
     z = _times(per["z"], meta.get("spacing"))
+    step_notes: tuple[str, ...] = ()
+    if z is not None and z < 0:  # the sign is that of the stage's way; ImageJ leaves it out, too
+        z = -z
+        step_notes = (
+            f"voxel spacing along z: ImageJ states {-z:.5g} um: the planes are read in the order "
+            "of the file",
+        )
     hint = "ImageJ leaves out a depth of 1" if "spacing" not in meta else ""
     luts = meta.get("LUTs")
     colors = tuple(_lut_color(lut) for lut in luts) if isinstance(luts, list) else ()
     values, notes = _imagej_calibration(meta)
-    notes += (*_label_notes(meta), *_repeat_notes(tiff))
+    notes = (*step_notes, *notes, *_label_notes(meta), *_repeat_notes(tiff))
     return Stated((z, y, x), _imagej_names(meta), colors, hint, values, notes)
 
 
