@@ -129,3 +129,21 @@ def test_a_black_channel_has_another_colour() -> None:
     assert _chosen(["a", "GFP"], [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]) == [
         PALETTE[0], color_of_name("GFP"),
     ]  # fmt: skip
+
+
+def test_a_dye_keeps_its_colour_behind_channels_that_name_none() -> None:
+    names = ["CD31", "DAPI", "CD45", "AF488", "CD3"]
+    colors = _chosen(names)
+    assert [colors[1], colors[3]] == [color_of_light(461), color_of_light(519)]
+    assert len(set(colors)) == len(names)
+
+
+def test_a_stated_colour_of_a_later_channel_comes_before_a_dye() -> None:
+    green = color_of_light(519)
+    colors = _chosen(["GFP", "CD31"], [None, green])
+    assert colors[1] == green
+    assert colors[0] != green
+
+
+def test_more_channels_than_the_palette_has_colours_are_all_coloured() -> None:
+    assert _chosen(list("abcdefghij")) == [*PALETTE, *PALETTE[:2]]
