@@ -29,6 +29,7 @@ from stereocell.model.spacing import Spacing
 SHARE = 0.5  # share of a mean below which a fragment goes
 ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
 MIN_ALPHA = 1.0  # least alpha in coarsest spacings: nearer voxels have no gap between them
+MAIN_SHARE = 0.02  # of the largest component's voxels: components with fewer are not the main ones
 OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 
 
@@ -36,7 +37,8 @@ OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 class ComponentSums:
     """Sums over a tile's connected components: over all of them, and over those the rule keeps.
 
-    voxels, largest  of all components, specks included; of the largest
+    voxels, largest          of all components, specks included; of the largest
+    main_voxels, main_faces  of the main components: at least MAIN_SHARE as large as the largest
     """
 
     count: int
@@ -47,6 +49,8 @@ class ComponentSums:
     kept_diagonal_um: float
     voxels: int
     largest: int
+    main_voxels: int
+    main_faces: int
 
 
 def sum_components(
@@ -63,8 +67,10 @@ def sum_components(
     large = components.diagonal_um >= min_diagonal_um
     faces, diagonal = components.faces()[large], components.diagonal_um[large]
     voxels, largest = int(components.voxels.sum()), int(components.voxels.max(initial=0))
+    is_main = components.voxels >= MAIN_SHARE * largest
+    main = int(components.voxels[is_main].sum()), int(components.faces()[is_main].sum())
     if not len(faces):
-        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest)
+        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest, *main)
     kept = (faces >= SHARE * faces.mean()) & (diagonal >= SHARE * diagonal.mean())
     return ComponentSums(
         len(faces),
@@ -75,6 +81,7 @@ def sum_components(
         float(diagonal[kept].sum()),
         voxels,
         largest,
+        *main,
     )
 
 
