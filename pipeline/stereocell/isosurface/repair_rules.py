@@ -31,6 +31,7 @@ from stereocell.model.spacing import Spacing
 SHARE = 0.5  # share of a mean below which a fragment goes
 ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
 MIN_ALPHA = 1.0  # least alpha in coarsest spacings: nearer voxels have no gap between them
+MAIN_SHARE = 0.02  # of the largest component's voxels: components with fewer are not the main ones
 OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 
 
@@ -38,9 +39,10 @@ OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 class ComponentSums:
     """Sums over a tile's connected components: over all of them, and over those the rule keeps.
 
-    voxels, largest  of all components, specks included; of the largest
-    large_voxels     of all components but specks
-    thin_voxels      those of them that are too thin for the planes that carry the surface
+    voxels, largest          of all components, specks included; of the largest
+    large_voxels             of all components but specks
+    thin_voxels              those of them that are too thin for the planes that carry the surface
+    main_voxels, main_faces  of the main components: at least MAIN_SHARE as large as the largest
     """
 
     count: int
@@ -53,6 +55,8 @@ class ComponentSums:
     largest: int
     large_voxels: int
     thin_voxels: int
+    main_voxels: int
+    main_faces: int
 
 
 def sum_components(
@@ -73,8 +77,10 @@ def sum_components(
     large = components.diagonal_um >= min_diagonal_um
     faces, diagonal = components.faces()[large], components.diagonal_um[large]
     voxels, largest = int(components.voxels.sum()), int(components.voxels.max(initial=0))
+    is_main = components.voxels >= MAIN_SHARE * largest
+    main = int(components.voxels[is_main].sum()), int(components.faces()[is_main].sum())
     if not len(faces):
-        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest, 0, 0)
+        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest, 0, 0, *main)
     kept = (faces >= SHARE * faces.mean()) & (diagonal >= SHARE * diagonal.mean())
     return ComponentSums(
         len(faces),
@@ -87,6 +93,7 @@ def sum_components(
         largest,
         int(components.voxels[large].sum()),
         0 if step == (1, 1, 1) else count_thin(components.mask_of(large), step),
+        *main,
     )
 
 
