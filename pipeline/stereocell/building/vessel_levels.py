@@ -23,7 +23,7 @@ MOST_INSIDE = 0.15  # share of all voxels: vessels with more than this inside ar
 # trunk's brightness; lower levels follow the trunk's own blur.
 STEPS = (1.0, 0.85, 0.7, 0.6, 0.5)
 ABOVE_NOISE = 4.0  # sigmas of the noise above the outside at the least
-LEAST_GAIN = 1.04  # length over that a step before: smaller gains are a thicker, rougher surface
+LEAST_GAIN = 1.035  # length over that a step before: smaller gains are a thicker, rougher surface
 # Voxels inside over those a step before. The steps on the flank of a vessel add up to half as many;
 # noise and tissue that join multiply them.
 MOST_GROWTH = 1.6
