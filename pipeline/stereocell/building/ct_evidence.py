@@ -54,7 +54,7 @@ class CtEvidence:
 
 def find_ct_evidence(dataset: Dataset) -> CtEvidence:
     """Return what the values in the middle of the first channel say about CT."""
-    middle = _read_middle(dataset)
+    middle = read_middle(dataset)
     voxels = middle.voxels
     least = float(np.min(voxels))
     if dataset.dtype.kind != "u" and _has_air(voxels, 0.0):
@@ -87,12 +87,12 @@ def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:
     known = dataset.modality or stated
     if known or len(dataset.channels) != 1 or dataset.dtype.kind == "u":
         return known, ""
-    if not _has_air(_read_middle(dataset).voxels, 0.0):
+    if not _has_air(read_middle(dataset).voxels, 0.0):
         return "", ""
     return "CT", f"{_LIKE_HU}: taken for CT (--modality GM: it is a microscope's)"
 
 
-def _read_middle(dataset: Dataset) -> Volume:
+def read_middle(dataset: Dataset) -> Volume:
     """Return planes of the first channel: corners alone may be padding, and the middle all body."""
     depth, height, width = dataset.levels[0].shape
     first = max(0, (depth - _PLANES) // 2)
