@@ -42,6 +42,33 @@ def test_a_name_holds_a_dye(name: str, nm: float) -> None:
     assert emission_of(name) == nm
 
 
+# Emission maxima that the makers publish. The colour is the one of that light.
+@pytest.mark.parametrize(
+    ("name", "nm"),
+    [
+        *[("CF405S", 431), ("CF488A", 515), ("CF568", 583), ("Anti-CD4 CF640R", 662)],
+        *[("DyLight 350", 432), ("DyLight 488", 518), ("DyLight-594", 618), ("DyLight650", 672)],
+        *[("BODIPY FL", 513), ("BODIPY 493/503", 503), ("BODIPY 581/591", 591)],
+        *[("JF549", 571), ("Janelia Fluor 646", 664), ("JFX650", 667)],
+        *[("Qdot 655", 655), ("QDOT525", 525), ("BV421", 421), ("CD8_BV605", 605)],
+        *[("Brilliant Violet 510", 510), ("BUV737", 737), ("eFluor 450", 450)],
+        *[("ATTO 488", 523), ("Atto594", 624), ("ATTO647N", 669), ("STAR 635P", 651)],
+        *[("SYTOX Green", 523), ("SYTOX Orange", 576), ("MitoTracker Deep Red FM", 665)],
+        *[("MitoTracker Red CMXRos", 603), ("LysoTracker Blue", 460), ("Opal 690", 694)],
+    ],
+)
+def test_a_dye_of_a_numbered_family_has_the_colour_of_its_light(name: str, nm: float) -> None:
+    found = color_of_name(name)
+    assert found is not None
+    hue_deg = abs(_hue_deg(found) - _hue_deg(color_of_light(nm) or (0, 0, 0)))
+    assert min(hue_deg, 360 - hue_deg) <= 45  # the same band of the spectrum, or the one beside it
+
+
+@pytest.mark.parametrize("name", ["BV2 cells", "CF", "JF", "CF 12", "BV4210", "scf488", "starch"])
+def test_a_name_that_resembles_a_family_of_dyes_holds_none(name: str) -> None:
+    assert emission_of(name) is None
+
+
 @pytest.mark.parametrize(
     "name", ["", "Channel0", "CD31", "MART1", "Ki67", "afferent", "cyclin", "A4"]
 )
@@ -129,3 +156,21 @@ def test_a_black_channel_has_another_colour() -> None:
     assert _chosen(["a", "GFP"], [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]) == [
         PALETTE[0], color_of_name("GFP"),
     ]  # fmt: skip
+
+
+def test_a_dye_keeps_its_colour_behind_channels_that_name_none() -> None:
+    names = ["CD31", "DAPI", "CD45", "AF488", "CD3"]
+    colors = _chosen(names)
+    assert [colors[1], colors[3]] == [color_of_light(461), color_of_light(519)]
+    assert len(set(colors)) == len(names)
+
+
+def test_a_stated_colour_of_a_later_channel_comes_before_a_dye() -> None:
+    green = color_of_light(519)
+    colors = _chosen(["GFP", "CD31"], [None, green])
+    assert colors[1] == green
+    assert colors[0] != green
+
+
+def test_more_channels_than_the_palette_has_colours_are_all_coloured() -> None:
+    assert _chosen(list("abcdefghij")) == [*PALETTE, *PALETTE[:2]]

@@ -93,6 +93,20 @@ def test_presets_and_defaults_suit_their_data(preset: str | None, level: Level) 
     plan_of(settings.pop("plan"), levels=(level,), channels=CHANNELS[:1], **settings)
 
 
+@pytest.mark.parametrize("preset", ["ct", "ct-bone", "mri"])
+@pytest.mark.parametrize(
+    ("rows", "flags", "tiles"), [(512, {}, 1), (611, {}, 2), (611, {"tile_size": [768] * 3}, 1)]
+)
+def test_a_body_is_one_tile_up_to_512_voxels_a_side_or_the_size_that_is_asked_for(
+    preset: str, rows: int, flags: dict[str, object], tiles: int
+) -> None:
+    settings = settings_module.to_dict(settings_module.load(preset, None, flags={}))
+    level = Level((60, rows, 512), (3000.0, 800.0, 800.0))
+    asked = settings.pop("plan") | flags
+    found = plan_of(asked, levels=(level,), channels=CHANNELS[:1], **settings)
+    assert len(found.tiles) == tiles
+
+
 @pytest.mark.parametrize(
     "surface",
     [

@@ -188,7 +188,9 @@ def test_tiles_make_one_sound_surface_on_thinned_planes(
     tmp_path: Path, scene: NDArray[np.uint16]
 ) -> None:
     """Every third plane carries the surface; three divides no tile."""
-    built = _build(tmp_path, scene, SETTINGS.replace("[surface]", "[surface]\ngrid_um = 3.0"))
+    built = _build(
+        tmp_path, scene, SETTINGS.replace("[surface]", "[surface]\ngrid_um = 3.0\nmax_thin = 1.0")
+    )
     assert TILE % 3
     assert built.plan.step == (3, 3, 3)
     meshes = [lods[0].mesh for lods in built.lods.values()]

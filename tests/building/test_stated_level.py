@@ -89,13 +89,13 @@ def _stated(out: Path, channel: str) -> dict[str, Any]:
 def _bounded(
     field: NDArray[np.float64], voxels: NDArray[np.uint16], denoising: dict[str, Any]
 ) -> NDArray[np.float64]:
-    """Return the field, moved from the voxels without hot pixels by no more than the file says."""
-    others, rank = np.ones(denoising["median_voxels"], bool), denoising["hot_pixel_rank"]
-    others[tuple(n // 2 for n in others.shape)] = False
-    low, high = (
-        ndimage.rank_filter(voxels, place, footprint=others, mode="mirror")
-        for place in (rank - 1, -rank)
-    )
+    """Return the field, moved from the voxels without hot voxels by no more than the file says."""
+    others = np.ones(denoising["hot_voxel_box"], bool)
+    in_plane = [n > 1 for n in denoising["median_voxels"]]
+    straight = [1 if is_in else slice(None) for is_in in in_plane]
+    others[tuple(straight)] = False
+    low = ndimage.minimum_filter(voxels, footprint=others, mode="mirror")
+    high = ndimage.maximum_filter(voxels, footprint=others, mode="mirror")
     measured = np.clip(voxels, low, high).astype(np.float64)
     return np.clip(field, measured - denoising["max_shift"], measured + denoising["max_shift"])
 

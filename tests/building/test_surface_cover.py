@@ -1,5 +1,6 @@
 """How a surface covers the source's voxels above its level, beside what filters removed of them."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy import ndimage
 from skimage.measure import marching_cubes
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.surface_cover import REMEDY
 from stereocell.building.unit_files import cover_of, load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.cover import measure_cover
@@ -52,25 +54,39 @@ def test_shares_are_those_of_both_counts() -> None:
     assert (Cover(0, 0, 0).missing, Cover(0, 0, 0).added) == (0, 0)
 
 
-@pytest.mark.parametrize("step", [(1, 1, 1), (2, 2, 2)])
-def test_voxels_are_counted_on_the_tile_s_own_points(step: tuple[int, int, int]) -> None:
+@pytest.mark.parametrize("step", [(1, 1, 1), (2, 2, 2), (1, 3, 2)])
+def test_all_voxels_are_counted_on_the_tile_s_own_points(step: tuple[int, int, int]) -> None:
+    """SciPy interpolates the solid between the planes that carry it."""
     rng = np.random.default_rng(0)
     voxels = rng.integers(0, 1000, (20, 24, 28)).astype(np.uint16)
     window, own = Box((2, 4, 6), (18, 24, 28)), Box((4, 8, 12), (15, 19, 23))
     region = Box((0, 0, 0), voxels.shape)
     lattice = Lattice(window, own, region, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
-    every = np.zeros(voxels.shape, bool)
-    every[:: step[0], :: step[1], :: step[2]] = True
-    inside = ndimage.gaussian_filter(voxels.astype(float), 1) > 500
-    kept = lattice.slices_of_thinned(step)
-    distance = np.where(inside[window.slices], 1.0, -1.0).astype(np.float32)[kept]
+    field = (ndimage.gaussian_filter(voxels.astype(float), 1) - 500).astype(np.float32)
+    distance = field[window.slices][lattice.slices_of_thinned(step)]
     iso = LatticeField(((0.0,), (0.0,), (0.0,)), np.full((1, 1, 1), 400.0))
     under = LatticeField(((0.0,), (0.0,), (0.0,)), np.full((1, 1, 1), 100.0))
     found = measure_cover(
         voxels[window.slices], distance, lattice, step, iso=iso, background=under, holder=None
     )
-    above, solid = ((part & every)[own.slices] for part in (voxels > 500, inside))
+    places = np.mgrid[own.slices] / np.reshape(step, (3, 1, 1, 1))
+    planes = field[:: step[0], :: step[1], :: step[2]].astype(np.float64)
+    solid = ndimage.map_coordinates(planes, places, order=1, mode="nearest") > 0
+    above = (voxels > 500)[own.slices]
     assert found == Cover(int(above.sum()), int((above & solid).sum()), int(solid.sum()))
+
+
+def test_a_plate_between_two_planes_of_the_surface_counts_as_lost() -> None:
+    voxels = np.zeros((9, 9, 10), np.uint16)
+    voxels[3, 2:7, 2:7] = 1000
+    voxels[2:7, 2:7, 9] = 1000  # beyond the last plane
+    lattice = Lattice.of_whole(Box((0, 0, 0), voxels.shape), (1.0, 1.0, 1.0))
+    level = LatticeField(((0.0,), (0.0,), (0.0,)), np.full((1, 1, 1), 500.0))
+    distance = (voxels.astype(np.float32) - 500)[::2, ::2, ::2]
+    found = measure_cover(
+        voxels, distance, lattice, (2, 2, 2), iso=level, background=None, holder=None
+    )
+    assert found == Cover(50, 0, 0)
 
 
 @pytest.mark.slow
@@ -93,10 +109,25 @@ def test_a_surface_that_loses_sheets_says_so_everywhere(
     sheets = above[:, :, 40:].sum()
     assert cover.missing == pytest.approx(sheets / above.sum(), abs=0.03)  # and the ball's skin
     assert f"its surface leaves out {cover.missing:.0%} of the source's voxels" in units
+    assert REMEDY in " ".join(units.split())
     assert cover.words in deep
     titles = {remark.title: remark.lines for remark in find_remarks(gather(OutFolder(out)))}
     (lines,) = (lines for title, lines in titles.items() if "leaves out more than 5%" in title)
     assert cover.words in lines[0]
+
+
+@pytest.mark.slow
+def test_the_remedy_that_the_note_names_keeps_thin_sheets_and_specks(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = re.findall(r"[a-z_]+ = [0-9.]+", REMEDY)
+    remedy = tmp_path / "remedy.toml"
+    remedy.write_text("\n".join(["[surface]", *settings]))
+    assert len(settings) == 3
+    level = ("--iso-value", f"Channel0={LEVEL:g}", "--config", str(remedy))
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--grid", "1x1", *level]) == 0
+    assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
+    assert "leaves out" not in capsys.readouterr().err
 
 
 @pytest.mark.slow

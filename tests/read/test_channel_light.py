@@ -62,6 +62,7 @@ def test_emission_wavelengths_of_tifffile_color_the_channels(tmp_path: Path) -> 
     [
         ({"emission_wavelength": 519.0}, 519),
         ({"emission_wavelength": 0.519, "emission_wavelength_unit": "\u00b5m"}, 519),
+        ({"fluor": "CF568"}, 583),
         ({"fluor": "Alexa Fluor 647"}, 667),
         ({"fluor": "DAPI", "emission_wavelength": 519.0}, 519),
         ({"color": Color("white"), "emission_wavelength": 519.0}, 519),

@@ -1,5 +1,6 @@
 """The preset for vessels: a tree from a wide trunk to branches as thin as a voxel stays whole."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from stereocell.building.survey_file import ChannelSurvey, read_survey
 from stereocell.building.vessel_levels import choose_connected
 from stereocell.cli.__main__ import main
 from stereocell.filters.denoise import denoise
+from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.volume import Volume
 
 SHAPE = (40, 96, 96)
@@ -105,7 +107,10 @@ def test_thin_branches_stay_on_the_tree(
 
 
 def _sums(*pairs: tuple[int, int]) -> list[dict[str, dict[str, int]]]:
-    return [{"r0_c0": {"voxels": voxels, "faces": faces}} for voxels, faces in pairs]
+    return [
+        {"r0_c0": {"voxels": voxels, "main_voxels": voxels, "main_faces": faces}}
+        for voxels, faces in pairs
+    ]
 
 
 def test_a_level_that_only_thickens_vessels_is_not_taken() -> None:
@@ -115,3 +120,15 @@ def test_a_level_that_only_thickens_vessels_is_not_taken() -> None:
 
 def test_a_level_that_adds_branches_is_taken_until_tissue_joins() -> None:
     assert choose_connected(_sums((1000, 900), (1100, 1100), (1250, 1350), (9000, 30000))) == 2
+
+
+def test_pieces_that_hang_on_no_vessel_add_no_length() -> None:
+    """A wide vessel with soft edges, in tissue that gets loose above each lower level."""
+    rng = np.random.default_rng(4)
+    _, y, x = np.indices((40, 64, 64))
+    tube = ndimage.gaussian_filter((np.hypot(y - 32, x - 32) < 10).astype(float), 2.0)
+    grain = ndimage.gaussian_filter(rng.normal(size=tube.shape), 1.0)
+    field = 1000 * tube + 130 * grain / grain.std()
+    sums = [sum_components(field > level, (1.0, 1.0, 1.0), 2.0) for level in (500, 425, 350, 300)]
+    assert sums[-1].count > 10 * sums[0].count
+    assert choose_connected([{"r0_c0": asdict(one)} for one in sums]) == 0

@@ -2,7 +2,8 @@
 
 Scans of bodies are warm and pale, radiotracers amber, a channel that is named after a dye has the
 colour of its light, and a volume of one channel is a warm grey. All others have PALETTE's colours.
-No two channels have nearly the same one: the later takes the next of PALETTE.
+Stated colours are given to all channels first, then recognised ones, then PALETTE's. No two
+channels have nearly the same colour: the later one takes the next of PALETTE.
 """
 
 from collections.abc import Sequence
@@ -30,14 +31,28 @@ def choose_colors(
     modality  DICOM's code; empty: not known
     is_alone  whether the source has one channel only
     """
-    chosen: list[Color] = []
-    for place, (name, stated) in enumerate(channels):
-        wanted = [stated, _of_modality(place, modality), color_of_name(name)]
-        wanted += [WARM_GREY if is_alone and not modality else None]
-        wanted += [PALETTE[(place + step) % len(PALETTE)] for step in range(len(PALETTE))]
-        colors = [color for color in wanted if color is not None and max(color) > _BLACK]
-        chosen.append(next((one for one in colors if not _is_near(one, chosen)), colors[0]))
-    return chosen
+    places = range(len(channels))
+    modal = [_of_modality(place, modality) for place in places]
+    lone = WARM_GREY if is_alone and not modality else None
+    chosen: dict[int, Color] = {}
+    # No later round takes a colour of an earlier one: DAPI is blue behind a channel "CD31" too.
+    for wishes in (
+        [[stated] for _, stated in channels],
+        [[modal[place], color_of_name(channels[place][0]), lone] for place in places],
+        [PALETTE[place % len(PALETTE) :] + PALETTE[: place % len(PALETTE)] for place in places],
+    ):
+        for place in places:
+            if place not in chosen:
+                free = _first_free(wishes[place], list(chosen.values()))
+                chosen.update({} if free is None else {place: free})
+    # More channels than the palette has colours: the others repeat it.
+    return [chosen.get(place, PALETTE[place % len(PALETTE)]) for place in places]
+
+
+def _first_free(wishes: Sequence[Color | None], taken: Sequence[Color]) -> Color | None:
+    """Return the first colour that can be seen and is not near one that is taken."""
+    visible = (color for color in wishes if color is not None and max(color) > _BLACK)
+    return next((color for color in visible if not _is_near(color, taken)), None)
 
 
 def _of_modality(place: int, modality: str) -> Color | None:

@@ -216,6 +216,10 @@ def _of_channel(
         level_percentile=plan.settings.window.volume_percentile,
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)
+    large, thin = (
+        sum(one[key] for one in components.values()) for key in ("large_voxels", "thin_voxels")
+    )
+    thin_share = thin / large if large else 0.0
     return ChannelSurvey(
         statistics,
         file,
@@ -234,8 +238,9 @@ def _of_channel(
         () if found.levels is None else found.levels.ladder,
         None if found.levels is None else Curve(*found.levels.curve()),
         found.window.holder,
-        plan.grid_for(most_faces),
+        plan.grid_for(most_faces, thin_share),
         most_faces,
+        thin_share,
     )
 
 
@@ -318,12 +323,14 @@ def _components(
             around(one.background, tile.box),
             float(surface.min_diagonal_um),
             one.window.max_shift,
+            plan.step,
         )
         return task, [
             box_to_json(tile.box),
             task.smoothing_um,
             task.max_shift,
             task.min_diagonal_um,
+            task.step,
             iso,
             None if task.background is None else task.background.to_json(),
         ]

@@ -101,17 +101,20 @@ class Plan:
         settings = replace(self.settings, surface=surface)
         return replace(self, settings=settings, halo=_halo(settings, self.spacing_um, self.region))
 
-    def grid_for(self, faces: int) -> float:
+    def grid_for(self, faces: int, thin: float) -> float:
         """Return how far apart planes lie, um, that carry a surface of at most surface.max_faces.
+
+        All planes do at first where more than surface.max_thin is too thin for surface.grid_um.
 
         Of a smooth surface every k-th plane along each axis leaves a k^2-th of the faces, of noise
         less. Thinned are the axes whose planes lie nearest, as long as a tile keeps MIN_PLANES
         and what a unit reads around it stays in proportion.
 
         faces  of voxels, of the surface in one tile
+        thin   share of the channel's voxels above its level that are too thin for grid_um
         """
         surface = self.settings.surface
-        grid = surface.grid_um
+        grid = 0.0 if thin > surface.max_thin else surface.grid_um
         while faces / math.prod(_step_of(grid, self.spacing_um)) ** (2 / 3) > surface.max_faces:
             step = _step_of(grid, self.spacing_um)
             wider = min((k + 1) * h for k, h in zip(step, self.spacing_um, strict=True))

@@ -60,6 +60,7 @@ class ChannelSurvey:
     holder           a CT's table or head holder, which is left out; None: there is none
     grid_um          how far apart the planes lie that carry its surface; 0: all do
     most_faces       most voxel faces of its surface in a tile, before planes are left out
+    thin_share       of its voxels above the level, those too thin for planes surface.grid_um apart
     """
 
     statistics: ChannelStatistics
@@ -72,6 +73,7 @@ class ChannelSurvey:
     holder: Holder | None = None
     grid_um: float = 0.0
     most_faces: int = 0
+    thin_share: float = 0.0
 
     @property
     def near_levels(self) -> str:
@@ -84,10 +86,17 @@ class ChannelSurvey:
         return words_of(near, mark) if near else ""
 
     def thinning(self, plan: Plan) -> str:
-        """Return what is said of a surface that fewer planes carry than asked for; empty: none."""
-        if self.grid_um == plan.settings.surface.grid_um:
+        """Return what is said of a surface that other planes carry than asked for; empty: none."""
+        surface = plan.settings.surface
+        if self.grid_um == surface.grid_um:
             return ""
         z, y, x = plan.with_grid(self.grid_um).step
+        if (z, y, x) == (1, 1, 1):
+            return (
+                f"{self.thin_share:.0%} of its voxels above the level lie in structures too thin "
+                f"for planes {surface.grid_um:g} um apart (surface.grid_um), more than "
+                f"{surface.max_thin:.0%} (surface.max_thin): all planes carry its surface"
+            )
         return (
             f"up to {self.most_faces:,} voxel faces of its surface lie in a tile, more than "
             f"{plan.settings.surface.max_faces:,} (surface.max_faces): of the planes along z, y, x "

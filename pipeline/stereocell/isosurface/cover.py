@@ -2,6 +2,9 @@
 
 A surface's stated distances are measured on the filtered field, and say nothing about what the
 filter removed. So the solid is compared with the voxels as they were read, too.
+
+All voxels are compared, also where only some planes of them carry the surface. The solid is linear
+between those planes, and beyond the last one it is as there.
 """
 
 from typing import Any
@@ -33,18 +36,40 @@ def measure_cover(
     iso         above the background, voxel values
     holder      what is left out of the surface, and of the count; None: nothing is
     """
-    thin = lattice.thinned(step)
-    kept = lattice.slices_of_thinned(step)
     own = tuple(
         slice(a - low, b - low)
-        for a, b, low in zip(thin.own.start, thin.own.stop, thin.window.start, strict=True)
+        for a, b, low in zip(lattice.own.start, lattice.own.stop, lattice.window.start, strict=True)
     )
     level = iso.at(lattice.window)
     if background is not None:
         level = level + background.at(lattice.window)
-    is_above = (voxels > level)[kept][own]
+    is_above = (voxels > level)[own]
     if holder is not None:
-        is_above &= ~np.broadcast_to(holder.at(lattice.window), voxels.shape)[kept][own]
-    is_inside = distance[own] > 0
+        is_above &= ~np.broadcast_to(holder.at(lattice.window), voxels.shape)[own]
+    is_inside = between_planes(distance, lattice, step) > 0
     source, solid = int(is_above.sum()), int(is_inside.sum())
     return Cover(source, int((is_above & is_inside).sum()), solid)
+
+
+def between_planes(field: NDArray[np.float32], lattice: Lattice, step: Step) -> NDArray[np.float32]:
+    """Return a field of the thinned lattice's window at all of the tile's own points.
+
+    It is linear between two planes of the thinned lattice, and beyond the last one as there.
+    """
+    first = lattice.thinned(step).window.start
+    for axis in range(3):
+        if step[axis] == 1:
+            start = lattice.own.start[axis] - lattice.window.start[axis]
+            stop = lattice.own.stop[axis] - lattice.window.start[axis]
+            field = field[(slice(None),) * axis + (slice(start, stop),)]
+            continue
+        points = np.arange(lattice.own.start[axis], lattice.own.stop[axis])
+        planes, past = np.divmod(points - lattice.region.start[axis], step[axis])
+        last = field.shape[axis] - 1
+        low = np.clip(planes - first[axis], 0, last)
+        below = np.take(field, low, axis)
+        shape = [-1 if axis == k else 1 for k in range(3)]
+        share = (past / step[axis]).astype(np.float32).reshape(shape)
+        below += (np.take(field, np.minimum(low + 1, last), axis) - below) * share
+        field = below
+    return field

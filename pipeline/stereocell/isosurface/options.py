@@ -159,6 +159,12 @@ class SurfaceOptions:
         "planes of voxels so far apart carry the surface; 0: all; .42 alpha shows what alpha does",
         bounds=LENGTH_UM,
     )
+    max_thin: float = setting(
+        0.05,
+        "share of a channel's voxels above its level in structures too thin for planes grid_um "
+        "apart; where there are more, all planes carry its surface; 1: planes grid_um apart do",
+        bounds=Bounds(0, 1),
+    )
     max_faces: int = setting(
         5_000_000,
         "voxel faces of a unit's surface: where noise or a sponge has more, planes farther apart "

@@ -23,12 +23,15 @@ from numpy.typing import NDArray
 from stereocell.isosurface.components import find_components
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.thin_structures import count_thin
+from stereocell.model.lattice import Step
 from stereocell.model.settings import AUTO
 from stereocell.model.spacing import Spacing
 
 SHARE = 0.5  # share of a mean below which a fragment goes
 ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
 MIN_ALPHA = 1.0  # least alpha in coarsest spacings: nearer voxels have no gap between them
+MAIN_SHARE = 0.02  # of the largest component's voxels: components with fewer are not the main ones
 OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 
 
@@ -36,7 +39,10 @@ OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 class ComponentSums:
     """Sums over a tile's connected components: over all of them, and over those the rule keeps.
 
-    voxels, largest  of all components, specks included; of the largest
+    voxels, largest          of all components, specks included; of the largest
+    large_voxels             of all components but specks
+    thin_voxels              those of them that are too thin for the planes that carry the surface
+    main_voxels, main_faces  of the main components: at least MAIN_SHARE as large as the largest
     """
 
     count: int
@@ -47,10 +53,17 @@ class ComponentSums:
     kept_diagonal_um: float
     voxels: int
     largest: int
+    large_voxels: int
+    thin_voxels: int
+    main_voxels: int
+    main_faces: int
 
 
 def sum_components(
-    inside: NDArray[np.bool_], spacing_um: Spacing, min_diagonal_um: float
+    inside: NDArray[np.bool_],
+    spacing_um: Spacing,
+    min_diagonal_um: float,
+    step: Step = (1, 1, 1),
 ) -> ComponentSums:
     """Return the sums over the connected components of {field > iso-value}.
 
@@ -58,13 +71,16 @@ def sum_components(
     spacing_um       (z, y, x)
     min_diagonal_um  smaller components are left out: noise has more of them than a tile has bodies,
                      so they would decide the means
+    step             voxels (z, y, x) between planes that carry the surface
     """
     components = find_components(inside, spacing_um, 26)
     large = components.diagonal_um >= min_diagonal_um
     faces, diagonal = components.faces()[large], components.diagonal_um[large]
     voxels, largest = int(components.voxels.sum()), int(components.voxels.max(initial=0))
+    is_main = components.voxels >= MAIN_SHARE * largest
+    main = int(components.voxels[is_main].sum()), int(components.faces()[is_main].sum())
     if not len(faces):
-        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest)
+        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest, 0, 0, *main)
     kept = (faces >= SHARE * faces.mean()) & (diagonal >= SHARE * diagonal.mean())
     return ComponentSums(
         len(faces),
@@ -75,6 +91,9 @@ def sum_components(
         float(diagonal[kept].sum()),
         voxels,
         largest,
+        int(components.voxels[large].sum()),
+        0 if step == (1, 1, 1) else count_thin(components.mask_of(large), step),
+        *main,
     )
 
 

@@ -7,6 +7,7 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.copying import copy_plane
 
 Field = NDArray[np.float32]
+Planes = NDArray[np.float32]
 Row = NDArray[np.float32]
 Weights = NDArray[np.float64]
 
@@ -49,31 +50,43 @@ def _find_median(plane: Field, out: Field, low: Field, mid: Field, high: Field) 
 
 
 @part
-def _clip_hot_pixels(plane: Field, out: Field, low: Field, mid: Field, high: Field) -> None:
-    """Write each pixel, clipped to the second least and second largest of its eight neighbours.
+def _find_extremes(plane: Field, least: Field, most: Field, low: Row, high: Row) -> None:
+    """Write the least and largest of each pixel's eight neighbours.
 
-    A line of one pixel has two neighbours of its own brightness at each of its pixels, and stays; a
-    hot pixel, or two side by side, do not. Beyond an edge the plane is mirrored.
+    Beyond an edge the plane is mirrored. low, high: (width + 2,), memory to work in.
     """
     height, width = plane.shape
     for y in range(height):
         here = plane[y]
         above = plane[y - 1 if y else min(1, height - 1)]
         below = plane[y + 1 if y + 1 < height else max(y - 1, 0)]
-        _order_columns(above, here, below, low, mid, high)
-        near, far = min(2, width), max(width - 1, 1)
-        low[0], mid[0], high[0] = low[near], mid[near], high[near]
-        low[width + 1], mid[width + 1], high[width + 1] = low[far], mid[far], high[far]
-        row = out[y]
         for x in range(width):
-            dark, bright = min(above[x], below[x]), max(above[x], below[x])
-            inner_low, inner_high = min(mid[x], mid[x + 2]), max(mid[x], mid[x + 2])
-            least = min(low[x], low[x + 2])
-            second_least = min(max(low[x], low[x + 2]), inner_low)
-            most = max(high[x], high[x + 2])
-            second_most = max(min(high[x], high[x + 2]), inner_high)
-            floor = min(max(least, dark), min(second_least, bright))
-            ceiling = max(min(most, bright), max(second_most, dark))
+            low[x + 1] = min(here[x], min(above[x], below[x]))
+            high[x + 1] = max(here[x], max(above[x], below[x]))
+        near, far = min(2, width), max(width - 1, 1)
+        low[0], high[0] = low[near], high[near]
+        low[width + 1], high[width + 1] = low[far], high[far]
+        lows, highs = least[y], most[y]
+        for x in range(width):
+            lows[x] = min(min(low[x], low[x + 2]), min(above[x], below[x]))
+            highs[x] = max(max(high[x], high[x + 2]), max(above[x], below[x]))
+
+
+@part
+def _clip_hot_voxels(plane: Field, out: Field, least: Planes, most: Planes) -> None:
+    """Write a plane, each voxel clipped to the least and largest of its 24 neighbours.
+
+    least, most  (3, height, width): extremes of planes z - 1, z and z + 1, in any order
+
+    The two neighbours straight across the plane don't count: a camera's hot pixel is hot in all
+    planes.
+    """
+    height, width = plane.shape
+    for y in range(height):
+        here, row = plane[y], out[y]
+        for x in range(width):
+            floor = min(least[0, y, x], min(least[1, y, x], least[2, y, x]))
+            ceiling = max(most[0, y, x], max(most[1, y, x], most[2, y, x]))
             row[x] = max(floor, min(ceiling, here[x]))
 
 
@@ -124,8 +137,8 @@ def smooth_in_place(
 
     along_z, along_y, along_x  weights, symmetric, of odd length; they add up to 1
     has_median                 whether a 3 x 3 median in plane goes before
-    max_shift                  by how much both may move a value that is no hot pixel; infinite: by
-                               any
+    max_shift                  by how much both may move a value from that of the voxel without hot
+                               voxels; infinite: by any
 
     Edges repeat. Sums are float64, in an order that the voxel's neighbours alone decide; what is
     kept between the axes is float32.
@@ -135,6 +148,9 @@ def smooth_in_place(
     ring = np.empty((2 * rz + 1, height, width), np.float32)
     is_bounded = max_shift < np.inf
     measured = np.empty((rz + 1 if is_bounded else 0, height, width), np.float32)
+    clips = is_bounded and has_median
+    least = np.empty((3 if clips else 0, height, width), np.float32)
+    most = np.empty((3 if clips else 0, height, width), np.float32)
     plane = np.empty((height, width), np.float32)
     low, mid = np.empty(width + 2, np.float32), np.empty(width + 2, np.float32)
     high = np.empty(width + 2, np.float32)
@@ -145,8 +161,15 @@ def smooth_in_place(
                 _find_median(field[z], plane, low, mid, high)
             else:
                 copy_plane(field[z], plane)
-            if is_bounded and has_median:
-                _clip_hot_pixels(field[z], measured[z % len(measured)], low, mid, high)
+            if clips:
+                # planes beyond the ends repeat those within, which changes no extreme
+                for k in range(0 if z == 0 else z + 1, min(z + 2, depth)):
+                    _find_extremes(field[k], least[k % 3], most[k % 3], low, high)
+                if z == 0:
+                    least[2], most[2] = least[0], most[0]
+                if z + 1 == depth:
+                    least[(z + 1) % 3], most[(z + 1) % 3] = least[z % 3], most[z % 3]
+                _clip_hot_voxels(field[z], measured[z % len(measured)], least, most)
             elif is_bounded:
                 copy_plane(field[z], measured[z % len(measured)])
             _smooth_plane(plane, ring[z % len(ring)], along_y, along_x, total, wide)

@@ -24,6 +24,30 @@ _BANDS = (
 )
 _SHORTEST_NM = 300.0  # shorter numbers are no emission of a dye: they are left out
 
+# Families of dyes that are numbered by the light they emit, nm, and by the light they absorb.
+# BODIPY has both numbers, or the last one only.
+_BY_EMISSION = re.compile(
+    r"(?<![a-z])(?:qdot|quantum dot|qd|bu?v|bb|brilliant (?:ultra ?)?(?:violet|blue)|super bright"
+    r"|e ?fluor|opal|m?irfp|bodipy(?: [0-9]{3})?) ?([3-9][0-9]{2})(?![0-9])"
+)
+_BY_EXCITATION = re.compile(
+    r"(?<![a-z])(?:atto|cf|dylight|jfx?|janelia ?fluor|i ?fluor|hilyte(?: ?fluor)?|ir ?dye"
+    r"|(?:abberior )?star|dyomics|dy|chromeo) ?([3-9][0-9]{2})(?![0-9])"
+)
+_SHIFT_NM = 20.0  # from the light that such a dye absorbs to the light that it emits: 10 to 35
+_VISIBLE_NM = 400.0  # dyes that absorb shorter light emit at about _BLUE_NM
+_BLUE_NM = 442.0
+
+# Stains that are named by a colour, and its emission maximum, nm
+_BY_WORD = re.compile(
+    r"(?<![a-z])(?:sytox(?: aadvanced)?|(?:mito|lyso|er|cell) ?tracker|cell ?mask|cell ?trace"
+    r"|zombie|live dead(?: fixable)?) ?(violet|blue|green|yellow|orange|deep red|far red|red)"
+)
+_WORDS_NM = {
+    "violet": 430, "blue": 460, "green": 520, "yellow": 560, "orange": 580, "red": 610,
+    "deep red": 665, "far red": 665,
+}  # fmt: skip
+
 # Emission maximum, nm, by a pattern of the name in lower case with single spaces
 _DYES = tuple(
     (re.compile(rf"(?<![a-z])(?:{pattern})(?![a-z0-9]|\.[0-9])"), nm)
@@ -36,17 +60,17 @@ _DYES = tuple(
         r"m?cerulean3?|[em]?cfp|m?turquoise2?": 475,
         r"(?:alexa ?(?:fluor)?|af|a) ?488": 519,
         r"(?:e|em|sf|t|z|m)?gfp|m?neongreen|m?clover": 510,
-        r"fitc|fluorescein|fam|cy ?2|calcein|sytox green|atto ?488|oregon green": 520,
+        r"fitc|fluorescein|fam|cy ?2|calcein|bodipy fl|oregon green": 520,
         r"gcamp[0-9a-z]*": 512,
         r"[em]?yfp|m?venus|m?citrine": 528,
         r"(?:alexa ?(?:fluor)?|af|a) ?532": 554,
         r"(?:alexa ?(?:fluor)?|af|a) ?(?:546|555)": 567,
-        r"cy ?3|tritc|rhodamine|tmr|atto ?550|(?:m|m?k)orange2?": 570,
+        r"cy ?3|tritc|rhodamine|tmr|(?:m|m?k)orange2?": 570,
         r"tdtomato|dsred2?|tagrfp|m?rfp": 583,
-        r"(?:alexa ?(?:fluor)?|af|a) ?(?:568|594)|texas red|cy ?3\.5|atto ?594": 610,
+        r"(?:alexa ?(?:fluor)?|af|a) ?(?:568|594)|texas red|cy ?3\.5|bodipy tr": 610,
         r"m?cherry2?|mscarlet[0-9i]*|mruby[0-9]?|propidium iodide": 610,
         r"(?:alexa ?(?:fluor)?|af|a) ?(?:633|635|647|660)|cy ?5|apc|draq ?5|to ?pro ?3": 667,
-        r"atto ?(?:633|647n?)|sir(?: ?(?:dna|actin|tubulin))?|mplum|mkate2?": 665,
+        r"percp|sir(?: ?(?:dna|actin|tubulin))?|mplum|mkate2?": 665,
         r"(?:alexa ?(?:fluor)?|af|a) ?(?:680|700)|cy ?5\.5": 700,
         r"(?:alexa ?(?:fluor)?|af|a) ?(?:750|790)|cy ?7|indocyanine green|icg": 780,
     }.items()
@@ -64,6 +88,13 @@ def color_of_wavelength(nm: float) -> Color | None:
 def emission_of(name: str) -> float | None:
     """Return the emission maximum, nm, of the dye that a channel's name holds; None: of none."""
     plain = " ".join(re.sub(r"[^a-z0-9.]+", " ", name.lower()).split())
+    if (found := _BY_EMISSION.search(plain)) is not None:
+        return float(found[1])
+    if (found := _BY_EXCITATION.search(plain)) is not None:
+        absorbed = float(found[1])
+        return _BLUE_NM if absorbed < _VISIBLE_NM else absorbed + _SHIFT_NM
+    if (found := _BY_WORD.search(plain)) is not None:
+        return float(_WORDS_NM[found[1]])
     return next((float(nm) for pattern, nm in _DYES if pattern.search(plain)), None)
 
 

@@ -6,7 +6,8 @@ are sorted along their normal. The median of the gaps decides which gaps are reg
 gaps are, or are whole multiples of it (planes are missing), the spacing is the mean over the
 length, so that rounded positions don't add up. Else the length is divided into as many gaps as the
 median fits in, and all planes between are interpolated. Planes that drift sideways (a tilted
-gantry) are a sheared stack; they are shifted within their planes onto an orthogonal grid.
+gantry) are a sheared stack; they are shifted within their planes onto an orthogonal grid. So are
+planes of which some jump sideways, but a note names the jump, which no gantry makes.
 
 References: DICOM PS3.3 C.7.6.2 (Image Plane module).
 """
@@ -21,6 +22,7 @@ from stereocell.model.counted import agreeing, counted
 
 REGULAR = 0.02  # share of the median gap: an even gap deviates by no more (rounded positions)
 DRIFT = 0.05  # pixels over the whole stack: planes that drift less are not shifted
+JUMP = 0.05  # share of a plane's shorter side: a larger sideways step than the others' is no tilt
 SAME_PLACE = 0.02  # pixels: planes at a smaller distance count as one place
 
 
@@ -43,6 +45,7 @@ class StackLayout:
     missing      the number of grid planes without a plane of the stack
     is_even      the gaps are whole multiples of the spacing
     tilt_deg     angle between the normal and the line through the planes' first pixels; 0: none
+    jump_mm      largest sideways step between neighbours beyond their usual one; 0: all are alike
     """
 
     shape: tuple[int, int, int]
@@ -55,6 +58,7 @@ class StackLayout:
     missing: int
     is_even: bool
     tilt_deg: float
+    jump_mm: float
 
     @property
     def is_resampled(self) -> bool:
@@ -88,7 +92,12 @@ class StackLayout:
                 f"({self.missing / total:.1%}), {agreeing(len(wide), 'a gap', 'gaps')} of {shown} "
                 f"mm among slices {spacing:.4g} mm apart: interpolated"
             )
-        if self.tilt_deg:
+        if self.jump_mm:
+            notes.append(
+                f"neighbouring slices jump sideways by up to {self.jump_mm:.3g} mm, as no gantry "
+                "tilt does: each lies where its position says, which may be wrong"
+            )
+        elif self.tilt_deg:
             notes.append(
                 f"gantry tilt of {self.tilt_deg:.3g} degrees: resampled onto an orthogonal grid"
             )
@@ -170,7 +179,19 @@ def lay_out(
         count - len(positions) if is_even else count,
         is_even,
         tilt,
+        _find_jump(local, JUMP * float(np.min(np.multiply(plane_shape, pixel_spacing_mm)))),
     )
+
+
+def _find_jump(local: NDArray[np.float64], least_mm: float) -> float:
+    """Return the largest sideways step beyond the usual drift, mm; 0 if it is below `least_mm`.
+
+    local  (n, 3): places in mm along the normal and along two axes in the plane
+    """
+    steps = np.diff(local, axis=0)
+    usual = np.median(steps[:, 1:] / steps[:, :1], axis=0)
+    jump = float(np.linalg.norm(steps[:, 1:] - usual * steps[:, :1], axis=1).max())
+    return jump if jump > least_mm else 0.0
 
 
 def _count_planes(gaps: NDArray[np.float64]) -> tuple[int, bool]:

@@ -23,7 +23,7 @@ from typing import Any
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from stereocell.filters.denoise import HOT_PIXEL_RANK, SMOOTHING_REACH
+from stereocell.filters.denoise import HOT_VOXEL_REACH, SMOOTHING_REACH
 from stereocell.formats.exr import write_lut
 from stereocell.model.channel import Appearance, OpacityPoints, Shapes, SurfaceLevel
 from stereocell.model.object_table import ObjectTable
@@ -92,7 +92,8 @@ def level_to_json(level: SurfaceLevel) -> dict[str, Any]:
         "about": "The surface lies where the denoised voxels are background + iso. Axes z, y, x; "
         "knots in voxels of the level that was built, values linear between them. Median and "
         "Gaussian move a value by max_shift at most (null: by any), from the voxel clipped to the "
-        "hot_pixel_rank-th least and largest of the others in median_voxels.",
+        "least and largest of its neighbours in hot_voxel_box but those straight across the plane "
+        "of median_voxels.",
         "iso": level.iso,
         "iso_by_tile": None if level.by_tile is None else level.by_tile.to_json(),
         "background": None if level.background is None else level.background.to_json(),
@@ -101,7 +102,7 @@ def level_to_json(level: SurfaceLevel) -> dict[str, Any]:
             "gaussian_sigma_um": level.smoothing_um,
             "gaussian_truncate": SMOOTHING_REACH,
             "max_shift": level.max_shift,
-            "hot_pixel_rank": HOT_PIXEL_RANK,
+            "hot_voxel_box": [2 * HOT_VOXEL_REACH * (max(level.median_size) > 1) + 1] * 3,
         },
     }
 

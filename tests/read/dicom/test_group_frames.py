@@ -194,8 +194,65 @@ def test_slices_of_a_frame_of_reference_each_at_irregular_places_are_refused(
     tmp_path: Path, indices: list[float]
 ) -> None:
     write_series(tmp_path / "s", AFFINE, SHAPE, indices=indices, change=new_reference)
-    with pytest.raises(SourceError, match="stacks of one slice each, told apart by FrameOfRef"):
+    with pytest.raises(SourceError) as caught:
         read.open(tmp_path / "s")
+    line = str(caught.value)
+    assert "stacks of one slice each, told apart by FrameOfReferenceUID" in line
+    assert len(indices) < 3 or "irregular positions (gaps of" in line
+
+
+def jump_sideways(ds: pydicom.Dataset) -> None:
+    """Move the upper half of the slices by 20 mm along the patient's left."""
+    x, y, z = ds.ImagePositionPatient
+    ds.ImagePositionPatient = [x + (20 if ds.InstanceNumber > 5 else 0), y, z]
+
+
+def test_slices_of_a_frame_of_reference_each_that_jump_sideways_are_refused(
+    tmp_path: Path,
+) -> None:
+    def change(ds: pydicom.Dataset) -> None:
+        new_reference(ds)
+        jump_sideways(ds)
+
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=change)
+    with pytest.raises(SourceError, match="a sideways jump of 20 mm between neighbouring"):
+        read.open(tmp_path / "s")
+
+
+def test_a_sideways_jump_of_one_series_is_named_and_is_no_tilt(tmp_path: Path) -> None:
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=jump_sideways)
+    notes = read.open(tmp_path / "s").notes
+    assert any("jump sideways by up to 20 mm" in note for note in notes)
+    assert not any("gantry tilt of" in note for note in notes)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_runs_of_slices_of_a_frame_of_reference_each_are_joined(tmp_path: Path, count: int) -> None:
+    def change(ds: pydicom.Dataset) -> None:
+        ds.FrameOfReferenceUID = f"1.2.{(ds.InstanceNumber - 1) // count + 1}"
+
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=change)
+    dataset = read.open(tmp_path / "s")
+    assert error(dataset) <= 0.51
+    (note,) = dataset.notes
+    assert note.startswith(f"10 slices have {-(-10 // count)} FrameOfReferenceUIDs")
+
+
+def test_runs_of_slices_with_a_gap_between_them_stay_apart(tmp_path: Path) -> None:
+    def change(ds: pydicom.Dataset) -> None:
+        ds.FrameOfReferenceUID = f"1.2.{(ds.InstanceNumber - 1) // 3 + 1}"
+
+    indices = [0, 1, 2, 5, 6, 7, 10, 11, 12]
+    write_series(tmp_path / "s", AFFINE, SHAPE, indices=indices, change=change)
+    assert len(read.list_series(tmp_path / "s")) == 3
+
+
+def test_slices_of_three_frames_of_reference_in_turn_stay_apart(tmp_path: Path) -> None:
+    def change(ds: pydicom.Dataset) -> None:
+        ds.FrameOfReferenceUID = f"1.2.{ds.InstanceNumber % 3 + 1}"
+
+    write_series(tmp_path / "s", AFFINE, SHAPE, change=change)
+    assert len(read.list_series(tmp_path / "s")) == 3
 
 
 def test_stacks_of_two_frames_of_reference_stay_apart(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.repair_rules import sum_components
+from stereocell.model.lattice import Step
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.storage.json_files import write_sealed
@@ -21,6 +22,7 @@ class ComponentsTask:
     background       near the tile, voxel values; None: none is subtracted
     min_diagonal_um  smaller components are left out
     max_shift        by how much smoothing may move a value, voxel values; None: by any
+    step             voxels (z, y, x) between planes that carry the surface
     """
 
     ref: SourceRef
@@ -32,6 +34,7 @@ class ComponentsTask:
     background: LatticeField | None
     min_diagonal_um: float
     max_shift: float | None
+    step: Step = (1, 1, 1)
 
 
 def write_components(task_and_file: tuple[ComponentsTask, Path]) -> None:
@@ -42,5 +45,5 @@ def write_components(task_and_file: tuple[ComponentsTask, Path]) -> None:
     if task.background is not None:
         field -= task.background.at(task.box)
     inside = field > np.float32(task.iso)
-    found = sum_components(inside, volume.spacing_um, task.min_diagonal_um)
+    found = sum_components(inside, volume.spacing_um, task.min_diagonal_um, task.step)
     write_sealed(file, {"components": asdict(found)})

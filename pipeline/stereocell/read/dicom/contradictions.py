@@ -166,6 +166,8 @@ def _wobble_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
 
 
 def _tilt_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, ...]:
+    if layout.jump_mm:
+        return ()  # the positions show no tilt to compare with
     found = [f.stated.tilt_deg for f in frames if f.stated.tilt_deg is not None]
     if not found:
         return ()

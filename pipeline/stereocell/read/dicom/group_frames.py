@@ -9,6 +9,7 @@ even steps is taken, since a wobble moves the one and not the other.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ class Group:
         self.words: tuple[str, ...] = ()  # of the properties that separate it from other groups
         self.order: tuple[int, ...] = ()  # sorts it among those
         self.notes: tuple[str, ...] = ()
+        self.unjoined = ""  # why slices of a frame of reference each are not one stack
         self._directions = _directions(first)
         self._spacing = np.array(first.spacing)
         self._is_exact = True  # all frames state the same: no mean, which rounds
@@ -172,9 +174,9 @@ def _group(frames: Iterable[Frame]) -> Group:
 
 
 def _join_references(groups: list[Group]) -> list[Group]:
-    """Join slices of which each has a frame of reference of its own, as after de-identification.
+    """Join slices whose frames of reference change along the stack, as after de-identification.
 
-    They are one stack where all else is equal and their positions are regular.
+    They are one stack where all else is equal and the positions of all of them are regular.
     """
     alike: dict[tuple[object, ...], list[list[Group]]] = {}
     for group in groups:
@@ -189,40 +191,66 @@ def _join_references(groups: list[Group]) -> list[Group]:
 
 
 def _joined(family: list[Group]) -> list[Group]:
-    if len(family) < _LEAST_JOINED or not all(_is_one_place(group) for group in family):
+    if len(family) < _LEAST_JOINED:
         return family
     joined = _group([frame for group in family for frame in group.frames])
+    places, runs = _runs(family, joined)
+    are_single = all(low == high for low, high in runs)
+    reason = _irregularity(joined, places, are_single=are_single)
+    # Points in time share a place, which is fine; runs that share several places are volumes apart.
+    overlap = any(b[0] <= a[1] and not (a == b and a[0] == a[1]) for a, b in pairwise(sorted(runs)))
+    if reason or overlap:
+        for group in family:
+            group.unjoined = reason
+        return family
+    slices = (
+        f"each of {len(family)} slices has a FrameOfReferenceUID of its own"
+        if are_single
+        else f"{len(places)} slices have {len(family)} FrameOfReferenceUIDs, one after the other"
+    )
+    joined.notes = (
+        f"{slices}, as after de-identification: joined, since series, orientation and spacings are "
+        "the same and the positions are regular",
+    )
+    return [joined]
+
+
+def _runs(family: list[Group], joined: Group) -> tuple[list[Vector], list[tuple[int, int]]]:
+    """Return the places of all frames, rising, and the first and last one of each group."""
     normal = _axes(joined)[0]
-    rising = sorted(joined.frames, key=lambda f: float(normal @ f.position))
     near = SAME_PLACE * min(joined.spacing)
-    places = [rising[0].position]
-    for frame in rising:
-        if np.linalg.norm(np.subtract(frame.position, places[-1])) > near:
+    numbered = [(frame, number) for number, group in enumerate(family) for frame in group.frames]
+    places: list[Vector] = []
+    found: list[list[int]] = [[] for _ in family]
+    for frame, number in sorted(numbered, key=lambda one: float(normal @ one[0].position)):
+        if not places or np.linalg.norm(np.subtract(frame.position, places[-1])) > near:
             places.append(frame.position)
+        found[number].append(len(places) - 1)
+    return places, [(min(indices), max(indices)) for indices in found]
+
+
+def _irregularity(joined: Group, places: list[Vector], *, are_single: bool) -> str:
+    """Return why these places are no regular stack; empty: they are one.
+
+    are_single  each slice has a frame of reference of its own: slices between may be missing
+    """
+    first = joined.frames[0]
     try:
         layout = lay_out(
             places,
             joined.along_row,
             along_column=joined.along_column,
             pixel_spacing_mm=joined.spacing,
-            plane_shape=(rising[0].rows, rising[0].columns),
+            plane_shape=(first.rows, first.columns),
         )
-    except NoStackError:
-        return family
-    if not layout.is_even:
-        return family
-    joined.notes = (
-        f"each of {len(family)} slices has a FrameOfReferenceUID of its own, as after "
-        "de-identification: joined, since series, orientation and spacings are the same and the "
-        "positions are regular",
-    )
-    return [joined]
-
-
-def _is_one_place(group: Group) -> bool:
-    first, *others = group.frames
-    near = SAME_PLACE * min(group.spacing)
-    return all(np.linalg.norm(np.subtract(f.position, first.position)) <= near for f in others)
+    except NoStackError as error:
+        return str(error)
+    if layout.jump_mm:
+        return f"a sideways jump of {layout.jump_mm:.3g} mm between neighbouring positions"
+    if not layout.is_even or (layout.missing and not are_single):
+        gaps = layout.gaps_mm
+        return f"irregular positions (gaps of {gaps.min():.3g} to {gaps.max():.3g} mm)"
+    return ""
 
 
 def _parts(group: Group) -> list[Group]:

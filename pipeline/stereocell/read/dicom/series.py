@@ -146,6 +146,8 @@ def _explain_single(stacks: list[Stack], groups: list[Group]) -> list[Stack]:
         return stacks
     apart = sorted({word for group in groups[1:] for word in group.differences(groups[0])})
     problem = f"found {len(slices)} stacks of one slice each, told apart by {', '.join(apart)}"
+    if reasons := sorted({group.unjoined for group in groups if group.unjoined}):
+        problem += f" (not joined: {', '.join(reasons)})"
     return [replace(stack, problem=problem) if stack in slices else stack for stack in stacks]
 
 
