@@ -212,6 +212,7 @@ def _of_channel(
         confidence=confidence,
         doubt=found.doubt or find_doubt(found, chosen, list(iso.values())),
         modality="" if channel.source else plan.modality,
+        is_hounsfield=plan.is_hounsfield,
         level_percentile=plan.settings.window.volume_percentile,
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)

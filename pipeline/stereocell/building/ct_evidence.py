@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.building.skin_level import find_skin_level
 from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
 from stereocell.read import Dataset
 
 # At least AIR_SHARE of the voxels lie within AIR_SPREAD of air, and 99 % lie below metal.
@@ -22,10 +24,7 @@ WINDOW_HU = (-1024.0, 2000.0)  # window of the presets
 _LIKE_HU = "values like Hounsfield units"
 _OFFSET = 1024.0  # that scanners add to store Hounsfield units without a sign; some programs: 1000
 _PLANES = 8  # in the middle, that are looked at
-# A volume that was mapped to 8 bits does not state the mapping, so no level in HU can be computed.
-_BASIS = (
-    "half-way between its dark and bright voxels, since no scaling to Hounsfield units is known"
-)
+_NO_SCALE = "since no scaling to Hounsfield units is known"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,8 @@ class CtEvidence:
 
 def find_ct_evidence(dataset: Dataset) -> CtEvidence:
     """Return what the values in the middle of the first channel say about CT."""
-    voxels = _read_middle(dataset)
+    middle = read_middle(dataset)
+    voxels = middle.voxels
     least = float(np.min(voxels))
     if dataset.dtype.kind != "u" and _has_air(voxels, 0.0):
         return CtEvidence(True, _LIKE_HU, least=least)
@@ -70,8 +70,11 @@ def find_ct_evidence(dataset: Dataset) -> CtEvidence:
     if dataset.stored_dtype == np.uint8:
         words = "8-bit values, which are no Hounsfield units"
     low, high = (float(value) for value in np.quantile(voxels, (0.001, 0.999)))
-    flags = "--preset ct" if low >= high else _flags("ct", _halfway(voxels), (low, high))
-    return CtEvidence(False, words, flags, least=least, basis=_BASIS)
+    if low >= high:
+        return CtEvidence(False, words, "--preset ct", least=least, basis=_NO_SCALE)
+    level, origin = find_skin_level(middle)
+    flags, basis = _flags("ct", level, (low, high)), f"{origin}, {_NO_SCALE}"
+    return CtEvidence(False, words, flags, least=least, basis=basis)
 
 
 def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:
@@ -84,26 +87,17 @@ def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:
     known = dataset.modality or stated
     if known or len(dataset.channels) != 1 or dataset.dtype.kind == "u":
         return known, ""
-    if not _has_air(_read_middle(dataset), 0.0):
+    if not _has_air(read_middle(dataset).voxels, 0.0):
         return "", ""
     return "CT", f"{_LIKE_HU}: taken for CT (--modality GM: it is a microscope's)"
 
 
-def _read_middle(dataset: Dataset) -> NDArray[Any]:
+def read_middle(dataset: Dataset) -> Volume:
     """Return planes of the first channel: corners alone may be padding, and the middle all body."""
     depth, height, width = dataset.levels[0].shape
     first = max(0, (depth - _PLANES) // 2)
     middle = Box((first, 0, 0), (min(depth, first + _PLANES), height, width))
-    return dataset.read(0, middle).voxels
-
-
-def _halfway(voxels: NDArray[Any]) -> float:
-    """Return the value half-way between the means of Otsu's two classes."""
-    from skimage.filters import threshold_otsu  # slow to import, and few sources need it
-
-    values = voxels.astype(np.float64)  # float32 has too few steps for the bins of a narrow range
-    is_dark = values <= threshold_otsu(values)
-    return float(values[is_dark].mean() + values[~is_dark].mean()) / 2.0
+    return dataset.read(0, middle)
 
 
 def _flags(preset: str, level: float, window: tuple[float, float]) -> str:

@@ -14,7 +14,12 @@ from stereocell.building import stage_tasks
 from stereocell.building.channel_colors import choose_colors
 from stereocell.building.channels import PALETTE, Channel, with_surfaces
 from stereocell.building.ct_evidence import recognise_modality
-from stereocell.building.hounsfield import without_hounsfield
+from stereocell.building.hounsfield import (
+    NOTE,
+    has_hounsfield,
+    require_no_console_window,
+    without_hounsfield,
+)
 from stereocell.building.input_files import open_anew, require_table, watch_table
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
@@ -135,6 +140,10 @@ def settle(source: str, settings: Settings) -> Plan:
         settings, modality = without_hounsfield(settings), ""
     elif not alone:
         modality, recognised = recognise_modality(dataset, options.modality)
+    is_hounsfield = alone or has_hounsfield(dataset, modality)
+    if not is_hounsfield:
+        recognised = NOTE
+        require_no_console_window(settings)
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
     wanted = [dataset.channels[index] for index in chosen]
@@ -193,7 +202,8 @@ def settle(source: str, settings: Settings) -> Plan:
     # numbers of objects are read as they are
     read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
     kind = [recognised] if recognised else []
-    plan = replace(plan, notes=(*read, *kind, *gaps, *objects))
+    notes = (*read, *kind, *gaps, *objects)
+    plan = replace(plan, notes=notes, is_hounsfield=is_hounsfield)
     for note in (*plan.notes, *told_in_vain(settings, channels)):  # an error stands alone
         console.print(f"plan: {note}", markup=False)
     return plan

@@ -58,8 +58,8 @@ class Plan:
                 specimen's place is the patient's world (read/anatomical_axes.py)
     labels      label maps whose objects are built, channels beside `channels`
     formats     which formats the source and the label maps have, sorted (readers.format_of)
-    notes       what was chosen, assumed or left out in reading the source, a sentence each; no
-                result depends on them
+    notes       what was chosen, assumed or left out in reading the source, a sentence each
+    is_hounsfield  whether values may be compared with Hounsfield units, if it is a CT
     """
 
     source: str
@@ -81,6 +81,7 @@ class Plan:
     labels: tuple[Labels, ...] = ()
     formats: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    is_hounsfield: bool = True
 
     @property
     def repair(self) -> RepairOptions:

@@ -22,7 +22,8 @@ def statistics_task(plan: Plan, channel: Channel) -> StatisticsTask:
     if channel.name in settings.windows:
         window = parse_window(f"--window {channel.name}", settings.windows[channel.name])
     ref = source_of(plan, channel=channel)
-    finds_holder = plan.modality == "CT" and not channel.source and not settings.surface.keep_holder
+    is_in_hu = plan.modality == "CT" and plan.is_hounsfield and not channel.source
+    finds_holder = is_in_hu and not settings.surface.keep_holder
     # shares of tissue have no noise that was measured
     max_shift = 0.0 if channel.source else settings.surface.max_shift
     return StatisticsTask(

@@ -6,7 +6,7 @@ it is found on tiles spread evenly, and the table says so.
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +16,8 @@ from PIL.PngImagePlugin import PngInfo
 
 from stereocell.building.channels import Channel
 from stereocell.building.level_choice import (
-    Components,
     Found,
     check_histogram,
-    choose_by_components,
     find_level,
     given_level,
     highest_of,
@@ -35,12 +33,11 @@ from stereocell.building.tasks.evidence import measure_evidence
 from stereocell.building.tasks.window import Window, measure_window
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels
-from stereocell.isosurface.level import Level
 from stereocell.isosurface.options import LADDER
-from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.errors import NoSurfaceError, OutputError, UsageError
 from stereocell.model.tiling import Tile
 from stereocell.model.version import GENERATOR
+from stereocell.preview.chosen_level import Chosen, choose_level
 from stereocell.preview.draw_slices import Color, Slice, find_font, paint_slices
 from stereocell.preview.views import views_of
 from stereocell.storage.atomic_write import replacing
@@ -87,11 +84,17 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """What was found: the candidates, why a build makes no surface, and what it rests on."""
+    """What was found.
+
+    doubt   why a build makes no surface; empty: it makes one
+    basis   what the levels rest on
+    unsure  why a build calls its level unsure; empty: the level is clear, or given
+    """
 
     candidates: list[Candidate]
     doubt: str
     basis: str
+    unsure: str = ""
 
 
 def preview(
@@ -127,7 +130,8 @@ def preview(
     under = np.zeros((1, 1, 1), np.float32)
     if window.statistics.background is not None:
         under = window.statistics.background.at(tile.box)
-    chosen = _choose(plan, found, tile, field, under)
+    above = field - under if found.subtracts else field
+    chosen = choose_level(plan, found, tiles, tile=tile, field=above)
     candidates = _candidates(plan, channel, found, chosen, field, under)
     if not candidates:
         raise NoSurfaceError(
@@ -135,12 +139,12 @@ def preview(
         )
     where = f"{len(tiles)} of {len(plan.tiles)}" if len(tiles) < len(plan.tiles) else "all"
     is_given = given_level(plan, channel) is not None
-    basis = f"{'given, and judged' if is_given else 'found'} on {where} tiles"
+    basis = f"{'given, and others found' if is_given else 'found'} on {where} tiles"
     if where != "all":
         basis += "; a build takes all"
     if window.holder is not None:
         basis += f"; a build leaves out a table or holder: {', '.join(window.holder.pieces)}"
-    result = Preview(candidates, found.doubt, basis)
+    result = Preview(candidates, found.doubt, basis, chosen.unsure)
     picture = _compose(
         paint_slices(
             _slices(volume.voxels, field, under, candidates, window, plan),
@@ -213,7 +217,8 @@ def _note(result: Preview) -> str:
     if not any(c.is_chosen for c in result.candidates):
         return f"a build makes no surface: {result.doubt}; {result.basis}"
     marks = " (b: the background)" if any(c.above for c in result.candidates) else ""
-    return f"* a build takes it{marks}; {result.basis}"
+    unsure = f" and calls it unsure: {result.unsure}" if result.unsure else ""
+    return f"* a build takes it{unsure}{marks}; {result.basis}"
 
 
 def _find_channel(plan: Plan, name: str) -> Channel:
@@ -233,39 +238,11 @@ def _find_tile(plan: Plan, tile_id: str) -> Tile:
     raise UsageError(f"--tile is {tile_id!r}, expected {known}")
 
 
-def _choose(
-    plan: Plan, found: Found, tile: Tile, field: NDArray[np.float32], under: NDArray[np.float32]
-) -> Level | float | None:
-    """Return the level that a build would take of this tile."""
-    rung = _choose_rung(plan, found, field, under)
-    if found.levels is None or not isinstance(rung, Level) or found.is_fixed:
-        return rung
-    if plan.settings.isovalue.scope != "tile":
-        return rung
-    return replace(rung, value=found.levels.level_of_tile(rung, found.evidence[tile.id]))
-
-
-def _choose_rung(
-    plan: Plan, found: Found, field: NDArray[np.float32], under: NDArray[np.float32]
-) -> Level | float | None:
-    """Return the rung that a build would take if all tiles were like this one."""
-    if len(found.rungs) < 2:
-        return next(iter(found.rungs), None)
-    values = field - under if found.subtracts else field
-    least = float(plan.settings.surface.min_diagonal_um)
-    components: list[Components] = [
-        {"": asdict(sum_components(values > rung.value, plan.spacing_um, least))}
-        for rung in found.rungs
-        if isinstance(rung, Level)
-    ]
-    return found.rungs[choose_by_components(plan.settings.isovalue, components)]
-
-
 def _candidates(
     plan: Plan,
     channel: Channel,
     found: Found,
-    chosen: Level | float | None,
+    chosen: Chosen,
     field: NDArray[np.float32],
     under: NDArray[np.float32],
 ) -> list[Candidate]:
@@ -279,7 +256,7 @@ def _candidates(
         return Candidate(name, level, above, raw, float(inside), confidence, chosen, setting)
 
     ladder = () if found.levels is None else found.levels.ladder
-    value = chosen.value if isinstance(chosen, Level) else chosen
+    value = chosen.value
     candidates = []
     if value is not None:
         is_given, name = given_level(plan, channel) is not None, plan.settings.isovalue.criterion
@@ -287,9 +264,8 @@ def _candidates(
             name = "given"
         elif channel.rung or name == LADDER:
             name = channel.rung or plan.settings.isovalue.rung
-        confidence = chosen.confidence if isinstance(chosen, Level) else None
         setting = take(plan, channel, value, above=found.subtracts) if is_given else ""
-        candidates.append(candidate(name, value, found.subtracts, confidence, setting, True))
+        candidates.append(candidate(name, value, found.subtracts, chosen.confidence, setting, True))
     threshold = found.window.statistics.threshold
     for other in find_other_levels(
         plan,

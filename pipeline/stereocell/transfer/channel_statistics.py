@@ -98,12 +98,14 @@ def make_appearance(
     confidence: float,
     doubt: str,
     modality: str = "",
+    is_hounsfield: bool = True,
     level_percentile: float = 99.0,
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
 
     doubt     why there is no level, or why the level cannot be called clear; empty: it can
     modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
+    is_hounsfield  whether a CT's values are Hounsfield units: else it has no functions by tissue
     level_percentile  percent of the voxels below the level of a volume without a surface
     """
     iso_value, threshold = None, None
@@ -143,7 +145,7 @@ def make_appearance(
         is_calibrated=modality == "CT",
     )
     function = None
-    if modality == "CT":
+    if modality == "CT" and is_hounsfield:
         functions |= tissue_functions(statistics.window)
         function = opening_function(iso_value, functions)
     transfer_2d = statistics.suggested.transfer_2d

@@ -1,0 +1,75 @@
+"""Which level a build would take of a tile, and whether it would call that level unsure."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.building.level_choice import (
+    Components,
+    Found,
+    choose_by_components,
+    find_doubt,
+    level_of_tile,
+)
+from stereocell.building.plan import Plan
+from stereocell.isosurface.level import Level
+from stereocell.isosurface.repair_rules import sum_components
+from stereocell.model.channel import LOW_CONFIDENCE
+from stereocell.model.tiling import Tile
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """The level that a build would take.
+
+    value       voxel values; None: there is no surface
+    confidence  of the channel, 0..1; None: not rated, as a level that the settings state
+    unsure      why the level cannot be called clear; empty: it can
+    """
+
+    value: float | None
+    confidence: float | None = None
+    unsure: str = ""
+
+
+def choose_level(
+    plan: Plan,
+    found: Found,
+    tiles: Sequence[Tile],
+    *,
+    tile: Tile,
+    field: NDArray[np.float32],
+) -> Chosen:
+    """Return the level that a build would take if all tiles were like this one.
+
+    tiles  those that `found` rests on
+    field  float32 (z, y, x), denoised voxels of `tile`; above the background if `found` subtracts
+    """
+    if not found.rungs:
+        return Chosen(None)
+    place = _place_of_rung(plan, found, field)
+    rung = found.rungs[place]
+    if found.levels is None or not isinstance(rung, Level):
+        return Chosen(rung.value if isinstance(rung, Level) else rung)
+    if found.is_given:
+        return Chosen(rung.value)
+    unsure = find_doubt(found, place, [level_of_tile(plan, one, found, place, {}) for one in tiles])
+    if not unsure and rung.confidence < LOW_CONFIDENCE:
+        unsure = f"below a confidence of {LOW_CONFIDENCE:g} about half of such surfaces are right"
+    value = rung.value
+    if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
+        value = found.levels.level_of_tile(rung, found.evidence[tile.id])
+    return Chosen(value, rung.confidence, unsure)
+
+
+def _place_of_rung(plan: Plan, found: Found, field: NDArray[np.float32]) -> int:
+    """Return the index of the rung that the pieces in one tile speak for."""
+    least = float(plan.settings.surface.min_diagonal_um)
+    components: list[Components] = [
+        {"": asdict(sum_components(field > rung.value, plan.spacing_um, least))}
+        for rung in found.rungs
+        if isinstance(rung, Level) and len(found.rungs) > 1
+    ]
+    return choose_by_components(plan.settings.isovalue, components)
