@@ -156,10 +156,11 @@ def test_series_are_listed_and_chosen_by_number(
     for command in ("build", "plan", "slices"):
         assert main([command, str(tmp_path / "s"), "-o", str(out), "--series", "list"]) == 0
         lines = capsys.readouterr().out.splitlines()
-        assert [line.split()[:3] for line in lines] == [
+        assert [line.split()[:3] for line in lines[:2]] == [
             ["1", "MR,", "coronal,"],
             ["2", "CT,", "axial,"],
         ]
+        assert [line.split(":")[0] for line in lines[2:]] == ["order"]
     assert not out.exists()
     given = [str(tmp_path / "s"), "-o", str(out), "--preset", "mri"]
     assert main(["plan", *given, "--series", "2"]) == 0
