@@ -54,11 +54,22 @@ def _faults(out: Path) -> str:
 def _change(file: Path) -> None:
     """Change the last digit or letter of a file that stands before its last 160 bytes."""
     data = bytearray(file.read_bytes())
-    place = next(
-        k for k in range(max(len(data) - 160, len(data) // 2), 0, -1) if data[k : k + 1].isalnum()
-    )
-    data[place] = ord("1") if data[place] != ord("1") else ord("2")
-    file.write_bytes(data)
+    for place in range(max(len(data) - 160, len(data) // 2), 0, -1):
+        if not data[place : place + 1].isalnum():
+            continue
+        changed = bytearray(data)
+        changed[place] = ord("1") if data[place] != ord("1") else ord("2")
+        if file.suffix != ".json" or _is_json(changed):  # `true` with a digit in it is none
+            break
+    file.write_bytes(changed)
+
+
+def _is_json(data: bytearray) -> bool:
+    try:
+        json.loads(data)
+    except ValueError:
+        return False
+    return True
 
 
 def _answer(capfd: pytest.CaptureFixture[str]) -> str:

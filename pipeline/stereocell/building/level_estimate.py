@@ -47,6 +47,7 @@ from stereocell.transfer.joint_histogram import sample_boxes
 # confidences within .12
 SHARE, BOUNDS = 1 / 12, (1_200_000, 3_000_000)
 LEAST = 200_000  # voxels of one channel, however many there are
+MOST_VOXELS = 500_000_000  # of a channel's region: blocks of larger ones lie in too many chunks
 MARGIN = 0.1  # of a confidence by blocks: an estimate below the bound by less is not called unsure
 MAX_CHANNELS = 12  # channels that are looked at
 PASSES = 3  # that find the background; all six find nearly the same levels
@@ -56,9 +57,11 @@ BLOCK = (12, 40, 40)  # voxels (slice, row, column) of a block
 def notes_on_levels(plan: Plan) -> list[str]:
     """Return a line for each channel whose level is unsure, or has others near it.
 
-    Channels whose level is given need none, and neither do further surfaces of a channel.
+    Channels whose level is given need none, and neither do further surfaces of a channel. Of
+    regions beyond MOST_VOXELS there are none: each block would cost a chunk of many times its size.
     """
-    if plan.settings.isovalue.rung == NO_SURFACE:
+    is_large = math.prod(plan.region.shape) > MOST_VOXELS
+    if is_large or plan.settings.isovalue.rung == NO_SURFACE:
         return []
     wanted = [
         channel
