@@ -1,4 +1,4 @@
-"""What was found in a source is kept from command to command, and never instead of another's."""
+"""The facts found in a source are kept from command to command, and serve that source alone."""
 
 import json
 import subprocess

@@ -18,7 +18,7 @@ from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.volume import Volume
 
 SHAPE = (40, 96, 96)
-BLOOD, TISSUE, NOISE, BLUR = 400.0, 60.0, 6.0, 0.8  # voxel values; voxels
+BLOOD, TISSUE, NOISE, BLUR = 400.0, 60.0, 6.0, 1.1  # voxel values; voxels
 
 
 def _tree() -> tuple[NDArray[np.uint16], NDArray[np.int64]]:
@@ -102,7 +102,7 @@ def test_thin_branches_stay_on_the_tree(
     before, _ = _kept(voxels, centres, _built(voxels, tmp_path, "none"))
     assert vessels.appearance.surface == "clear"
     assert kept > 0.9
-    assert before < kept - 0.02
+    assert before < kept - 0.1
     assert inside < 0.1
 
 

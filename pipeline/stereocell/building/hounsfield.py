@@ -1,4 +1,4 @@
-"""What a CT whose values are no Hounsfield units is built without.
+"""Decide whether the values of a CT are Hounsfield units, and build it as another volume if not.
 
 Where the source itself says so, it is built as a volume of no known modality: presets' levels and
 windows go, and others are found. Where the voxels alone show it, the settings stay as they are

@@ -9,8 +9,7 @@ hang on none of them are noise or tissue, and a rough thickening makes many of t
 
 On a CT angiogram of a head (`cta_head` of the corpus) that estimate grows by 1.35 from a level of
 128 to 64, and the voxels of a skeleton by 1.45. An aorta (`mra_aorta`) gains a branch from 929 to
-841; below, it thickens and gains 3 % a step at most. LEAST_GAIN lies between these 3 % and the
-3.8 % of the made tree in the tests.
+841; below, it thickens and gains 3 % a step at most. LEAST_GAIN lies just above these 3 %.
 """
 
 from collections.abc import Mapping, Sequence

@@ -31,7 +31,7 @@ _NO_LABELS = 0.5  # share of equal pairs below which components are not looked f
 
 @dataclass(frozen=True, slots=True)
 class LabelEvidence:
-    """What was found in an array.
+    """The evidence in an array on whether it holds labels.
 
     kind    mask: two values in all, whatever they are
     values  the number of values besides 0

@@ -84,7 +84,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """What was found.
+    """The levels at which a channel's surface could lie, and which of them a build takes.
 
     doubt   why a build makes no surface; empty: it makes one
     basis   what the levels rest on

@@ -74,9 +74,10 @@ class Boundary:
 
 @dataclass(frozen=True, slots=True)
 class Boundaries:
-    """What was found; `reason` says why there is no boundary, empty if there is one.
+    """The boundaries between materials of a volume.
 
     materials  values 0..1, rising
+    reason     why there is no boundary; empty: there is one
     """
 
     boundaries: tuple[Boundary, ...]

@@ -21,11 +21,12 @@ NEAR_SURFACE = 0.8
 AT_SURFACE = 0.18  # opacity a voxel at the surface's level ...
 IN_BODY = 0.45  # ... and where the body is bright
 BRIGHT = 0.3  # share of the window above the level over which a body becomes bright
-# The same of magnitudes, as of MR. A cut through them shows tissues by their opacity, which has to
-# rise over all of their values.
+# The same two numbers for magnitudes, as MR has them. A cut through such a volume shows tissues by
+# their opacity, so the opacity has to rise over all of their values.
 AT_SURFACE_OF_MAGNITUDES, BRIGHT_OF_MAGNITUDES = 0.12, 0.5
 # Share of the window between the start of a body's opacity and its surface: 36 HU by the presets
-# of CT. Values rise by more within a voxel of the edge, and a step of the opacity would be jagged.
+# of CT. At an edge the values rise by more than that within a voxel. A step of the opacity would
+# look jagged.
 BELOW_BODY = 0.012
 SOLID_BODY = 0.06  # share of the window above the surface in which a body becomes opaque: 180 HU
 NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them

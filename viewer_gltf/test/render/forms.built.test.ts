@@ -21,7 +21,7 @@ const BUNDLES = (process.env.STEREOCELL_FORM_BUNDLES ?? "")
   .filter((path) => path !== "");
 /** Least intersection over union of two silhouettes. */
 const MIN_OVERLAP = 0.95;
-/** The same of a level that the page shows only where the object is a few pixels large. */
+/** The same bound for a level that the page shows only where the object is a few pixels large. */
 const MIN_OVERLAP_FROM_AFAR = 0.8;
 /** Largest difference of mean colours (CIEDE2000). */
 const MAX_DELTA_E = 8;

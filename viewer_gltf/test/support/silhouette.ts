@@ -30,7 +30,9 @@ export function silhouetteOf(picture: Picture): Silhouette {
   return light.map((v, i) => most[i] > LIT && toLight(v) - dark >= (toLight(most[i]) - dark) / 2);
 }
 
-/** Of each value and its neighbours along a row (stride 1) or a column (stride of a row). */
+/**
+ * The largest of each value and its neighbours along a row (stride 1) or a column (stride of a row).
+ */
 function largestAround(values: readonly number[], width: number, stride: number): number[] {
   return values.map((_, i) => {
     let most = 0;

@@ -19,7 +19,7 @@ from stereocell.storage.location import Location
 
 @dataclass(frozen=True, slots=True)
 class _Stack:
-    """What one file states.
+    """The statements of one file on its stack.
 
     stored  dtype of the numbers in the file
     dtype   of their values
