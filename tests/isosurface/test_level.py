@@ -7,22 +7,9 @@ import pytest
 
 from corpus.real import real_cases
 from corpus.sight import look_at
-from stereocell.isosurface.level import Level, bodies_in_haze, shown_of
+from stereocell.isosurface.level import bodies_in_haze, shown_of
+from support.levels import CLEAR
 
-# contrast five times the noise, slopes of a blur of 2.5 voxels, in no valley
-CLEAR = Level(
-    value=100.0,
-    inside=150.0,
-    outside=50.0,
-    snr=5.0,
-    sharpness=0.16,
-    separation=0.75,
-    dip=1.0,
-    stability=0.9,
-    share=0.3,
-    rise=3.0,
-    stands_out=3.0,
-)
 SPECKS = replace(CLEAR, value=900.0, share=0.002)
 CORES = replace(CLEAR, value=300.0, share=0.1)
 

@@ -1,23 +1,10 @@
-"""Which levels are named beside a channel's own."""
+"""The levels that are named beside a channel's own."""
 
 from dataclasses import replace
 
-from stereocell.isosurface.level import Level
 from stereocell.isosurface.near_levels import find_near_levels, words_of
+from support.levels import CLEAR
 
-CLEAR = Level(
-    value=100.0,
-    inside=150.0,
-    outside=50.0,
-    snr=5.0,
-    sharpness=0.16,
-    separation=0.75,
-    dip=1.0,
-    stability=0.9,
-    share=0.3,
-    rise=3.0,
-    stands_out=3.0,
-)
 CORES = replace(CLEAR, value=300.0, share=0.017)
 NEARLY = replace(CLEAR, value=60.0, separation=0.67, share=0.7)
 NOISE = replace(CLEAR, value=55.0, separation=0.5, sharpness=0.01, share=0.9)
