@@ -91,7 +91,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for name, holder in held.items():
         if holder is not None:
             pieces = ", ".join(holder.pieces)
-            about = f"a table or holder is left out: {pieces} (--keep-holder builds it)"
+            about = f"left out, {holder.WORDS}: {pieces} (--keep-holder builds it)"
             console.print(f"units: {name}: {about}", markup=False)
     evidence = _evidence(out_folder, plan, engine, windows)
     survey, inside = {}, {}
