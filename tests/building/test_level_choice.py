@@ -16,15 +16,20 @@ from support import phantoms
 Rung = dict[str, dict[str, int]]
 
 
-def _rung(*tiles: tuple[int, int, int]) -> Rung:
-    """Return a rung's sums by tile, of (voxels, largest, count)."""
-    names = ("voxels", "largest", "count")
-    return {f"r0_c{i}": dict(zip(names, tile, strict=True)) for i, tile in enumerate(tiles)}
+def _rung(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> Rung:
+    """Return a rung's sums by tile, of (voxels, largest, count), and of those that are no specks."""
+    names = ("voxels", "largest", "count", "kept")
+    return {
+        f"r0_c{i}": dict(zip(names, (*tile, round(kept_share * tile[2])), strict=True))
+        for i, tile in enumerate(tiles)
+    }
 
 
 TISSUE = _rung((1000, 1000, 1), (900, 890, 4))
 CELLS = _rung((100, 10, 40), (90, 9, 50))
 TOUCHING = _rung((100, 60, 40), (90, 20, 50))  # the largest hold .42
+# of a whole mouse brain at 25 um: the level of its brightest cortex
+BRIGHT_PARTS = _rung((249778, 89062, 159), (98724, 94128, 32), kept_share=0.05)
 SPECKS = _rung((4, 2, 2), (5, 2, 3))
 
 
@@ -35,6 +40,7 @@ SPECKS = _rung((4, 2, 2), (5, 2, 3))
         ([TISSUE, TOUCHING, CELLS], 2),
         ([TISSUE, TOUCHING], 1),
         ([TISSUE, SPECKS], 0),  # a few specks are no cells
+        ([TISSUE, BRIGHT_PARTS], 0),  # nor are specks beside a few large pieces
         ([TISSUE, _rung((100, 99, 60), (90, 80, 50))], 0),
         ([TISSUE, _rung((0, 0, 0), (0, 0, 0))], 0),
         ([CELLS, TISSUE], 0),

@@ -32,7 +32,7 @@ from stereocell.model.tiling import Tile
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
 APART_SHARE = 0.25  # share of all voxels inside: a rung whose largest components hold less has many
-# the same where many components may touch: the share, and the least number of components
+# the same where many components may touch: the share, and the least number of components but specks
 JOINED_SHARE, MANY = 2 / 3, 30
 # Share of all voxels that cells of a cleared tissue fill at least: in a stack whose cells stood at
 # 1675, a level of 8384 left .02 % inside
@@ -207,19 +207,21 @@ def choose_rung(of_rungs: Sequence[Components]) -> int:
     """Return the index of the level that has the most components.
 
     A level counts if its largest components, one a tile, hold less than APART_SHARE of the voxels
-    inside. Where cells touch they may hold JOINED_SHARE, if there are MANY components. Without such
-    a level the outermost is returned.
+    inside. Where cells touch they may hold JOINED_SHARE, if MANY components are of a size with one
+    another: the bright parts of a whole brain are a few large pieces among a hundred specks. Without
+    such a level the outermost is returned.
 
     of_rungs  the ComponentSums of each tile at each level, outermost first
     """
     best, most = 0, (0, 0.0)
     for place, components in enumerate(of_rungs):
         # summed over the tiles: a component that fills all of them is the largest in each
-        voxels, largest, count = (
-            sum(one[key] for one in components.values()) for key in ("voxels", "largest", "count")
+        voxels, largest, count, kept = (
+            sum(one[key] for one in components.values())
+            for key in ("voxels", "largest", "count", "kept")
         )
         share = largest / voxels if voxels else 1.0
-        is_apart = share < APART_SHARE or (share < JOINED_SHARE and count >= MANY)
+        is_apart = share < APART_SHARE or (share < JOINED_SHARE and kept >= MANY)
         if is_apart and (count, -share) > most:
             best, most = place, (count, -share)
     return best
