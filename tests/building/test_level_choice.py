@@ -17,7 +17,7 @@ Rung = dict[str, dict[str, int]]
 
 
 def _rung(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> Rung:
-    """Return a rung's sums by tile, of (voxels, largest, count), and of those that are no specks."""
+    """Return a rung's sums by tile, of (voxels, largest, count); the others are specks."""
     names = ("voxels", "largest", "count", "kept")
     return {
         f"r0_c{i}": dict(zip(names, (*tile, round(kept_share * tile[2])), strict=True))
@@ -107,6 +107,19 @@ def test_a_haze_around_far_brighter_bodies_is_unsure_and_their_level_is_named(
     assert f"{inner:.5g} (" in channel.near_levels
     told = capsys.readouterr().err
     assert told.count(f"{inner:.5g} (") >= 2  # by plan, and by units
+
+
+def test_a_tile_is_no_surer_of_a_level_than_its_channel(tmp_path: Path) -> None:
+    """A bright core makes a tile sure of the skin around it, which the channel is less sure of."""
+    shape, spacing, rng = (24, 64, 64), (5.0, 2.0, 2.0), np.random.default_rng(0)
+    middle = (60.0, 64.0, 64.0)
+    skin = phantoms.blurred_ball(shape, spacing, middle, 50.0, 2.0)
+    core = phantoms.blurred_ball(shape, spacing, middle, 28.0, 2.0)
+    voxels = 100 + 350 * skin + 2500 * core + rng.normal(0, 90, shape)
+    (channel,) = _surveyed(tmp_path, voxels.round().clip(0).astype(np.uint16)).values()
+    (tile,) = channel.iso.values()
+    assert channel.appearance.iso_confidence == channel.ladder[0].confidence
+    assert tile.confidence == pytest.approx(channel.appearance.iso_confidence)
 
 
 DATA = data_folder()

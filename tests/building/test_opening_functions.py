@@ -13,6 +13,7 @@ from stereocell.isosurface.options import parse_level
 from stereocell.model.channel import Appearance, SurfaceLevel
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
 from stereocell.transfer.opacity import evaluate
+from stereocell.transfer.shapes2d import evaluate2d
 from stereocell.transfer.windows import parse_window
 from support.plans import plan_of
 
@@ -41,7 +42,7 @@ CASES: dict[str, tuple[Callable[[np.random.Generator], NDArray[np.float64]], flo
 MOST_BELOW_HU = 60.0  # that a CT's opacity begins below its surface
 
 
-def _opened(preset: str) -> tuple[Appearance, float]:
+def _opened(preset: str, *, is_hounsfield: bool = True) -> tuple[Appearance, float]:
     """Return how a channel of a preset's kind is drawn, and the level of its background."""
     settings = load(preset, None, flags={})
     make, level, background = CASES[settings.plan.modality]
@@ -59,6 +60,7 @@ def _opened(preset: str) -> tuple[Appearance, float]:
         confidence=1.0,
         doubt="",
         modality=settings.plan.modality,
+        is_hounsfield=is_hounsfield,
     )
     return appearance, background
 
@@ -82,8 +84,34 @@ def test_a_preset_opens_with_a_function_whose_foot_lies_at_the_surface(preset: s
 
 def test_a_surface_of_bone_opens_with_the_function_of_bone() -> None:
     assert _opened("ct-bone")[0].function == "bone"
-    assert _opened("ct")[0].function == "default"
+    assert _opened("ct")[0].function == "tissues"
     assert _opened("mri")[0].function == "default"
+
+
+def _color_at(appearance: Appearance, hu: float, step_hu: float) -> tuple[NDArray[np.float64], int]:
+    """Return colour and opacity, 0..255, of the opening function at a value and a step."""
+    table = evaluate2d(appearance.transfer_2d.functions[appearance.function])
+    low, high = appearance.window
+    rows, columns = table.shape[:2]
+    row = step_hu / (high - low) / appearance.transfer_2d.gradient_max * (rows - 1)
+    cell = table[min(round(row), rows - 1), round((hu - low) / (high - low) * (columns - 1))]
+    return cell[:3] / 255, int(cell[3])
+
+
+def test_tissues_of_a_ct_have_colours_of_their_own_and_an_edge_to_air_is_skin() -> None:
+    appearance, _ = _opened("ct")
+    fat, muscle, bone = (_color_at(appearance, hu, 0.0)[0] for hu in (-100, 50, 900))
+    assert min(fat[:2]) > 0.8  # yellow
+    assert fat[2] < 0.7
+    assert muscle[0] > 2 * max(muscle[1:])  # red
+    assert min(bone) > 0.95  # the channel's own, pale
+    skin = [_color_at(appearance, hu, 900.0)[0] for hu in (-290, -100, 50)]
+    assert all(min(color) > 0.8 for color in skin)
+    assert _color_at(appearance, -600, 900.0)[1] == 0
+
+
+def test_a_ct_without_hounsfield_units_has_no_colours_of_tissues() -> None:
+    assert "tissues" not in _opened("ct", is_hounsfield=False)[0].transfer_functions
 
 
 def test_a_ct_is_solid_just_inside_its_skin() -> None:

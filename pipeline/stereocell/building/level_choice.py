@@ -208,8 +208,8 @@ def choose_rung(of_rungs: Sequence[Components]) -> int:
 
     A level counts if its largest components, one a tile, hold less than APART_SHARE of the voxels
     inside. Where cells touch they may hold JOINED_SHARE, if MANY components are of a size with one
-    another: the bright parts of a whole brain are a few large pieces among a hundred specks. Without
-    such a level the outermost is returned.
+    another: the bright parts of a whole brain are a few large pieces among a hundred specks.
+    Without such a level the outermost is returned.
 
     of_rungs  the ComponentSums of each tile at each level, outermost first
     """
@@ -286,4 +286,7 @@ def level_of_tile(
     judged = found.levels.judge_tile(level, tile_evidence)
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
         value = found.levels.level_of_tile(level, tile_evidence)
-    return TileIso(value, below, None if judged is None else judged.confidence, files)
+    # A tile judges a level among all that lies above it, and the channel among what lies up to the
+    # next level: a tile is no surer than its channel.
+    sure = None if judged is None else min(judged.confidence, level.confidence)
+    return TileIso(value, below, sure, files)

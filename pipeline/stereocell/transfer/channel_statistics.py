@@ -19,7 +19,7 @@ from stereocell.model.channel import (
 )
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.modality import TRACER_MODALITIES
-from stereocell.transfer import heat
+from stereocell.transfer import ct_colors, heat
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
     Threshold,
@@ -27,7 +27,7 @@ from stereocell.transfer.adaptive_threshold import (
     make_histogram,
 )
 from stereocell.transfer.boundaries import SuggestedShapes
-from stereocell.transfer.ct_tissues import opening_function, tissue_functions
+from stereocell.transfer.ct_tissues import BONE_LEVEL_HU, opening_function, tissue_functions
 from stereocell.transfer.opacity import make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import fall_back
@@ -149,6 +149,14 @@ def make_appearance(
         functions |= tissue_functions(statistics.window)
         function = opening_function(iso_value, functions)
     transfer_2d = statistics.suggested.transfer_2d
+    if modality == "CT" and is_hounsfield and iso_value is not None and iso_value < BONE_LEVEL_HU:
+        bands = {
+            ct_colors.NAME: ct_colors.tissue_shapes(
+                iso_value, statistics.window, transfer_2d.gradient_max
+            )
+        }
+        transfer_2d = replace(transfer_2d, functions={**bands, **transfer_2d.functions})
+        function = ct_colors.NAME
     if modality in TRACER_MODALITIES:
         organs = appearance.iso_normalized
         if organs is None:
