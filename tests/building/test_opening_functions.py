@@ -42,7 +42,9 @@ CASES: dict[str, tuple[Callable[[np.random.Generator], NDArray[np.float64]], flo
 MOST_BELOW_HU = 60.0  # that a CT's opacity begins below its surface
 
 
-def _opened(preset: str, *, is_hounsfield: bool = True) -> tuple[Appearance, float]:
+def _opened(
+    preset: str, *, is_hounsfield: bool = True, unevenness: float = 1.0
+) -> tuple[Appearance, float]:
     """Return how a channel of a preset's kind is drawn, and the level of its background."""
     settings = load(preset, None, flags={})
     make, level, background = CASES[settings.plan.modality]
@@ -61,6 +63,7 @@ def _opened(preset: str, *, is_hounsfield: bool = True) -> tuple[Appearance, flo
         doubt="",
         modality=settings.plan.modality,
         is_hounsfield=is_hounsfield,
+        unevenness=unevenness,
     )
     return appearance, background
 
@@ -108,6 +111,12 @@ def test_tissues_of_a_ct_have_colours_of_their_own_and_an_edge_to_air_is_skin() 
     skin = [_color_at(appearance, hu, 900.0)[0] for hu in (-290, -100, 50)]
     assert all(min(color) > 0.8 for color in skin)
     assert _color_at(appearance, -600, 900.0)[1] == 0
+
+
+def test_a_ct_of_thick_slices_opens_in_one_colour() -> None:
+    appearance, _ = _opened("ct", unevenness=8.0)
+    assert appearance.function == "default"
+    assert "tissues" in appearance.transfer_functions
 
 
 def test_a_ct_without_hounsfield_units_has_no_colours_of_tissues() -> None:

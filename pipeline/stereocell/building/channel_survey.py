@@ -213,6 +213,7 @@ def _of_channel(
         doubt=found.doubt or find_doubt(found, chosen, list(iso.values())),
         modality="" if channel.source else plan.modality,
         is_hounsfield=plan.is_hounsfield,
+        unevenness=max(plan.spacing_um) / min(plan.spacing_um),
         level_percentile=plan.settings.window.volume_percentile,
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
-from stereocell.building.channel_colors import choose_colors
+from stereocell.building.channel_colors import choose_colors, lies_at_bone
 from stereocell.building.channels import PALETTE, Channel, with_surfaces
 from stereocell.building.ct_evidence import recognise_modality
 from stereocell.building.hounsfield import (
@@ -151,6 +151,7 @@ def settle(source: str, settings: Settings) -> Plan:
         [(one.name, one.color) for one in wanted],
         modality=modality,
         is_alone=len(dataset.channels) == 1,
+        is_bone=lies_at_bone(settings.iso_values, is_hounsfield=is_hounsfield),
     )
     channels = [
         Channel(index, one.name, color)

@@ -99,6 +99,7 @@ def make_appearance(
     doubt: str,
     modality: str = "",
     is_hounsfield: bool = True,
+    unevenness: float = 1.0,
     level_percentile: float = 99.0,
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
@@ -106,6 +107,7 @@ def make_appearance(
     doubt     why there is no level, or why the level cannot be called clear; empty: it can
     modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
     is_hounsfield  whether a CT's values are Hounsfield units: else it has no functions by tissue
+    unevenness  coarsest over finest voxel spacing; a CT of thick slices opens in one colour
     level_percentile  percent of the voxels below the level of a volume without a surface
     """
     iso_value, threshold = None, None
@@ -156,7 +158,8 @@ def make_appearance(
             )
         }
         transfer_2d = replace(transfer_2d, functions={**bands, **transfer_2d.functions})
-        function = ct_colors.NAME
+        if unevenness <= ct_colors.MAX_UNEVEN:
+            function = ct_colors.NAME
     if modality in TRACER_MODALITIES:
         organs = appearance.iso_normalized
         if organs is None:
