@@ -2,8 +2,8 @@
 
 Scans of bodies are warm, a CT as skin or as bone, radiotracers amber, a channel that is named after
 a dye has the colour of its light, and a volume of one channel is a warm grey. All others have
-PALETTE's colours. Stated colours are given to all channels first, then recognised ones, then PALETTE's. No two
-channels have nearly the same colour: the later one takes the next of PALETTE.
+PALETTE's colours. Stated colours are given to all channels first, then recognised ones, then
+PALETTE's. No two channels have nearly the same colour: the later one takes the next of PALETTE.
 """
 
 from collections.abc import Mapping, Sequence

@@ -4,6 +4,7 @@
  */
 import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
 import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
 import { shownBox } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { Action } from "../state/actions";
@@ -14,6 +15,7 @@ import {
   dragHandle,
   type HandleId,
   handlesOf,
+  markedClip,
   type Pointing,
   pickHandle,
   TOLERANCE_RAD,

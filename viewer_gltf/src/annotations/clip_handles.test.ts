@@ -2,7 +2,15 @@ import { describe, expect, it } from "vitest";
 import type { Box } from "../math/box";
 import type { Clip } from "../math/clip";
 import type { Ray } from "../math/vec3";
-import { armOf, boxWithin, dragHandle, handlesOf, markedClip, pickHandle, TOLERANCE_RAD } from "./clip_handles";
+import {
+  armOf,
+  boxWithin,
+  dragHandle,
+  handlesOf,
+  markedClip,
+  pickHandle,
+  TOLERANCE_RAD,
+} from "./clip_handles";
 
 const SPECIMEN: Box = { min: [0, -400, 0], max: [1000, 0, 200] };
 const BOX: Box = { min: [100, -300, 50], max: [900, -100, 150] };
