@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building.channels import Channel, has_brain
+from stereocell.building.channels import Channel, has_brain, opens
 from stereocell.building.settings import load, preset_names
 from stereocell.isosurface.options import parse_level
 from stereocell.model.channel import Appearance, SurfaceLevel
@@ -88,7 +88,7 @@ def test_a_preset_opens_with_a_function_whose_foot_lies_at_the_surface(preset: s
 def test_a_surface_of_bone_opens_with_the_function_of_bone() -> None:
     assert _opened("ct-bone")[0].function == "bone"
     assert _opened("ct")[0].function == "tissues"
-    assert _opened("mri")[0].function == "default"
+    assert _opened("mri")[0].function == "grey"
 
 
 def _color_at(appearance: Appearance, hu: float, step_hu: float) -> tuple[NDArray[np.float64], int]:
@@ -111,6 +111,20 @@ def test_tissues_of_a_ct_have_colours_of_their_own_and_an_edge_to_air_is_skin() 
     skin = [_color_at(appearance, hu, 900.0)[0] for hu in (-290, -100, 50)]
     assert all(min(color) > 0.8 for color in skin)
     assert _color_at(appearance, -600, 900.0)[1] == 0
+
+
+def test_brighter_tissue_of_an_mr_is_lighter_and_noise_no_stronger() -> None:
+    appearance, _ = _opened("mri")
+    assert appearance.iso_normalized is not None
+    table = evaluate2d(appearance.transfer_2d.functions["grey"])
+    columns = table.shape[1]
+    inner = table[0, int(1.2 * appearance.iso_normalized * columns) :]
+    light = inner[inner[:, 3] > 0][:, 0].astype(int)
+    assert (np.diff(light) >= -2).all()
+    assert light[-1] > 2 * light[0]
+    general = evaluate(appearance.transfer_functions["default"])
+    air = slice(0, int(0.8 * appearance.iso_normalized * columns))
+    assert (table[0, air, 3] / 255 <= general[air] + 0.03).all()
 
 
 def test_a_ct_of_thick_slices_opens_in_one_colour() -> None:
@@ -145,3 +159,14 @@ def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
     assert replace(plain, channels=(*plain.channels, *head[:2])).opens_cut
     # a channel of the input may have such a name
     assert not has_brain([replace(one, source="") for one in head])
+
+
+def test_autofluorescence_is_off_at_first_beside_other_channels() -> None:
+    def shown(*names: str) -> list[bool]:
+        channels = [Channel(index, name, (1, 1, 1)) for index, name in enumerate(names)]
+        return [opens(channel, channels) for channel in channels]
+
+    assert shown("signal", "background") == [True, False]
+    assert shown("Cells", "Autofluorescence") == [True, False]
+    assert shown("background") == [True]
+    assert shown("DAPI", "AF488") == [True, True]  # a dye

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.building.channels import BRAIN, Channel, has_brain
+from stereocell.building.channels import Channel, opens
 from stereocell.building.level_choice import (
     Components,
     Found,
@@ -234,7 +234,7 @@ def _of_channel(
         replace(
             appearance,
             painted_by=painter.id if painter else "",
-            opens=channel.name in BRAIN or not has_brain(plan.channels),
+            opens=opens(channel, plan.channels),
         ),
         () if found.levels is None else found.levels.ladder,
         None if found.levels is None else Curve(*found.levels.curve()),

@@ -1,5 +1,6 @@
 """The channels of a build, each of its surfaces one, and settings that are given by channel."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -65,6 +66,23 @@ class Channel:
     def id(self) -> str:
         """The name as an identifier, for paths and prims."""
         return to_identifier(self.name)
+
+
+def opens(channel: Channel, channels: Sequence[Channel]) -> bool:
+    """Return whether a channel shows when the specimen is opened.
+
+    Where classes of a brain are built, they alone show. A channel of autofluorescence shows the
+    same tissue as the others do. Its surface would hide theirs, or run through it.
+    """
+    if has_brain(channels):
+        return channel.name in BRAIN
+    return not _shows_tissue(channel) or all(_shows_tissue(one) for one in channels)
+
+
+def _shows_tissue(channel: Channel) -> bool:
+    """Return whether a channel's name says that it holds the tissue's own light."""
+    name = channel.base or channel.name
+    return re.search(r"auto.?fluo|^background$|^af$", name.strip(), re.IGNORECASE) is not None
 
 
 def has_brain(channels: Iterable[Channel]) -> bool:

@@ -19,7 +19,7 @@ from stereocell.model.channel import (
 )
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.modality import TRACER_MODALITIES
-from stereocell.transfer import ct_colors, heat
+from stereocell.transfer import ct_colors, heat, mr_grey
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
     Threshold,
@@ -160,6 +160,17 @@ def make_appearance(
         transfer_2d = replace(transfer_2d, functions={**bands, **transfer_2d.functions})
         if unevenness <= ct_colors.MAX_UNEVEN:
             function = ct_colors.NAME
+    if modality == "MR" and appearance.iso_normalized is not None:
+        counts = np.cumsum(statistics.histogram[int(appearance.iso_normalized * BINS) :])
+        within = float(np.searchsorted(counts, 0.95 * counts[-1])) / BINS
+        greys = mr_grey.grey_shapes(
+            appearance.iso_normalized,
+            min(appearance.iso_normalized + within, 1.0),
+            functions["default"],
+            transfer_2d.gradient_max,
+        )
+        transfer_2d = replace(transfer_2d, functions={mr_grey.NAME: greys, **transfer_2d.functions})
+        function = mr_grey.NAME
     if modality in TRACER_MODALITIES:
         organs = appearance.iso_normalized
         if organs is None:
