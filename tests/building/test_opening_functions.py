@@ -12,8 +12,10 @@ from stereocell.building.settings import load, preset_names
 from stereocell.isosurface.options import parse_level
 from stereocell.model.channel import Appearance, SurfaceLevel
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
+from stereocell.transfer.ct_colors import tissue_shapes
+from stereocell.transfer.mr_grey import grey_shapes
 from stereocell.transfer.opacity import evaluate
-from stereocell.transfer.shapes2d import evaluate2d
+from stereocell.transfer.shapes2d import evaluate2d, find_fault
 from stereocell.transfer.windows import parse_window
 from support.plans import plan_of
 
@@ -170,3 +172,26 @@ def test_autofluorescence_is_off_at_first_beside_other_channels() -> None:
     assert shown("Cells", "Autofluorescence") == [True, False]
     assert shown("background") == [True]
     assert shown("DAPI", "AF488") == [True, True]  # a dye
+
+
+@pytest.mark.parametrize("level", [0.02, 0.3, 0.9])
+@pytest.mark.parametrize("foot", [0.5, 0.98, 1.5])
+@pytest.mark.parametrize("brightest", [0.1, 1.0])
+def test_grey_values_have_valid_shapes_wherever_noise_lets_opacity_begin(
+    level: float, foot: float, brightest: float
+) -> None:
+    start = min(foot * level, 0.97)
+    opacity = ((0.0, 0.0), (start, 0.0), (min(start + 0.02, 0.99), 0.2), (1.0, 0.6))
+    shapes = grey_shapes(level, max(brightest, level), opacity, 0.1)
+    assert [find_fault(shape) for shape in shapes] == [""] * len(shapes)
+
+
+@pytest.mark.parametrize("level", [-900.0, -300.0, -120.0, 0.0, 140.0])
+@pytest.mark.parametrize("window", [(-1024.0, 2000.0), (-160.0, 240.0), (0.0, 80.0)])
+def test_tissues_have_valid_shapes_and_none_below_the_surface(
+    level: float, window: tuple[float, float]
+) -> None:
+    shapes = tissue_shapes(level, window, 0.05)
+    assert [find_fault(shape) for shape in shapes] == [""] * len(shapes)
+    lows = [shape.values[0] * (window[1] - window[0]) + window[0] for shape in shapes]
+    assert all(low >= max(level - MOST_BELOW_HU, window[0]) for low in lows)

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from stereocell.model.channel import (
     LOW_CONFIDENCE,
     Appearance,
+    OpacityPoints,
+    Shapes,
     SurfaceConfidence,
     SurfaceLevel,
     TransferFunctions2d,
@@ -33,6 +35,7 @@ from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import fall_back
 
 BINS = 256
+BRIGHT_SHARE = 0.95  # share of an MR's tissue that is darker than its lightest grey
 _AT_ONCE = 1 << 20  # voxels
 NO_SUGGESTION = SuggestedShapes(TransferFunctions2d(), "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
@@ -151,33 +154,13 @@ def make_appearance(
         functions |= tissue_functions(statistics.window)
         function = opening_function(iso_value, functions)
     transfer_2d = statistics.suggested.transfer_2d
-    if modality == "CT" and is_hounsfield and iso_value is not None and iso_value < BONE_LEVEL_HU:
-        bands = {
-            ct_colors.NAME: ct_colors.tissue_shapes(
-                iso_value, statistics.window, transfer_2d.gradient_max
-            )
-        }
-        transfer_2d = replace(transfer_2d, functions={**bands, **transfer_2d.functions})
-        if unevenness <= ct_colors.MAX_UNEVEN:
-            function = ct_colors.NAME
-    if modality == "MR" and appearance.iso_normalized is not None:
-        counts = np.cumsum(statistics.histogram[int(appearance.iso_normalized * BINS) :])
-        within = float(np.searchsorted(counts, 0.95 * counts[-1])) / BINS
-        greys = mr_grey.grey_shapes(
-            appearance.iso_normalized,
-            min(appearance.iso_normalized + within, 1.0),
-            functions["default"],
-            transfer_2d.gradient_max,
-        )
-        transfer_2d = replace(transfer_2d, functions={mr_grey.NAME: greys, **transfer_2d.functions})
-        function = mr_grey.NAME
-    if modality in TRACER_MODALITIES:
-        organs = appearance.iso_normalized
-        if organs is None:
-            organs = next(x for x, opacity in functions["default"] if opacity > 0)
-        bands = {heat.NAME: heat.heat_shapes(organs)}
-        transfer_2d = replace(transfer_2d, functions={**transfer_2d.functions, **bands})
-        function = heat.NAME
+    known = "" if modality == "CT" and not is_hounsfield else modality
+    coloured = _coloured_function(appearance, statistics, functions["default"], known)
+    if coloured is not None:
+        name_2d, shapes = coloured
+        transfer_2d = replace(transfer_2d, functions={**transfer_2d.functions, name_2d: shapes})
+        if name_2d != ct_colors.NAME or unevenness <= ct_colors.MAX_UNEVEN:
+            function = name_2d
     for name_2d, shapes in transfer_2d.functions.items():
         functions[name_2d] = fall_back(shapes)
     return replace(
@@ -186,3 +169,33 @@ def make_appearance(
         transfer_2d=transfer_2d,
         function=function or appearance.function,
     )
+
+
+def _coloured_function(
+    appearance: Appearance,
+    statistics: ChannelStatistics,
+    opacity: OpacityPoints,
+    modality: str,
+) -> tuple[str, Shapes] | None:
+    """Return the name and the shapes of a 2D function that colours values; None: there is none.
+
+    opacity   of the general function
+    modality  DICOM's code; of a CT only where its values are Hounsfield units
+    """
+    level, gradient_max = appearance.iso_normalized, statistics.suggested.transfer_2d.gradient_max
+    if modality in TRACER_MODALITIES:
+        organs = level
+        if organs is None:
+            organs = next(x for x, absorbed in opacity if absorbed > 0)
+        return heat.NAME, heat.heat_shapes(organs)
+    if level is None or appearance.iso_value is None:
+        return None
+    if modality == "CT" and appearance.iso_value < BONE_LEVEL_HU:
+        shapes = ct_colors.tissue_shapes(appearance.iso_value, statistics.window, gradient_max)
+        return (ct_colors.NAME, shapes) if shapes else None
+    if modality == "MR":
+        counts = np.cumsum(statistics.histogram[int(level * BINS) :])
+        within = float(np.searchsorted(counts, BRIGHT_SHARE * counts[-1])) / BINS
+        brightest = min(level + within, 1.0)
+        return mr_grey.NAME, mr_grey.grey_shapes(level, brightest, opacity, gradient_max)
+    return None

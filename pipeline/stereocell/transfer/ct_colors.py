@@ -49,7 +49,7 @@ def tissue_shapes(level: float, window: tuple[float, float], gradient_max: float
     return tuple(
         shape
         for low, high, gradients, color, opacity in bands
-        if (shape := _band((low, high), window, gradients, color, opacity)) is not None
+        if (shape := _band((max(low, first), high), window, gradients, color, opacity)) is not None
     )
 
 

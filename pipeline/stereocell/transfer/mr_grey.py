@@ -14,6 +14,7 @@ _BANDS = 10
 _DARKEST = 0.12  # linear RGB of the dimmest tissue, as a factor to the channel's colour
 _BEYOND = 1.4  # levels up to which steep values are the body's outer edge
 _CONTRAST = 1.3  # power of the share of the range that becomes light
+_LEAST_RANGE = 0.01  # share of the window from the foot to the brightest tissue, at least
 _STEEP = 0.6  # step over two voxels, in levels, from which on an edge is one to air
 
 
@@ -30,7 +31,7 @@ def grey_shapes(
     foot = next(value for value, absorbed in reversed(opacity) if absorbed == 0)
     places, absorbed = np.array(opacity).T
     steep = min(_STEEP * level / gradient_max, 0.9)
-    step = (brightest - foot) / _BANDS
+    step = (max(brightest, foot + _LEAST_RANGE) - foot) / _BANDS
     bands = []
     for band in range(_BANDS):
         middle = foot + (band + 0.5) * step
@@ -39,8 +40,9 @@ def grey_shapes(
         high = 1.0 if band == _BANDS - 1 else min(middle + step, 1.0)
         share = float(np.interp(middle, places, absorbed))
         bands.append(_shape((low, high), (0.0, 1.0), light, share))
-    at_edge = float(np.interp(_BEYOND * level, places, absorbed))
-    return (*bands, _shape((foot, _BEYOND * level), (steep, 1.0), 1.0, at_edge))
+    beyond = max(_BEYOND * level, foot + step)  # strong noise lets opacity begin above the level
+    at_edge = float(np.interp(beyond, places, absorbed))
+    return (*bands, _shape((foot, min(beyond, 1.0)), (steep, 1.0), 1.0, at_edge))
 
 
 def _shape(
