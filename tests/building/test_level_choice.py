@@ -122,6 +122,28 @@ def test_a_tile_is_no_surer_of_a_level_than_its_channel(tmp_path: Path) -> None:
     assert tile.confidence == pytest.approx(channel.appearance.iso_confidence)
 
 
+def test_in_voxels_wider_than_cells_light_sheet_outlines_the_tissue(tmp_path: Path) -> None:
+    """Bright bodies in tissue, as cells are at 5 um a voxel, and parts of a brain at 25 um."""
+    shape, rng = (24, 80, 80), np.random.default_rng(3)
+    tissue = phantoms.blurred_ball(shape, (1.0, 1.0, 1.0), (12.0, 40.0, 40.0), 34.0, 1.0)
+    bodies = np.zeros(shape)
+    for y in range(20, 64, 10):
+        for x in range(20, 64, 10):
+            for z in (6, 17):
+                bodies += phantoms.blurred_ball(shape, (1.0, 1.0, 1.0), (z, y, x), 3.5, 0.5)
+    voxels = 50 + 300 * tissue + 1500 * bodies + rng.normal(0, 12, shape)
+    taken = []
+    for um in (5.0, 25.0):
+        flags = ("--preset", "lightsheet", "--spacing-um", f"{um},{um},{um}")
+        kept = voxels.round().clip(0).astype(np.uint16)
+        (channel,) = _surveyed(tmp_path / f"{um}", kept, *flags).values()
+        assert channel.appearance.level is not None
+        taken.append(channel.appearance.level)
+    assert taken[0].iso > 500
+    assert taken[1].background is None
+    assert 100 < taken[1].iso < 320
+
+
 DATA = data_folder()
 SHEET = None if DATA is None else next(DATA.glob("brain_cells_2ch/*.tif"), None)
 

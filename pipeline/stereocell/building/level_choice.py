@@ -89,7 +89,8 @@ def find_level(
         options=options if criterion in CRITERIA else None,
     )
     levels = find(subtracts=None if given is None else given[1])
-    if given is None and (channel.rung or options.rung) == APART and not levels.subtracts:
+    wants_cells = (channel.rung or options.rung) == APART and _shows_cells(plan)
+    if given is None and wants_cells and not levels.subtracts:
         # cells in dim and in bright tissue have their height above the tissue in common; without
         # sparse ones, a level above it is that of the tissue's own texture
         above = find(subtracts=True)
@@ -126,7 +127,7 @@ def find_level(
         return Found(window, plain, evidence, (rated,), False, "", is_fixed=True)
     rung = channel.rung or options.rung
     if rung == APART:
-        clear = _fit_for_cells(clear, highest)
+        clear = _fit_for_cells(clear, highest) if wants_cells else clear[:1]
     elif rung == CONNECTED:
         clear = find_vessel_levels(levels)
     elif clear:
@@ -171,6 +172,12 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
             "the voxels inside"
         )
     return ""
+
+
+def _shows_cells(plan: Plan) -> bool:
+    """Return whether a cell is at least a voxel wide; in coarser voxels there is tissue alone."""
+    body_um = plan.settings.surface.body_um
+    return not body_um or min(plan.spacing_um) <= body_um
 
 
 def _fit_for_cells(levels: tuple[Level, ...], highest: float) -> tuple[Level, ...]:
