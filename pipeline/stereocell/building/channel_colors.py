@@ -56,7 +56,7 @@ def choose_colors(
     return [chosen.get(place, PALETTE[place % len(PALETTE)]) for place in places]
 
 
-def lies_at_bone(iso_values: Mapping[str, object], *, is_hounsfield: bool) -> bool:
+def lies_at_bone(iso_values: Mapping[str, float | str], *, is_hounsfield: bool) -> bool:
     """Return whether the settings put a CT's surface at its bones, as preset `ct-bone` does."""
     level = iso_values.get(ALL)
     if level is None or not is_hounsfield:
