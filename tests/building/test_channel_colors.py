@@ -7,7 +7,7 @@ import pytest
 from skimage.color import deltaE_ciede2000, rgb2hsv, rgb2lab
 
 from stereocell.building.channel_colors import AMBER, WARM_GREY, choose_colors, lies_at_bone
-from stereocell.building.channels import FLESH, PALETTE, SKIN
+from stereocell.building.channels import FLESH, MR_GREY, PALETTE, SKIN
 from stereocell.building.settings import load
 from stereocell.model.color import lab_of_linear, linear_color_of_lab, to_srgb8
 from stereocell.model.emission_color import color_of_light, color_of_name, emission_of
@@ -121,7 +121,7 @@ def test_what_nothing_names_has_the_colours_that_all_eyes_tell_apart() -> None:
 
 
 def test_scans_are_no_blue_nuclei() -> None:
-    assert _chosen(["MR"], modality="MR") == [FLESH]
+    assert _chosen(["MR"], modality="MR") == [MR_GREY]
     assert _chosen(["CT"], modality="CT") == [SKIN]
     assert _chosen(["CT"], modality="CT", bone=True) == [FLESH]
     assert _chosen(["PT"], modality="PT") == [AMBER]

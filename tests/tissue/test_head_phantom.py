@@ -9,7 +9,7 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 
 from stereocell import read
-from stereocell.building.channels import FLESH
+from stereocell.building.channels import MR_GREY
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.samples import write_head
@@ -247,7 +247,7 @@ def test_a_build_opens_path_traced_and_holds_nothing_of_the_patient(
     manifest = load(out / "bundle" / "manifest.json")
     assert manifest["specimen"]["modality"] == "MR"
     (channel,) = manifest["channels"]
-    assert channel["color"] == list(FLESH)
+    assert channel["color"] == list(MR_GREY)
     assert channel["transfer_function"] == "grey"
     assert "threshold" in channel["transfer_functions"]
     assert 0 < channel["threshold_normalized"] < 1

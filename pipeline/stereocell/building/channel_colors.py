@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stereocell.building.channels import ALL, BODY_MODALITIES, FLESH, PALETTE, SKIN
+from stereocell.building.channels import ALL, BODY_MODALITIES, FLESH, MR_GREY, PALETTE, SKIN
 from stereocell.isosurface.options import parse_level
 from stereocell.model.color import lab_of_linear
 from stereocell.model.emission_color import color_of_name
@@ -72,7 +72,9 @@ def _first_free(wishes: Sequence[Color | None], taken: Sequence[Color]) -> Color
 
 def _of_modality(place: int, modality: str, *, is_bone: bool) -> Color | None:
     if place == 0 and modality in BODY_MODALITIES:
-        return SKIN if modality == "CT" and not is_bone else FLESH
+        if modality == "MR":
+            return MR_GREY
+        return FLESH if is_bone else SKIN
     return AMBER if place == 0 and modality in TRACER_MODALITIES else None
 
 

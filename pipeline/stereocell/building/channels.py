@@ -26,10 +26,12 @@ PALETTE = tuple(
 
 
 _PALE = 0.6  # linear RGB: a colour whose least part is more has no lighter one beside it
-# Colours (linear RGB) of MR, and of bone in CT: warm and neutral, as tissue is usually drawn ...
+# Colours (linear RGB) of bone in CT: warm and neutral, as it is usually drawn ...
 FLESH = (0.78, 0.66, 0.55)
-# ... and of a CT's skin. Light that is scattered many times in a paler one leaves no shade.
+# ... of a CT's skin. Light that is scattered many times in a paler one leaves no shade ...
 SKIN = (0.72, 0.5, 0.37)
+# ... and of the brightest tissue of an MR, which is nearly white in its slices.
+MR_GREY = (0.92, 0.88, 0.82)
 BODY_MODALITIES = ("MR", "CT")
 # Classes of tissue that an MR of a head is looked at for: skin, skull and fluid would hide them.
 GREY_MATTER, WHITE_MATTER = "grey matter", "white matter"

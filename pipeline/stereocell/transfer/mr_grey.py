@@ -5,17 +5,20 @@ shows tissues of a solid body hardly at all. The edge between air and tissue has
 colour, which the surface has.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from stereocell.model.channel import OpacityPoints, Shape, Shapes
 
 NAME = "grey"
 _BANDS = 10
-_DARKEST = 0.12  # linear RGB of the dimmest tissue, as a factor to the channel's colour
-_BEYOND = 1.4  # levels up to which steep values are the body's outer edge
-_CONTRAST = 1.3  # power of the share of the range that becomes light
+_DARKEST = 0.14  # linear RGB of the dimmest tissue, as a factor to the channel's colour
+_BEYOND = 1.5  # levels up to which steep values are the body's outer edge
 _LEAST_RANGE = 0.01  # share of the window from the foot to the brightest tissue, at least
 _STEEP = 0.6  # step over two voxels, in levels, from which on an edge is one to air
+_EDGE_OPACITY = 0.7  # what an edge to air absorbs, at least: skin hides the dim tissue beneath it
+_EDGE_SOFTNESS = 0.25  # a sharp end: in a soft one the edge would mix with the dimmest tissue
 
 
 def grey_shapes(
@@ -32,17 +35,19 @@ def grey_shapes(
     places, absorbed = np.array(opacity).T
     steep = min(_STEEP * level / gradient_max, 0.9)
     step = (max(brightest, foot + _LEAST_RANGE) - foot) / _BANDS
+    beyond = min(max(_BEYOND * level, foot + step), 1.0)  # strong noise: opacity begins above
     bands = []
     for band in range(_BANDS):
         middle = foot + (band + 0.5) * step
-        light = _DARKEST + (1 - _DARKEST) * ((band + 0.5) / _BANDS) ** _CONTRAST
+        light = _DARKEST + (1 - _DARKEST) * (band + 0.5) / _BANDS
         low = max(middle - step, foot)
         high = 1.0 if band == _BANDS - 1 else min(middle + step, 1.0)
         share = float(np.interp(middle, places, absorbed))
-        bands.append(_shape((low, high), (0.0, 1.0), light, share))
-    beyond = max(_BEYOND * level, foot + step)  # strong noise lets opacity begin above the level
-    at_edge = float(np.interp(beyond, places, absorbed))
-    return (*bands, _shape((foot, min(beyond, 1.0)), (steep, 1.0), 1.0, at_edge))
+        flattest = (0.0, steep) if middle < beyond else (0.0, 1.0)
+        bands.append(_shape((low, high), flattest, light, share))
+    at_edge = max(float(np.interp(beyond, places, absorbed)), _EDGE_OPACITY)
+    edge = _shape((foot, beyond), (steep / 2, 1.0), 1.0, at_edge)
+    return (*bands, replace(edge, softness=_EDGE_SOFTNESS))
 
 
 def _shape(

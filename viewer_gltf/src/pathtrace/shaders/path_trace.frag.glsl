@@ -58,11 +58,19 @@ uniform sampler2D uNoisiness;  // of tiles of NOISE_TILE pixels: standard error 
 uniform vec2 uTurn;  // which tiles take their turn: from x on, a share of y
 uniform float uCalm;  // the standard error at which a tile is as good as done; 0: no tile rests
 
+// The box that the chunks take for the one round all tiles: the paths' own.
+#define uAllLow vec3(0.0)
+#define uAllHigh uSize
+
+// Finest voxel spacings behind a cut's face in which matter is lit as the face.
+const float FACE_DEPTH = 2.0;
+
 layout(location = 0) out vec4 oSums;
 layout(location = 1) out vec4 oMoments;
 
 #include <chunks/intersect_box>
 #include <chunks/clip_span>
+#include <chunks/cut_face>
 #include <chunks/sample_intensities>
 #include <chunks/gradient>
 #include <chunks/random>
@@ -153,13 +161,18 @@ float openness(vec3 p, vec3 to, vec2 span) {
 }
 
 // Colour of a path that begins at `p` (already scattered there), and how open it is beyond.
-vec3 follow(vec3 p, vec3 dir, vec4 medium, out float open) {
+// `face`: normal of the cut's face that `p` lies on; 0: it lies on none.
+vec3 follow(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
   vec3 sum = vec3(0.0);
   vec3 weight = vec3(1.0);
   open = 1.0;
   for (int i = 1; i <= uScatters; i++) {
     vec3 color;
     Scatter s = chooseScatter(p, dir, medium.rgb, color);
+    if (i == 1 && face != vec3(0.0)) {
+      s = Scatter(DIFFUSE, face, vec3(0.0));
+      color = medium.rgb;
+    }
     weight *= color;
     sum += weight * lightAt(p, dir, s);
     float survives = min(1.0, max(weight.r, max(weight.g, weight.b)));
@@ -208,8 +221,12 @@ void main() {
   vec4 medium;
   float t = track(start, dir, 0.0, span.y - span.x, medium);
   if (t < 0.0) return;
+  // What is cut through is lit as the face, as in the march: by itself, even matter has no side, and
+  // light that is scattered many times in it comes out dark.
+  vec3 face = span.x > 0.0 && t < FACE_DEPTH * uVoxel ? cutFace(start) : vec3(0.0);
+  vec3 p = face == vec3(0.0) ? start + t * dir : start;
   float open;
-  vec3 color = min(follow(start + t * dir, dir, medium, open), vec3(uMostLight));
+  vec3 color = min(follow(p, dir, medium, face, open), vec3(uMostLight));
   float luminance = dot(color, vec3(0.2126, 0.7152, 0.0722));
   oSums += vec4(color, 1.0);
   oMoments += vec4(luminance * luminance, 0.0, span.x + t, open);
