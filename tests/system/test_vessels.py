@@ -106,29 +106,54 @@ def test_thin_branches_stay_on_the_tree(
     assert inside < 0.1
 
 
-def _sums(*pairs: tuple[int, int]) -> list[dict[str, dict[str, int]]]:
-    return [
-        {"r0_c0": {"voxels": voxels, "main_voxels": voxels, "main_faces": faces}}
-        for voxels, faces in pairs
-    ]
+def _sums(*added: tuple[int, int, int, int]) -> list[dict[str, dict[str, int]]]:
+    """Return sums of one tile at each level: all voxels, main ones, new ones, those apart."""
+    names = ("voxels", "main_voxels", "new_voxels", "apart_voxels")
+    return [{"r0_c0": dict(zip(names, one, strict=True))} for one in added]
+
+
+def _tube(radius: float, length: int = 60) -> NDArray[np.bool_]:
+    _, y, x = np.indices((70, 40, 40))
+    tube = np.hypot(y - 20, x - 20) < radius
+    tube[length:] = False
+    return np.asarray(tube)
+
+
+def _of(*masks: NDArray[np.bool_]) -> list[dict[str, dict[str, int]]]:
+    pairs = zip((None, *masks), masks, strict=False)
+    sums = [sum_components(now, (1.0, 1.0, 1.0), 2.0, higher=before) for before, now in pairs]
+    return [{"r0_c0": asdict(one)} for one in sums]
 
 
 def test_a_level_that_only_thickens_vessels_is_not_taken() -> None:
-    # a tube of radius 4, 4.5 and 5 and the same length: surface grows with r, volume with r^2
-    assert choose_connected(_sums((1600, 800), (2025, 900), (2500, 1000))) == 0
+    assert choose_connected(_of(_tube(4), _tube(4.8), _tube(5.5))) == 0
+
+
+def test_a_branch_is_found_below_levels_that_only_thicken_vessels() -> None:
+    branched = _tube(5.5)
+    branched[20:22, 20, :18] = True
+    assert choose_connected(_of(_tube(4), _tube(4.8), _tube(5.2), branched)) == 3
 
 
 def test_a_level_that_adds_branches_is_taken_until_tissue_joins() -> None:
-    assert choose_connected(_sums((1000, 900), (1100, 1100), (1250, 1350), (9000, 30000))) == 2
+    branches = (1000, 900, 0, 0), (1100, 1100, 50, 0), (1250, 1200, 40, 0)
+    assert choose_connected(_sums(*branches, (9000, 8000, 5000, 0))) == 2
 
 
-def test_pieces_that_hang_on_no_vessel_add_no_length() -> None:
+def test_tissue_that_comes_up_beside_vessels_ends_the_search() -> None:
+    beside = _tube(5.2)
+    beside[10:20, 2:8, 2:8] = True
+    longer = _tube(5.2, 70) | beside
+    assert choose_connected(_of(_tube(4), _tube(4.8), beside, longer)) == 0
+
+
+def test_pieces_that_hang_on_no_vessel_add_no_branch() -> None:
     """A wide vessel with soft edges, in tissue that gets loose above each lower level."""
     rng = np.random.default_rng(4)
     _, y, x = np.indices((40, 64, 64))
     tube = ndimage.gaussian_filter((np.hypot(y - 32, x - 32) < 10).astype(float), 2.0)
     grain = ndimage.gaussian_filter(rng.normal(size=tube.shape), 1.0)
     field = 1000 * tube + 130 * grain / grain.std()
-    sums = [sum_components(field > level, (1.0, 1.0, 1.0), 2.0) for level in (500, 425, 350, 300)]
-    assert sums[-1].count > 10 * sums[0].count
-    assert choose_connected([{"r0_c0": asdict(one)} for one in sums]) == 0
+    sums = _of(*(field > level for level in (500, 425, 350, 300)))
+    assert sums[-1]["r0_c0"]["count"] > 10 * sums[0]["r0_c0"]["count"]
+    assert choose_connected(sums) == 0

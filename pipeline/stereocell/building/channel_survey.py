@@ -61,6 +61,7 @@ from stereocell.building.tasks.window import (
 from stereocell.engine.run import Engine, console
 from stereocell.filters.denoise import median_size
 from stereocell.isosurface.level import Level
+from stereocell.isosurface.options import CONNECTED
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.lattice_field import make_iso_field
@@ -313,6 +314,8 @@ def _components(
         iso = level_of_tile(plan, tile, one, rung, {}).value
         if iso is None:
             return None
+        compares = rung > 0 and plan.settings.isovalue.rung == CONNECTED
+        higher = level_of_tile(plan, tile, one, rung - 1, {}).value if compares else None
         surface = plan.settings.surface
         task = ComponentsTask(
             source_of(plan, channel=channel),
@@ -325,7 +328,9 @@ def _components(
             float(surface.min_diagonal_um),
             one.window.max_shift,
             plan.step,
+            higher,
         )
+        compared = [] if higher is None else [higher]
         return task, [
             box_to_json(tile.box),
             task.smoothing_um,
@@ -334,6 +339,7 @@ def _components(
             task.step,
             iso,
             None if task.background is None else task.background.to_json(),
+            *compared,
         ]
 
     return _by_tile(

@@ -19,8 +19,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
-from stereocell.isosurface.components import find_components
+from stereocell.isosurface.components import Components, find_components
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.isosurface.thin_structures import count_thin
@@ -31,6 +32,7 @@ from stereocell.model.spacing import Spacing
 SHARE = 0.5  # share of a mean below which a fragment goes
 ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
 MIN_ALPHA = 1.0  # least alpha in coarsest spacings: nearer voxels have no gap between them
+REACH = 2  # voxels: a branch reaches farther from the vessels at a higher level, a thicker wall not
 MAIN_SHARE = 0.02  # of the largest component's voxels: components with fewer are not the main ones
 OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
 
@@ -42,7 +44,10 @@ class ComponentSums:
     voxels, largest          of all components, specks included; of the largest
     large_voxels             of all components but specks
     thin_voxels              those of them that are too thin for the planes that carry the surface
-    main_voxels, main_faces  of the main components: at least MAIN_SHARE as large as the largest
+    main_voxels              of the main components: at least MAIN_SHARE as large as the largest
+    new_voxels, apart_voxels of them, beside the main components at a higher level, where one is
+                             given: farther than REACH voxels from these; in components that touch
+                             none of these
     """
 
     count: int
@@ -56,7 +61,8 @@ class ComponentSums:
     large_voxels: int
     thin_voxels: int
     main_voxels: int
-    main_faces: int
+    new_voxels: int = 0
+    apart_voxels: int = 0
 
 
 def sum_components(
@@ -64,6 +70,8 @@ def sum_components(
     spacing_um: Spacing,
     min_diagonal_um: float,
     step: Step = (1, 1, 1),
+    *,
+    higher: NDArray[np.bool_] | None = None,
 ) -> ComponentSums:
     """Return the sums over the connected components of {field > iso-value}.
 
@@ -72,15 +80,16 @@ def sum_components(
     min_diagonal_um  smaller components are left out: noise has more of them than a tile has bodies,
                      so they would decide the means
     step             voxels (z, y, x) between planes that carry the surface
+    higher           bool (z, y, x): {field > a higher iso-value}, to tell what `inside` adds to it
     """
     components = find_components(inside, spacing_um, 26)
     large = components.diagonal_um >= min_diagonal_um
     faces, diagonal = components.faces()[large], components.diagonal_um[large]
     voxels, largest = int(components.voxels.sum()), int(components.voxels.max(initial=0))
-    is_main = components.voxels >= MAIN_SHARE * largest
-    main = int(components.voxels[is_main].sum()), int(components.faces()[is_main].sum())
+    main = int(components.voxels[_is_main(components)].sum())
+    added = (0, 0) if higher is None else _added(components, higher, spacing_um)
     if not len(faces):
-        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest, 0, 0, *main)
+        return ComponentSums(0, 0, 0.0, 0, 0, 0.0, voxels, largest, 0, 0, main, *added)
     kept = (faces >= SHARE * faces.mean()) & (diagonal >= SHARE * diagonal.mean())
     return ComponentSums(
         len(faces),
@@ -93,8 +102,27 @@ def sum_components(
         largest,
         int(components.voxels[large].sum()),
         0 if step == (1, 1, 1) else count_thin(components.mask_of(large), step),
-        *main,
+        main,
+        *added,
     )
+
+
+def _is_main(components: Components) -> NDArray[np.bool_]:
+    return components.voxels >= MAIN_SHARE * components.voxels.max(initial=0)
+
+
+def _added(
+    components: Components, higher: NDArray[np.bool_], spacing_um: Spacing
+) -> tuple[int, int]:
+    """Return `new_voxels` and `apart_voxels` of ComponentSums."""
+    above = find_components(higher, spacing_um, 26)
+    before, main = above.mask_of(_is_main(above)), components.mask_of(_is_main(components))
+    labels, count = ndimage.label(main, np.ones((3, 3, 3)))
+    touches = np.zeros(count + 1, bool)
+    touches[labels[before & main]] = True
+    hangs = touches[labels]
+    around = ndimage.binary_dilation(before, np.ones((3, 3, 3)), REACH)
+    return int((hangs & ~around).sum()), int((main & ~hangs).sum())
 
 
 def choose_repair(

@@ -15,6 +15,7 @@ from stereocell.building.level_choice import (
 )
 from stereocell.building.plan import Plan
 from stereocell.isosurface.level import Level
+from stereocell.isosurface.options import CONNECTED
 from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.channel import LOW_CONFIDENCE
 from stereocell.model.tiling import Tile
@@ -67,9 +68,11 @@ def choose_level(
 def _place_of_rung(plan: Plan, found: Found, field: NDArray[np.float32]) -> int:
     """Return the index of the rung that the pieces in one tile speak for."""
     least = float(plan.settings.surface.min_diagonal_um)
-    components: list[Components] = [
-        {"": asdict(sum_components(field > rung.value, plan.spacing_um, least))}
-        for rung in found.rungs
-        if isinstance(rung, Level) and len(found.rungs) > 1
-    ]
+    rungs = [rung.value for rung in found.rungs if isinstance(rung, Level)]
+    compares = plan.settings.isovalue.rung == CONNECTED
+    components: list[Components] = []
+    for place, value in enumerate(rungs if len(rungs) > 1 else []):
+        higher = field > rungs[place - 1] if compares and place else None
+        sums = sum_components(field > value, plan.spacing_um, least, higher=higher)
+        components.append({"": asdict(sums)})
     return choose_by_components(plan.settings.isovalue, components)

@@ -14,11 +14,13 @@ from stereocell.model.channel import OpacityPoints, Shape, Shapes
 NAME = "grey"
 _BANDS = 10
 _DARKEST = 0.14  # linear RGB of the dimmest tissue, as a factor to the channel's colour
-_BEYOND = 1.5  # levels up to which steep values are the body's outer edge
 _LEAST_RANGE = 0.01  # share of the window from the foot to the brightest tissue, at least
-_STEEP = 0.6  # step over two voxels, in levels, from which on an edge is one to air
-_EDGE_OPACITY = 0.7  # what an edge to air absorbs, at least: skin hides the dim tissue beneath it
-_EDGE_SOFTNESS = 0.25  # a sharp end: in a soft one the edge would mix with the dimmest tissue
+# Step over two voxels, as a factor to the value, from which on an edge is one to air. Half-way up a
+# blurred edge to air it is 1.6, and between tissues about 1 at most.
+_STEEP = 1.1
+_STEEPEST = 0.8  # gradient, 0..1, from which on no band has an edge of its own
+_EDGE_FROM = 0.6  # share of that step at which the edge's colour begins
+_EDGE_SOFTNESS = 0.3  # a sharp end: in a soft one the edge would mix with the dimmest tissue
 
 
 def grey_shapes(
@@ -33,21 +35,21 @@ def grey_shapes(
     """
     foot = next(value for value, absorbed in reversed(opacity) if absorbed == 0)
     places, absorbed = np.array(opacity).T
-    steep = min(_STEEP * level / gradient_max, 0.9)
     step = (max(brightest, foot + _LEAST_RANGE) - foot) / _BANDS
-    beyond = min(max(_BEYOND * level, foot + step), 1.0)  # strong noise: opacity begins above
-    bands = []
+    shapes = []
     for band in range(_BANDS):
         middle = foot + (band + 0.5) * step
         light = _DARKEST + (1 - _DARKEST) * (band + 0.5) / _BANDS
-        low = max(middle - step, foot)
-        high = 1.0 if band == _BANDS - 1 else min(middle + step, 1.0)
+        is_last = band == _BANDS - 1
+        low, high = max(middle - step, foot), 1.0 if is_last else min(middle + step, 1.0)
         share = float(np.interp(middle, places, absorbed))
-        flattest = (0.0, steep) if middle < beyond else (0.0, 1.0)
-        bands.append(_shape((low, high), flattest, light, share))
-    at_edge = max(float(np.interp(beyond, places, absorbed)), _EDGE_OPACITY)
-    edge = _shape((foot, beyond), (steep / 2, 1.0), 1.0, at_edge)
-    return (*bands, replace(edge, softness=_EDGE_SOFTNESS))
+        steep = _STEEP * middle / gradient_max
+        has_edge = steep < _STEEPEST and not is_last
+        shapes.append(_shape((low, high), (0.0, steep if has_edge else 1.0), light, share))
+        if has_edge:
+            edge = _shape((low, high), (_EDGE_FROM * steep, 1.0), 1.0, share)
+            shapes.append(replace(edge, softness=_EDGE_SOFTNESS))
+    return tuple(shapes)
 
 
 def _shape(

@@ -23,6 +23,7 @@ class ComponentsTask:
     min_diagonal_um  smaller components are left out
     max_shift        by how much smoothing may move a value, voxel values; None: by any
     step             voxels (z, y, x) between planes that carry the surface
+    higher           a higher level that `iso` is compared with, in the same values; None: none
     """
 
     ref: SourceRef
@@ -35,6 +36,7 @@ class ComponentsTask:
     min_diagonal_um: float
     max_shift: float | None
     step: Step = (1, 1, 1)
+    higher: float | None = None
 
 
 def write_components(task_and_file: tuple[ComponentsTask, Path]) -> None:
@@ -45,5 +47,8 @@ def write_components(task_and_file: tuple[ComponentsTask, Path]) -> None:
     if task.background is not None:
         field -= task.background.at(task.box)
     inside = field > np.float32(task.iso)
-    found = sum_components(inside, volume.spacing_um, task.min_diagonal_um, task.step)
+    higher = None if task.higher is None else field > np.float32(task.higher)
+    found = sum_components(
+        inside, volume.spacing_um, task.min_diagonal_um, task.step, higher=higher
+    )
     write_sealed(file, {"components": asdict(found)})
