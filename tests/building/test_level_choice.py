@@ -166,3 +166,28 @@ def test_light_sheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Path) -> 
     components = json.loads(path.read_text("utf-8"))["components"]
     assert components["count"] > 60
     assert components["largest"] < 0.5 * components["voxels"]
+
+
+def _lit(least: float) -> np.ndarray:
+    """Return balls on a ground, both under light that falls along x from 1 to `least`."""
+    shape, rng = (32, 96, 96), np.random.default_rng(6)
+    field = np.zeros(shape)
+    for place in rng.uniform((20, 12, 12), (140, 180, 180), (30, 3)):
+        middle = (float(place[0]), float(place[1]), float(place[2]))
+        ball = phantoms.blurred_ball(shape, (5.0, 2.0, 2.0), middle, 7.0, 1.5)
+        field = np.maximum(field, ball)
+    light = np.linspace(1.0, least, shape[2])
+    return (light * (600 + 1000 * field) + rng.normal(0, 12, shape)).round().astype(np.uint16)
+
+
+def test_one_level_in_uneven_light_is_unsure_and_the_plan_says_the_same(tmp_path: Path) -> None:
+    (even,) = _surveyed(tmp_path / "a", _lit(1.0)).values()
+    assert even.appearance.surface == "clear"
+    (uneven,) = _surveyed(tmp_path / "b", _lit(0.5)).values()
+    level = uneven.appearance.level
+    assert level is not None
+    assert level.background is None
+    assert uneven.appearance.surface == "unsure"
+    assert "uneven light" in uneven.appearance.surface_reason
+    (note,) = [note for note in OutFolder(tmp_path / "b" / "out").plan().notes if "level" in note]
+    assert f"unsure level {level.iso:.5g} (" in note

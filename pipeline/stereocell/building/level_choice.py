@@ -70,6 +70,11 @@ class Found:
         return self.window.statistics.background if self.subtracts else None
 
 
+GROUND_ENDS = (0.05, 0.95)  # quantiles of a background: its dim and its bright side
+# The rise of the background, as a share of a level's contrast, from which on the light is uneven
+UNEVEN_GROUND = 0.5
+
+
 def find_level(
     plan: Plan, channel: Channel, window: Window, evidence: Mapping[str, TileEvidence]
 ) -> Found:
@@ -165,6 +170,8 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
         return f"it lies above the display window, which ends at {highest:.5g}"
     if all(tile.confidence is None for tile in tiles):
         return "no tile by itself has enough voxels on both sides of it"
+    if uneven := _uneven_light(found, level):
+        return uneven
     if bodies := bodies_in_haze(level, found.levels.ladder):
         return (
             f"it may be a haze around brighter bodies, whose level, {bodies.value:.5g}, has "
@@ -172,6 +179,23 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
             "the voxels inside"
         )
     return ""
+
+
+def _uneven_light(found: Found, level: Level) -> str:
+    """Return why one level may lose the bodies of a dim side; empty: the ground is even enough.
+
+    A ground that crosses the level is a large body itself, and no light.
+    """
+    ground = found.window.statistics.background
+    if ground is None or found.subtracts:
+        return ""
+    dim, bright = (float(v) for v in np.quantile(ground.values, GROUND_ENDS))
+    if bright >= level.value or bright - dim < UNEVEN_GROUND * level.contrast:
+        return ""
+    return (
+        f"the ground rises from {dim:.5g} to {bright:.5g}, as in uneven light, beside a contrast "
+        f"of {level.contrast:.5g}: bodies on the dim side may be missing"
+    )
 
 
 def _shows_cells(plan: Plan) -> bool:

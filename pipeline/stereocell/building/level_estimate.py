@@ -45,7 +45,7 @@ from stereocell.transfer.joint_histogram import sample_boxes
 # Voxels of all channels together that are looked at: this share of all, within these bounds. In
 # cells, brains and heads the levels of the blocks are within 15 % of those of all voxels, and
 # confidences within .12
-SHARE, BOUNDS = 1 / 12, (1_200_000, 3_000_000)
+SHARE, BOUNDS = 1 / 12, (2_000_000, 3_000_000)
 LEAST = 200_000  # voxels of one channel, however many there are
 MOST_VOXELS = 500_000_000  # of a channel's region: blocks of larger ones lie in too many chunks
 MARGIN = 0.1  # of a confidence by blocks: an estimate below the bound by less is not called unsure
