@@ -77,8 +77,8 @@ def _absent(
     ]
 
 
-def told_in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:
-    """Yield what is said of each setting that another one overrules."""
+def ignored_notes(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:
+    """Yield a note on each setting that another one overrules."""
     options = settings.isovalue
     for channel in channels:
         keys = (channel.name, str(channel.index), ALL)

@@ -58,7 +58,7 @@ def find_remarks(facts: Facts) -> list[Remark]:
             is_note=True,
         ),
         _remark("with a table or a holder left out", _holders(facts), "channel", is_note=True),
-        _remark("on how the source was read", facts.plan.notes, "note", is_note=True),
+        _remark("on how the source is read and built", facts.plan.notes, "note", is_note=True),
         _counts(("fragment", "fragments"), "dropped", units, lambda u: u.fragments_dropped),
         _counts(("cavity", "cavities"), "filled", units, lambda u: u.cavities_filled),
     ]
