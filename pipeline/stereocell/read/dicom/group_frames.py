@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.counted import agreeing, counted
+from stereocell.read.dicom.bed_positions import join_beds
 from stereocell.read.dicom.frame import Frame, Vector
 from stereocell.read.dicom.rounded_positions import restore_positions
 from stereocell.read.dicom.split_kinds import split_kinds
@@ -255,13 +256,15 @@ def _irregularity(joined: Group, places: list[Vector], *, are_single: bool) -> s
 
 def _parts(group: Group) -> list[Group]:
     """Return the group, or one for each kind of frame in it."""
-    parts = split_kinds(group.frames, _axes(group)[0], SAME_PLACE * min(group.spacing))
-    if len(parts) == 1:
-        return [group]
+    normal, near = _axes(group)[0], SAME_PLACE * min(group.spacing)
+    parts = split_kinds(group.frames, normal, near)
     found = []
     for part in parts:
-        small = _group(part.frames)
-        small.words, small.order, small.notes = part.words, part.order, group.notes
+        frames, notes = join_beds(part.frames, normal, near)
+        if len(parts) == 1 and not notes:
+            return [group]
+        small = _group(frames)
+        small.words, small.order, small.notes = part.words, part.order, (*group.notes, *notes)
         found.append(small)
     return found
 
