@@ -9,11 +9,11 @@ References: RFC 8259, section 4 (the names within an object should be unique); O
 """
 
 import json
-import os
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import takewhile
 from typing import Any
 from xml.etree import ElementTree
 
@@ -121,7 +121,7 @@ def _values(used: Any, other: Any) -> tuple[Value, Value]:
     texts = [one if isinstance(one, str) else json.dumps(one) for one in (used, other)]
     if max(map(len, texts)) <= _MOST_SHOWN:
         return texts[0], texts[1]
-    first = len(os.path.commonprefix(texts))
+    first = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*texts, strict=False)))
     begin = max(first - _MOST_SHOWN // 3, 0)
     ours, theirs = (f"...{text[begin : begin + _MOST_SHOWN]}..." for text in texts)
     return ours, theirs
