@@ -67,7 +67,8 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
             why = f" (RescaleType is {kinds[0]})"
         notes.append(
             f"this CT states no Hounsfield units{why}: its levels and window are found as for any "
-            "other volume (--iso-value and --window set them in voxel values)"
+            "other volume (--iso-value and --window set them in voxel values; --as hounsfield: "
+            "they are Hounsfield units all the same)"
         )
     elif first.modality == "CT" and not first.scale.has_rescale:
         notes.append(
