@@ -34,6 +34,7 @@ _SINGLE = {
 _UNIQUE = {
     "Plane": ("TheZ", "TheC", "TheT"),
     "Channel": ("ID",),
+    "Distance": ("Id",),
     "ViewRegistration": ("timepoint", "setup"),
 }
 _FIRST = "the first one"
@@ -88,7 +89,7 @@ def record_xml(root: ElementTree.Element, source: str) -> None:
             name = _local(child)
             if name in _SINGLE.get(_local(parent), ()):
                 alike[name,].append(child)
-            elif name in _UNIQUE:
+            elif all(key in child.attrib for key in _UNIQUE.get(name, ("",))):
                 alike[name, *(child.get(key, "") for key in _UNIQUE[name])].append(child)
         for (name, *_), (first, *others) in alike.items():
             where = f"element {name} in {_local(parent)}"
@@ -128,11 +129,10 @@ def _values(used: Any, other: Any) -> tuple[Value, Value]:
 
 
 def _text(element: ElementTree.Element) -> str:
-    """Return an element's attributes, else its text, else the names and texts of its children."""
+    """Return an element's attributes, its text, and the names and texts of its children."""
     words = [f"{name}={value}" for name, value in element.attrib.items()]
     words.append((element.text or "").strip())
-    if not element.attrib:
-        words += [f"{_local(child)} {(child.text or '').strip()}" for child in element]
+    words += [f"{_local(child)} {(child.text or '').strip()}" for child in element]
     return " ".join(filter(None, words))
 
 

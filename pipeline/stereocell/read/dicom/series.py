@@ -19,9 +19,9 @@ import numpy as np
 from stereocell.read.dicom.contradictions import geometry_notes
 from stereocell.read.dicom.echo_phase import with_echo_phases
 from stereocell.read.dicom.frame import Frame
+from stereocell.read.dicom.frame_group import Group
 from stereocell.read.dicom.frame_kind import LOCALIZER
 from stereocell.read.dicom.group_frames import (
-    Group,
     describe_elsewhere,
     describe_neighbours,
     find_groups,
