@@ -31,9 +31,10 @@ def find_value(header: Any, groups: Sequence[Any], sequence: str, key: str) -> A
     An enhanced image states the values of its frames in functional groups. One that was converted
     from single frames keeps other attributes of them in groups of their own. Raises DICOM_FAULTS.
     """
-    for name in (sequence, *_CONVERTED):
-        for group in groups:
-            item = None if group is None else first_item(group.get(name))
+    stated = [group for group in groups if group is not None]
+    for name in (sequence, *_CONVERTED) if stated else ():
+        for group in stated:
+            item = first_item(group.get(name))
             if item is not None and item.get(key) is not None:
                 return item[key].value
     return header.get(key)
