@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
-from stereocell.building.channel_colors import choose_colors
+from stereocell.building.channel_colors import choose_colors, lies_at_bone
 from stereocell.building.channels import PALETTE, Channel, with_surfaces
-from stereocell.building.hounsfield import settle_modality
+from stereocell.building.hounsfield import believe, settle_modality
 from stereocell.building.input_files import open_anew, require_table, watch_table
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
@@ -137,7 +137,7 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
     if settings.unwrap.maps:
         require_map_packages()
     _require_labels(settings)
-    dataset = open_anew(as_asked(location, options))
+    dataset = believe(open_anew(as_asked(location, options)), options.taken_as)
     alone = are_alone(settings.labels)
     settings, modality = settle_modality(dataset, settings, are_labels=alone)
     indices = dataset.find_channels(options.channels) if options.channels else None
@@ -147,6 +147,7 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
         [(one.name, one.color) for one in wanted],
         modality=modality.code,
         is_alone=len(dataset.channels) == 1,
+        is_bone=lies_at_bone(settings.iso_values, is_hounsfield=modality.is_hounsfield),
     )
     channels = [
         Channel(index, one.name, color)

@@ -13,7 +13,7 @@ from stereocell.building.ct_evidence import (
     is_other_scale,
 )
 from stereocell.building.open_source import as_asked, open_source
-from stereocell.building.settings import NO_PRESET, Settings, load
+from stereocell.building.settings import HOUNSFIELD, NO_PRESET, Settings, load
 from stereocell.engine.run import console
 from stereocell.model.errors import StereoCellError
 from stereocell.read import Dataset
@@ -48,6 +48,12 @@ def load_for(
     try:
         location = Location.of(source).source
         dataset = open_source(as_asked(location, options))
+        if (
+            options.taken_as == HOUNSFIELD
+            and (dataset.modality or options.modality or "CT") == "CT"
+        ):
+            text = f"the values are taken for Hounsfield units (--as {HOUNSFIELD})"
+            return load("ct", None, flags=flags, where=where), _describe("ct", text)
         chosen, notes = choose_preset(dataset, modality=options.modality)
     except StereoCellError:
         return settings, ()
@@ -57,6 +63,8 @@ def load_for(
 def _doubts_of(source: str | Path, preset: str, settings: Settings) -> tuple[str, ...]:
     """Return the note on a preset of CT that the user names and that the voxels do not fit."""
     try:
+        if settings.plan.taken_as == HOUNSFIELD:
+            return ()
         dataset = open_source(as_asked(Location.of(source).source, settings.plan))
         if dataset.modality and dataset.dtype.kind != "u":  # as the source states itself
             return ()
