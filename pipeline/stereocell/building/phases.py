@@ -42,6 +42,7 @@ from stereocell.building.plan_notes import (
     ignored_notes,
     told_of_absent,
     told_of_gaps,
+    words_of_spacing,
 )
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
 from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
@@ -116,7 +117,8 @@ def make(
         write_sealed(out_folder.provenance_file, provenance_record(plan))
     shape = " x ".join(str(n) for n in plan.region.shape)
     console.print(
-        f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
+        f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x) of "
+        f"{words_of_spacing(plan.spacing_um)}, "
         f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
         + "".join(f", objects of {one.name}" for one in plan.labels)
     )
