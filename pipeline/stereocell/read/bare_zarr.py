@@ -1,7 +1,7 @@
 """A Zarr array (v2 or v3) without the metadata of OME-Zarr.
 
-Its axes come from `--axes`, from the names of dimensions (v3, or xarray's `_ARRAY_DIMENSIONS` in
-v2), else three dimensions are z, y, x. Its spacing comes from `--spacing-um`, from arrays of
+Its axes come from `--axes`, from the names of dimensions (v3, or attributes of
+read/axis_names.py), else three dimensions are z, y, x. Its spacing comes from `--spacing-um`, from arrays of
 positions beside it (read/zarr_coordinates.py), or from the attributes of read/array_spacing.py.
 """
 
@@ -15,6 +15,7 @@ from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import settle_stated_axes
+from stereocell.read.axis_names import NAME_LISTS, listed_names
 from stereocell.read.axis_spacings import AxisSpacings, SettledSpacing
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.flipped_array import FlippedArray
@@ -77,8 +78,13 @@ def _named_axes(array: "zarr.Array[Any]", around: Beside) -> list[Statement]:
     """
     axes = {one.name: one.axis for one in around.positions if one is not None and one.axis}
     return [
-        Statement(tuple(axes.get(name, name.lower()) for name in named), place)
+        Statement(tuple(axes.get(name, name) for name in named), place)
         for place, named in named_dimensions(array).items()
+    ] + [
+        Statement(names, f"{field} of {of}", Trust.REPEATED)
+        for of, attributes in around.attributes
+        for field in NAME_LISTS
+        if (names := listed_names(attributes.get(field), array.ndim))
     ]
 
 
