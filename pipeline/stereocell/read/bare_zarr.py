@@ -1,8 +1,9 @@
 """A Zarr array (v2 or v3) without the metadata of OME-Zarr.
 
 Its axes come from `--axes`, from the names of dimensions (v3, or attributes of
-read/axis_names.py), else three dimensions are z, y, x. Its spacing comes from `--spacing-um`, from arrays of
-positions beside it (read/zarr_coordinates.py), or from the attributes of read/array_spacing.py.
+read/axis_names.py), else three dimensions are z, y, x. Its spacing comes from `--spacing-um`, from
+arrays of positions beside it (read/zarr_coordinates.py), or from the attributes of
+read/array_spacing.py.
 """
 
 from collections.abc import Sequence

@@ -25,6 +25,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.file_array import FileArray, PackedArray, notes_on_rest, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.nrrd_labels import labelled_axes, names_by_labels, notes_beside_directions
 from stereocell.read.nrrd_segments import segments_of
 from stereocell.read.nrrd_statements import (
     axis_lengths,
@@ -69,8 +70,9 @@ def read_image(location: Location) -> Image:
     require_file(location)
     fields, end = _header(location)
     shape = [int(n) for n in np.atleast_1d(fields["sizes"])]
-    directions = _directions(where, fields, shape)
-    names = _axes(where, fields, shape, directions)
+    labelled = labelled_axes(fields, shape)
+    directions = _directions(where, fields, shape, labelled)
+    names = _axes(where, fields, shape, directions, labelled)
     array = _array(location, fields, end, shape[::-1])
     axes = tuple(reversed(names))
     sizes = [shape[names.index(axis)] for axis in "ijk"]
@@ -89,12 +91,12 @@ def read_image(location: Location) -> Image:
         *notes_on_rest(array),
     )
     if to_lps is None:
-        swapped = {"i": "x", "j": "y", "k": "z"}
-        voxels = VoxelArray(array, tuple(swapped.get(axis, axis) for axis in axes))
-        z, y, x = reversed(sizes)
-        grid = grid_of((z, y, x), _spacing(spatial))
+        stacked, label_notes = names_by_labels(names, labelled, shape)
+        voxels = VoxelArray(array, tuple(reversed(stacked)))
+        rows = [at.index(stacked.index(axis)) for axis in "xyz"]
+        grid = grid_of(voxels.shape, _spacing(spatial[rows]))
         unnamed = (None,) * count
-        notes = (*notes, *_turned(fields, directions[at]))
+        notes = (*notes, *label_notes, *_turned(fields, directions[at][rows]))
         return Image(
             (voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files,
             labels=labels, objects=objects,
@@ -104,7 +106,12 @@ def read_image(location: Location) -> Image:
     origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
     origin = np.where(np.isfinite(origin), origin, 0.0) * factors.max(axis=0)
     affine[:3, 3] = to_lps @ origin / 1000.0
-    notes = (*notes, *size_notes(np.linalg.norm(affine[:3, :3], axis=0).tolist(), sizes))
+    label_notes = notes_beside_directions([labelled[index] for index in at if labelled], affine)
+    notes = (
+        *notes,
+        *label_notes,
+        *size_notes(np.linalg.norm(affine[:3, :3], axis=0).tolist(), sizes),
+    )
     image = place(where, array, axes, affine, "space directions").image(
         NAME, notes=notes, has_sides=_names_sides(fields)
     )
@@ -132,8 +139,13 @@ def _header(location: Location) -> tuple[Mapping[str, Any], int]:
     return fields, blank.end() if blank else len(content)
 
 
-def _directions(where: str, fields: Mapping[str, Any], shape: Sequence[int]) -> NDArray[np.float64]:
-    """Return a row of the directions for each axis, (n, 3); NaN: an axis of no direction."""
+def _directions(
+    where: str, fields: Mapping[str, Any], shape: Sequence[int], labelled: Sequence[str]
+) -> NDArray[np.float64]:
+    """Return a row of the directions for each axis, (n, 3); NaN: an axis of no direction.
+
+    labelled  by `labelled_axes`
+    """
     stated = fields.get("space directions")
     found = np.full((len(shape), 3), np.nan)
     if stated is None:  # only lengths; the axes of space are the first three that have one
@@ -141,6 +153,8 @@ def _directions(where: str, fields: Mapping[str, Any], shape: Sequence[int]) -> 
         kinds = list(fields.get("kinds", ()))
         known = [i for i, kind in enumerate(kinds[: len(shape)]) if kind in ("domain", "space")]
         count = len(shape)
+        if not known and set("xyz") <= set(labelled):
+            known = [i for i in range(count) if labelled[i] in tuple("xyz")]
         known = known or [i for i in range(count) if np.isfinite(lengths[i]) or count == 3]
         for row, index in enumerate(known[:3]):
             found[index] = 0.0
@@ -156,8 +170,9 @@ def _directions(where: str, fields: Mapping[str, Any], shape: Sequence[int]) -> 
 
 
 def _axes(
-    where: str, fields: Mapping[str, Any], shape: Sequence[int], directions: NDArray[np.float64]
-) -> list[str]:
+    where: str, fields: Mapping[str, Any], shape: Sequence[int], directions: NDArray[np.float64],
+    labelled: Sequence[str],
+) -> list[str]:  # fmt: skip
     """Return the names of the axes, fastest first: i, j, k of space, t and c."""
     spatial = [index for index in range(len(shape)) if np.isfinite(directions[index]).all()]
     if len(spatial) != 3:
@@ -170,7 +185,8 @@ def _axes(
     for name, index in zip("ijk", spatial, strict=True):
         names[index] = name
     for index in set(range(len(shape))) - set(spatial):
-        name = "t" if str(kinds[index]) == "time" else "c"
+        is_time = str(kinds[index]) == "time" or (labelled and labelled[index] == "t")
+        name = "t" if is_time else "c"
         if name in names and shape[index] > 1:
             raise SourceError(
                 f"{where}: kinds: found {kinds[: len(shape)]}, expected one axis of time, and one "
@@ -217,7 +233,8 @@ def _spacing(spatial: NDArray[np.float64]) -> PartialTriple:
 def _turned(fields: Mapping[str, Any], spatial: NDArray[np.float64]) -> tuple[str, ...]:
     """Note directions that are not along x, y, z: outside a patient they are not followed."""
     notes = []
-    if not np.array_equal(spatial, np.diag(np.abs(np.diag(spatial)))):
+    is_stated = fields.get("space directions") is not None
+    if is_stated and not np.array_equal(spatial, np.diag(np.abs(np.diag(spatial)))):
         notes.append("axes turned or mirrored by `space directions`: as stored")
     if "left-handed" in str(fields.get("space", "")).lower():
         notes.append("space: its axes are left-handed: as stored, so the volume may be mirrored")
