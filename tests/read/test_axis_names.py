@@ -70,6 +70,20 @@ def test_texts_that_netcdf_stores_as_arrays_of_one_are_read(tmp_path: Path, unit
     require_phantom(read.open(write_netcdf(tmp_path / "a.nc", scales, "xyz")))
 
 
+def test_a_depth_that_counts_downwards_is_noted(tmp_path: Path) -> None:
+    scales = {"depth": {"units": "um", "positive": "down"}, "y": {"units": "um"}}
+    scales["x"] = {"units": "um", "positive": "down"}
+    hdf5 = read.open(write_netcdf(tmp_path / "a.nc", scales, "zyx"))
+    group = zarr.open_group(tmp_path / "a.zarr", mode="w")
+    write_zarr(tmp_path / "a.zarr" / "ct", "zyx", _ARRAY_DIMENSIONS=list(scales))
+    steps = SPACING["z"] * np.arange(len(f_phantom()))
+    group.create_array("depth", data=steps, attributes=scales["depth"])
+    for dataset in (hdf5, read.open(tmp_path / "a.zarr" / "ct")):
+        require_phantom(dataset)
+        (note,) = [note for note in dataset.notes if "count downwards" in note]
+        assert "a mirror image where y points north" in note
+
+
 @pytest.mark.parametrize("kind", ["array of one", "one for each axis", "bytes"])
 def test_units_of_an_hdf5_dataset_may_be_one_text_or_one_for_each_axis(
     tmp_path: Path, kind: str

@@ -220,7 +220,7 @@ def test_an_own_attribute_separates_setups_of_one_channel(tmp_path: Path) -> Non
 def test_setups_of_one_channel_are_not_overlaid(tmp_path: Path) -> None:
     setups = [{"body": BODY + 9 * number, "channel": 0, "tile": 0} for number in (0, 1)]
     path = write(tmp_path, setups)
-    assert "setup 1" in list_series(path)[1]
+    assert "setup 1, 16 x 48 x 36" in list_series(path)[1]
     np.testing.assert_array_equal(voxels_of(read.open(path, series=2)), BODY + 9)
 
 
@@ -293,7 +293,7 @@ def test_channels_of_another_scale_or_direction_are_images_of_their_own(
     path = write(tmp_path, setups, kind=kind)
     first, second = list_series(path)
     assert "setup 0, setup 2" in first
-    assert "setup 1" in second
+    assert "setup 1, registered apart from others" in second
     assert len(read.open(path).channels) == 2
     other = read.open(path, series=2)
     assert other.levels[0].spacing_um == pytest.approx(spacing)

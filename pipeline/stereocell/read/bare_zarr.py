@@ -96,6 +96,7 @@ def _spacing(array: "zarr.Array[Any]", axes: Sequence[str], around: Beside) -> S
         if one is not None:
             size = array.shape[dimension]
             spacings.add_positions(dimension, one.name, one.values, one.unit, size)
+            spacings.add_sense(dimension, one.name, one.sense)
     spacings.add_attributes(dict(array.attrs), "the array")
     for of, attributes in around.attributes:
         spacings.add_attributes(attributes, of, Trust.REPEATED)

@@ -151,7 +151,10 @@ class Described:
             for other in self.views(every)
             if self._values(other[0], names) == self._values(view[0], names)
         ]
-        shown += [f"setup {number}" for number in view] if len(alike) > 1 else []
+        if len(alike) > 1:
+            shown += [f"setup {number}" for number in view]
+            is_repeated = any(self._repeated(every).intersection(other) for other in alike)
+            shown += [] if is_repeated else ["registered apart from others"]
         label = ", ".join([*shown, found.label])
         return Candidate(label, found.voxels)
 

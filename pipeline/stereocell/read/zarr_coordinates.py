@@ -38,12 +38,14 @@ class Positions:
     values  one for each voxel
     unit    of the values; empty: not stated
     axis    `t`, `z`, `y` or `x`, by CF's attribute; empty: not stated
+    sense   up or down, by CF's attribute `positive`; empty: not stated
     """
 
     name: str
     values: NDArray[np.float64]
     unit: str
     axis: str
+    sense: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +193,7 @@ def _positions(
                 np.asarray(values[(slice(None),)], np.float64),
                 text_of(attributes.get("units")),
                 axis if axis in tuple("tzyx") else "",
+                text_of(attributes.get("positive")),
             )
         return found, files_of(one.location, [path])
     return None
