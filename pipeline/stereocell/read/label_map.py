@@ -1,6 +1,7 @@
 """A label map: voxels that hold their object's number, of any integer type, or whole floats."""
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class LabelMap:
             if least < 0:
                 stored = np.where(stored < 0, 0, stored)
             stored = stored.view(f"u{stored.itemsize}")
-        return stored
+        return cast("NDArray[np.unsignedinteger]", stored)
 
     def _integers(self, box: Box) -> NDArray[np.integer]:
         stored = self.dataset.read_stored(self.channel, box)

@@ -38,7 +38,7 @@ from stereocell.read.nrrd_values import ValueAxis, value_axis
 from stereocell.read.ordered_array import OrderedArray
 from stereocell.read.patient_grid import place
 from stereocell.read.plausible_size import size_notes
-from stereocell.read.spacing import PartialTriple, grid_of
+from stereocell.read.spacing import Grid, PartialTriple, grid_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file, require_own
 
@@ -95,11 +95,8 @@ def read_image(location: Location) -> Image:
         *notes_on_rest(stored),
     )
     if to_lps is None:
-        stacked, label_notes = names_by_labels(names, labelled, shape)
-        voxels = VoxelArray(array, tuple(reversed(stacked)))
-        rows = [at.index(stacked.index(axis)) for axis in "xyz"]
-        grid = grid_of(voxels.shape, _spacing(spatial[rows]))
-        notes = (*notes, *label_notes, *_turned(fields, directions[at][rows]))
+        voxels, grid, stack_notes = _stacked(fields, array, names, directions, spatial)
+        notes = (*notes, *stack_notes)
         return Image(
             (voxels,), (grid,), values.names, values.colors, 1, notes=notes, files=files,
             labels=labels, objects=objects,
@@ -141,6 +138,24 @@ def _with_values(
     if list(values.order) != sorted(values.order):
         array = OrderedArray(array, at, values.order)
     return array, ["t" if name == "c" else name for name in names], values
+
+
+def _stacked(
+    fields: Mapping[str, Any], array: StoredArray, names: Sequence[str],
+    directions: NDArray[np.float64], spatial: NDArray[np.float64],
+) -> tuple[VoxelArray, Grid, tuple[str, ...]]:  # fmt: skip
+    """Return the voxels of a stack that lies in no patient, their grid, and notes.
+
+    names    of the axes, fastest first
+    spatial  rows of `directions` of i, j, k, in um
+    """
+    shape = [int(n) for n in fields["sizes"]]
+    stacked, notes = names_by_labels(names, labelled_axes(fields, shape), shape)
+    voxels = VoxelArray(array, tuple(reversed(stacked)))
+    at = [names.index(axis) for axis in "ijk"]
+    rows = [at.index(stacked.index(axis)) for axis in "xyz"]
+    grid = grid_of(voxels.shape, _spacing(spatial[rows]))
+    return voxels, grid, (*notes, *_turned(fields, directions[at][rows]))
 
 
 def _header(location: Location) -> tuple[Mapping[str, Any], int]:
