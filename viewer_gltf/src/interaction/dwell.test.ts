@@ -17,7 +17,9 @@ const MIDDLES: Readonly<Record<string, number>> = { a: 0, b: 2, far: 20 };
 function seen(target: string | null, more: Partial<RaySample> = {}, at_deg?: number): RaySample {
   const angle = ((at_deg ?? (target === null ? 10 : MIDDLES[target])) * Math.PI) / 180;
   const direction = [Math.sin(angle), 0, -Math.cos(angle)] as const;
-  return { target, place: null, layout: "", direction, isGradual: false, ...more };
+  const { layout = "" } = more;
+  const own = { target, place: null, layout, layouts: [layout], direction, isGradual: false };
+  return { ...own, ...more };
 }
 
 /** Look at each sample for so many seconds; the targets that fired, in order. */

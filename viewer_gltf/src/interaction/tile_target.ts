@@ -15,8 +15,7 @@ const OF = "/";
 
 export class TileTarget implements Target {
   readonly isOnTop = false;
-  /** The names of the tiles that are shown. */
-  layout = "";
+  private names = "";
   private shown: readonly BoxedTile[] = [];
   clip: Clip = WHOLE;
   /** The object along a ray, in um of the specimen: its name, and where; null: none. */
@@ -33,7 +32,12 @@ export class TileTarget implements Target {
   set tiles(tiles: readonly BoxedTile[]) {
     if (tiles === this.shown) return;
     this.shown = tiles;
-    this.layout = tiles.map(({ id }) => id).join();
+    this.names = tiles.map(({ id }) => id).join();
+  }
+
+  /** The tiles that are shown and where they are: a tile that comes under a resting gaze was not looked for. */
+  get layout(): string {
+    return `tiles ${this.names} ${placeText(this.specimen.matrixWorld)}`;
   }
 
   meet(ray: RoomRay): Hit | null {
@@ -41,9 +45,10 @@ export class TileTarget implements Target {
     const inside = rayAlong(ray, this.toSpecimen);
     const met = pickTile(inside, this.shown, this.clip);
     const object = met && this.objectAlong(inside);
-    if (object) return { key: `${TILE}${met.id}${OF}${object.id}`, distance_m: object.distance };
+    if (met === null) return null;
+    const key = TILE + (object ? `${met.id}${OF}${object.id}` : met.id);
     // The ray's direction is one metre long, whatever it is in um.
-    return met && { key: TILE + met.id, distance_m: met.distance };
+    return { key, place: key, distance_m: (object ?? met).distance, isStep: true };
   }
 
   choose({ key }: Hit, ray: RoomRay, isByGaze: boolean): void {
@@ -51,4 +56,9 @@ export class TileTarget implements Target {
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
     this.onChoose(rayAlong(ray, this.toSpecimen), key.slice(TILE.length).split(OF)[0], isByGaze);
   }
+}
+
+/** A pose as text, to a tenth of a millimetre. */
+export function placeText({ elements }: Matrix4): string {
+  return elements.map((each) => each.toPrecision(5)).join(" ");
 }

@@ -13,7 +13,7 @@ import {
   type Target,
 } from "../interaction/ray_pointer";
 import { TILE, TileTarget } from "../interaction/tile_target";
-import { type HandPose, zoomAbout } from "../math/grab";
+import { type HandPose, type SpecimenPose, zoomAbout } from "../math/grab";
 import { shownTiles } from "../math/pick";
 import type { Command } from "../state/commands";
 import { DWELL } from "../state/parameters/tools";
@@ -26,6 +26,7 @@ import {
   type HeadHold,
   moveByCommand,
   moveByFingers,
+  moveByGaze,
   moveByHead,
   moveByHolders,
   moveByStick,
@@ -44,6 +45,15 @@ const HEAD_HOLD_S = 0.6;
 /** By gaze alone it is not switched off: nothing would be left to switch it on by. */
 const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
 const KEEPS_GAZE = "Switch this off by the button: where there is none, the gaze is all there is.";
+
+const CARRY = "It moves with your gaze. Rest to put it down.";
+/** For so long after a choice, s, it can be undone by the bar. */
+const UNDO_S = 4;
+/** The bar's button that undoes it. */
+const UNDO = `${PANEL}undo-choice`;
+
+/** What the last choice has changed. */
+type Moment = Readonly<{ state: ViewerState; pose: SpecimenPose }>;
 
 /** A trigger that is down. */
 type Press = {
@@ -86,6 +96,12 @@ export class Hands {
   private headHold: HeadHold | null = null;
   /** What is gone on with. */
   private goesOn: GoesOn | null = null;
+  /** Before the last choice, and the time left in which it can be undone. */
+  private before: Moment | null = null;
+  private undo_s = 0;
+  /** The specimen as it was taken by the bar. */
+  private barHold: HeadHold | null = null;
+  private state: ViewerState | null = null;
 
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
@@ -97,6 +113,8 @@ export class Hands {
       onLenses,
       isPainted,
       onAnnounce: (text) => this.announce(text),
+      onUndo: () => this.undo(),
+      onCarry: (ray, isStart) => this.carrySpecimen(ray, isStart),
       onWish: (wish) => {
         if (typeof wish === "string") options.onCommand(wish);
         else options.onAction(wish);
@@ -146,6 +164,7 @@ export class Hands {
     this.touched = null;
     this.goesOn = null;
     this.headHold = null;
+    this.before = null;
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
@@ -194,6 +213,7 @@ export class Hands {
     if (!this.isRunning) return false;
     const { xr } = this.options;
     this.gaze = gazeOf(head);
+    this.state = state;
     this.tiles.tiles = shownTiles(this.options.tiles, state.isolated);
     this.tiles.clip = state.clip;
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
@@ -204,6 +224,8 @@ export class Hands {
     const hasHeld = this.hold(dt_s);
     const hasFollowed = this.followHead(dt_s, state);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
+    this.panel.canUndo = this.mayUndo(dt_s, state);
+    this.panel.isCarrying = this.carry.isCarrying;
     const isRepainted = this.panel.update(dt_s, head, state);
     const isNoticeNew = this.notice.update(read_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
@@ -311,8 +333,47 @@ export class Hands {
     if (met.key === null) return;
     const counts = this.pointer.press(met, this.free, time_ms);
     if (!counts && !isByGaze) return;
+    if (met.key !== UNDO) this.remember();
     met.target.choose(met, met.ray, isByGaze);
     if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
+  }
+
+  /** The moment before a choice, to which the bar leads back. */
+  private remember(): void {
+    if (this.state === null) return;
+    this.before = { state: this.state, pose: this.options.specimen.pose };
+    this.undo_s = UNDO_S;
+  }
+
+  /** Whether the last choice has changed anything, a short while ago or while *Undo* is looked at. */
+  private mayUndo(dt_s: number, state: ViewerState): boolean {
+    if (this.before === null) return false;
+    const { pose } = this.options.specimen;
+    const isGoing = this.goesOn !== null || this.carry.isCarrying;
+    const isAsked = this.pointer.gaze?.key === UNDO;
+    if (isGoing) this.undo_s = UNDO_S;
+    else if (!isAsked) this.undo_s -= dt_s;
+    if (this.undo_s <= 0) this.before = null;
+    return this.before !== null && (this.before.state !== state || this.before.pose !== pose);
+  }
+
+  private undo(): void {
+    const { before } = this;
+    if (before === null) return;
+    this.before = null;
+    this.options.onAction({ type: "restore", state: before.state });
+    this.options.specimen.moveTo(before.pose, this.gaze.origin);
+  }
+
+  /** The bar is taken hold of, and the specimen moves as the gaze does until it rests. */
+  private carrySpecimen(gaze: RoomRay, isStart: boolean): void {
+    const { specimen } = this.options;
+    if (isStart && this.state !== null) {
+      this.barHold = { pose: specimen.pose, pivot: middleOf(this.around(this.state)), gaze };
+      this.announce(CARRY);
+    } else if (this.barHold !== null) {
+      specimen.moveTo(moveByGaze(this.barHold, gaze), gaze.origin);
+    }
   }
 
   /** Input sources come and go, also while they hold something. */
@@ -429,7 +490,7 @@ export class Hands {
     this.panel.light(leading?.key ?? null);
     const eye = new Vector3().setFromMatrixPosition(head);
     if (leading === null) this.ring.hide();
-    else this.ring.show(pointOn(leading), eye, progress, leading.key !== null);
+    else this.ring.show(pointOn(leading), eye, progress);
     const shown = `${leading?.key} ${leading?.distance_m} ${progress}`;
     const isChanged = shown !== this.shown;
     this.shown = shown;

@@ -8,7 +8,7 @@ import { type PanelView, START_VIEW } from "../controls";
 import { layOut } from "../layout";
 import { blocksOf } from "./controls";
 import { type Rect, type Region, ROW } from "./draw_list";
-import { HEIGHT, type Page, PX_PER_M, pageOf, paginate, WIDTH } from "./page";
+import { HEIGHT, MAX_TARGETS, type Page, PX_PER_M, pageOf, paginate, START_CANVAS, WIDTH } from "./page";
 
 /** By the camera of the flat screen, into files. */
 const OF_THE_SCREEN = [
@@ -46,7 +46,7 @@ function allPages(state: ViewerState, view: Partial<PanelView> = {}): readonly P
   return TABS.flatMap((tab) => {
     const pages: Page[] = [];
     for (let page = 0; ; page++) {
-      const made = pageOf(laidOut(state, view), { tab, page });
+      const made = pageOf(laidOut(state, view), { ...START_CANVAS, tab, page });
       pages.push(made);
       const more = made.regions.find(({ id }) => id === "more")?.to(0);
       if (
@@ -156,7 +156,7 @@ describe("the panel on a plane", () => {
   });
 
   it("has all ten moves on one page, each going on while it is held", () => {
-    const { regions } = pageOf(laidOut(start()), { tab: "move", page: 0 });
+    const { regions } = pageOf(laidOut(start()), { ...START_CANVAS, tab: "move" });
     const moves = regions.filter(({ repeats }) => repeats !== undefined);
     expect(new Set(moves.map((move) => move.repeats))).toEqual(
       new Set([
@@ -170,7 +170,7 @@ describe("the panel on a plane", () => {
 
   it("reports why something is refused", () => {
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
-    const page = pageOf(laidOut(off), { tab: "volumes", page: 0 });
+    const page = pageOf(laidOut(off), { ...START_CANVAS, tab: "volumes" });
     const radius = find(page, "disc-radius");
     expect(radius.isSlide).toBe(false);
     expect(radius.to(0.3)).toEqual({ canvas: "announce", text: "Only the mode Disc has one." });
@@ -180,17 +180,17 @@ describe("the panel on a plane", () => {
 
 describe("its controls", () => {
   it("do what the layout's do", () => {
-    const channels = pageOf(laidOut(start()), { tab: "channels", page: 0 });
+    const channels = pageOf(laidOut(start()), { ...START_CANVAS, tab: "channels" });
     expect(find(channels, "c0/shown").to(0)).toEqual({ type: "show", channel: "c0", shown: false });
     expect(find(channels, "c3/open").to(0)).toEqual({ panel: "pick", channel: "c3" });
-    const tiles = pageOf(laidOut(start()), { tab: "tiles", page: 0 });
+    const tiles = pageOf(laidOut(start()), { ...START_CANVAS, tab: "tiles" });
     expect(find(tiles, "tile-map=r1_c4").to(0)).toEqual({ type: "select", tile: "r1_c4" });
-    const view = pageOf(laidOut(start()), { tab: "view", page: 0 });
+    const view = pageOf(laidOut(start()), { ...START_CANVAS, tab: "view" });
     expect(find(view, "reset").to(0)).toBe("reset");
   });
 
   it("slide from end to end, in the control's steps, a little before the region's ends", () => {
-    const page = pageOf(laidOut(start(), { picked: "c0" }), { tab: "channels", page: 0 });
+    const page = pageOf(laidOut(start(), { picked: "c0" }), { ...START_CANVAS, tab: "channels" });
     const opacity = find(page, "c0/opacity");
     const at = (across: number) => {
       const wish = opacity.to(across);

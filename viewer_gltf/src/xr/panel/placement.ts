@@ -1,24 +1,25 @@
-/** Where in the room the panel and its button are, as directions from the eye. Radians. Pure. */
+/** Where in the room the panel and the bar are, as directions from the eye. Radians. Pure. */
 import { type Matrix4, Vector3 } from "three";
 
 /** From the eye: to the right of -z, and up. */
 export type Bearing = Readonly<{ yaw: number; pitch: number }>;
 
 const DEG = Math.PI / 180;
-/**
- * Pitch of the button and of the panel, which takes its place, radians: as far below a level gaze as eyes
- * and neck go without thinking. While the panel is open the button hangs under it.
- */
+/** Distance of the panel and of the bar from the eye, m. */
+export const PANEL_DISTANCE_M = 1.2;
+/** Pitch of the bar, radians: as far below a level gaze as eyes and neck go without thinking. */
 const BELOW = -30 * DEG;
+/** Pitch of the panel, radians: it begins just below a level gaze, and the bar hangs under it. */
+const PANEL_PITCH = -24 * DEG;
 /** Pitch of the panel above and behind a specimen on a table: in front, it would hide the specimen. */
 const OVER_TABLE = -5 * DEG;
 /** A head that looks steeper, radians, up or down, has no clear heading. */
 const STEEP = 75 * DEG;
 /** The same below a panel, or below a specimen on a table. */
-const OPENER_PITCH_LOW = -52 * DEG;
-/** The head turns this far, radians, before the button follows. */
+const BAR_PITCH_LOW = -51 * DEG;
+/** The head turns this far, radians, before the bar follows. */
 const SLACK = 15 * DEG;
-/** Pitch of the head, radians: a user who looks down further looks for the button, so it waits. */
+/** Pitch of the head, radians: a user who looks down further looks for the bar, so it waits. */
 const LOOKING_DOWN = -20 * DEG;
 const FOLLOW_PER_S = 4;
 
@@ -31,8 +32,8 @@ export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
   return { yaw, pitch: Math.max(pitch - NOTICE_BELOW, Math.min(pitch, NOTICE_LOWEST)) };
 }
 
-export function openerPitch(isLow: boolean): number {
-  return isLow ? OPENER_PITCH_LOW : BELOW;
+export function barPitch(isLow: boolean): number {
+  return isLow ? BAR_PITCH_LOW : BELOW;
 }
 
 export function bearingOf(direction: Vector3): Bearing {
@@ -61,16 +62,16 @@ function wrapped(angle: number): number {
  */
 export function panelBearing(
   { yaw, pitch }: Bearing,
-  openerYaw: number,
+  barYaw: number,
   isOverTable = false,
 ): Bearing {
   return {
-    yaw: Math.abs(pitch) < STEEP ? yaw : openerYaw,
-    pitch: isOverTable ? OVER_TABLE : BELOW,
+    yaw: Math.abs(pitch) < STEEP ? yaw : barYaw,
+    pitch: isOverTable ? OVER_TABLE : PANEL_PITCH,
   };
 }
 
-/** The button stays where it is until the head has turned away, and while it is looked for. */
+/** The bar stays where it is until the head has turned away, and while it is looked for. */
 export function followHead(yaw: number, head: Bearing, dt_s: number): number {
   if (head.pitch < LOOKING_DOWN) return yaw;
   const away = wrapped(head.yaw - yaw);

@@ -99,6 +99,17 @@ export class LookingPerson {
       .flatMap(({ kind, id }) => (kind === "toggle" ? [id] : []));
   }
 
+  /** The sections of the menu. */
+  get tabs(): readonly string[] {
+    while (this.has("up")) this.pressOn("up");
+    const found = new Set<string>();
+    for (let before = -1; found.size > before; this.pressOn("more")) {
+      before = found.size;
+      for (const { id } of this.regions) if (id.startsWith("tab=")) found.add(id.slice(4));
+    }
+    return [...found];
+  }
+
   region(id: string): Region {
     const found = this.regions.find((each) => each.id === id);
     if (found === undefined) throw new Error(`no ${id} in ${this.regions.map((each) => each.id)}`);
@@ -146,15 +157,24 @@ export class LookingPerson {
     this.hands.panel.take(view);
     if (!this.hands.panel.isOpen) this.hands.panel.toggle();
     this.frame(0);
-    this.lookAt(`tab=${tab}`);
-    this.press();
-    this.frame(0);
-    if (page > 0) this.lookAt("more");
-    for (let k = 0; k < page; k++) this.press();
+    while (this.has("up")) this.pressOn("up");
+    while (!this.has(`tab=${tab}`)) this.pressOn("more");
+    this.pressOn(`tab=${tab}`);
+    for (let k = 0; k < page; k++) this.pressOn("more");
     this.lookUp();
     this.frame(FRAME_S);
     this.wishes.length = 0;
     this.changes = 0;
+  }
+
+  private has(id: string): boolean {
+    return this.regions.some((each) => each.id === id);
+  }
+
+  private pressOn(id: string): void {
+    this.lookAt(id);
+    this.press();
+    this.frame(0);
   }
 
   dispose(): void {
@@ -187,9 +207,9 @@ export function pagesOf(
 ): readonly (readonly [tab: string, page: number, ids: readonly string[]])[] {
   const person = new LookingPerson(12, change);
   person.open("channels", 0, view);
-  const tabs = person.regions.flatMap(({ id }) => (id.startsWith("tab=") ? [id.slice(4)] : []));
+  const tabs = person.tabs;
   const pages = tabs.flatMap((tab) => {
-    person.open(tab);
+    person.open(tab, 0, view);
     const found: (readonly [string, number, readonly string[]])[] = [];
     const seen = new Set<string>();
     for (let page = 0; ; page++) {
@@ -207,5 +227,5 @@ export function pagesOf(
   return pages;
 }
 
-/** Tabs, and the two buttons above, are the same on every page. */
-const isOfThePage = (id: string) => !id.startsWith("tab=") && !["leave", "close"].includes(id);
+/** The bar's buttons are the same on every page. */
+const isOfThePage = (id: string) => !["leave", "close", "up"].includes(id);
