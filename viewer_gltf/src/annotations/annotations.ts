@@ -28,7 +28,7 @@ import type { Cone, Probed } from "./probe";
 import { Reading, type ReadingOptions } from "./probe_reader";
 import { Ruler } from "./ruler";
 import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
-import { type Sight, screenZoom } from "./style";
+import { type Sight, STEREO_TEXT, screenZoom } from "./style";
 
 /** Why no point is set. */
 const NOTHING_MET = "Nothing there to measure: no surface, no volume and no slice.";
@@ -86,7 +86,7 @@ export class Marks {
   private readonly reading: Reading;
   private readonly toSpecimen = new Matrix4();
   /** From where the last frame was seen. */
-  sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
+  sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1, textZoom: 1 };
   /** The lamp that the ray which drags it has lost over its rim. */
   private beside: HandleId | null = null;
   /** How many surfaces are on screen. */
@@ -138,7 +138,7 @@ export class Marks {
     eye_um.setFromMatrixPosition(view.head).applyMatrix4(this.toSpecimen);
     up.setFromMatrixColumn(view.head, 1).transformDirection(this.toSpecimen);
     const zoom = view.screen === null ? 1 : screenZoom(pxPerRad(view.screen));
-    this.sight = { eye_um, up, zoom };
+    this.sight = { eye_um, up, zoom, textZoom: view.screen === null ? STEREO_TEXT : zoom };
     this.target.specimen = view.specimen;
     this.reading.specimen = view.specimen;
     this.reading.disc = view.disc;

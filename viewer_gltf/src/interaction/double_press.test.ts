@@ -43,7 +43,9 @@ describe("the second of two quick presses", () => {
     const other = { target: "b", layout: "after", layouts: ["after"] };
     expect(isSecondPress(first, pressed(1150, other))).toBe(true);
     expect(isSecondPress(first, pressed(1150, other, true))).toBe(true);
-    expect(isSecondPress(first, pressed(1150, { place: "lower", layout: "after", layouts: ["after"] }))).toBe(true);
+    expect(
+      isSecondPress(first, pressed(1150, { place: "lower", layout: "after", layouts: ["after"] })),
+    ).toBe(true);
   });
 
   it("counts on another control to which the ray has moved", () => {

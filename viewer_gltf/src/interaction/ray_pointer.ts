@@ -66,7 +66,6 @@ export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null 
   return first;
 }
 
-
 /** @param met null: nothing can be chosen */
 function sampleOf({ direction }: RoomRay, met: Met | null, targets: readonly Target[]): RaySample {
   return {

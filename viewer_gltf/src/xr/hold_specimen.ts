@@ -182,7 +182,11 @@ export function moveByGaze({ pose, pivot, gaze: before }: HeadHold, gaze: Gaze):
   const steepest = Math.PI / 2 - STEEPEST_RAD;
   const up = MathUtils.clamp(pitchOfPivot + pitch - pitchBefore, -steepest, steepest);
   const aside = yawOfPivot + yaw - yawBefore;
-  const at = new Vector3(-Math.sin(aside) * Math.cos(up), Math.sin(up), -Math.cos(aside) * Math.cos(up))
+  const at = new Vector3(
+    -Math.sin(aside) * Math.cos(up),
+    Math.sin(up),
+    -Math.cos(aside) * Math.cos(up),
+  )
     .multiplyScalar(away.length())
     .add(gaze.origin);
   const turned = turnAbout(pose, about(UP, yaw - yawBefore), pivot);

@@ -91,6 +91,24 @@ describeInChromium("stereo without WebXR", () => {
     }
   });
 
+  it("asks to turn an upright phone, and begins as soon as it lies on its side", async () => {
+    const sign = page.getByText("Turn the phone on its side");
+    await page.setViewportSize({ width: HEIGHT, height: WIDTH });
+    await page.click("button");
+    await sign.waitFor();
+    expect((await status()).isRunning).toBe(false);
+    await page.setViewportSize({ width: WIDTH, height: HEIGHT });
+    expect(await page.evaluate(() => window.started)).toBe("started");
+    expect((await status()).isRunning).toBe(true);
+    expect(await sign.isVisible()).toBe(false);
+    await page.setViewportSize({ width: HEIGHT, height: WIDTH });
+    await sign.waitFor();
+    await page.getByRole("button", { name: "Leave stereo" }).click();
+    expect((await status()).isRunning).toBe(false);
+    expect(await sign.count()).toBe(0);
+    await page.setViewportSize({ width: WIDTH, height: HEIGHT });
+  });
+
   it("shows what lies on a lens's axis at the lens's centre", async () => {
     await start();
     for (const [eye, sign] of [

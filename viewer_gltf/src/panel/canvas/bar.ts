@@ -115,13 +115,11 @@ function whileClosed({ state, lastMode }: BarFacts): readonly (Slot | null)[] {
 function whileOpen({ page, count, up }: Page): readonly (Slot | null)[] {
   const next = { canvas: "page", page: (page + 1) % count } as const;
   return [
-    up === null ? null : { id: "up", label: up === "list" ? "All menus" : "Back", to: { canvas: "back" } },
-    count < 2 ? null : { id: "more", label: "Next page", to: next, more: { isStep: true } },
-    null,
-    { id: "close", label: "Close", to: { canvas: "close" } },
-    null,
-    null,
-    null,
+    up === null ? null : { id: "up", label: "Back", to: { canvas: "back" } },
+    count < 2
+      ? null
+      : { id: "more", label: "Next", name: "Next page", to: next, more: { isStep: true } },
     { id: "leave", label: "Leave", name: "Leave stereo", to: { canvas: "leave" } },
+    { id: "close", label: "Close", to: { canvas: "close" } },
   ];
 }

@@ -2,7 +2,7 @@
  * The controls of a layout as rows of the panel on a canvas, each tall enough to be gazed at. Pure.
  */
 import type { Button, Choice, Colour, Control, Group, Search, Toggle } from "../controls";
-import { chips, mapBlock, nextSwatch, palettes, stepper, swatchMarks, swatches } from "./choices";
+import { chips, mapBlock, nextSwatch, palettes, stepper, swatches, swatchMarks } from "./choices";
 import {
   type Block,
   box,
@@ -93,9 +93,7 @@ export function blocksOfAll(
     if (isRepeating(item) && next !== undefined && isRepeating(next)) {
       const rects = split({ x: 0, y: 0, width, height: ROW }, 2);
       const [left, right] = [buttonIn(item, rects[0]), buttonIn(next, rects[1])];
-      blocks.push(
-        one([...left.marks, ...right.marks], [...left.regions, ...right.regions]),
-      );
+      blocks.push(one([...left.marks, ...right.marks], [...left.regions, ...right.regions]));
       i++;
     } else blocks.push(...blocksOf(item, width, fanned));
   }
@@ -193,7 +191,11 @@ function fanned({ id, label }: Group, colour: Colour, row: Rect): Block {
     canvas: "group",
     group: id,
   }));
-  const marks = [...colours.marks, box(more, "raised"), text(more, "More", { align: "center", size: SMALL })];
+  const marks = [
+    ...colours.marks,
+    box(more, "raised"),
+    text(more, "More", { align: "center", size: SMALL }),
+  ];
   return one(marks, [...colours.regions, open]);
 }
 

@@ -106,11 +106,11 @@ export type Block = Readonly<{
 export const ROW = 100;
 export const GAP = 12;
 /**
- * Sizes of letters. The smaller one is 27 mm at 1 m: its x-height takes 6 pixels of a phone of 1600 x 720
- * in either Cardboard (test/xr/legibility.test.ts).
+ * Sizes of letters. The smaller one is 35 mm at 1 m: its x-height takes 6 pixels of a phone of 1600 x 720
+ * in either Cardboard (xr/legibility.test.ts).
  */
-export const TEXT = 36;
-export const SMALL = 33;
+export const TEXT = 38;
+export const SMALL = 34;
 
 /** The part of a row that is painted. */
 export function inset({ x, y, width, height }: Rect, by = GAP / 2): Rect {

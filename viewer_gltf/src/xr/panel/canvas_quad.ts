@@ -17,7 +17,8 @@ import { PX_PER_M } from "../../panel/canvas/page";
 import { paint } from "../../panel/canvas/paint";
 
 const LIT = 0xffffff;
-const LIT_OPACITY = 0.14;
+/** In linear light, in which 0.04 looks like a fifth of white. */
+const LIT_OPACITY = 0.04;
 /** Distance before the quad, m. */
 const LIT_M = 0.001;
 /** Anisotropy of the texture, samples: the user may see the text aslant. */

@@ -47,7 +47,7 @@ describe("notices in stereo", () => {
     // over 2 degrees, of which a phone of 280 pixels an eye makes 6 pixels
     expect(Math.min(...sizesOf(HOW_IT_WORKS))).toBeGreaterThan(60);
     expect(sizesOf("Quality: low", "Choosing by gaze: off")).toEqual([80, 80]);
-    expect(sizesOf("a word ".repeat(60))).toEqual([28]);
+    expect(sizesOf("a word ".repeat(60))).toEqual([48]);
   });
 
   it("fits the plane, however long", () => {

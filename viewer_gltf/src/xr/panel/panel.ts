@@ -41,7 +41,7 @@ import {
 const RENDER_ORDER = 1800;
 /** Time between readings of values outside the state (frame time, gazed tile), s. */
 const REFRESH_S = 0.5;
-/** The gaze rests on a swatch for so long, s, before colours lie beside it. */
+/** Time, s, after which colours lie beside a swatch that is looked at. */
 const FAN_S = 0.4;
 
 export const PANEL = "panel:";
@@ -305,13 +305,17 @@ export class RoomPanel {
     this.isStale = true;
   }
 
-  /** The colours of the swatch that is looked at lie over the channel's name until the gaze leaves the row. */
+  /**
+   * The colours of the swatch that is looked at lie over the channel's name until the gaze has left the row for
+   * as long: a head that trembles is still there.
+   */
   private fan(dt_s: number): void {
     this.lit_s += dt_s;
+    if (this.lit_s < FAN_S) return;
     const { fanned } = this.section;
     const swatch = this.lit?.endsWith("/open") ? this.lit.slice(0, -"/open".length) : null;
     const isInRow = fanned !== null && this.lit?.startsWith(`${fanned}/`) === true;
-    const next = swatch !== null && this.lit_s >= FAN_S ? swatch : isInRow ? fanned : null;
+    const next = swatch ?? (isInRow ? fanned : null);
     if (next === fanned) return;
     this.section = { ...this.section, fanned: next };
     this.isStale = true;
@@ -338,8 +342,7 @@ export class RoomPanel {
     const { x, y, width, height } = region.rect;
     const inside = (share: number) => Math.min(1, Math.max(0, share));
     const at = [inside((spot.x - x) / width), inside((spot.y - y) / height)] as const;
-    const wish =
-      isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
+    const wish = isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
     const words = JSON.stringify(wish);
     if (wish === null || (!isPress && words === this.dragged)) return;
     this.dragged = words;

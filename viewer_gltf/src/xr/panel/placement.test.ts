@@ -1,10 +1,13 @@
 import { Vector3 } from "three";
 import { describe, expect, it } from "vitest";
+import { BAR_HEIGHT } from "../../panel/canvas/bar";
+import { PX_PER_M } from "../../panel/canvas/page";
 import {
+  barPitch,
   bearingOf,
   followHead,
   noticeBearing,
-  openerPitch,
+  PANEL_DISTANCE_M,
   panelBearing,
   pointAt,
 } from "./placement";
@@ -12,22 +15,22 @@ import {
 const DEG = Math.PI / 180;
 const EYE = new Vector3(0.3, 1.6, -0.2);
 /** From the panel's middle to its edge. */
-const HALF_PITCH = 9.5 * DEG;
+const HALF_PITCH = 20 * DEG;
 
 describe("the panel's place", () => {
   it("is straight below the gaze, also of one who has turned round", () => {
     for (const yaw of [0, 0.7, 3, -2.5]) {
       for (const pitch of [0.2, 0, -0.5]) {
-        expect(panelBearing({ yaw, pitch }, 0)).toEqual({ yaw, pitch: expect.closeTo(-30 * DEG) });
+        expect(panelBearing({ yaw, pitch }, 0)).toEqual({ yaw, pitch: expect.closeTo(-24 * DEG) });
       }
     }
   });
 
-  it("is over a specimen on a table, between its upper edge and a level gaze", () => {
+  it("is over a specimen on a table, above its upper edge and about level", () => {
     const { pitch } = panelBearing({ yaw: 0, pitch: -0.7 }, 0, true);
     const upper = Math.atan2(0.24 - 0.5, 0.9); // of 48 cm, their middle half a metre under the eyes
     expect(pitch - HALF_PITCH).toBeGreaterThan(upper);
-    expect(pitch).toBeLessThan(0);
+    expect(pitch).toBeLessThan(10 * DEG);
   });
 
   it("is where the button was for one who looks straight down, with no heading", () => {
@@ -53,12 +56,12 @@ describe("a notice", () => {
   });
 });
 
-describe("the panel's button", () => {
+describe("the bar", () => {
   it("hangs where a level gaze finds it, and out of the panel's way while that is open", () => {
-    expect(openerPitch(false)).toBeCloseTo(-30 * DEG, 12);
-    const button = 2 * DEG; // half of its height, 0.7 m away
-    const lowest = -30 * DEG - HALF_PITCH;
-    expect(openerPitch(true) + button).toBeLessThan(lowest);
+    expect(barPitch(false)).toBeCloseTo(-30 * DEG, 12);
+    const bar = Math.atan(BAR_HEIGHT / PX_PER_M / 2 / PANEL_DISTANCE_M);
+    const lowest = -24 * DEG - HALF_PITCH;
+    expect(barPitch(true) + bar).toBeLessThan(lowest);
   });
 
   it("stays while the head turns a little, or looks down", () => {

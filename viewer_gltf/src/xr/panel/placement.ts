@@ -12,7 +12,7 @@ const BELOW = -30 * DEG;
 /** Pitch of the panel, radians: it begins just below a level gaze, and the bar hangs under it. */
 const PANEL_PITCH = -24 * DEG;
 /** Pitch of the panel above and behind a specimen on a table: in front, it would hide the specimen. */
-const OVER_TABLE = -5 * DEG;
+const OVER_TABLE = 6 * DEG;
 /** A head that looks steeper, radians, up or down, has no clear heading. */
 const STEEP = 75 * DEG;
 /** The same below a panel, or below a specimen on a table. */
@@ -58,7 +58,7 @@ function wrapped(angle: number): number {
 
 /**
  * Where the panel's middle goes: straight below the gaze, whichever way its user has turned; `isOverTable`: just
- * below a level gaze.
+ * above a level gaze.
  */
 export function panelBearing(
   { yaw, pitch }: Bearing,

@@ -51,6 +51,9 @@ export class LookingPerson {
   readonly hands: Hands;
   /** Time on the clock of the frames, in milliseconds. */
   now_ms = 1000;
+  private readonly specimen: Specimen;
+  private readonly pose: Specimen["pose"];
+  private readonly tiles: ReturnType<typeof sampleManifest>["tiles"];
   private view: Partial<PanelView> = {};
   private session: ButtonSession | null = null;
   private facing = new Quaternion();
@@ -63,6 +66,9 @@ export class LookingPerson {
     this.state = change(initialState(manifest));
     const specimen = new Specimen(manifest.specimen.bounds_um);
     specimen.anchorAt(new Vector3(0, 0, -XR_DISTANCE_M));
+    this.specimen = specimen;
+    this.pose = specimen.pose;
+    this.tiles = manifest.tiles;
     this.hands = new Hands({
       xr: { getFrame: () => null as unknown as XRFrame, getReferenceSpace: () => null },
       scene: new Scene(),
@@ -75,7 +81,10 @@ export class LookingPerson {
         this.wishes.push(action);
         this.state = reduce(this.state, action);
       },
-      onCommand: (command) => this.wishes.push(command),
+      onCommand: (command) => {
+        this.wishes.push(command);
+        this.hands.run(command, this.state);
+      },
       onChoose: (_, tile) => {
         this.wishes.push(tile);
         this.state = reduce(this.state, chosenTile(this.state, tile));
@@ -120,13 +129,36 @@ export class LookingPerson {
   lookAt(id: string, across?: number, down?: number): void {
     const at = this.hands.panel.pointOf(id, across, down);
     if (at === null) throw new Error(`no ${id} in ${this.regions.map((each) => each.id)}`);
-    this.facing.setFromRotationMatrix(new Matrix4().lookAt(EYE, at, new Vector3(0, 1, 0)));
+    this.faceTo(at);
+  }
+
+  lookUp(): void {
+    this.turnTo(0, 60);
+  }
+
+  /** From where it was to the right, at the same height. */
+  lookAside(): void {
+    const { x, y } = new Euler().setFromQuaternion(this.facing, "YXZ");
+    this.turnTo(y / RAD - 20, x / RAD);
+  }
+
+  /** Look at the middle of a tile's front. */
+  lookAtTile(name: string): void {
+    const tile = this.tiles.find(({ id }) => `tile:${id}` === name);
+    if (tile === undefined) throw new Error(`no ${name}`);
+    const { min, max } = tile.bounds_um;
+    const front = new Vector3((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]);
+    this.faceTo(front.applyMatrix4(this.specimen.group.matrixWorld));
+  }
+
+  private turnTo(yaw_deg: number, pitch_deg: number): void {
+    this.facing.setFromEuler(new Euler(pitch_deg * RAD, yaw_deg * RAD, 0, "YXZ"));
     this.now_ms += TURN_MS;
     this.frame(0);
   }
 
-  lookUp(): void {
-    this.facing.setFromEuler(new Euler(60 * RAD, 0, 0));
+  private faceTo(at: Vector3): void {
+    this.facing.setFromRotationMatrix(new Matrix4().lookAt(EYE, at, new Vector3(0, 1, 0)));
     this.now_ms += TURN_MS;
     this.frame(0);
   }
@@ -151,8 +183,9 @@ export class LookingPerson {
     this.frame(0);
   }
 
-  /** Open the panel's page of a tab, and go on by so many pages. */
-  open(tab: string, page = 0, view: Partial<PanelView> = {}): void {
+  /** Open the panel's page of a tab, or of a group of it (`channels/c2`), and go on by so many pages. */
+  open(where: string, page = 0, view: Partial<PanelView> = {}): void {
+    const [tab, group] = where.split("/");
     this.view = view;
     this.hands.panel.take(view);
     if (!this.hands.panel.isOpen) this.hands.panel.toggle();
@@ -160,6 +193,7 @@ export class LookingPerson {
     while (this.has("up")) this.pressOn("up");
     while (!this.has(`tab=${tab}`)) this.pressOn("more");
     this.pressOn(`tab=${tab}`);
+    if (group !== undefined) this.openGroup(group);
     for (let k = 0; k < page; k++) this.pressOn("more");
     this.lookUp();
     this.frame(FRAME_S);
@@ -167,8 +201,28 @@ export class LookingPerson {
     this.changes = 0;
   }
 
-  private has(id: string): boolean {
-    return this.regions.some((each) => each.id === id);
+  /** Whether there is such a target of the menu or of the bar. */
+  has(id: string): boolean {
+    return this.hands.panel.places.some((each) => each.id === id);
+  }
+
+  /** The first target of the menu or of the bar whose name begins so. */
+  find(start: string): string {
+    const found = this.hands.panel.places.find(({ id }) => id.startsWith(start));
+    if (found === undefined) throw new Error(`no ${start}`);
+    return found.id;
+  }
+
+  /** Whether the specimen is elsewhere, or turned otherwise, than at the start. */
+  get hasMoved(): boolean {
+    const [{ position, orientation }, then] = [this.specimen.pose, this.pose];
+    return !position.equals(then.position) || !orientation.equals(then.orientation);
+  }
+
+  private openGroup(group: string): void {
+    while (!this.has(`${group}/open`)) this.pressOn("more");
+    this.pressOn(`${group}/open`);
+    this.pressOn(`${group}/more`);
   }
 
   private pressOn(id: string): void {
@@ -208,7 +262,7 @@ export function pagesOf(
   const person = new LookingPerson(12, change);
   person.open("channels", 0, view);
   const tabs = person.tabs;
-  const pages = tabs.flatMap((tab) => {
+  const pages = [...tabs, "channels/c2"].flatMap((tab) => {
     person.open(tab, 0, view);
     const found: (readonly [string, number, readonly string[]])[] = [];
     const seen = new Set<string>();
