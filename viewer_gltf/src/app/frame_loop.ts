@@ -299,6 +299,8 @@ export class FrameLoop {
     const { specimen } = room;
     const { group } = specimen;
     const isMoving = specimen.advance(dt_s);
+    this.picture.fade.advance(fade_s);
+    if (specimen.takeJump() && stereo.kind !== null) this.picture.fade.begin();
     const isReady = (tile: string) => contents.volumes.isReady(tile);
     if (hybrid.look(state, head, group.matrixWorld, isReady, dt_s)) onFollow();
     const screen = {

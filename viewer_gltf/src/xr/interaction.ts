@@ -13,7 +13,7 @@ import {
   type Target,
 } from "../interaction/ray_pointer";
 import { TILE, TileTarget } from "../interaction/tile_target";
-import { type HandPose, type SpecimenPose, zoomAbout } from "../math/grab";
+import { type HandPose, zoomAbout } from "../math/grab";
 import { shownTiles } from "../math/pick";
 import type { Command } from "../state/commands";
 import { DWELL } from "../state/parameters/tools";
@@ -24,6 +24,7 @@ import { Controllers, type Hand, type HandEvent } from "./controllers";
 import type { HandsOptions } from "./hands_options";
 import {
   type HeadHold,
+  isFacing,
   moveByCommand,
   moveByFingers,
   moveByGaze,
@@ -32,6 +33,7 @@ import {
   moveByStick,
   STEPS_PER_S,
 } from "./hold_specimen";
+import { LastChoice } from "./last_choice";
 import { RoomNotice } from "./panel/notice";
 import { PANEL, RoomPanel } from "./panel/panel";
 import { hullOf, middleOf } from "./shown_hull";
@@ -47,13 +49,8 @@ const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
 const KEEPS_GAZE = "Switch this off by the button: where there is none, the gaze is all there is.";
 
 const CARRY = "It moves with your gaze. Rest to put it down.";
-/** For so long after a choice, s, it can be undone by the bar. */
-const UNDO_S = 4;
 /** The bar's button that undoes it. */
 const UNDO = `${PANEL}undo-choice`;
-
-/** What the last choice has changed. */
-type Moment = Readonly<{ state: ViewerState; pose: SpecimenPose }>;
 
 /** A trigger that is down. */
 type Press = {
@@ -96,13 +93,10 @@ export class Hands {
   private headHold: HeadHold | null = null;
   /** What is gone on with. */
   private goesOn: GoesOn | null = null;
-  /** Before the last choice, and the time left in which it can be undone. */
-  private before: Moment | null = null;
-  private undo_s = 0;
+  private readonly lastChoice = new LastChoice();
   /** The specimen as it was taken by the bar. */
   private barHold: HeadHold | null = null;
   private state: ViewerState | null = null;
-
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
@@ -140,6 +134,11 @@ export class Hands {
     return this.pointer.progress;
   }
 
+  /** Whether the gaze carries a handle or the specimen. */
+  get isCarrying(): boolean {
+    return this.carry.isCarrying;
+  }
+
   get isHolding(): boolean {
     return this.held.size > 0;
   }
@@ -164,7 +163,7 @@ export class Hands {
     this.touched = null;
     this.goesOn = null;
     this.headHold = null;
-    this.before = null;
+    this.lastChoice.take();
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
@@ -191,7 +190,8 @@ export class Hands {
     const pivot = middleOf(this.around(state));
     const pose = moveByCommand(specimen.pose, command, pivot, this.gaze.origin, share);
     if (pose === null) return false;
-    specimen.moveTo(pose, this.gaze.origin);
+    if (isFacing(command)) specimen.jumpTo(pose, this.gaze.origin);
+    else specimen.moveTo(pose, this.gaze.origin);
     return true;
   }
 
@@ -215,7 +215,7 @@ export class Hands {
     this.gaze = gazeOf(head);
     this.state = state;
     this.tiles.tiles = shownTiles(this.options.tiles, state.isolated);
-    this.tiles.clip = state.clip;
+    this.tiles.follow(state);
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
     for (const event of this.controllers.take()) this.handle(event);
     const hasTouched = this.followFingers(state);
@@ -224,8 +224,11 @@ export class Hands {
     const hasHeld = this.hold(dt_s);
     const hasFollowed = this.followHead(dt_s, state);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
-    this.panel.canUndo = this.mayUndo(dt_s, state);
-    this.panel.isCarrying = this.carry.isCarrying;
+    const isGoingOn = this.goesOn !== null || this.carry.isCarrying;
+    const now = { state, pose: this.options.specimen.pose };
+    const isAsked = this.pointer.gaze?.key === UNDO;
+    this.panel.canUndo = this.lastChoice.advance(dt_s, now, isGoingOn, isAsked);
+    this.panel.isCarrying = this.carry.isCarrying || this.headHold !== null;
     const isRepainted = this.panel.update(dt_s, head, state);
     const isNoticeNew = this.notice.update(read_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
@@ -333,36 +336,17 @@ export class Hands {
     if (met.key === null) return;
     const counts = this.pointer.press(met, this.free, time_ms);
     if (!counts && !isByGaze) return;
-    if (met.key !== UNDO) this.remember();
+    const { pose } = this.options.specimen;
+    if (met.key !== UNDO && this.state) this.lastChoice.remember({ state: this.state, pose });
     met.target.choose(met, met.ray, isByGaze);
     if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
   }
 
-  /** The moment before a choice, to which the bar leads back. */
-  private remember(): void {
-    if (this.state === null) return;
-    this.before = { state: this.state, pose: this.options.specimen.pose };
-    this.undo_s = UNDO_S;
-  }
-
-  /** Whether the last choice has changed anything, a short while ago or while *Undo* is looked at. */
-  private mayUndo(dt_s: number, state: ViewerState): boolean {
-    if (this.before === null) return false;
-    const { pose } = this.options.specimen;
-    const isGoing = this.goesOn !== null || this.carry.isCarrying;
-    const isAsked = this.pointer.gaze?.key === UNDO;
-    if (isGoing) this.undo_s = UNDO_S;
-    else if (!isAsked) this.undo_s -= dt_s;
-    if (this.undo_s <= 0) this.before = null;
-    return this.before !== null && (this.before.state !== state || this.before.pose !== pose);
-  }
-
   private undo(): void {
-    const { before } = this;
+    const before = this.lastChoice.take();
     if (before === null) return;
-    this.before = null;
     this.options.onAction({ type: "restore", state: before.state });
-    this.options.specimen.moveTo(before.pose, this.gaze.origin);
+    this.options.specimen.jumpTo(before.pose, this.gaze.origin);
   }
 
   /** The bar is taken hold of, and the specimen moves as the gaze does until it rests. */

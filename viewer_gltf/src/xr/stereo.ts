@@ -251,8 +251,8 @@ export class Stereo {
 
   private begin(session: XRSession | null): void {
     const isInHand = session?.interactionMode === "screen-space";
-    this.hands.panel.isTableBelow = this.isInUsersRoom;
-    this.hands.panel.isOverTable = this.isInUsersRoom && !isInHand;
+    const onTable = isInHand ? "in-hand" : "over-table";
+    this.hands.panel.setting = this.isInUsersRoom ? onTable : "before-eyes";
     this.options.onStart();
     this.hands.start(session);
     if (isToBeTold()) this.hands.announce(HOW_IT_WORKS);

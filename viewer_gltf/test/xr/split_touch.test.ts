@@ -43,7 +43,8 @@ describeInChromium("fingers in a Cardboard", () => {
       await devtools.send("Input.dispatchTouchEvent", { type, touchPoints });
       await page.waitForTimeout(150); // a few frames
     };
-    const leftEye = () => takePicture(page, { x: 0, y: 0, width: SIZE.width / 2, height: 300 });
+    // above the bar, which stays where it is in the room
+    const leftEye = () => takePicture(page, { x: 0, y: 0, width: SIZE.width / 2, height: 190 });
     const drawn = async () => (await leftEye()).count((pixel) => Math.max(...pixel) > 60);
     const finger = (x: number, y = 150, id = 1): Finger => ({ x, y, id });
 
@@ -90,6 +91,7 @@ describeInChromium("fingers in a Cardboard", () => {
       await page.waitForTimeout(400);
     };
     await turnHead(0, 90);
+    await page.waitForTimeout(600); // it has come to rest: that is ahead
     const still = await leftEye();
     await turnHead(25, 90);
     expect(difference(still, await leftEye())).toBeGreaterThan(0.05); // the head alone looks aside
