@@ -10,7 +10,7 @@ import type { Profile } from "./cardboard/viewer_profile";
 import type { HandsOptions } from "./hands_options";
 import { betweenEyes } from "./head_pose";
 import { Hands } from "./interaction";
-import { bearingOf, headBearing } from "./panel/placement";
+import { bearingOf, headBearing, type Setting } from "./panel/placement";
 import { XrSession } from "./session";
 import { spreadEyes } from "./stereo_strength";
 
@@ -33,9 +33,12 @@ export type EyeSettings = Readonly<{
   cssPixelsPerInch: number | null;
 }>;
 
-/** On a card before the eyes when stereo begins. */
-export const HOW_IT_WORKS = "Look down: menu.\nPress: choose.\nHold: it follows you.";
-/** Whoever has seen it so often knows. */
+/** On a card before the eyes when stereo begins. Before a head that looks at a table the bar is higher than the gaze. */
+export function howItWorks(setting: Setting): string {
+  const way = setting === "over-table" ? "up" : "down";
+  return `Look ${way}: the bar.\nRest or press: choose.\nHold: it follows you.`;
+}
+/** Times that the card is shown on a device. */
 const TOLD_OFTEN = 3;
 const TOLD_KEY = "stereocell-told";
 
@@ -255,7 +258,7 @@ export class Stereo {
     this.hands.panel.setting = this.isInUsersRoom ? onTable : "before-eyes";
     this.options.onStart();
     this.hands.start(session);
-    if (isToBeTold()) this.hands.announce(HOW_IT_WORKS);
+    if (isToBeTold()) this.hands.announce(howItWorks(this.hands.panel.setting));
   }
 
   private leave(): void {

@@ -138,7 +138,9 @@ async function walk(stand: Stand, only = "") {
     };
 
     turn(0, 90);
-    pass(1);
+    pass(0.1);
+    await new Promise((resolve) => setTimeout(resolve, 600)); // it has come to rest: that is ahead
+    pass(0.1);
     const before = ids();
     if (only === "") {
       await walkPages("bar");

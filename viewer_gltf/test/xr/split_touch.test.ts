@@ -102,7 +102,7 @@ describeInChromium("fingers in a Cardboard", () => {
     await turnHead(25, 90);
     expect(difference(still, await leftEye())).toBeLessThan(0.04);
     await turnHead(25, 80);
-    expect(await drawn()).toBeGreaterThan(1.2 * size);
+    await expect.poll(drawn).toBeGreaterThan(1.2 * size);
     await touch("touchEnd", []);
     expect(await chosen()).toEqual(selected); // that was no tap
     const held = await leftEye();

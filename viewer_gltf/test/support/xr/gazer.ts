@@ -11,7 +11,7 @@ const CORRECTIONS = 4;
 /** Age of a report, ms, from which nothing is predicted: the head's turn is then the same in every run. */
 const OLD_MS = 1000;
 
-/** Time after which where the head rests is ahead, ms. */
+/** Time after which where the head rests is ahead, ms of the phone's own clock. */
 const SETTLED_MS = 600;
 
 /** The page's clock must be held: see `addClock`. */
@@ -44,7 +44,9 @@ export class Gazer {
     [this.yaw_deg, this.pitch_deg] = [yaw_deg, pitch_deg];
     await this.report(0, 0);
     await tick(this.page, 10);
-    for (let k = 0; isFirst && k * FRAME_MS < SETTLED_MS; k++) await tick(this.page, FRAME_MS);
+    if (!isFirst) return;
+    await this.page.waitForTimeout(SETTLED_MS);
+    await tick(this.page, 10);
   }
 
   /** Keep looking at the same place, with the tremble of a head. */
