@@ -67,6 +67,8 @@ export type MarksView = Readonly<{
   disc: Cone | null;
   /** The panel lies beside the specimen, and ruler and axes would lie across it. */
   isPanelOpen: boolean;
+  /** The bar of stereo hangs below the specimen. */
+  isBarBelow: boolean;
   dt_s: number;
 }>;
 
@@ -148,7 +150,7 @@ export class Marks {
     this.surfaces = surfaces;
     this.name.follow(view.gaze, TREMBLE_M / m_per_um, view.dt_s, () => this.nameOf(view.gaze));
     if (this.state.measured.length > 0) this.showMeasured(); // volumes come and refine
-    if (view.screen === null) this.updateInRoom(view.isPanelOpen);
+    if (view.screen === null) this.updateInRoom(view);
     else this.updateOnScreen(view, view.screen, m_per_um);
     this.handles.update(this.sight);
     this.lamps.update(this.sight);
@@ -219,12 +221,12 @@ export class Marks {
     return this.options.manifest.specimen.bounds_um;
   }
 
-  private updateInRoom(isPanelOpen: boolean): void {
+  private updateInRoom({ isPanelOpen, isBarBelow }: MarksView): void {
     const { sight, shown } = this;
     this.mean(this.target.takeSeen());
     this.scaleBar.update(null);
     this.orientation.root.style.display = "none";
-    this.ruler.update(shown, sight);
+    this.ruler.update(shown, sight, isBarBelow);
     if (isPanelOpen) this.ruler.group.visible = false;
     this.axes.group.visible = !isPanelOpen;
     this.axes.update(shown, sight);

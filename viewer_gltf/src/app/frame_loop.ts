@@ -315,6 +315,7 @@ export class FrameLoop {
       gaze: rayAhead(head, group),
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
       isPanelOpen: stereo.hands.panel.isOpen,
+      isBarBelow: !stereo.isInUsersRoom,
       dt_s,
     };
     const isFading = contents.advance(seen, fade_s);
@@ -332,7 +333,7 @@ export class FrameLoop {
       volumes,
       traced,
       panes: surfaces.blended,
-      overlays: [...marks.overlays, ...slices.overlays, ...stereo.hands.overlays],
+      overlays: [...marks.overlays, ...slices.overlays, ...stereo.overlays],
       bounds: this.options.bounds,
       solids: surfaces.triangles + slices.solid,
     };

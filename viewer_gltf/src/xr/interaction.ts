@@ -49,8 +49,10 @@ const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
 const KEEPS_GAZE = "Switch this off by the button: where there is none, the gaze is all there is.";
 
 const CARRY = "It moves with your gaze. Rest to put it down.";
-/** The bar's button that undoes it. */
+/** The bar's button that undoes the last choice. */
 const UNDO = `${PANEL}undo-choice`;
+/** The bar's button by which the gaze takes the specimen. */
+const CARRY_BUTTON = `${PANEL}bar-move`;
 
 /** A trigger that is down. */
 type Press = {
@@ -137,6 +139,13 @@ export class Hands {
   /** Whether the gaze carries a handle or the specimen. */
   get isCarrying(): boolean {
     return this.carry.isCarrying;
+  }
+
+  /** Whether the gaze or the head carries something of the scene, not a part of the open menu. */
+  private get isCarryingInScene(): boolean {
+    const { key } = this.carry;
+    const isOfMenu = key?.startsWith(PANEL) === true && key !== CARRY_BUTTON;
+    return this.headHold !== null || (key !== null && !isOfMenu);
   }
 
   get isHolding(): boolean {
@@ -228,7 +237,7 @@ export class Hands {
     const now = { state, pose: this.options.specimen.pose };
     const isAsked = this.pointer.gaze?.key === UNDO;
     this.panel.canUndo = this.lastChoice.advance(dt_s, now, isGoingOn, isAsked);
-    this.panel.isCarrying = this.carry.isCarrying || this.headHold !== null;
+    this.panel.isCarrying = this.isCarryingInScene;
     const isRepainted = this.panel.update(dt_s, head, state);
     const isNoticeNew = this.notice.update(read_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);

@@ -348,6 +348,10 @@ describeInChromium("marks", () => {
     const ruler = await page.evaluate(() => window.bench?.ruler());
     expect(ruler?.isVisible).toBe(true);
     expect(ruler?.length_um).toBeGreaterThan(100);
+    await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isInUsersRoom: true });
+    const onTable = await page.evaluate(() => window.bench?.ruler());
+    const { up_um = Number.NaN } = ruler ?? {};
+    expect(up_um).toBeGreaterThan(onTable?.up_um ?? Number.NaN); // else the bar would lie before it
     await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isPanelOpen: true });
     const behindPanel = await page.evaluate(() => window.bench?.ruler());
     expect(behindPanel).toMatchObject({ isVisible: false, hasAxes: false });

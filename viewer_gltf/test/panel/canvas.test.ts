@@ -124,7 +124,10 @@ describeInChromium("the panel in the room", () => {
     expect(opacities.length).toBeLessThan(5); // not one for each frame
     await picture("card");
     // the second of two quick presses does nothing
-    while ((await hands().status()).regions.includes("up")) await choose("up");
+    while ((await hands().status()).regions.includes("up")) {
+      await choose("up");
+      await hands().page.waitForTimeout(450);
+    }
     await reach("tab=view");
     await choose("tab=view");
     await reach("top");

@@ -92,6 +92,7 @@ async function walk(stand: Stand, only = "") {
           pass(6); // what was told has gone
           if (ids().includes(id) && !tryOut(id)) silent.push(`${name} ${id}`);
         }
+        pass(3); // what the gaze carries is put down
         if (!ids().includes("more")) break;
         gaze("more");
       }
@@ -142,10 +143,7 @@ async function walk(stand: Stand, only = "") {
     await new Promise((resolve) => setTimeout(resolve, 600)); // it has come to rest: that is ahead
     pass(0.1);
     const before = ids();
-    if (only === "") {
-      await walkPages("bar");
-      pass(3); // what the gaze carries is put down
-    }
+    if (only === "") await walkPages("bar");
     gaze("opener");
     for (const tab of sections().filter((id) => id.startsWith(`tab=${only}`))) {
       toList();

@@ -1,4 +1,4 @@
-/** In stereo a jump of the specimen is a fade of the picture; what a person carries or turns follows at once. */
+/** The room in stereo: a jump of the specimen is a fade of the picture, and a grid on the ground stays where it is. */
 import { expect, it } from "vitest";
 import { addClock, holdFrames, tick } from "../support/browser/clock";
 import { type Picture, takePicture } from "../support/browser/picture";
@@ -74,5 +74,18 @@ describeInChromium("the picture in stereo", () => {
     }
     const [turned] = await changes("ArrowLeft");
     expect(turned).toBeGreaterThan(0.9);
+  });
+
+  it("has a faint grid on the ground, also behind the head", async () => {
+    await enter();
+    const gazer = new Gazer(stand.viewer);
+    await gazer.turnTo(0, 0);
+    await gazer.turnTo(140, -20);
+    await tick(page(), FRAME_MS, FRAMES);
+    const dark = 0x0b + 0x0d + 0x12; // the room behind
+    const sum = ([r, g, b]: readonly [number, number, number]) => r + g + b;
+    const shown = await picture();
+    expect(shown.count((pixel) => sum(pixel) > dark + 12)).toBeGreaterThan(100);
+    expect(shown.count((pixel) => Math.max(...pixel) > 110)).toBe(0);
   });
 });

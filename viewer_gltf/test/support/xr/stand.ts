@@ -13,6 +13,8 @@ const PAGE = `<!doctype html><style>
 </style><body><div id="stage"></div>`;
 
 const MOST_PAGES = 12;
+/** Time, ms, after which a press is no second one of a double press, which does nothing. */
+const PRESS_APART_MS = 450;
 
 export type At = readonly [number, number, number];
 export type Side = "left" | "right";
@@ -67,7 +69,10 @@ export class HandsStand {
   /** Go from any page of the open panel to a section, by the bar and the list of sections. */
   async openSection(section: string): Promise<void> {
     const regions = async () => (await this.status()).regions;
-    while ((await regions()).includes("up")) await this.tapOn("up");
+    while ((await regions()).includes("up")) {
+      await this.tapOn("up");
+      await this.page.waitForTimeout(PRESS_APART_MS);
+    }
     await this.reach(`tab=${section}`);
     await this.tapOn(`tab=${section}`);
   }
