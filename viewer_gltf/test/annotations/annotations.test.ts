@@ -231,7 +231,7 @@ describeInChromium("marks", () => {
     for (const angle of angles) expect(angle * px_per_rad).toBeCloseTo(LABEL_PX, 1);
     await look([0, 0, 2], [0, 0, 0], { isStereo: true });
     const inRoom = (await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0;
-    expect(inRoom).toBeCloseTo(LABEL_HEIGHT, 5);
+    expect(inRoom).toBeCloseTo(STEREO_TEXT * LABEL_HEIGHT, 5);
   });
 
   it("let a handle be dragged: the face follows the pointer, and the camera does not", async () => {
