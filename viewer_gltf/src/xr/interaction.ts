@@ -13,7 +13,7 @@ import {
   type Target,
 } from "../interaction/ray_pointer";
 import { TILE, TileTarget } from "../interaction/tile_target";
-import { type HandPose, zoomAbout } from "../math/grab";
+import type { HandPose } from "../math/grab";
 import { shownTiles } from "../math/pick";
 import type { Command } from "../state/commands";
 import { DWELL } from "../state/parameters/tools";
@@ -24,9 +24,6 @@ import { Controllers, type Hand, type HandEvent } from "./controllers";
 import type { HandsOptions } from "./hands_options";
 import {
   type HeadHold,
-  isFacing,
-  moveByCommand,
-  moveByFingers,
   moveByGaze,
   moveByHead,
   moveByHolders,
@@ -36,7 +33,7 @@ import {
 import { LastChoice } from "./last_choice";
 import { RoomNotice } from "./panel/notice";
 import { PANEL, RoomPanel } from "./panel/panel";
-import { hullOf, middleOf } from "./shown_hull";
+import { SpecimenMover } from "./specimen_mover";
 
 /** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
 const HOLD_S = 0.35;
@@ -75,6 +72,7 @@ export class Hands {
   readonly panel: RoomPanel;
   readonly ring = new Ring();
   readonly notice: RoomNotice;
+  private readonly mover: SpecimenMover;
   private readonly controllers = new Controllers();
   private readonly pointer = new Pointer();
   readonly tiles: TileTarget;
@@ -102,6 +100,7 @@ export class Hands {
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
+    this.mover = new SpecimenMover(specimen, options.tiles);
     this.notice = new RoomNotice(isPainted);
     this.panel = new RoomPanel({
       layOut,
@@ -195,22 +194,12 @@ export class Hands {
 
   /** What would move the camera of a flat screen, by a step; false: the command is another's. */
   run(command: Command, state: ViewerState, share = 1): boolean {
-    const { specimen } = this.options;
-    const pivot = middleOf(this.around(state));
-    const pose = moveByCommand(specimen.pose, command, pivot, this.gaze.origin, share);
-    if (pose === null) return false;
-    if (isFacing(command)) specimen.jumpTo(pose, this.gaze.origin);
-    else specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.run(command, state, this.gaze.origin, share);
   }
 
   /** The specimen becomes so much larger about its middle. */
   resize(factor: number, state: ViewerState): void {
-    const { specimen } = this.options;
-    specimen.moveTo(
-      zoomAbout(specimen.pose, middleOf(this.around(state)), factor),
-      this.gaze.origin,
-    );
+    this.mover.resize(factor, state, this.gaze.origin);
   }
 
   /**
@@ -234,7 +223,7 @@ export class Hands {
     const hasFollowed = this.followHead(dt_s, state);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
     const isGoingOn = this.goesOn !== null || this.carry.isCarrying;
-    const now = { state, pose: this.options.specimen.pose };
+    const now = { state, pose: this.mover.pose };
     const isAsked = this.pointer.gaze?.key === UNDO;
     this.panel.canUndo = this.lastChoice.advance(dt_s, now, isGoingOn, isAsked);
     this.panel.isCarrying = this.isCarryingInScene;
@@ -316,8 +305,7 @@ export class Hands {
 
   /** What fingers on the split screen have done since the frame before; whether anything has moved. */
   private followFingers(state: ViewerState): boolean {
-    const { specimen } = this.options;
-    const before = specimen.pose;
+    const before = this.mover.pose;
     for (const [gesture, time_ms] of this.gestures.splice(0)) {
       if (gesture.kind === "press") {
         const met = meetFirst(this.gaze, this.free);
@@ -327,12 +315,10 @@ export class Hands {
       else if (gesture.kind === "tap") {
         if (this.touched?.isUsed === false) this.tap(time_ms);
       } else {
-        const pivot = middleOf(this.around(state));
-        const pose = moveByFingers(specimen.pose, gesture, pivot, this.gaze.origin);
-        specimen.moveTo(pose, this.gaze.origin);
+        this.mover.byFingers(gesture, state, this.gaze.origin);
       }
     }
-    return specimen.pose !== before;
+    return this.mover.pose !== before;
   }
 
   /** The button: what the ray meets, or if that is nothing, what is gazed at. */
@@ -345,7 +331,7 @@ export class Hands {
     if (met.key === null) return;
     const counts = this.pointer.press(met, this.free, time_ms);
     if (!counts && !isByGaze) return;
-    const { pose } = this.options.specimen;
+    const { pose } = this.mover;
     if (met.key !== UNDO && this.state) this.lastChoice.remember({ state: this.state, pose });
     met.target.choose(met, met.ray, isByGaze);
     if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
@@ -355,17 +341,16 @@ export class Hands {
     const before = this.lastChoice.take();
     if (before === null) return;
     this.options.onAction({ type: "restore", state: before.state });
-    this.options.specimen.jumpTo(before.pose, this.gaze.origin);
+    this.mover.backTo(before.pose, this.gaze.origin);
   }
 
   /** The bar is taken hold of, and the specimen moves as the gaze does until it rests. */
   private carrySpecimen(gaze: RoomRay, isStart: boolean): void {
-    const { specimen } = this.options;
     if (isStart && this.state !== null) {
-      this.barHold = { pose: specimen.pose, pivot: middleOf(this.around(this.state)), gaze };
+      this.barHold = this.mover.holdBy(gaze, this.state);
       this.announce(CARRY);
     } else if (this.barHold !== null) {
-      specimen.moveTo(moveByGaze(this.barHold, gaze), gaze.origin);
+      this.mover.to(moveByGaze(this.barHold, gaze), gaze.origin);
     }
   }
 
@@ -382,12 +367,9 @@ export class Hands {
   private hold(dt_s: number): boolean {
     for (const [source, press] of this.presses) this.advance(source, press, dt_s);
     const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
-    const { specimen } = this.options;
-    const pose = moveByHolders(specimen.pose, this.held, now);
+    const pose = moveByHolders(this.mover.pose, this.held, now);
     this.held = now;
-    if (pose === specimen.pose) return false;
-    specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.to(pose, this.gaze.origin);
   }
 
   private advance(source: XRInputSource, press: Press, dt_s: number): void {
@@ -439,39 +421,30 @@ export class Hands {
       this.headHold = null;
       return false;
     }
-    const { specimen } = this.options;
     const { gaze } = this;
     press.isUsed = true; // letting go of it chooses nothing
     if (this.headHold === null) {
-      this.headHold = { pose: specimen.pose, pivot: middleOf(this.around(state)), gaze };
+      this.headHold = this.mover.holdBy(gaze, state);
       return false;
     }
-    specimen.moveTo(moveByHead(this.headHold, gaze), gaze.origin);
+    this.mover.to(moveByHead(this.headHold, gaze), gaze.origin);
     return true;
   }
 
   private moveBySticks(dt_s: number, state: ViewerState): boolean {
     if (this.isHolding) return false;
-    const { specimen } = this.options;
-    let { pose } = specimen;
+    let { pose } = this.mover;
     for (const { stick, ray } of this.tracked) {
       if (stick.x === 0 && stick.y === 0) continue;
       const met = this.tileAlong(ray) ?? this.tileAlong(this.gaze);
-      pose = moveByStick(pose, stick, met ?? middleOf(this.around(state)), dt_s);
+      pose = moveByStick(pose, stick, met ?? this.mover.middle(state), dt_s);
     }
-    if (pose === specimen.pose) return false;
-    specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.to(pose, this.gaze.origin);
   }
 
   private tileAlong(ray: RoomRay | null): Vector3 | null {
     const hit = ray && this.tiles.meet(ray);
     return hit && pointOn({ ...hit, ray });
-  }
-
-  private around({ isolated }: ViewerState): readonly Vector3[] {
-    const { tiles, specimen } = this.options;
-    return hullOf(shownTiles(tiles, isolated), specimen.group.matrixWorld);
   }
 
   /** Ring, rays, and the light on what is pointed at. */
