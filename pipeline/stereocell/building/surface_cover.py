@@ -58,7 +58,7 @@ class SurfaceCover:
     @property
     def words(self) -> str:
         """Both shares, for a reader."""
-        beside = f"; noise alone lifts {self.lifted:,} other voxels above it" if self.lifted else ""
+        beside = f"; noise alone lifts about {self.lifted:,} others above it" if self.lifted else ""
         return self.cover.words + beside
 
     @property
@@ -82,7 +82,9 @@ def notes_on_cover(out_folder: OutFolder, plan: Plan) -> list[str]:
         lifted = lifted_by_tile(out_folder, plan, survey[channel.id])
         found = SurfaceCover.of(total, sum_lifted(lifted.values()))
         if found.missing > MAX_MISSING:
-            noise = f", beside {found.lifted:,} that only noise lifts there" * bool(found.lifted)
+            noise = f", beside about {found.lifted:,} that only noise lifts there" * bool(
+                found.lifted
+            )
             notes.append(
                 f"{channel.name}: its surface leaves out {found.missing:.0%} of the source's "
                 f"voxels above its level{noise}: filters and cleaning remove thin and small "
