@@ -40,6 +40,7 @@ from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
 from stereocell.building.plan_notes import (
     changes_of,
     ignored_notes,
+    print_notes,
     told_of_absent,
     told_of_gaps,
     words_of_spacing,
@@ -99,10 +100,7 @@ def make(
         if engine is not None:
             require_own_places(out_folder, is_same_plan=True)  # what no plan may replace
         plan = settle(source, settings, choice)
-        levels = notes_on_levels(plan)
-        for note in levels:
-            console.print(f"plan: {note}", markup=False, soft_wrap=True)
-        plan = replace(plan, notes=(*plan.notes, *levels))
+        plan = replace(plan, notes=(*plan.notes, *notes_on_levels(plan)))
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()
         there = out_folder.replaced_plan(plan)
@@ -110,6 +108,7 @@ def make(
         if engine is not None:
             require_own_places(out_folder, is_same_plan=there == plan)
             engine.join()
+        print_notes(plan)  # an error stands alone
         if there is not None and (changes := changes_of(there, plan)):
             console.print(f"plan: {changes}", markup=False, soft_wrap=True)
         phase.is_up_to_date = not out_folder.save_plan(plan)
@@ -126,7 +125,7 @@ def make(
 
 
 def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
-    """Return the plan of a build, and print its notes. Nothing is written.
+    """Return the plan of a build, with its notes. Nothing is written or printed.
 
     choice  notes on how the settings were chosen; see `load_for`
 
@@ -202,10 +201,7 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
     read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
     kind = [modality.note] if modality.note else []
     notes = (*read, *choice, *kind, *gaps, *objects, *ignored_notes(settings, channels))
-    plan = replace(plan, notes=notes, is_hounsfield=modality.is_hounsfield)
-    for note in plan.notes:  # an error stands alone
-        console.print(f"plan: {note}", markup=False)
-    return plan
+    return replace(plan, notes=notes, is_hounsfield=modality.is_hounsfield)
 
 
 def _require_labels(settings: Settings) -> None:

@@ -9,6 +9,7 @@ from stereocell.building.open_source import SourceRef
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings, to_dict
+from stereocell.engine.run import console
 from stereocell.isosurface.options import LADDER, NO_SURFACE, RUNGS
 from stereocell.model.errors import SourceError
 from stereocell.model.spacing import Spacing
@@ -77,6 +78,12 @@ def _absent(
         f"they are read as {absent.fill}, and the format does not state whether they are empty or "
         "missing"
     ]
+
+
+def print_notes(plan: Plan) -> None:
+    """Print the notes of a plan, a line each."""
+    for note in plan.notes:
+        console.print(f"plan: {note}", markup=False, soft_wrap=True)
 
 
 def words_of_spacing(spacing_um: Spacing) -> str:
