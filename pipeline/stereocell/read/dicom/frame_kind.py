@@ -206,14 +206,19 @@ class FrameKind:
 
     @property
     def rank(self) -> int:
-        """Lower ranks are shown first: images and magnitudes have 0.
+        """Lower ranks are shown first: images and magnitudes have 0."""
+        uncorrected = _UNCORRECTED_RANK * (self.is_attenuation_corrected is False)
+        return max(
+            _PART_RANKS.get(self.part, 0), _RANKS[self.role], int(self.is_derived), uncorrected
+        )
 
-        Water and fat are computed from the echoes, so that DERIVED doesn't make them lesser images.
+    @property
+    def is_derived(self) -> bool:
+        """Whether ImageType says DERIVED and no contrast: water and fat are computed from echoes,
+        and are no lesser images.
         """
         is_named = any(word in _CONTRASTS.values() for word in self.contrasts)
-        is_derived = self.image_type[:1] == ("DERIVED",) and not is_named
-        uncorrected = _UNCORRECTED_RANK * (self.is_attenuation_corrected is False)
-        return max(_PART_RANKS.get(self.part, 0), _RANKS[self.role], int(is_derived), uncorrected)
+        return self.image_type[:1] == ("DERIVED",) and not is_named
 
     @property
     def contrast_rank(self) -> int:
