@@ -2,6 +2,7 @@
 import { Matrix4, Vector3 } from "three";
 import type { Hit, RoomRay, Target } from "../interaction/ray_pointer";
 import { rayAlong } from "../interaction/rays";
+import { placeText } from "../interaction/tile_target";
 import { type Handle, type HandleId, pickHandle } from "./clip_handles";
 
 const HANDLE = "handle:";
@@ -17,6 +18,12 @@ export class HandleTarget implements Target {
   private seen: HandleId | null = null;
   private readonly toSpecimen = new Matrix4();
 
+  /** The handles and where they are: one that comes under a resting gaze was not looked for. */
+  get layout(): string {
+    const places = this.handles.map(({ id, position }) => `${id} ${position}`);
+    return `handles ${places} ${placeText(this.specimen)}`;
+  }
+
   constructor(
     private readonly tolerance_rad: number,
     /** The ray is in um. */
@@ -30,7 +37,8 @@ export class HandleTarget implements Target {
     if (handle === undefined) return null;
     this.seen = handle.id;
     const place = new Vector3(...handle.position).applyMatrix4(this.specimen);
-    return { key: HANDLE + id, distance_m: place.distanceTo(ray.origin), hold: "carry" };
+    const key = HANDLE + id;
+    return { key, place: key, distance_m: place.distanceTo(ray.origin), hold: "carry" };
   }
 
   choose(): void {

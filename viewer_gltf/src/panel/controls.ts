@@ -141,6 +141,8 @@ export type Colour = Base &
     kind: "colour";
     value: string;
     palettes: readonly Palette[];
+    /** Eight colours that no other channel has, where there are other channels. */
+    free?: readonly string[];
     /** Colours that it shows instead of its own; none or absent: nothing else. */
     shows?: readonly string[];
     to: (hex: string) => Wish;

@@ -6,15 +6,17 @@
  */
 
 import { valueText } from "../../annotations/measure";
+import { toHex } from "../../math/color";
 import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel";
 import { isTwoD } from "../../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 import { colourOf, controlOf, paletteOf } from "../control_templates";
-import type { Control, Group, PanelView, Section } from "../controls";
+import type { Colour, Control, Group, PanelView, Section } from "../controls";
+import { freeColours } from "../palettes";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
-/** Largest number of channels that all have a card: so many rows fit a page of the panel in stereo. */
+/** Largest number of channels that all have a card. */
 export const FEW = 9;
 /** Channels of a page of the list; fewer need no search. */
 export const PAGE = 6;
@@ -66,8 +68,15 @@ export function windowTexts(
   return [intensityText(low, range), `${intensityText(high, range)} ${unit}`.trim()];
 }
 
+/** The channel's colour, with those that no other channel has. */
+function ownColour(channel: ChannelState, channels: readonly ChannelState[]): Colour {
+  const others = channels.filter(({ id }) => id !== channel.id).map(({ color }) => toHex(color));
+  return { ...colourOf(COLOR, channel, channel.id), free: freeColours(others) };
+}
+
 function cardOf(
   channel: ChannelState,
+  { channels }: ViewerState,
   { ranges, histogram = null, objects = [] }: ChannelFacts,
   view: PanelView,
 ): Group {
@@ -95,7 +104,7 @@ function cardOf(
   return {
     ...head,
     controls: [
-      controlOf(COLOR, channel, id),
+      ownColour(channel, channels),
       shownToggle(channel),
       controlOf(VOLUME, channel, id),
       {
@@ -191,7 +200,7 @@ function addingOf(
     });
   }
   for (const channel of found.slice(page * PAGE, (page + 1) * PAGE)) {
-    items.push(rowOf(cardOf(channel, facts, view)));
+    items.push(rowOf(cardOf(channel, state, facts, view)));
   }
   if (isLong && found.length === 0) {
     const value = `No channel of the list is called "${view.search.trim()}".`;
@@ -227,7 +236,7 @@ export function channelItems(
   facts: ChannelFacts,
   view: PanelView,
 ): Section["items"] {
-  const cards = withCards(state, view).map((channel) => cardOf(channel, facts, view));
+  const cards = withCards(state, view).map((channel) => cardOf(channel, state, facts, view));
   return [...cards, ...addingOf(state, facts, view)];
 }
 
