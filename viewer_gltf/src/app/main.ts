@@ -111,7 +111,6 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   );
   controller = new Controller(viewer, parent, said, {
     subtitle: describeSize(manifest),
-    isPhone: isTouch,
     onStereo: () => void enterStereo(viewer, "immersive-vr"),
     onRoom: () => void enterStereo(viewer, "immersive-ar"),
     onSplit: (lenses) => void viewer.startSplit(lenses).catch((error) => viewer.report(error)),

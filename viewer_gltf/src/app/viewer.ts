@@ -72,7 +72,10 @@ const OBJECT_IN_ROOM_M = 0.15;
 const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
 const NEXT_KEPT = "` goes to the next.";
 
-const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
+const NO_LAYOUT: Layout = {
+  ...{ title: "", subtitle: "", sections: [], status: "", isHidden: true },
+  more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
+};
 
 export class Viewer {
   readonly renderer: WebGLRenderer;

@@ -79,7 +79,7 @@ export const START_VIEW: PanelView = {
   shape: null,
   grasp: null,
   shapeNumber: null,
-  open: ["channels", "objects", "volumes", "light", "tiles", "view", "stereo"],
+  open: ["channels", "objects", "volumes"],
   lenses: "v2",
   code: "",
   isHidden: false,
@@ -127,7 +127,7 @@ export type Choice = Base &
     kind: "choice";
     value: string;
     options: readonly Option[];
-    /** Few and short: side by side. */
+    /** Few and short: side by side. Otherwise a list to open. */
     isInline: boolean;
     to: (value: string) => Wish;
   }>;
@@ -256,6 +256,8 @@ export type Group = Readonly<{
 export type Section = Readonly<{
   id: string;
   label: string;
+  /** On a flat screen it is listed under *More*. */
+  isDeeper: boolean;
   isOpen: boolean;
   opener: PanelChange;
   items: readonly (Control | Group)[];
@@ -265,7 +267,9 @@ export type Layout = Readonly<{
   title: string;
   subtitle: string;
   sections: readonly Section[];
-  /** Triangles, level, frame time: one line that is always in view. */
+  /** Opens and closes the list of the deeper sections. */
+  more: Readonly<{ isOpen: boolean; opener: PanelChange }>;
+  /** What is shown and whether it is complete: one line that is always in view. */
   status: string;
   isHidden: boolean;
 }>;

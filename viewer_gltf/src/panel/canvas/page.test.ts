@@ -131,7 +131,7 @@ describe("the panel on a plane", () => {
   it("reports why something is refused", () => {
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     const page = regionsOf(laidOut(off), "volumes");
-    const radius = find(page, "disc-radius");
+    const radius = find(regionsOf(laidOut(off), "volume-settings"), "disc-radius");
     expect(radius.isSlide).toBe(false);
     expect(radius.to(0.3)).toEqual({ canvas: "announce", text: "Only the mode Disc has one." });
     expect(find(page, "mode=disc").to(0)).toEqual({ type: "set", id: "mode", value: "disc" });
