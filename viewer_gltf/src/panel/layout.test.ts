@@ -90,8 +90,8 @@ describe("the panel's layout", () => {
   it("reports what is shown, whether it is complete, and that nothing is", () => {
     const status = (state: ViewerState, facts: Partial<Facts> = {}) =>
       laid(state, START_VIEW, { ...FACTS, ...facts }).status;
-    expect(status(start())).toBe("Surfaces, near ones as volumes · complete");
-    expect(status(start(), { isLoading: true })).toBe("Surfaces, near ones as volumes · loading …");
+    expect(status(start())).toBe("Surfaces; volumes when near · complete");
+    expect(status(start(), { isLoading: true })).toBe("Surfaces; volumes when near · loading …");
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     expect(status(off)).toBe("Surfaces · complete");
     const none = { ...off, channels: off.channels.map((each) => ({ ...each, shown: false })) };

@@ -312,8 +312,8 @@ function statusOf({ channels, mode, isolated }: ViewerState, facts: Facts): stri
 }
 
 const STATUS: Readonly<Record<ViewerState["mode"], string>> = {
-  disc: "Surfaces, near ones as volumes",
-  tile: "Surfaces, the near tile as a volume",
+  disc: "Surfaces; volumes when near",
+  tile: "Surfaces; one tile as volume when near",
   all: "Volumes",
   stage: "As the stage has it",
   traced: "Volumes, path-traced",

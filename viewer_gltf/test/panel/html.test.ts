@@ -152,6 +152,7 @@ describeInChromium("the panel", () => {
     await press("h");
     expect(await page().locator(".panel .body").isVisible()).toBe(false);
     await press("h");
+    await stand.viewer.openCard(FIRST);
     await control(`${FIRST}/transfer-function`).focus();
     await press("o");
     expect((await first()).opacity).toBeCloseTo(0.9, 5);
@@ -290,6 +291,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     await page().keyboard.press("/");
     expect(await focused()).toBe("find-channel");
     await control("find-channel").fill("marker 42");
+    await page().keyboard.press("Tab"); // its swatch
     await page().keyboard.press("Tab");
     await page().keyboard.press("Space");
     const shown = (await state()).channels.filter((channel) => channel.shown);
