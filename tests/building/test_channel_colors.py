@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from skimage.color import deltaE_ciede2000, rgb2hsv, rgb2lab
 
-from stereocell.building.channel_colors import AMBER, WARM_GREY, choose_colors
-from stereocell.building.channels import FLESH, PALETTE
+from stereocell.building.channel_colors import AMBER, WARM_GREY, choose_colors, lies_at_bone
+from stereocell.building.channels import FLESH, PALETTE, SKIN
+from stereocell.building.settings import load
 from stereocell.model.color import lab_of_linear, linear_color_of_lab, to_srgb8
 from stereocell.model.emission_color import color_of_light, color_of_name, emission_of
 
@@ -109,9 +110,10 @@ def _chosen(
     stated: list[Color | None] | None = None,
     modality: str = "",
     alone: bool = False,
+    bone: bool = False,
 ) -> list[Color]:
-    colors = stated or [None] * len(names)
-    return choose_colors(list(zip(names, colors, strict=True)), modality=modality, is_alone=alone)
+    wanted = list(zip(names, stated or [None] * len(names), strict=True))
+    return choose_colors(wanted, modality=modality, is_alone=alone, is_bone=bone)
 
 
 def test_what_nothing_names_has_the_colours_that_all_eyes_tell_apart() -> None:
@@ -120,10 +122,18 @@ def test_what_nothing_names_has_the_colours_that_all_eyes_tell_apart() -> None:
 
 def test_scans_are_no_blue_nuclei() -> None:
     assert _chosen(["MR"], modality="MR") == [FLESH]
-    assert _chosen(["CT"], modality="CT") == [FLESH]
+    assert _chosen(["CT"], modality="CT") == [SKIN]
+    assert _chosen(["CT"], modality="CT", bone=True) == [FLESH]
     assert _chosen(["PT"], modality="PT") == [AMBER]
     assert _chosen(["Channel0"], alone=True) == [WARM_GREY]
     assert _chosen(["DAPI"], alone=True) == [color_of_light(461)]
+
+
+@pytest.mark.parametrize(("preset", "is_bone"), [("ct", False), ("ct-bone", True)])
+def test_a_preset_of_bone_is_told_from_one_of_skin(preset: str, is_bone: bool) -> None:
+    iso_values = load(preset, None, flags={}).iso_values
+    assert lies_at_bone(iso_values, is_hounsfield=True) == is_bone
+    assert not lies_at_bone(iso_values, is_hounsfield=False)
 
 
 @pytest.mark.parametrize(

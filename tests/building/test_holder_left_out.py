@@ -63,7 +63,7 @@ def test_a_table_is_left_out_of_the_volume_and_a_deep_check_agrees(
     without, with_table = tmp_path / "without", tmp_path / "with"
     assert make_assets(source, without, "1x1", "--workers", "0", plan=PRESET) == 0
     said = capsys.readouterr().err
-    assert "a table or holder is left out: " in said
+    assert "left out, as no part of the body (a table, holder, pad or cable): " in said
     assert "--keep-holder builds it" in said
     assert "unsure" not in said
     keep = (*PRESET, "--keep-holder")

@@ -16,15 +16,20 @@ from support import phantoms
 Rung = dict[str, dict[str, int]]
 
 
-def _rung(*tiles: tuple[int, int, int]) -> Rung:
-    """Return a rung's sums by tile, of (voxels, largest, count)."""
-    names = ("voxels", "largest", "count")
-    return {f"r0_c{i}": dict(zip(names, tile, strict=True)) for i, tile in enumerate(tiles)}
+def _rung(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> Rung:
+    """Return a rung's sums by tile, of (voxels, largest, count); the others are specks."""
+    names = ("voxels", "largest", "count", "kept")
+    return {
+        f"r0_c{i}": dict(zip(names, (*tile, round(kept_share * tile[2])), strict=True))
+        for i, tile in enumerate(tiles)
+    }
 
 
 TISSUE = _rung((1000, 1000, 1), (900, 890, 4))
 CELLS = _rung((100, 10, 40), (90, 9, 50))
 TOUCHING = _rung((100, 60, 40), (90, 20, 50))  # the largest hold .42
+# of a whole mouse brain at 25 um: the level of its brightest cortex
+BRIGHT_PARTS = _rung((249778, 89062, 159), (98724, 94128, 32), kept_share=0.05)
 SPECKS = _rung((4, 2, 2), (5, 2, 3))
 
 
@@ -35,6 +40,7 @@ SPECKS = _rung((4, 2, 2), (5, 2, 3))
         ([TISSUE, TOUCHING, CELLS], 2),
         ([TISSUE, TOUCHING], 1),
         ([TISSUE, SPECKS], 0),  # a few specks are no cells
+        ([TISSUE, BRIGHT_PARTS], 0),  # nor are specks beside a few large pieces
         ([TISSUE, _rung((100, 99, 60), (90, 80, 50))], 0),
         ([TISSUE, _rung((0, 0, 0), (0, 0, 0))], 0),
         ([CELLS, TISSUE], 0),
@@ -101,6 +107,41 @@ def test_a_haze_around_far_brighter_bodies_is_unsure_and_their_level_is_named(
     assert f"{inner:.5g} (" in channel.near_levels
     told = capsys.readouterr().err
     assert told.count(f"{inner:.5g} (") >= 2  # by plan, and by units
+
+
+def test_a_tile_is_no_surer_of_a_level_than_its_channel(tmp_path: Path) -> None:
+    """A bright core makes a tile sure of the skin around it, which the channel is less sure of."""
+    shape, spacing, rng = (24, 64, 64), (5.0, 2.0, 2.0), np.random.default_rng(0)
+    middle = (60.0, 64.0, 64.0)
+    skin = phantoms.blurred_ball(shape, spacing, middle, 50.0, 2.0)
+    core = phantoms.blurred_ball(shape, spacing, middle, 28.0, 2.0)
+    voxels = 100 + 350 * skin + 2500 * core + rng.normal(0, 90, shape)
+    (channel,) = _surveyed(tmp_path, voxels.round().clip(0).astype(np.uint16)).values()
+    (tile,) = channel.iso.values()
+    assert channel.appearance.iso_confidence == channel.ladder[0].confidence
+    assert tile.confidence == pytest.approx(channel.appearance.iso_confidence)
+
+
+def test_in_voxels_wider_than_cells_light_sheet_outlines_the_tissue(tmp_path: Path) -> None:
+    """Bright bodies in tissue, as cells are at 5 um a voxel, and parts of a brain at 25 um."""
+    shape, rng = (24, 80, 80), np.random.default_rng(3)
+    tissue = phantoms.blurred_ball(shape, (1.0, 1.0, 1.0), (12.0, 40.0, 40.0), 34.0, 1.0)
+    bodies = np.zeros(shape)
+    for y in range(20, 64, 10):
+        for x in range(20, 64, 10):
+            for z in (6, 17):
+                bodies += phantoms.blurred_ball(shape, (1.0, 1.0, 1.0), (z, y, x), 3.5, 0.5)
+    voxels = 50 + 300 * tissue + 1500 * bodies + rng.normal(0, 12, shape)
+    taken = []
+    for um in (5.0, 25.0):
+        flags = ("--preset", "lightsheet", "--spacing-um", f"{um},{um},{um}")
+        kept = voxels.round().clip(0).astype(np.uint16)
+        (channel,) = _surveyed(tmp_path / f"{um}", kept, *flags).values()
+        assert channel.appearance.level is not None
+        taken.append(channel.appearance.level)
+    assert taken[0].iso > 500
+    assert taken[1].background is None
+    assert 100 < taken[1].iso < 320
 
 
 DATA = data_folder()

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building.channels import Channel, has_brain
+from stereocell.building.channels import Channel, has_brain, opens
 from stereocell.building.settings import load, preset_names
 from stereocell.isosurface.options import parse_level
 from stereocell.model.channel import Appearance, SurfaceLevel
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
+from stereocell.transfer.ct_colors import tissue_shapes
+from stereocell.transfer.mr_grey import grey_shapes
 from stereocell.transfer.opacity import evaluate
+from stereocell.transfer.shapes2d import evaluate2d, find_fault
 from stereocell.transfer.windows import parse_window
 from support.plans import plan_of
 
@@ -41,7 +44,9 @@ CASES: dict[str, tuple[Callable[[np.random.Generator], NDArray[np.float64]], flo
 MOST_BELOW_HU = 60.0  # that a CT's opacity begins below its surface
 
 
-def _opened(preset: str) -> tuple[Appearance, float]:
+def _opened(
+    preset: str, *, is_hounsfield: bool = True, unevenness: float = 1.0
+) -> tuple[Appearance, float]:
     """Return how a channel of a preset's kind is drawn, and the level of its background."""
     settings = load(preset, None, flags={})
     make, level, background = CASES[settings.plan.modality]
@@ -59,6 +64,8 @@ def _opened(preset: str) -> tuple[Appearance, float]:
         confidence=1.0,
         doubt="",
         modality=settings.plan.modality,
+        is_hounsfield=is_hounsfield,
+        unevenness=unevenness,
     )
     return appearance, background
 
@@ -82,8 +89,54 @@ def test_a_preset_opens_with_a_function_whose_foot_lies_at_the_surface(preset: s
 
 def test_a_surface_of_bone_opens_with_the_function_of_bone() -> None:
     assert _opened("ct-bone")[0].function == "bone"
-    assert _opened("ct")[0].function == "default"
-    assert _opened("mri")[0].function == "default"
+    assert _opened("ct")[0].function == "tissues"
+    assert _opened("mri")[0].function == "grey"
+
+
+def _color_at(appearance: Appearance, hu: float, step_hu: float) -> tuple[NDArray[np.float64], int]:
+    """Return colour and opacity, 0..255, of the opening function at a value and a step."""
+    table = evaluate2d(appearance.transfer_2d.functions[appearance.function])
+    low, high = appearance.window
+    rows, columns = table.shape[:2]
+    row = step_hu / (high - low) / appearance.transfer_2d.gradient_max * (rows - 1)
+    cell = table[min(round(row), rows - 1), round((hu - low) / (high - low) * (columns - 1))]
+    return cell[:3] / 255, int(cell[3])
+
+
+def test_tissues_of_a_ct_have_colours_of_their_own_and_an_edge_to_air_is_skin() -> None:
+    appearance, _ = _opened("ct")
+    fat, muscle, bone = (_color_at(appearance, hu, 0.0)[0] for hu in (-100, 50, 900))
+    assert min(fat[:2]) > 0.8  # yellow
+    assert fat[2] < 0.7
+    assert muscle[0] > 2 * max(muscle[1:])  # red
+    assert min(bone) > 0.95  # the channel's own, pale
+    skin = [_color_at(appearance, hu, 900.0)[0] for hu in (-290, -100, 50)]
+    assert all(min(color) > 0.8 for color in skin)
+    assert _color_at(appearance, -600, 900.0)[1] == 0
+
+
+def test_brighter_tissue_of_an_mr_is_lighter_and_noise_no_stronger() -> None:
+    appearance, _ = _opened("mri")
+    assert appearance.iso_normalized is not None
+    table = evaluate2d(appearance.transfer_2d.functions["grey"])
+    columns = table.shape[1]
+    inner = table[0, int(1.2 * appearance.iso_normalized * columns) :]
+    light = inner[inner[:, 3] > 0][:, 0].astype(int)
+    assert (np.diff(light) >= -2).all()
+    assert light[-1] > 2 * light[0]
+    general = evaluate(appearance.transfer_functions["default"])
+    air = slice(0, int(0.8 * appearance.iso_normalized * columns))
+    assert (table[0, air, 3] / 255 <= general[air] + 0.03).all()
+
+
+def test_a_ct_of_thick_slices_opens_in_one_colour() -> None:
+    appearance, _ = _opened("ct", unevenness=8.0)
+    assert appearance.function == "default"
+    assert "tissues" in appearance.transfer_functions
+
+
+def test_a_ct_without_hounsfield_units_has_no_colours_of_tissues() -> None:
+    assert "tissues" not in _opened("ct", is_hounsfield=False)[0].transfer_functions
 
 
 def test_a_ct_is_solid_just_inside_its_skin() -> None:
@@ -108,3 +161,37 @@ def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
     assert replace(plain, channels=(*plain.channels, *head[:2])).opens_cut
     # a channel of the input may have such a name
     assert not has_brain([replace(one, source="") for one in head])
+
+
+def test_autofluorescence_is_off_at_first_beside_other_channels() -> None:
+    def shown(*names: str) -> list[bool]:
+        channels = [Channel(index, name, (1, 1, 1)) for index, name in enumerate(names)]
+        return [opens(channel, channels) for channel in channels]
+
+    assert shown("signal", "background") == [True, False]
+    assert shown("Cells", "Autofluorescence") == [True, False]
+    assert shown("background") == [True]
+    assert shown("DAPI", "AF488") == [True, True]  # a dye
+
+
+@pytest.mark.parametrize("level", [0.02, 0.3, 0.9])
+@pytest.mark.parametrize("foot", [0.5, 0.98, 1.5])
+@pytest.mark.parametrize("brightest", [0.1, 1.0])
+def test_grey_values_have_valid_shapes_wherever_noise_lets_opacity_begin(
+    level: float, foot: float, brightest: float
+) -> None:
+    start = min(foot * level, 0.97)
+    opacity = ((0.0, 0.0), (start, 0.0), (min(start + 0.02, 0.99), 0.2), (1.0, 0.6))
+    shapes = grey_shapes(level, max(brightest, level), opacity, 0.1)
+    assert [find_fault(shape) for shape in shapes] == [""] * len(shapes)
+
+
+@pytest.mark.parametrize("level", [-900.0, -300.0, -120.0, 0.0, 140.0])
+@pytest.mark.parametrize("window", [(-1024.0, 2000.0), (-160.0, 240.0), (0.0, 80.0)])
+def test_tissues_have_valid_shapes_and_none_below_the_surface(
+    level: float, window: tuple[float, float]
+) -> None:
+    shapes = tissue_shapes(level, window, 0.05)
+    assert [find_fault(shape) for shape in shapes] == [""] * len(shapes)
+    lows = [shape.values[0] * (window[1] - window[0]) + window[0] for shape in shapes]
+    assert all(low >= max(level - MOST_BELOW_HU, window[0]) for low in lows)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building.channels import FLESH
+from stereocell.building.channels import SKIN
 from stereocell.building.ct_evidence import LEVELS_HU, WINDOW_HU
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.preset_choice import choose_preset, load_for
@@ -228,7 +228,7 @@ def test_hounsfield_units_of_a_mouse_are_a_ct_without_a_preset(
     note = "values like Hounsfield units: taken for CT (--modality GM: it is a microscope's)"
     assert f"plan: {note}" in capsys.readouterr().err
     plan = OutFolder(tmp_path / "out").plan()
-    assert (plan.modality, plan.channels[0].color) == ("CT", FLESH)
+    assert (plan.modality, plan.channels[0].color) == ("CT", SKIN)
     assert note in plan.notes
     flags = ["-o", str(tmp_path / "light"), "--modality", "GM"]
     assert main(["plan", str(source), *flags]) == 0

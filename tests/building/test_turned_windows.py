@@ -16,7 +16,7 @@ from stereocell.building.tasks.window import Window, measure_window
 from stereocell.cli.__main__ import main
 from stereocell.filters.background import find_background
 from stereocell.filters.min_max_bricks import mip_levels
-from stereocell.isosurface.holder import find_holder
+from stereocell.isosurface.find_holder import find_holder
 from stereocell.model.image_plane import back_of_three, slices_back
 from stereocell.model.tiling import Box
 from support import phantoms

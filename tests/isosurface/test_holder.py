@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.isosurface.holder import Holder, find_holder
+from stereocell.isosurface.find_holder import find_holder
+from stereocell.isosurface.holder import Holder
 from stereocell.model.tiling import Box
 
 SPACING = (3000.0, 1500.0, 1500.0)  # um
@@ -184,3 +185,48 @@ def test_air_takes_the_place_of_what_is_left_out_and_all_else_is_as_measured() -
     assert left.dtype == hu.dtype
     assert (left[table & out] <= -1000).all()
     np.testing.assert_array_equal(left[~out], hu[~out])
+
+
+def test_a_pad_as_faint_as_skin_is_left_out_whole() -> None:
+    z, y, x = _places()
+    body = (y / 55) ** 2 + (x / 80) ** 2 < 1
+    away = np.hypot(y / 55, x / 80) * 55
+    pad = (away > 57) & (away < 63) & (y > 25)
+    fragment = np.mod(x + z, 30) < 20  # what a level of -300 leaves of the pad
+    hu = np.where(body, 40.0, np.where(pad, np.where(fragment, -240.0, -360.0), -1000.0))
+    table = (y > 66) & (y < 76) & (abs(x) < 85)
+    hu[table] = 100
+    hu += np.random.default_rng(2).normal(0, 12, SHAPE)
+    out = _left_out(hu.round().astype(np.int16))
+    assert (out & table).sum() > 0.9 * table.sum()
+    assert (out & pad).sum() > 0.95 * pad.sum()
+    assert not (out & body).any()
+
+
+def test_all_cables_of_a_cardiogram_are_left_out_and_vessels_in_a_cut_lung_stay() -> None:
+    z, y, x = _places()
+    body = (y / 55) ** 2 + (x / 80) ** 2 < 1
+    lung = (np.hypot(y, x - 62) < 25) & body
+    vessel = (np.hypot(y, x - 62) < 3) & (abs(z) < 30)
+    long_cable = (np.hypot(y + 62, x) < 2.5) & (z > -80)
+    short_cable = (np.hypot(y + 58, x - 35) < 2.5) & (z > 60)
+    clip = (np.hypot(y + 62, x - 5) < 5) & (abs(z) < 8)
+    hu = np.where(lung, -850.0, np.where(body, 40.0, -1000.0))
+    hu[vessel] = 600
+    cables = long_cable | short_cable | clip
+    hu[cables] = 2800
+    out = _left_out(hu.round().astype(np.int16))
+    assert (out & cables).sum() > 0.95 * cables.sum()
+    assert not (out & body).any()
+
+
+@pytest.mark.slow
+def test_a_thin_ear_in_a_foam_rest_stays() -> None:
+    hu, body = _head()
+    _, y, x = _places()
+    cradle = _cradle(8.0) & ~body
+    foam = (abs(x) > 60) & (abs(x) < 90) & (abs(y) < 60) & ~body & ~cradle
+    given = np.where(foam, np.int16(-600), _with(hu, cradle))
+    out = _left_out(given)
+    assert (out & cradle).sum() > 0.7 * cradle.sum()
+    assert not (out & body).any()

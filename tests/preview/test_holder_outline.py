@@ -31,7 +31,7 @@ def test_the_share_inside_a_level_is_that_of_the_body_alone(
     flags = ("--preset", "ct", "--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / "ct.png"))
     assert main(["iso", str(source), *flags]) == 0
     told = capsys.readouterr().out
-    assert "leaves out a table or holder" in told
+    assert "as no part of the body (a table, holder, pad or cable)" in told
     row = next(line.split() for line in told.splitlines() if " * " in line)
     inside = next(float(word.rstrip("%")) / 100 for word in row if word.endswith("%"))
     assert cradle.mean() > 0.02

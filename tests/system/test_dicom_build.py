@@ -10,7 +10,7 @@ import zstandard
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from stereocell.building.channels import FLESH
+from stereocell.building.channels import FLESH, SKIN
 from stereocell.cli.__main__ import main
 from stereocell.verify.formats import check
 from support.bundles import load
@@ -143,7 +143,7 @@ def test_the_preset_s_modality_holds_where_the_input_says_none(
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", "mri"]) == 0
     plan = json.loads((tmp_path / "out" / "plan.json").read_text("utf-8"))
     assert plan["modality"] == modality
-    assert plan["channels"][0]["color"] == list(FLESH)
+    assert plan["channels"][0]["color"] == list(SKIN if modality == "CT" else FLESH)
 
 
 def test_series_are_listed_and_chosen_by_number(

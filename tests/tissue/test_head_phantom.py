@@ -248,7 +248,7 @@ def test_a_build_opens_path_traced_and_holds_nothing_of_the_patient(
     assert manifest["specimen"]["modality"] == "MR"
     (channel,) = manifest["channels"]
     assert channel["color"] == list(FLESH)
-    assert channel["transfer_function"] == "default"
+    assert channel["transfer_function"] == "grey"
     assert "threshold" in channel["transfer_functions"]
     assert 0 < channel["threshold_normalized"] < 1
     assert [line for line in check(out) if not line.ok] == []

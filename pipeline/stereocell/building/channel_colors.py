@@ -1,19 +1,21 @@
 """The colours of a build's channels: as the file states them, else by what is recognised.
 
-Scans of bodies are warm and pale, radiotracers amber, a channel that is named after a dye has the
-colour of its light, and a volume of one channel is a warm grey. All others have PALETTE's colours.
-Stated colours are given to all channels first, then recognised ones, then PALETTE's. No two
-channels have nearly the same colour: the later one takes the next of PALETTE.
+Scans of bodies are warm, a CT as skin or as bone, radiotracers amber, a channel that is named after
+a dye has the colour of its light, and a volume of one channel is a warm grey. All others have
+PALETTE's colours. Stated colours are given to all channels first, then recognised ones, then
+PALETTE's. No two channels have nearly the same colour: the later one takes the next of PALETTE.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stereocell.building.channels import BODY_MODALITIES, FLESH, PALETTE
+from stereocell.building.channels import ALL, BODY_MODALITIES, FLESH, PALETTE, SKIN
+from stereocell.isosurface.options import parse_level
 from stereocell.model.color import lab_of_linear
 from stereocell.model.emission_color import color_of_name
 from stereocell.model.modality import TRACER_MODALITIES
+from stereocell.transfer.ct_tissues import BONE_LEVEL_HU
 
 Color = tuple[float, float, float]
 AMBER = (1.0, 0.6, 0.24)  # linear RGB of tracers of PET and SPECT: the lightest part of a heat map
@@ -23,16 +25,21 @@ NEAR = 12.0  # distance in CIELab below which two colours are hard to tell apart
 
 
 def choose_colors(
-    channels: Sequence[tuple[str, Color | None]], *, modality: str, is_alone: bool
+    channels: Sequence[tuple[str, Color | None]],
+    *,
+    modality: str,
+    is_alone: bool,
+    is_bone: bool = False,
 ) -> list[Color]:
     """Return the colour, linear RGB, of each channel that is built.
 
     channels  each one's name, and the colour that the file states
     modality  DICOM's code; empty: not known
     is_alone  whether the source has one channel only
+    is_bone   whether the surface of a CT lies at its bones
     """
     places = range(len(channels))
-    modal = [_of_modality(place, modality) for place in places]
+    modal = [_of_modality(place, modality, is_bone=is_bone) for place in places]
     lone = WARM_GREY if is_alone and not modality else None
     chosen: dict[int, Color] = {}
     # No later round takes a colour of an earlier one: DAPI is blue behind a channel "CD31" too.
@@ -49,15 +56,23 @@ def choose_colors(
     return [chosen.get(place, PALETTE[place % len(PALETTE)]) for place in places]
 
 
+def lies_at_bone(iso_values: Mapping[str, float | str], *, is_hounsfield: bool) -> bool:
+    """Return whether the settings put a CT's surface at its bones, as preset `ct-bone` does."""
+    level = iso_values.get(ALL)
+    if level is None or not is_hounsfield:
+        return False
+    return parse_level("iso-value", level)[0] >= BONE_LEVEL_HU
+
+
 def _first_free(wishes: Sequence[Color | None], taken: Sequence[Color]) -> Color | None:
     """Return the first colour that can be seen and is not near one that is taken."""
     visible = (color for color in wishes if color is not None and max(color) > _BLACK)
     return next((color for color in visible if not _is_near(color, taken)), None)
 
 
-def _of_modality(place: int, modality: str) -> Color | None:
+def _of_modality(place: int, modality: str, *, is_bone: bool) -> Color | None:
     if place == 0 and modality in BODY_MODALITIES:
-        return FLESH
+        return SKIN if modality == "CT" and not is_bone else FLESH
     return AMBER if place == 0 and modality in TRACER_MODALITIES else None
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.building.channels import BRAIN, Channel, has_brain
+from stereocell.building.channels import Channel, opens
 from stereocell.building.level_choice import (
     Components,
     Found,
@@ -91,7 +91,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for name, holder in held.items():
         if holder is not None:
             pieces = ", ".join(holder.pieces)
-            about = f"a table or holder is left out: {pieces} (--keep-holder builds it)"
+            about = f"left out, {holder.WORDS}: {pieces} (--keep-holder builds it)"
             console.print(f"units: {name}: {about}", markup=False)
     evidence = _evidence(out_folder, plan, engine, windows)
     survey, inside = {}, {}
@@ -213,6 +213,7 @@ def _of_channel(
         doubt=found.doubt or find_doubt(found, chosen, list(iso.values())),
         modality="" if channel.source else plan.modality,
         is_hounsfield=plan.is_hounsfield,
+        unevenness=max(plan.spacing_um) / min(plan.spacing_um),
         level_percentile=plan.settings.window.volume_percentile,
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)
@@ -233,7 +234,7 @@ def _of_channel(
         replace(
             appearance,
             painted_by=painter.id if painter else "",
-            opens=channel.name in BRAIN or not has_brain(plan.channels),
+            opens=opens(channel, plan.channels),
         ),
         () if found.levels is None else found.levels.ladder,
         None if found.levels is None else Curve(*found.levels.curve()),

@@ -1,5 +1,6 @@
 """The channels of a build, each of its surfaces one, and settings that are given by channel."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -24,9 +25,11 @@ PALETTE = tuple(
 )
 
 
-# colour (linear RGB) of MR and CT: warm and neutral, as bone and tissue are usually drawn
 _PALE = 0.6  # linear RGB: a colour whose least part is more has no lighter one beside it
+# Colours (linear RGB) of MR, and of bone in CT: warm and neutral, as tissue is usually drawn ...
 FLESH = (0.78, 0.66, 0.55)
+# ... and of a CT's skin. Light that is scattered many times in a paler one leaves no shade.
+SKIN = (0.72, 0.5, 0.37)
 BODY_MODALITIES = ("MR", "CT")
 # Classes of tissue that an MR of a head is looked at for: skin, skull and fluid would hide them.
 GREY_MATTER, WHITE_MATTER = "grey matter", "white matter"
@@ -63,6 +66,23 @@ class Channel:
     def id(self) -> str:
         """The name as an identifier, for paths and prims."""
         return to_identifier(self.name)
+
+
+def opens(channel: Channel, channels: Sequence[Channel]) -> bool:
+    """Return whether a channel shows when the specimen is opened.
+
+    Where classes of a brain are built, they alone show. A channel of autofluorescence shows the
+    same tissue as the others do. Its surface would hide theirs, or run through it.
+    """
+    if has_brain(channels):
+        return channel.name in BRAIN
+    return not _shows_tissue(channel) or all(_shows_tissue(one) for one in channels)
+
+
+def _shows_tissue(channel: Channel) -> bool:
+    """Return whether a channel's name says that it holds the tissue's own light."""
+    name = channel.base or channel.name
+    return re.search(r"auto.?fluo|^background$|^af$", name.strip(), re.IGNORECASE) is not None
 
 
 def has_brain(channels: Iterable[Channel]) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from stereocell.building.channels import ALL
 from stereocell.building.ct_evidence import read_middle
-from stereocell.building.settings import Settings, load
+from stereocell.building.settings import HOUNSFIELD, Settings, load
 from stereocell.model.errors import UsageError
 from stereocell.read import Dataset
 from stereocell.transfer.windows import NAMED
@@ -22,7 +22,7 @@ from stereocell.transfer.windows import NAMED
 _DARK_HU, _DARK_SHARE = -30.0, 0.02
 NOTE = (
     "the values of this CT are no Hounsfield units: functions of tissues, such as bone, are not "
-    "offered, and a table or head holder is not looked for, so it stays"
+    "offered, and a table or head holder is not looked for, so it stays (--as hounsfield: they are)"
 )
 _PRESETS = ("ct", "ct-bone")  # presets with levels and windows in Hounsfield units
 
@@ -37,6 +37,13 @@ def without_hounsfield(settings: Settings) -> Settings:
     if any(windows.get(ALL) == preset.windows[ALL] for preset in presets):
         del windows[ALL]
     return replace(settings, iso_values=levels, windows=windows)
+
+
+def believe(dataset: Dataset, taken_as: str) -> Dataset:
+    """Return the source; if the user takes its values for Hounsfield units, they count as such."""
+    if taken_as != HOUNSFIELD or dataset.has_hounsfield_units:
+        return dataset
+    return replace(dataset, has_hounsfield_units=True)
 
 
 def has_hounsfield(dataset: Dataset, modality: str) -> bool:

@@ -32,7 +32,7 @@ from stereocell.model.tiling import Tile
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
 APART_SHARE = 0.25  # share of all voxels inside: a rung whose largest components hold less has many
-# the same where many components may touch: the share, and the least number of components
+# the same where many components may touch: the share, and the least number of components but specks
 JOINED_SHARE, MANY = 2 / 3, 30
 # Share of all voxels that cells of a cleared tissue fill at least: in a stack whose cells stood at
 # 1675, a level of 8384 left .02 % inside
@@ -89,7 +89,8 @@ def find_level(
         options=options if criterion in CRITERIA else None,
     )
     levels = find(subtracts=None if given is None else given[1])
-    if given is None and (channel.rung or options.rung) == APART and not levels.subtracts:
+    wants_cells = (channel.rung or options.rung) == APART and _shows_cells(plan)
+    if given is None and wants_cells and not levels.subtracts:
         # cells in dim and in bright tissue have their height above the tissue in common; without
         # sparse ones, a level above it is that of the tissue's own texture
         above = find(subtracts=True)
@@ -126,7 +127,7 @@ def find_level(
         return Found(window, plain, evidence, (rated,), False, "", is_fixed=True)
     rung = channel.rung or options.rung
     if rung == APART:
-        clear = _fit_for_cells(clear, highest)
+        clear = _fit_for_cells(clear, highest) if wants_cells else clear[:1]
     elif rung == CONNECTED:
         clear = find_vessel_levels(levels)
     elif clear:
@@ -173,6 +174,12 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
     return ""
 
 
+def _shows_cells(plan: Plan) -> bool:
+    """Return whether a cell is at least a voxel wide; in coarser voxels there is tissue alone."""
+    body_um = plan.settings.surface.body_um
+    return not body_um or min(plan.spacing_um) <= body_um
+
+
 def _fit_for_cells(levels: tuple[Level, ...], highest: float) -> tuple[Level, ...]:
     """Return the levels that cells may lie at: all but specks, and none that no window shows.
 
@@ -207,19 +214,21 @@ def choose_rung(of_rungs: Sequence[Components]) -> int:
     """Return the index of the level that has the most components.
 
     A level counts if its largest components, one a tile, hold less than APART_SHARE of the voxels
-    inside. Where cells touch they may hold JOINED_SHARE, if there are MANY components. Without such
-    a level the outermost is returned.
+    inside. Where cells touch they may hold JOINED_SHARE, if MANY components are of a size with one
+    another: the bright parts of a whole brain are a few large pieces among a hundred specks.
+    Without such a level the outermost is returned.
 
     of_rungs  the ComponentSums of each tile at each level, outermost first
     """
     best, most = 0, (0, 0.0)
     for place, components in enumerate(of_rungs):
         # summed over the tiles: a component that fills all of them is the largest in each
-        voxels, largest, count = (
-            sum(one[key] for one in components.values()) for key in ("voxels", "largest", "count")
+        voxels, largest, count, kept = (
+            sum(one[key] for one in components.values())
+            for key in ("voxels", "largest", "count", "kept")
         )
         share = largest / voxels if voxels else 1.0
-        is_apart = share < APART_SHARE or (share < JOINED_SHARE and count >= MANY)
+        is_apart = share < APART_SHARE or (share < JOINED_SHARE and kept >= MANY)
         if is_apart and (count, -share) > most:
             best, most = place, (count, -share)
     return best
@@ -284,4 +293,7 @@ def level_of_tile(
     judged = found.levels.judge_tile(level, tile_evidence)
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
         value = found.levels.level_of_tile(level, tile_evidence)
-    return TileIso(value, below, None if judged is None else judged.confidence, files)
+    # A tile judges a level among all that lies above it, and the channel among what lies up to the
+    # next level: a tile is no surer than its channel.
+    sure = None if judged is None else min(judged.confidence, level.confidence)
+    return TileIso(value, below, sure, files)

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.building import stage_tasks
-from stereocell.building.channel_colors import choose_colors
+from stereocell.building.channel_colors import choose_colors, lies_at_bone
 from stereocell.building.channels import PALETTE, Channel, with_surfaces
 from stereocell.building.ct_evidence import recognise_modality
 from stereocell.building.hounsfield import (
     NOTE,
+    believe,
     has_hounsfield,
     require_no_console_window,
     without_hounsfield,
@@ -49,7 +50,7 @@ from stereocell.building.plan_notes import (
     told_of_absent,
     told_of_gaps,
 )
-from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
+from stereocell.building.settings import HOUNSFIELD, INTENSITY, Settings, to_dict, to_readable_toml
 from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
 from stereocell.building.surface_cover import notes_on_cover
 from stereocell.building.survey_file import appearance_to_json, read_survey
@@ -133,14 +134,17 @@ def settle(source: str, settings: Settings) -> Plan:
     if settings.unwrap.maps:
         require_map_packages()
     _require_labels(settings)
-    dataset = open_anew(as_asked(location, options))
+    dataset = believe(open_anew(as_asked(location, options)), options.taken_as)
+    is_asserted = options.taken_as == HOUNSFIELD
     alone = are_alone(settings.labels)
     modality, recognised = dataset.modality or options.modality, ""
     if not dataset.has_hounsfield_units:
         settings, modality = without_hounsfield(settings), ""
+    elif not alone and is_asserted:
+        modality = modality or "CT"
     elif not alone:
         modality, recognised = recognise_modality(dataset, options.modality)
-    is_hounsfield = alone or has_hounsfield(dataset, modality)
+    is_hounsfield = alone or is_asserted or has_hounsfield(dataset, modality)
     if not is_hounsfield:
         recognised = NOTE
         require_no_console_window(settings)
@@ -151,6 +155,7 @@ def settle(source: str, settings: Settings) -> Plan:
         [(one.name, one.color) for one in wanted],
         modality=modality,
         is_alone=len(dataset.channels) == 1,
+        is_bone=lies_at_bone(settings.iso_values, is_hounsfield=is_hounsfield),
     )
     channels = [
         Channel(index, one.name, color)

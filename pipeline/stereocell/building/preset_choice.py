@@ -7,7 +7,7 @@ from typing import Any
 from stereocell.building.channels import ALL
 from stereocell.building.ct_evidence import LEVELS_HU, CtEvidence, find_ct_evidence
 from stereocell.building.open_source import as_asked, open_source
-from stereocell.building.settings import NO_PRESET, Settings, load
+from stereocell.building.settings import HOUNSFIELD, NO_PRESET, Settings, load
 from stereocell.engine.run import console
 from stereocell.model.errors import StereoCellError
 from stereocell.read import Dataset
@@ -42,6 +42,12 @@ def load_for(
     try:
         location = Location.of(source).source
         dataset = open_source(as_asked(location, options))
+        if (
+            options.taken_as == HOUNSFIELD
+            and (dataset.modality or options.modality or "CT") == "CT"
+        ):
+            text = f"the values are taken for Hounsfield units (--as {HOUNSFIELD})"
+            return load("ct", None, flags=flags, where=where), _describe("ct", text)
         chosen, reason = choose_preset(dataset, modality=options.modality)
     except StereoCellError:
         return settings, ""
@@ -51,6 +57,8 @@ def load_for(
 def _doubt_of(source: str | Path, preset: str, settings: Settings) -> str:
     """Return the doubt about a preset of CT that the user names; empty: there is none."""
     try:
+        if settings.plan.taken_as == HOUNSFIELD:
+            return ""
         dataset = open_source(as_asked(Location.of(source).source, settings.plan))
         if dataset.modality and dataset.dtype.kind != "u":  # as the source states itself
             return ""

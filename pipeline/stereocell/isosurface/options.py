@@ -212,10 +212,10 @@ class SurfaceOptions:
     )
     keep_holder: bool = setting(
         False,
-        "whether a CT's table and head holder, long pieces apart from the body, are built too",
+        "whether a CT's table, head holder, pads and cables, apart from the body, are built too",
         flag=Flag(
             "--keep-holder",
-            "build a CT's table and head holder too (default: left out of surface and volume)",
+            "build a CT's table, holder, pads and cables too (default: they are left out)",
         ),
     )
     background_um: float | str = setting(

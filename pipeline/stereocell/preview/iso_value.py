@@ -143,7 +143,7 @@ def preview(
     if where != "all":
         basis += "; a build takes all"
     if window.holder is not None:
-        basis += f"; a build leaves out a table or holder: {', '.join(window.holder.pieces)}"
+        basis += f"; a build leaves out {', '.join(window.holder.pieces)}, {window.holder.WORDS}"
     result = Preview(candidates, found.doubt, basis, chosen.unsure)
     picture = _compose(
         paint_slices(

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from stereocell.read.bdv_described import Described, Matrix, Setup
+from stereocell.read.repeats import record_xml
 from stereocell.read.spacing import Triple, um_per
 from stereocell.storage.location import is_own
 
@@ -36,6 +37,7 @@ def read_described(path: str, xml: str = "") -> Described:
         root = _parsed(file.read_text(encoding="utf-8", errors="replace"))
         if root is None:
             continue
+        record_xml(root, file.name)
         loader = root.find("SequenceDescription/ImageLoader")
         named = [(node.text or "").strip() for node in loader] if loader is not None else []
         if xml or container.name in (Path(name).name for name in named if name):

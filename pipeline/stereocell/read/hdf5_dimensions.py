@@ -16,7 +16,6 @@ References: https://docs.unidata.ucar.edu/nug/, https://emdatasets.com/format/,
 https://manual.nexusformat.org/classes/base_classes/NXdata.html, HDF5 Dimension Scale Specification.
 """
 
-import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +24,7 @@ import h5py
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import axis_of
 from stereocell.read.hdf5_tree import Hdf5Tree
+from stereocell.read.repeats import load_json
 from stereocell.read.statements import Statement, Trust
 
 _EMD = "emd_group_type"
@@ -70,7 +70,7 @@ def _vigra(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
     if not isinstance(tags, str):
         return None
     try:
-        axes: list[dict[str, Any]] = json.loads(tags)["axes"]
+        axes: list[dict[str, Any]] = load_json(tags, "axistags")["axes"]
         names = tuple(str(axis["key"]) for axis in axes)
         steps = tuple(
             (float(axis.get("resolution") or 0), str(axis.get("description", ""))) for axis in axes

@@ -33,6 +33,8 @@ from stereocell.read.nrrd_statements import (
     units_um,
     value_notes,
 )
+from stereocell.read.nrrd_values import ValueAxis, value_axis
+from stereocell.read.ordered_array import OrderedArray
 from stereocell.read.patient_grid import place
 from stereocell.read.plausible_size import size_notes
 from stereocell.read.spacing import PartialTriple, grid_of
@@ -71,11 +73,12 @@ def read_image(location: Location) -> Image:
     shape = [int(n) for n in np.atleast_1d(fields["sizes"])]
     directions = _directions(where, fields, shape)
     names = _axes(where, fields, shape, directions)
-    array = _array(location, fields, end, shape[::-1])
-    axes = tuple(reversed(names))
     sizes = [shape[names.index(axis)] for axis in "ijk"]
     if (count := shape[names.index("c")] if "c" in names else 1) > MAX_CHANNELS:
         raise SourceError(f"{where}: sizes: found {count} values, expected at most {MAX_CHANNELS}")
+    stored: StoredArray = _array(location, fields, end, shape[::-1])
+    array, names, values = _with_values(fields, stored, names)
+    axes = tuple(reversed(names))
     at = [names.index(axis) for axis in "ijk"]
     to_lps, files = _to_lps(where, fields), _files(location, fields)
     factors, unit_notes = units_um(fields, at, is_patient=to_lps is not None)
@@ -86,17 +89,17 @@ def read_image(location: Location) -> Image:
         *kind_notes(fields, at),
         *unit_notes,
         *value_notes(fields),
-        *notes_on_rest(array),
+        *values.notes,
+        *notes_on_rest(stored),
     )
     if to_lps is None:
         swapped = {"i": "x", "j": "y", "k": "z"}
         voxels = VoxelArray(array, tuple(swapped.get(axis, axis) for axis in axes))
         z, y, x = reversed(sizes)
         grid = grid_of((z, y, x), _spacing(spatial))
-        unnamed = (None,) * count
         notes = (*notes, *_turned(fields, directions[at]))
         return Image(
-            (voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files,
+            (voxels,), (grid,), values.names, values.colors, 1, notes=notes, files=files,
             labels=labels, objects=objects,
         )  # fmt: skip
     affine = np.eye(4)
@@ -108,7 +111,29 @@ def read_image(location: Location) -> Image:
     image = place(where, array, axes, affine, "space directions").image(
         NAME, notes=notes, has_sides=_names_sides(fields)
     )
+    if len(values.names) > 1:
+        image = replace(image, names=values.names, colors=values.colors)
     return replace(image, files=files, labels=labels, objects=objects)
+
+
+def _with_values(
+    fields: Mapping[str, Any], array: StoredArray, names: list[str]
+) -> tuple[StoredArray, list[str], ValueAxis]:
+    """Return the voxels and the names of the axes (fastest first), with the axis of values."""
+    if "c" not in names:
+        return array, names, ValueAxis(names=(None,), colors=(None,))
+    index = names.index("c")
+    at = len(names) - 1 - index
+    kind = str([*fields.get("kinds", ()), *[""] * len(names)][index])
+    values = value_axis(fields, kind, array.shape[at])
+    if values.is_time and "t" in names:
+        unnamed = (None,) * array.shape[at]
+        return array, names, replace(values, names=unnamed, colors=unnamed)
+    if not values.is_time:
+        return array, names, values
+    if list(values.order) != sorted(values.order):
+        array = OrderedArray(array, at, values.order)
+    return array, ["t" if name == "c" else name for name in names], values
 
 
 def _header(location: Location) -> tuple[Mapping[str, Any], int]:

@@ -57,7 +57,9 @@ def find_remarks(facts: Facts) -> list[Remark]:
             "channel",
             is_note=True,
         ),
-        _remark("with a table or a holder left out", _holders(facts), "channel", is_note=True),
+        _remark(
+            "with pieces apart from the body left out", _holders(facts), "channel", is_note=True
+        ),
         _remark("on how the source was read", facts.plan.notes, "note", is_note=True),
         _counts(("fragment", "fragments"), "dropped", units, lambda u: u.fragments_dropped),
         _counts(("cavity", "cavities"), "filled", units, lambda u: u.cavities_filled),
@@ -77,7 +79,7 @@ def _covers(units: Iterable[UnitFacts]) -> list[tuple[str, Cover]]:
 def _holders(facts: Facts) -> list[str]:
     """Return a line for each channel whose CT's table or head holder is left out."""
     return [
-        f"{channel.name}: {', '.join(holder.pieces)}; --keep-holder builds it too"
+        f"{channel.name}: {', '.join(holder.pieces)}, {holder.WORDS}; --keep-holder builds it too"
         for channel in facts.plan.channels
         if (holder := facts.survey[channel.id].holder) is not None
     ]

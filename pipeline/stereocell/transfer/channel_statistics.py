@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 from stereocell.model.channel import (
     LOW_CONFIDENCE,
     Appearance,
+    OpacityPoints,
+    Shapes,
     SurfaceConfidence,
     SurfaceLevel,
     TransferFunctions2d,
 )
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.modality import TRACER_MODALITIES
-from stereocell.transfer import heat
+from stereocell.transfer import ct_colors, heat, mr_grey
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
     Threshold,
@@ -27,12 +29,13 @@ from stereocell.transfer.adaptive_threshold import (
     make_histogram,
 )
 from stereocell.transfer.boundaries import SuggestedShapes
-from stereocell.transfer.ct_tissues import opening_function, tissue_functions
+from stereocell.transfer.ct_tissues import BONE_LEVEL_HU, opening_function, tissue_functions
 from stereocell.transfer.opacity import make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import fall_back
 
 BINS = 256
+BRIGHT_SHARE = 0.95  # share of an MR's tissue that is darker than its lightest grey
 _AT_ONCE = 1 << 20  # voxels
 NO_SUGGESTION = SuggestedShapes(TransferFunctions2d(), "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
@@ -99,6 +102,7 @@ def make_appearance(
     doubt: str,
     modality: str = "",
     is_hounsfield: bool = True,
+    unevenness: float = 1.0,
     level_percentile: float = 99.0,
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
@@ -106,6 +110,7 @@ def make_appearance(
     doubt     why there is no level, or why the level cannot be called clear; empty: it can
     modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
     is_hounsfield  whether a CT's values are Hounsfield units: else it has no functions by tissue
+    unevenness  coarsest over finest voxel spacing; a CT of thick slices opens in one colour
     level_percentile  percent of the voxels below the level of a volume without a surface
     """
     iso_value, threshold = None, None
@@ -149,13 +154,13 @@ def make_appearance(
         functions |= tissue_functions(statistics.window)
         function = opening_function(iso_value, functions)
     transfer_2d = statistics.suggested.transfer_2d
-    if modality in TRACER_MODALITIES:
-        organs = appearance.iso_normalized
-        if organs is None:
-            organs = next(x for x, opacity in functions["default"] if opacity > 0)
-        bands = {heat.NAME: heat.heat_shapes(organs)}
-        transfer_2d = replace(transfer_2d, functions={**transfer_2d.functions, **bands})
-        function = heat.NAME
+    known = "" if modality == "CT" and not is_hounsfield else modality
+    coloured = _coloured_function(appearance, statistics, functions["default"], known)
+    if coloured is not None:
+        name_2d, shapes = coloured
+        transfer_2d = replace(transfer_2d, functions={**transfer_2d.functions, name_2d: shapes})
+        if name_2d != ct_colors.NAME or unevenness <= ct_colors.MAX_UNEVEN:
+            function = name_2d
     for name_2d, shapes in transfer_2d.functions.items():
         functions[name_2d] = fall_back(shapes)
     return replace(
@@ -164,3 +169,33 @@ def make_appearance(
         transfer_2d=transfer_2d,
         function=function or appearance.function,
     )
+
+
+def _coloured_function(
+    appearance: Appearance,
+    statistics: ChannelStatistics,
+    opacity: OpacityPoints,
+    modality: str,
+) -> tuple[str, Shapes] | None:
+    """Return the name and the shapes of a 2D function that colours values; None: there is none.
+
+    opacity   of the general function
+    modality  DICOM's code; of a CT only where its values are Hounsfield units
+    """
+    level, gradient_max = appearance.iso_normalized, statistics.suggested.transfer_2d.gradient_max
+    if modality in TRACER_MODALITIES:
+        organs = level
+        if organs is None:
+            organs = next(x for x, absorbed in opacity if absorbed > 0)
+        return heat.NAME, heat.heat_shapes(organs)
+    if level is None or appearance.iso_value is None:
+        return None
+    if modality == "CT" and appearance.iso_value < BONE_LEVEL_HU:
+        shapes = ct_colors.tissue_shapes(appearance.iso_value, statistics.window, gradient_max)
+        return (ct_colors.NAME, shapes) if shapes else None
+    if modality == "MR":
+        counts = np.cumsum(statistics.histogram[int(level * BINS) :])
+        within = float(np.searchsorted(counts, BRIGHT_SHARE * counts[-1])) / BINS
+        brightest = min(level + within, 1.0)
+        return mr_grey.NAME, mr_grey.grey_shapes(level, brightest, opacity, gradient_max)
+    return None

@@ -4,6 +4,7 @@
  */
 import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
 import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
 import { shownBox } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { Action } from "../state/actions";
@@ -14,6 +15,7 @@ import {
   dragHandle,
   type HandleId,
   handlesOf,
+  markedClip,
   type Pointing,
   pickHandle,
   TOLERANCE_RAD,
@@ -67,6 +69,8 @@ export type MarksView = Readonly<{
   disc: Cone | null;
   /** The panel lies beside the specimen, and ruler and axes would lie across it. */
   isPanelOpen: boolean;
+  /** The bar of stereo hangs below the specimen. */
+  isBarBelow: boolean;
   dt_s: number;
 }>;
 
@@ -89,6 +93,10 @@ export class Marks {
   sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1, textZoom: 1 };
   /** The lamp that the ray which drags it has lost over its rim. */
   private beside: HandleId | null = null;
+  /** The clip that the page opens with. */
+  private readonly opening: Clip;
+  /** Whether somebody has pointed at the picture. */
+  private isPointedAt = false;
   /** How many surfaces are on screen. */
   private surfaces = 0;
   private isDisposed = false;
@@ -97,6 +105,7 @@ export class Marks {
     private readonly options: MarksOptions,
     private state: ViewerState,
   ) {
+    this.opening = state.clip;
     const { sides } = options.manifest.specimen;
     this.orientation = new OrientationMark(sides);
     this.axes = new Axes(sides);
@@ -123,7 +132,7 @@ export class Marks {
   follow(state: ViewerState): void {
     this.state = state;
     this.reading.state = state;
-    this.handles.show(state.clip, this.shown);
+    this.handles.show(markedClip(state.clip, this.opening, this.isPointedAt), this.shown);
     this.lamps.show(state, this.specimen);
     const cuts = handlesOf(state.clip, this.shown);
     this.target.handles = [...cuts, ...lampHandles(state, this.specimen)];
@@ -148,7 +157,7 @@ export class Marks {
     this.surfaces = surfaces;
     this.name.follow(view.gaze, TREMBLE_M / m_per_um, view.dt_s, () => this.nameOf(view.gaze));
     if (this.state.measured.length > 0) this.showMeasured(); // volumes come and refine
-    if (view.screen === null) this.updateInRoom(view.isPanelOpen);
+    if (view.screen === null) this.updateInRoom(view);
     else this.updateOnScreen(view, view.screen, m_per_um);
     this.handles.update(this.sight);
     this.lamps.update(this.sight);
@@ -172,6 +181,7 @@ export class Marks {
 
   /** The handle that a ray (um) means. */
   pick(ray: Ray, pointing: Pointing): HandleId | null {
+    this.showHandles();
     return pickHandle(ray, this.target.handles, this.sight.zoom * TOLERANCE_RAD[pointing]);
   }
 
@@ -210,6 +220,15 @@ export class Marks {
     return this.reading.probe(ray);
   }
 
+  /** From the first time that somebody points: see `markedClip`. */
+  private showHandles(): void {
+    if (this.isPointedAt) return;
+    this.isPointedAt = true;
+    if (this.state.clip !== this.opening) return;
+    this.follow(this.state);
+    this.options.onChange();
+  }
+
   /** Box of what is shown: the specimen, or the isolated tile. */
   private get shown(): Box {
     return shownBox(this.options.manifest, this.state.isolated);
@@ -219,12 +238,13 @@ export class Marks {
     return this.options.manifest.specimen.bounds_um;
   }
 
-  private updateInRoom(isPanelOpen: boolean): void {
+  private updateInRoom({ isPanelOpen, isBarBelow }: MarksView): void {
     const { sight, shown } = this;
+    this.showHandles();
     this.mean(this.target.takeSeen());
     this.scaleBar.update(null);
     this.orientation.root.style.display = "none";
-    this.ruler.update(shown, sight);
+    this.ruler.update(shown, sight, isBarBelow);
     if (isPanelOpen) this.ruler.group.visible = false;
     this.axes.group.visible = !isPanelOpen;
     this.axes.update(shown, sight);

@@ -2,7 +2,15 @@ import { describe, expect, it } from "vitest";
 import type { Box } from "../math/box";
 import type { Clip } from "../math/clip";
 import type { Ray } from "../math/vec3";
-import { armOf, boxWithin, dragHandle, handlesOf, pickHandle, TOLERANCE_RAD } from "./clip_handles";
+import {
+  armOf,
+  boxWithin,
+  dragHandle,
+  handlesOf,
+  markedClip,
+  pickHandle,
+  TOLERANCE_RAD,
+} from "./clip_handles";
 
 const SPECIMEN: Box = { min: [0, -400, 0], max: [1000, 0, 200] };
 const BOX: Box = { min: [100, -300, 50], max: [900, -100, 150] };
@@ -34,6 +42,19 @@ describe("the handles", () => {
   it("are not moved to a tile beside which the box lies", () => {
     const beside: Box = { min: [950, -400, 0], max: [1000, 0, 200] };
     expect(boxWithin(BOX, beside)).toBe(BOX);
+  });
+});
+
+describe("the marks of the cut that a page opens with", () => {
+  it("wait until somebody points at the picture", () => {
+    const nothing = markedClip(CLIP, CLIP, false);
+    expect(handlesOf(nothing, SPECIMEN)).toEqual([]);
+    expect(markedClip(CLIP, CLIP, true)).toBe(CLIP);
+  });
+
+  it("show at once where the cut was moved", () => {
+    const moved: Clip = { ...CLIP, box: null };
+    expect(markedClip(moved, CLIP, false)).toBe(moved);
   });
 });
 

@@ -69,6 +69,16 @@ export function handlesOf({ box, plane }: Clip, shown: Box): readonly ClipHandle
   return found;
 }
 
+const NOTHING_CUT: Clip = { box: null, plane: null };
+
+/**
+ * The clip whose marks show. Those of the cut that a page opens with would lie over what it opens:
+ * they wait until somebody points at the picture, or moves the cut.
+ */
+export function markedClip(clip: Clip, opening: Clip, isPointedAt: boolean): Clip {
+  return clip === opening && !isPointedAt ? NOTHING_CUT : clip;
+}
+
 /** The handle that the ray (um) passes at the smallest angle, within a tolerance. */
 export function pickHandle(
   ray: Ray,

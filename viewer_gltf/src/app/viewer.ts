@@ -656,7 +656,7 @@ export class Viewer {
       const larger = Math.max(1, OBJECT_IN_ROOM_M / edge_m);
       const pose = zoomAbout(specimen.pose, middle, larger);
       pose.position.add(specimen.anchor).sub(middle);
-      specimen.moveTo(pose, new Vector3().setFromMatrixPosition(this.loop.head));
+      specimen.jumpTo(pose, new Vector3().setFromMatrixPosition(this.loop.head));
     }
     this.loop.change();
   }
@@ -664,11 +664,15 @@ export class Viewer {
   private enterStereo(): void {
     const { isInUsersRoom, head } = this.stereo;
     const table = isInUsersRoom && head !== null ? this.tableBefore(head) : null;
+    const { specimen } = this.room;
     this.transition.enter(this.state.specimenSize_m / START_TOOLS.specimenSize_m, table);
+    specimen.isJumping = true;
+    specimen.takeJump(); // there is no picture yet to fade from
     this.onState(this.state);
   }
 
   private leaveStereo(): void {
+    this.room.specimen.isJumping = false;
     this.transition.leave();
     this.fit();
     this.onState(this.state);

@@ -27,6 +27,8 @@ export type Hit = Readonly<{
   isStep?: boolean;
   /** A gaze that rests on it chooses nothing: what it shows comes by itself. */
   isGlance?: boolean;
+  /** Each point of it chooses something else, as on a slider. */
+  isGradual?: boolean;
 }>;
 
 /** Something that rays meet: the panel, handles, the specimen's tiles. */
@@ -74,7 +76,7 @@ function sampleOf({ direction }: RoomRay, met: Met | null, targets: readonly Tar
     layout: met?.target.layout ?? "",
     layouts: ["", ...targets.map(({ layout = "" }) => layout)],
     direction: direction.toArray(),
-    isGradual: met?.hold === "slide",
+    isGradual: met?.isGradual === true || met?.hold === "slide",
   };
 }
 

@@ -6,6 +6,7 @@ import { Matrix4, type Object3D } from "three";
 import { type Clip, WHOLE } from "../math/clip";
 import { type BoxedTile, pickTile } from "../math/pick";
 import type { Ray } from "../math/vec3";
+import type { ViewerState } from "../state/viewer_state";
 import type { Hit, RoomRay, Target } from "./ray_pointer";
 import { rayAlong } from "./rays";
 
@@ -17,7 +18,12 @@ export class TileTarget implements Target {
   readonly isOnTop = false;
   private names = "";
   private shown: readonly BoxedTile[] = [];
-  clip: Clip = WHOLE;
+  private clip: Clip = WHOLE;
+  /** What shows within the tiles, and how often that has changed. */
+  private content: readonly unknown[] = [];
+  private changes = 0;
+  /** Points are measured, so that each point of a tile is another choice. */
+  private isMeasuring = false;
   /** The object along a ray, in um of the specimen: its name, and where; null: none. */
   objectAlong: (ray: Ray) => Readonly<{ id: string; distance: number }> | null = () => null;
   private readonly toSpecimen = new Matrix4();
@@ -35,9 +41,21 @@ export class TileTarget implements Target {
     this.names = tiles.map(({ id }) => id).join();
   }
 
-  /** The tiles that are shown and where they are: a tile that comes under a resting gaze was not looked for. */
+  /** Other objects may show now, or another part of the specimen. */
+  follow({ objects, clip, channels, tool }: ViewerState): void {
+    const content = [objects, clip, channels];
+    if (content.some((each, i) => each !== this.content[i])) this.changes++;
+    this.content = content;
+    this.clip = clip;
+    this.isMeasuring = tool === "measure";
+  }
+
+  /**
+   * The tiles that are shown, where they are, and what shows within: what comes under a resting gaze was not
+   * looked for.
+   */
   get layout(): string {
-    return `tiles ${this.names} ${placeText(this.specimen.matrixWorld)}`;
+    return `tiles ${this.names} ${this.changes} ${placeText(this.specimen.matrixWorld)}`;
   }
 
   meet(ray: RoomRay): Hit | null {
@@ -48,7 +66,8 @@ export class TileTarget implements Target {
     if (met === null) return null;
     const key = TILE + (object ? `${met.id}${OF}${object.id}` : met.id);
     // The ray's direction is one metre long, whatever it is in um.
-    return { key, place: key, distance_m: (object ?? met).distance, isStep: true };
+    const { distance } = object ?? met;
+    return { key, place: key, distance_m: distance, isStep: true, isGradual: this.isMeasuring };
   }
 
   choose({ key }: Hit, ray: RoomRay, isByGaze: boolean): void {

@@ -74,6 +74,11 @@ const FACING: Readonly<Partial<Record<Command, Quaternion>>> = {
   side: about(UP, -Math.PI / 2),
   top: about(RIGHT, Math.PI / 2),
 };
+/** Whether a command turns the specimen at once, however far: the others go on by small steps. */
+export function isFacing(command: Command): boolean {
+  return FACING[command] !== undefined;
+}
+
 /** Where the camera would go to the left, the specimen turns to the right: about which axis. */
 const TURNS: Readonly<Partial<Record<Command, readonly [Vector3, number]>>> = {
   "turn-left": [UP, STEP_RAD],

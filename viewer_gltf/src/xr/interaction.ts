@@ -13,7 +13,7 @@ import {
   type Target,
 } from "../interaction/ray_pointer";
 import { TILE, TileTarget } from "../interaction/tile_target";
-import { type HandPose, type SpecimenPose, zoomAbout } from "../math/grab";
+import type { HandPose } from "../math/grab";
 import { shownTiles } from "../math/pick";
 import type { Command } from "../state/commands";
 import { DWELL } from "../state/parameters/tools";
@@ -24,17 +24,16 @@ import { Controllers, type Hand, type HandEvent } from "./controllers";
 import type { HandsOptions } from "./hands_options";
 import {
   type HeadHold,
-  moveByCommand,
-  moveByFingers,
   moveByGaze,
   moveByHead,
   moveByHolders,
   moveByStick,
   STEPS_PER_S,
 } from "./hold_specimen";
+import { LastChoice } from "./last_choice";
 import { RoomNotice } from "./panel/notice";
 import { PANEL, RoomPanel } from "./panel/panel";
-import { hullOf, middleOf } from "./shown_hull";
+import { SpecimenMover } from "./specimen_mover";
 
 /** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
 const HOLD_S = 0.35;
@@ -47,13 +46,10 @@ const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
 const KEEPS_GAZE = "Switch this off by the button: where there is none, the gaze is all there is.";
 
 const CARRY = "It moves with your gaze. Rest to put it down.";
-/** For so long after a choice, s, it can be undone by the bar. */
-const UNDO_S = 4;
-/** The bar's button that undoes it. */
+/** The bar's button that undoes the last choice. */
 const UNDO = `${PANEL}undo-choice`;
-
-/** What the last choice has changed. */
-type Moment = Readonly<{ state: ViewerState; pose: SpecimenPose }>;
+/** The bar's button by which the gaze takes the specimen. */
+const CARRY_BUTTON = `${PANEL}bar-move`;
 
 /** A trigger that is down. */
 type Press = {
@@ -76,6 +72,7 @@ export class Hands {
   readonly panel: RoomPanel;
   readonly ring = new Ring();
   readonly notice: RoomNotice;
+  private readonly mover: SpecimenMover;
   private readonly controllers = new Controllers();
   private readonly pointer = new Pointer();
   readonly tiles: TileTarget;
@@ -96,16 +93,14 @@ export class Hands {
   private headHold: HeadHold | null = null;
   /** What is gone on with. */
   private goesOn: GoesOn | null = null;
-  /** Before the last choice, and the time left in which it can be undone. */
-  private before: Moment | null = null;
-  private undo_s = 0;
+  private readonly lastChoice = new LastChoice();
   /** The specimen as it was taken by the bar. */
   private barHold: HeadHold | null = null;
   private state: ViewerState | null = null;
-
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
+    this.mover = new SpecimenMover(specimen, options.tiles);
     this.notice = new RoomNotice(isPainted);
     this.panel = new RoomPanel({
       layOut,
@@ -140,6 +135,18 @@ export class Hands {
     return this.pointer.progress;
   }
 
+  /** Whether the gaze carries a handle or the specimen. */
+  get isCarrying(): boolean {
+    return this.carry.isCarrying;
+  }
+
+  /** Whether the gaze or the head carries something of the scene, not a part of the open menu. */
+  private get isCarryingInScene(): boolean {
+    const { key } = this.carry;
+    const isOfMenu = key?.startsWith(PANEL) === true && key !== CARRY_BUTTON;
+    return this.headHold !== null || (key !== null && !isOfMenu);
+  }
+
   get isHolding(): boolean {
     return this.held.size > 0;
   }
@@ -164,7 +171,7 @@ export class Hands {
     this.touched = null;
     this.goesOn = null;
     this.headHold = null;
-    this.before = null;
+    this.lastChoice.take();
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
@@ -187,21 +194,12 @@ export class Hands {
 
   /** What would move the camera of a flat screen, by a step; false: the command is another's. */
   run(command: Command, state: ViewerState, share = 1): boolean {
-    const { specimen } = this.options;
-    const pivot = middleOf(this.around(state));
-    const pose = moveByCommand(specimen.pose, command, pivot, this.gaze.origin, share);
-    if (pose === null) return false;
-    specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.run(command, state, this.gaze.origin, share);
   }
 
   /** The specimen becomes so much larger about its middle. */
   resize(factor: number, state: ViewerState): void {
-    const { specimen } = this.options;
-    specimen.moveTo(
-      zoomAbout(specimen.pose, middleOf(this.around(state)), factor),
-      this.gaze.origin,
-    );
+    this.mover.resize(factor, state, this.gaze.origin);
   }
 
   /**
@@ -215,7 +213,7 @@ export class Hands {
     this.gaze = gazeOf(head);
     this.state = state;
     this.tiles.tiles = shownTiles(this.options.tiles, state.isolated);
-    this.tiles.clip = state.clip;
+    this.tiles.follow(state);
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
     for (const event of this.controllers.take()) this.handle(event);
     const hasTouched = this.followFingers(state);
@@ -224,8 +222,11 @@ export class Hands {
     const hasHeld = this.hold(dt_s);
     const hasFollowed = this.followHead(dt_s, state);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
-    this.panel.canUndo = this.mayUndo(dt_s, state);
-    this.panel.isCarrying = this.carry.isCarrying;
+    const isGoingOn = this.goesOn !== null || this.carry.isCarrying;
+    const now = { state, pose: this.mover.pose };
+    const isAsked = this.pointer.gaze?.key === UNDO;
+    this.panel.canUndo = this.lastChoice.advance(dt_s, now, isGoingOn, isAsked);
+    this.panel.isCarrying = this.isCarryingInScene;
     const isRepainted = this.panel.update(dt_s, head, state);
     const isNoticeNew = this.notice.update(read_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
@@ -304,8 +305,7 @@ export class Hands {
 
   /** What fingers on the split screen have done since the frame before; whether anything has moved. */
   private followFingers(state: ViewerState): boolean {
-    const { specimen } = this.options;
-    const before = specimen.pose;
+    const before = this.mover.pose;
     for (const [gesture, time_ms] of this.gestures.splice(0)) {
       if (gesture.kind === "press") {
         const met = meetFirst(this.gaze, this.free);
@@ -315,12 +315,10 @@ export class Hands {
       else if (gesture.kind === "tap") {
         if (this.touched?.isUsed === false) this.tap(time_ms);
       } else {
-        const pivot = middleOf(this.around(state));
-        const pose = moveByFingers(specimen.pose, gesture, pivot, this.gaze.origin);
-        specimen.moveTo(pose, this.gaze.origin);
+        this.mover.byFingers(gesture, state, this.gaze.origin);
       }
     }
-    return specimen.pose !== before;
+    return this.mover.pose !== before;
   }
 
   /** The button: what the ray meets, or if that is nothing, what is gazed at. */
@@ -333,46 +331,26 @@ export class Hands {
     if (met.key === null) return;
     const counts = this.pointer.press(met, this.free, time_ms);
     if (!counts && !isByGaze) return;
-    if (met.key !== UNDO) this.remember();
+    const { pose } = this.mover;
+    if (met.key !== UNDO && this.state) this.lastChoice.remember({ state: this.state, pose });
     met.target.choose(met, met.ray, isByGaze);
     if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
   }
 
-  /** The moment before a choice, to which the bar leads back. */
-  private remember(): void {
-    if (this.state === null) return;
-    this.before = { state: this.state, pose: this.options.specimen.pose };
-    this.undo_s = UNDO_S;
-  }
-
-  /** Whether the last choice has changed anything, a short while ago or while *Undo* is looked at. */
-  private mayUndo(dt_s: number, state: ViewerState): boolean {
-    if (this.before === null) return false;
-    const { pose } = this.options.specimen;
-    const isGoing = this.goesOn !== null || this.carry.isCarrying;
-    const isAsked = this.pointer.gaze?.key === UNDO;
-    if (isGoing) this.undo_s = UNDO_S;
-    else if (!isAsked) this.undo_s -= dt_s;
-    if (this.undo_s <= 0) this.before = null;
-    return this.before !== null && (this.before.state !== state || this.before.pose !== pose);
-  }
-
   private undo(): void {
-    const { before } = this;
+    const before = this.lastChoice.take();
     if (before === null) return;
-    this.before = null;
     this.options.onAction({ type: "restore", state: before.state });
-    this.options.specimen.moveTo(before.pose, this.gaze.origin);
+    this.mover.backTo(before.pose, this.gaze.origin);
   }
 
   /** The bar is taken hold of, and the specimen moves as the gaze does until it rests. */
   private carrySpecimen(gaze: RoomRay, isStart: boolean): void {
-    const { specimen } = this.options;
     if (isStart && this.state !== null) {
-      this.barHold = { pose: specimen.pose, pivot: middleOf(this.around(this.state)), gaze };
+      this.barHold = this.mover.holdBy(gaze, this.state);
       this.announce(CARRY);
     } else if (this.barHold !== null) {
-      specimen.moveTo(moveByGaze(this.barHold, gaze), gaze.origin);
+      this.mover.to(moveByGaze(this.barHold, gaze), gaze.origin);
     }
   }
 
@@ -389,12 +367,9 @@ export class Hands {
   private hold(dt_s: number): boolean {
     for (const [source, press] of this.presses) this.advance(source, press, dt_s);
     const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
-    const { specimen } = this.options;
-    const pose = moveByHolders(specimen.pose, this.held, now);
+    const pose = moveByHolders(this.mover.pose, this.held, now);
     this.held = now;
-    if (pose === specimen.pose) return false;
-    specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.to(pose, this.gaze.origin);
   }
 
   private advance(source: XRInputSource, press: Press, dt_s: number): void {
@@ -446,39 +421,30 @@ export class Hands {
       this.headHold = null;
       return false;
     }
-    const { specimen } = this.options;
     const { gaze } = this;
     press.isUsed = true; // letting go of it chooses nothing
     if (this.headHold === null) {
-      this.headHold = { pose: specimen.pose, pivot: middleOf(this.around(state)), gaze };
+      this.headHold = this.mover.holdBy(gaze, state);
       return false;
     }
-    specimen.moveTo(moveByHead(this.headHold, gaze), gaze.origin);
+    this.mover.to(moveByHead(this.headHold, gaze), gaze.origin);
     return true;
   }
 
   private moveBySticks(dt_s: number, state: ViewerState): boolean {
     if (this.isHolding) return false;
-    const { specimen } = this.options;
-    let { pose } = specimen;
+    let { pose } = this.mover;
     for (const { stick, ray } of this.tracked) {
       if (stick.x === 0 && stick.y === 0) continue;
       const met = this.tileAlong(ray) ?? this.tileAlong(this.gaze);
-      pose = moveByStick(pose, stick, met ?? middleOf(this.around(state)), dt_s);
+      pose = moveByStick(pose, stick, met ?? this.mover.middle(state), dt_s);
     }
-    if (pose === specimen.pose) return false;
-    specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.to(pose, this.gaze.origin);
   }
 
   private tileAlong(ray: RoomRay | null): Vector3 | null {
     const hit = ray && this.tiles.meet(ray);
     return hit && pointOn({ ...hit, ray });
-  }
-
-  private around({ isolated }: ViewerState): readonly Vector3[] {
-    const { tiles, specimen } = this.options;
-    return hullOf(shownTiles(tiles, isolated), specimen.group.matrixWorld);
   }
 
   /** Ring, rays, and the light on what is pointed at. */

@@ -2,7 +2,7 @@
 import { readFile } from "node:fs/promises";
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
-import { LABEL_HEIGHT, LABEL_PX } from "../../src/annotations/style";
+import { LABEL_HEIGHT, LABEL_PX, STEREO_TEXT } from "../../src/annotations/style";
 import type { Vec3 } from "../../src/math/vec3";
 import { bundled } from "../support/browser/bundled";
 import type { Browser } from "../support/browser/chromium";
@@ -231,7 +231,7 @@ describeInChromium("marks", () => {
     for (const angle of angles) expect(angle * px_per_rad).toBeCloseTo(LABEL_PX, 1);
     await look([0, 0, 2], [0, 0, 0], { isStereo: true });
     const inRoom = (await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0;
-    expect(inRoom).toBeCloseTo(LABEL_HEIGHT, 5);
+    expect(inRoom).toBeCloseTo(STEREO_TEXT * LABEL_HEIGHT, 5);
   });
 
   it("let a handle be dragged: the face follows the pointer, and the camera does not", async () => {
@@ -348,6 +348,10 @@ describeInChromium("marks", () => {
     const ruler = await page.evaluate(() => window.bench?.ruler());
     expect(ruler?.isVisible).toBe(true);
     expect(ruler?.length_um).toBeGreaterThan(100);
+    await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isInUsersRoom: true });
+    const onTable = await page.evaluate(() => window.bench?.ruler());
+    const { up_um = Number.NaN } = ruler ?? {};
+    expect(up_um).toBeGreaterThan(onTable?.up_um ?? Number.NaN); // else the bar would lie before it
     await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isPanelOpen: true });
     const behindPanel = await page.evaluate(() => window.bench?.ruler());
     expect(behindPanel).toMatchObject({ isVisible: false, hasAxes: false });

@@ -47,7 +47,9 @@ for (const { name, bundle, channels } of sweep(CASES, ({ name }) => name !== "re
       for (const channel of sweep(channels, (each) => each === channels[0])) {
         it(`${channel} has the surface's colour`, async () => {
           const at = async (mode: string) => {
-            await stand.open(`&mode=${mode}&switch=9&disc=${DISC}&quality=high#v=1&c=${channel}`);
+            // what opens cut has other colours for its inside
+            const link = `v=1&c=${channel}&l=${channel}:tdefault`;
+            await stand.open(`&mode=${mode}&switch=9&disc=${DISC}&quality=high#${link}`);
             await stand.viewer.settled();
             return takePicture(stand.viewer.page);
           };

@@ -104,6 +104,7 @@ describeInChromium("the share link", () => {
     await stand.viewer.still();
     expect(difference(left, await takePicture(page()))).toBeLessThan(SAME);
     await stand.viewer.enterStereo();
+    await silent();
     expect(difference(inHeadset, await takePicture(page()))).toBeLessThan(SAME_IN_HEADSET);
     expectSame(await written(), moved);
   });

@@ -14,7 +14,8 @@ from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.settings import Settings
 from stereocell.filters.background import find_background
 from stereocell.filters.noise import NoiseSample, find_max_shift
-from stereocell.isosurface.holder import Holder, find_holder
+from stereocell.isosurface.find_holder import find_holder
+from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.level_evidence import (
     MAX_PADDING,
     Counting,

@@ -31,8 +31,9 @@ from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.pixels import decode, dtype_of
 from stereocell.read.dicom.scale_notes import reaches_air, scale_notes
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels
-from stereocell.read.dicom.series import Stack, find_stacks, is_other_kind
+from stereocell.read.dicom.series import find_stacks, is_other_kind
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.dicom.stack import Stack
 from stereocell.read.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout

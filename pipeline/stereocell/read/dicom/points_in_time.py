@@ -1,7 +1,8 @@
 """Find the points in time of a stack: several pictures of the same slices, in the order of time.
 
-The points are told apart by the attribute that gives each place one frame per value. Without such
-an attribute the frames at a place are counted by their instance numbers. A point that lacks slices,
+The points are told apart by the attribute that gives each place one frame per value, or else by one
+that puts the frames of each place in an order. Without such an attribute the frames at a place are
+counted by their instance numbers. A point that lacks slices,
 as the last one does of an acquisition that was stopped, is incomplete: it is set apart.
 """
 
@@ -19,6 +20,7 @@ from stereocell.read.dicom.split_kinds import find_runs
 AreEqual = Callable[[Frame, Frame], bool]
 Place = Sequence[Frame]  # frames at one place, by instance number
 
+BY_REPETITION = "RepetitionTime"
 # attributes that number points in time: field of FrameKind, name in the standard
 _NUMBERED = (
     ("temporal", "TemporalPositionIdentifier"),
@@ -26,6 +28,8 @@ _NUMBERED = (
     ("trigger_time", "TriggerTime"),
     ("acquisition", "AcquisitionNumber"),
     ("reference_time", "FrameReferenceTime"),
+    ("time_slice", "ImageIndex"),
+    ("repetition_time", BY_REPETITION),
 )
 BY_NUMBER = "InstanceNumber"
 _LEAST_OF_RUN = 0.5  # least share of the slices in a run of instance numbers that is a point
@@ -64,7 +68,8 @@ def find_points(
     pairs = ((place[0], other) for place in places for other in place[1:])
     if all(are_equal(a, b) for a, b in pairs):  # stops at the first pair that differs
         return Points((first,), duplicates=extra)
-    numbered = _numbered(places) or _by_runs(places, normal, near_mm) or _by_rank(places)
+    numbered = _numbered(places) or _ranked(places)
+    numbered = numbered or _by_runs(places, normal, near_mm) or _by_rank(places)
     return numbered or Points((first,), duplicates=extra, differ=True)
 
 
@@ -80,6 +85,22 @@ def _numbered(places: Sequence[Place]) -> Points | None:
         points = _sorted_out([classes[value] for value in sorted(classes)], len(places), name)
         if points is not None:
             return points
+    return None
+
+
+def _ranked(places: Sequence[Place]) -> Points | None:
+    """Return the points by the first attribute that puts the frames of each place in an order.
+
+    Values of one point may differ from slice to slice, as trigger times do with the heart rate.
+    """
+    if len({len(place) for place in places}) > 1:
+        return None
+    for field, name in _NUMBERED:
+        orders = [[getattr(frame.kind, field) for frame in place] for place in places]
+        if any(None in values or len(set(values)) < len(values) for values in orders):
+            continue
+        in_order = [sorted(p, key=lambda frame: getattr(frame.kind, field)) for p in places]
+        return Points(tuple(zip(*in_order, strict=True)), (), name)
     return None
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.read.dicom.frame import Frame
+from stereocell.read.dicom.pet_kind import NOT_CORRECTED
 
 _SHARED = 0.5  # least share of the fewer slices that compete
 _MIN_WOVEN = 3  # fewest slices of a volume between the slices of another one
@@ -78,7 +79,11 @@ def _correction_of(frame: Frame) -> int | None:
 
 
 def _correction_words(value: Any, _: int) -> str:
-    return {0: "attenuation corrected", 1: "not attenuation corrected"}.get(value, "")
+    return {0: "attenuation corrected", 1: NOT_CORRECTED}.get(value, "")
+
+
+def _units_of(frame: Frame) -> str:
+    return frame.scale.units if frame.modality == "PT" else ""
 
 
 def _type_words(value: Any, place: int) -> str:
@@ -113,10 +118,13 @@ PROPERTIES = (
     Property(_kind("echo_number"), _measured("echo {:g}")),
     Property(_kind("inversion_time"), _measured("inversion time {:g} ms"), 0.01),
     Property(_kind("flip_angle"), _measured("flip angle {:g} degrees"), 0.01),
+    Property(_units_of, lambda value, _: f"Units {value}" if value else "no Units"),
     Property(_type_of, _type_words),
     Property(lambda frame: frame.stated.thickness_mm, _measured("slices {:g} mm thick"), 0.05),
     _ACQUISITION,
 )
+# properties that tell series apart; types and acquisitions have no word that a user knows
+NAMED = tuple(one for one in PROPERTIES if one.find is not _type_of and one is not _ACQUISITION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +173,7 @@ def find_runs(
 
 
 def _split(part: Part, one: Property, normal: NDArray[np.float64], near_mm: float) -> list[Part]:
-    values = _by_value(part.frames, one)
+    values = by_value(part.frames, one)
     if not 2 <= len(values) <= _MAX_VALUES:
         return [part]
     return _separate(part, values, one, (normal, near_mm))
@@ -209,7 +217,7 @@ def _separate(
     ]
 
 
-def _by_value(frames: Sequence[Frame], one: Property) -> list[tuple[Frame, ...]]:
+def by_value(frames: Sequence[Frame], one: Property) -> list[tuple[Frame, ...]]:
     """Return the frames by their value, values in rising order, those without one first."""
     pairs = [(one.find(frame), frame) for frame in frames]
     absent = tuple(frame for value, frame in pairs if value is None)

@@ -113,12 +113,11 @@ function whileClosed({ state, lastMode }: BarFacts): readonly (Slot | null)[] {
 }
 
 function whileOpen({ page, count, up }: Page): readonly (Slot | null)[] {
+  const name = `Next page (${page + 1} of ${count})`;
   const next = { canvas: "page", page: (page + 1) % count } as const;
   return [
     up === null ? null : { id: "up", label: "Back", to: { canvas: "back" } },
-    count < 2
-      ? null
-      : { id: "more", label: "Next", name: "Next page", to: next, more: { isStep: true } },
+    count < 2 ? null : { id: "more", label: "Next", name, to: next, more: { isStep: true } },
     { id: "leave", label: "Leave", name: "Leave stereo", to: { canvas: "leave" } },
     { id: "close", label: "Close", to: { canvas: "close" } },
   ];

@@ -110,7 +110,6 @@ export class SplitSession {
     running.problems = found === "absent" ? [...problems, ORIENTATION_ABSENT] : problems;
     await running.sign.turned();
     if (this.running !== running) return; // left while the phone was upright
-    this.recentre(); // ahead is where the head faces as stereo begins
     this.update();
     running.hasStarted = true;
     this.onStart();

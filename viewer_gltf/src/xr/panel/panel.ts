@@ -30,11 +30,13 @@ import { CanvasQuad, type Spot } from "./canvas_quad";
 import {
   type Bearing,
   barPitch,
+  bearingOf,
   followHead,
   headBearing,
-  PANEL_DISTANCE_M,
   panelBearing,
+  panelDistance_m,
   pointAt,
+  type Setting,
 } from "./placement";
 
 /** Over a specimen that is brought nearer than the panel, by which it is brought; under a notice. */
@@ -149,8 +151,8 @@ export class RoomPanel {
   private rested_s = 0;
   /** null until the first frame gives the head's direction. */
   private barYaw: number | null = null;
-  /** It opens with the next frame, which knows where the eye is. */
-  private wantsPlace = false;
+  /** It opens with the next frame, which knows where the eye is: over the bar, or where the head faces. */
+  private wantsPlace: "bar" | "head" | null = null;
   /** The last request: a button that is held still asks for nothing more. */
   private dragged = "";
   /** The target that is pointed at, and for how long. */
@@ -202,10 +204,8 @@ export class RoomPanel {
     return this.isOpen ? [...this.menu.shown.regions, ...this.bar.shown.regions] : [];
   }
 
-  /** The specimen stands on a table: where the bar hangs else it would be before it. */
-  isTableBelow = false;
-  /** And the panel, too. A screen in a hand shows the table alone: there it has to be before it. */
-  isOverTable = false;
+  /** What the specimen stands before. */
+  setting: Setting = "before-eyes";
 
   /** Stereo has begun, or has ended. */
   setShown(isShown: boolean): void {
@@ -222,22 +222,26 @@ export class RoomPanel {
 
   toggle(): void {
     if (this.isOpen) this.close();
-    else this.wantsPlace = true;
+    else this.wantsPlace = "head";
   }
 
   /** Whether it looks otherwise than before. */
   update(dt_s: number, head: Matrix4, state: ViewerState): boolean {
     const eye = new Vector3().setFromMatrixPosition(head);
     const bearing = headBearing(head);
-    this.barYaw = followHead(this.barYaw ?? bearing.yaw, bearing, dt_s);
+    const { setting } = this;
+    this.barYaw = followHead(this.barYaw ?? bearing.yaw, bearing, dt_s, setting);
     let isChanged = false;
-    if (this.wantsPlace) {
-      this.wantsPlace = false;
-      this.open(eye, panelBearing(bearing, this.barYaw, this.isOverTable));
+    if (this.wantsPlace !== null) {
+      const { pitch, yaw } = panelBearing(bearing, this.barYaw, setting);
+      this.open(eye, { pitch, yaw: this.wantsPlace === "bar" ? this.barYaw : yaw });
+      this.wantsPlace = null;
       isChanged = true;
     }
-    const pitch = barPitch(this.isOpen || this.isTableBelow);
-    this.bar.quad.place(pointAt({ yaw: this.barYaw, pitch }, eye, PANEL_DISTANCE_M), eye);
+    // the bar hangs under the panel while that is open
+    if (this.isOpen) this.barYaw = bearingOf(this.quad.mesh.position.clone().sub(eye)).yaw;
+    const under: Bearing = { yaw: this.barYaw, pitch: barPitch(setting, this.isOpen) };
+    this.bar.quad.place(pointAt(under, eye, panelDistance_m(setting)), eye);
     this.bar.quad.mesh.visible = !this.isCarrying;
     this.rested_s += dt_s;
     this.fan(dt_s);
@@ -293,7 +297,7 @@ export class RoomPanel {
   }
 
   private open(eye: Vector3, bearing: Bearing): void {
-    this.quad.place(pointAt(bearing, eye, PANEL_DISTANCE_M), eye);
+    this.quad.place(pointAt(bearing, eye, panelDistance_m(this.setting)), eye);
     this.quad.mesh.visible = true;
     this.go(START_CANVAS);
   }
@@ -360,7 +364,7 @@ export class RoomPanel {
     else {
       switch (wish.canvas) {
         case "open":
-          this.wantsPlace = true;
+          this.wantsPlace = "bar";
           break;
         case "tab":
           this.go({ ...START_CANVAS, tab: wish.section });

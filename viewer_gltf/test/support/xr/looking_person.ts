@@ -1,5 +1,15 @@
 /** A person in stereo who looks, rests and presses, without a browser: the hands as they are, nothing painted. */
 import { Euler, Matrix4, Quaternion, Scene, Vector3 } from "three";
+import {
+  dragHandle,
+  type HandleId,
+  handlesOf,
+  TOLERANCE_RAD,
+} from "../../../src/annotations/clip_handles";
+import { HandleTarget } from "../../../src/annotations/handle_target";
+import { dragLamp, isLampHandle, lampHandles } from "../../../src/annotations/lamp_handles";
+import type { Box } from "../../../src/math/box";
+import type { Ray } from "../../../src/math/vec3";
 import type { Region } from "../../../src/panel/canvas/draw_list";
 import { type PanelView, START_VIEW } from "../../../src/panel/controls";
 import { chosenTile, type Facts, layOut } from "../../../src/panel/layout";
@@ -10,7 +20,7 @@ import { reduce } from "../../../src/state/reduce";
 import type { ViewerState } from "../../../src/state/viewer_state";
 import { Hands } from "../../../src/xr/interaction";
 import { STEREO_FACTS } from "../fixture/facts";
-import { sampleManifest } from "../fixture/manifest";
+import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
 import { tremble } from "./tremble";
 
 /** Longest time that a frame counts, s. */
@@ -19,6 +29,7 @@ const FRAME_S = 0.1;
 const TURN_MS = 500;
 const EYE = new Vector3();
 const RAD = Math.PI / 180;
+const SPECIMEN: Box = { min: [...SPECIMEN_BOX.min], max: [...SPECIMEN_BOX.max] };
 
 /** Stereo is offered in both ways, and a step can be undone and redone, so that every control can be operated. */
 const FACTS: Facts = {
@@ -49,6 +60,10 @@ export class LookingPerson {
   /** How often anything has changed, the panel's own pages too; what follows in the next frame is the same change. */
   changes = 0;
   readonly hands: Hands;
+  /** The handles of the cut and of the lamps. */
+  readonly handles = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
+  /** Rays by which a point was measured, um. */
+  readonly measured: Ray[] = [];
   /** Time on the clock of the frames, in milliseconds. */
   now_ms = 1000;
   private readonly specimen: Specimen;
@@ -57,6 +72,7 @@ export class LookingPerson {
   private view: Partial<PanelView> = {};
   private session: ButtonSession | null = null;
   private facing = new Quaternion();
+  private readonly earlier = new Quaternion();
   private before: readonly unknown[] = [];
   private hasJustChanged = false;
   private readonly offsets = tremble(FRAME_S);
@@ -74,6 +90,7 @@ export class LookingPerson {
       scene: new Scene(),
       specimen,
       tiles: manifest.tiles,
+      handles: [this.handles],
       isPainted: false,
       now_ms: () => this.now_ms,
       layOut: (view) => layOut(this.state, FACTS, view),
@@ -85,7 +102,11 @@ export class LookingPerson {
         this.wishes.push(command);
         this.hands.run(command, this.state);
       },
-      onChoose: (_, tile) => {
+      onChoose: (ray, tile) => {
+        if (this.state.tool === "measure") {
+          this.measured.push(ray);
+          return;
+        }
         this.wishes.push(tile);
         this.state = reduce(this.state, chosenTile(this.state, tile));
       },
@@ -133,13 +154,13 @@ export class LookingPerson {
   }
 
   lookUp(): void {
+    this.earlier.copy(this.facing);
     this.turnTo(0, 60);
   }
 
   /** From where it was to the right, at the same height. */
   lookAside(): void {
-    const { x, y } = new Euler().setFromQuaternion(this.facing, "YXZ");
-    this.turnTo(y / RAD - 20, x / RAD);
+    this.turnBy(20);
   }
 
   /** Look at the middle of a tile's front. */
@@ -149,6 +170,44 @@ export class LookingPerson {
     const { min, max } = tile.bounds_um;
     const front = new Vector3((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]);
     this.faceTo(front.applyMatrix4(this.specimen.group.matrixWorld));
+  }
+
+  /** Look at the middle of a handle. */
+  lookAtHandle(id: HandleId): void {
+    const handle = this.handles.handles.find((each) => each.id === id);
+    if (handle === undefined) throw new Error(`no ${id}`);
+    this.faceTo(new Vector3(...handle.position).applyMatrix4(this.specimen.group.matrixWorld));
+  }
+
+  /** Look where it looked before it looked up. */
+  lookBack(): void {
+    this.facing.copy(this.earlier);
+    this.now_ms += TURN_MS;
+    this.frame(0);
+  }
+
+  /** Where the specimen is and how it is turned. */
+  get place(): string {
+    const { position, orientation, scale } = this.specimen.pose;
+    return JSON.stringify([position.toArray(), orientation.toArray(), scale]);
+  }
+
+  /** Whether the gaze carries something. */
+  get isCarrying(): boolean {
+    return this.hands.isCarrying;
+  }
+
+  /** Turn from where it looks to the right, degrees. */
+  turnBy(yaw_deg: number): void {
+    const { x, y } = new Euler().setFromQuaternion(this.facing, "YXZ");
+    this.turnTo(y / RAD - yaw_deg, x / RAD);
+  }
+
+  private drag(id: HandleId, ray: Ray): void {
+    const drag = isLampHandle(id)
+      ? (dragLamp(id, ray, this.state, SPECIMEN, false)?.action ?? null)
+      : dragHandle(id, ray, this.state.clip, SPECIMEN);
+    if (drag !== null) this.state = reduce(this.state, drag);
   }
 
   private turnTo(yaw_deg: number, pitch_deg: number): void {
@@ -237,6 +296,9 @@ export class LookingPerson {
 
   private frame(dt_s: number): void {
     this.now_ms += 1000 * dt_s;
+    const { clip } = this.state;
+    this.handles.handles = [...handlesOf(clip, SPECIMEN), ...lampHandles(this.state, SPECIMEN)];
+    this.handles.specimen = this.specimen.group.matrixWorld;
     const [right_deg, up_deg] = this.offsets.next().value as readonly [number, number];
     const offset = new Quaternion().setFromEuler(new Euler(up_deg * RAD, -right_deg * RAD, 0));
     const head = new Matrix4().makeRotationFromQuaternion(this.facing.clone().multiply(offset));

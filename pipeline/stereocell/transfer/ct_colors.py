@@ -1,0 +1,77 @@
+"""The tissues of a CT in their colours, as a physician knows them from an atlas.
+
+A 2D function of bands of Hounsfield units: fat is yellow, muscle red, bone has the channel's own
+light colour, and vessels with contrast medium are light red. An edge to air is skin, whatever its
+values are: half-way from air to muscle lies the value of fat. So the bands of fat and muscle lie at
+small steps alone, and skin, which has the channel's colour as the surface has, at large ones.
+"""
+
+from stereocell.model.channel import Shape, Shapes
+from stereocell.transfer.ct_tissues import TISSUES
+
+NAME = "tissues"
+# linear RGB as factors to the channel's colour, and Hounsfield units. Neighbours share their ends,
+# which SOFT_HU blurs
+_SKIN = (1.0, 1.0, 1.0)
+_FAT = (1.0, 0.92, 0.58)
+_MUSCLE = (0.7, 0.27, 0.2)
+_CONTRAST = (0.95, 0.42, 0.3)
+_BONE = (1.0, 1.0, 1.0)
+_SOFT_HU = 40.0
+_AIR_STEP_HU = 220.0  # step over two voxels from which on an edge is one to air
+_FAT_FROM_HU = -150.0  # blurred skin has values of the thinnest fat
+# Coarsest over finest voxel spacing, at most: across thicker slices an edge to air is as flat as
+# one between tissues
+MAX_UNEVEN = 3.0
+_FOOT_HU = 36.0  # Hounsfield units below the surface at which opacity starts
+# What one finest voxel spacing absorbs: skin hides the fat beneath it
+_OPACITY, _SKIN_OPACITY, _BONE_OPACITY = 0.45, 0.95, 0.6
+
+
+def tissue_shapes(level: float, window: tuple[float, float], gradient_max: float) -> Shapes:
+    """Return the bands of tissues that lie in a window.
+
+    level         where the surface lies, Hounsfield units
+    window        Hounsfield units that are 0 and 1
+    gradient_max  share of the window that a step is where its gradient is 1
+    """
+    fat, muscle, bone = (TISSUES[name] for name in ("fat", "soft_tissue", "bone"))
+    first = level - _FOOT_HU
+    step = min(_AIR_STEP_HU / (window[1] - window[0]) / gradient_max, 0.9)
+    bands = (
+        (first, _FAT_FROM_HU, (0.0, 1.0), _SKIN, _SKIN_OPACITY),
+        (_FAT_FROM_HU, fat[1], (0.0, step), _FAT, _OPACITY),
+        (fat[1], muscle[1], (0.0, step), _MUSCLE, _OPACITY),
+        (_FAT_FROM_HU, muscle[1], (step, 1.0), _SKIN, _SKIN_OPACITY),
+        (muscle[1], bone[0], (0.0, 1.0), _CONTRAST, _OPACITY),
+        (bone[0], bone[1], (0.0, 1.0), _BONE, _BONE_OPACITY),
+    )
+    return tuple(
+        shape
+        for low, high, gradients, color, opacity in bands
+        if (shape := _band((max(low, first), high), window, gradients, color, opacity)) is not None
+    )
+
+
+def _band(
+    ends_hu: tuple[float, float],
+    window: tuple[float, float],
+    gradients: tuple[float, float],
+    color: tuple[float, float, float],
+    opacity: float,
+) -> Shape | None:
+    """Return a band that overlaps its neighbours by SOFT_HU; None: the window shows none of it."""
+    low, high = window
+    first, last = ends_hu[0] - _SOFT_HU / 2, ends_hu[1] + _SOFT_HU / 2
+    values = tuple(min(max((hu - low) / (high - low), 0.0), 1.0) for hu in (first, last))
+    if values[1] - values[0] < 1e-3:
+        return None
+    return Shape(
+        kind="rectangle",
+        values=(values[0], values[1]),
+        gradients=gradients,
+        tip=0.5,
+        color=color,
+        opacity=opacity,
+        softness=min(2 * _SOFT_HU / (last - first), 1.0),
+    )
