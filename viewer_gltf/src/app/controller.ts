@@ -80,6 +80,7 @@ function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
 }
 
 const OPEN_KEY = "stereocell-open";
+const LETTERS_KEY = "stereocell-letters";
 
 /** The sections of the panel that the reader had open on the visit before. */
 function rememberedOpen(): readonly string[] {
@@ -142,7 +143,12 @@ export type ControllerOptions = Readonly<{
 
 export class Controller {
   readonly panel: Panel;
-  private view: PanelView = { ...START_VIEW, open: rememberedOpen(), ...rememberedLens() };
+  private view: PanelView = {
+    ...START_VIEW,
+    ...rememberedLens(),
+    open: rememberedOpen(),
+    hasLetters: remembered(LETTERS_KEY) !== "off",
+  };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
   private readonly help: Help;
   /** Once it was asked for. */
@@ -226,6 +232,7 @@ export class Controller {
       this.view = changePanel(this.view, wish);
       if (laysOutCards(wish)) this.view = { ...this.view, channelsWithCard: null };
       if (wish.panel === "unfold") remember(OPEN_KEY, this.view.open.join(" "));
+      if (wish.panel === "letters") remember(LETTERS_KEY, wish.areOn ? "on" : "off");
       this.refresh();
     } else this.viewer.dispatch(wish);
   }
@@ -364,6 +371,7 @@ export class Controller {
 
   private press(name: string): boolean {
     const { viewer, view } = this;
+    if (!view.hasLetters && isWritten(name) && name !== "?") return false;
     const context: KeyContext = {
       state: viewer.state,
       view,

@@ -36,6 +36,8 @@ export type PanelChange =
   | Readonly<{ panel: "lenses"; lenses: Lenses }>
   /** Of the phone viewer's lenses, as its QR code has it. */
   | Readonly<{ panel: "code"; text: string }>
+  /** Whether keys that write a character do anything (WCAG 2.1.4). */
+  | Readonly<{ panel: "letters"; areOn: boolean }>
   | Readonly<{ panel: "hide" }>
   | Readonly<{ panel: "help" }>;
 
@@ -62,6 +64,7 @@ export type PanelView = Readonly<{
   open: readonly string[];
   lenses: Lenses;
   code: string;
+  hasLetters: boolean;
   isHidden: boolean;
   isHelpOpen: boolean;
   /** The last link that was shared; "": none. */
@@ -82,6 +85,7 @@ export const START_VIEW: PanelView = {
   open: ["channels", "objects", "volumes"],
   lenses: "v2",
   code: "",
+  hasLetters: true,
   isHidden: false,
   isHelpOpen: false,
   link: "",
@@ -306,6 +310,8 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
       return change.lenses === view.lenses ? view : { ...view, lenses: change.lenses };
     case "code":
       return change.text === view.code ? view : { ...view, code: change.text };
+    case "letters":
+      return change.areOn === view.hasLetters ? view : { ...view, hasLetters: change.areOn };
     case "hide":
       return { ...view, isHidden: !view.isHidden };
     case "help":

@@ -170,15 +170,28 @@ function deeperSections(
       ofVolumes([...controlsOf(settings, state), discNow(state, facts)]),
     ),
     section("light", "Light", ofVolumes(lightItems(state, view, facts.isStereo))),
-    section("share", "Share", [
+    section("share", "Share and keys", [
       command("share", "Copy a link to this view"),
       ...(view.link === ""
         ? []
         : [{ kind: "link", id: "link", label: "Link", value: view.link } as const]),
       { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
+      ...(facts.isStereo ? [] : [lettersToggle(view)]),
     ]),
     section("quality", "Quality and speed", qualityItems(state, facts)),
   ];
+}
+
+/** For people who speak to their computer, or whose hands come upon keys. */
+function lettersToggle({ hasLetters: value }: PanelView): Control {
+  return {
+    kind: "toggle",
+    id: "letters",
+    label: "Keys of one character",
+    about: "Off: only ?, arrows, Escape and keys with Ctrl work.",
+    value,
+    to: (areOn) => ({ panel: "letters", areOn }),
+  };
 }
 
 function historyItems({ undo, redo }: Facts): readonly Control[] {

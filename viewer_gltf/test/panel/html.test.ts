@@ -158,6 +158,27 @@ describeInChromium("the panel", () => {
     expect((await first()).opacity).toBeCloseTo(0.9, 5);
   });
 
+  it("switches the keys of one character off, also for the next visit, and on again", async () => {
+    const { channels } = await state();
+    await stand.viewer.unfold("share");
+    await control("letters").uncheck();
+    const press = (key: string) => page().keyboard.press(key);
+    for (const key of ["1", "x", "m", "B"]) await press(key);
+    expect((await state()).channels).toEqual(channels);
+    await stand.open();
+    await press("1");
+    expect((await state()).channels).toEqual(channels);
+    await press("?"); // the list of keys names the switch's place
+    expect(await page().getByRole("dialog").isVisible()).toBe(true);
+    await press("Escape");
+    await control("letters").check();
+    await page()
+      .locator(".stage canvas")
+      .click({ position: { x: 3, y: 3 } });
+    await press("1");
+    expect((await state()).channels[0].shown).toBe(!channels[0].shown);
+  });
+
   it("leaves the keys alive whatever was clicked", async () => {
     const press = (key: string) => page().keyboard.press(key);
     const axes = () => page().locator(".orientation-mark").getAttribute("aria-label");

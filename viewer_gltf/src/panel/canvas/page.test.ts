@@ -112,7 +112,16 @@ describe("the panel on a plane", () => {
     const phone = ["lens-code", "scan", "measure-screen"];
     const files = OF_THE_SCREEN.filter((id) => !["next-view", "forget-views"].includes(id));
     expect(missing).toEqual(
-      ["stereo", "split", ...phone, ...files, "own-light", "help", "slice-pictures"].sort(),
+      [
+        "stereo",
+        "split",
+        ...phone,
+        ...files,
+        "own-light",
+        "help",
+        "letters",
+        "slice-pictures",
+      ].sort(),
     );
   });
 
