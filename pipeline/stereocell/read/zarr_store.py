@@ -309,7 +309,7 @@ def open_array(
         # not `path`, which may end in a slash
         names = possible_names(array)
         if location.is_local:
-            found = None if is_zipped(location) else names_on_disk(location, array)
+            found = names_on_disk(location, array, guard.members)
             names = (found,) if found is not None else ()
         chunks = Chunks(codecs, size, f"{array.path}/{named}".lstrip("/"), names)
         guard = GuardedStore(store, location, chunks)
