@@ -425,6 +425,7 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
             lan=options.lan,
             open_browser=open_browser,
             for_program=options.json,
+            frames=tuple(options.allow_frame),
         )
     except BrokenPipeError as error:  # the reader of the address has gone
         raise StdoutLost(error) from error

@@ -97,6 +97,8 @@ export class Marks {
   private readonly opening: Clip;
   /** Whether somebody has pointed at the picture. */
   private isPointedAt = false;
+  /** The cut when stereo began; null: there is no stereo. */
+  private cutAtEntry: ViewerState["clip"] | null = null;
   /** How many surfaces are on screen. */
   private surfaces = 0;
   private isDisposed = false;
@@ -149,6 +151,8 @@ export class Marks {
     const zoom = view.screen === null ? 1 : screenZoom(pxPerRad(view.screen));
     this.sight = { eye_um, up, zoom, textZoom: view.screen === null ? STEREO_TEXT : zoom };
     this.target.specimen = view.specimen;
+    this.cutAtEntry = view.screen === null ? (this.cutAtEntry ?? this.state.clip) : null;
+    this.target.isCutAsleep = this.cutAtEntry === this.state.clip;
     this.reading.specimen = view.specimen;
     this.reading.disc = view.disc;
     const m_per_um = view.specimen.getMaxScaleOnAxis();

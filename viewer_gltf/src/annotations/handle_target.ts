@@ -4,6 +4,7 @@ import type { Hit, RoomRay, Target } from "../interaction/ray_pointer";
 import { rayAlong } from "../interaction/rays";
 import { placeText } from "../interaction/tile_target";
 import { type Handle, type HandleId, pickHandle } from "./clip_handles";
+import { isLampHandle } from "./lamp_handles";
 
 const HANDLE = "handle:";
 
@@ -12,6 +13,8 @@ export class HandleTarget implements Target {
   readonly isOnTop = true;
   /** From um to the room. */
   specimen = new Matrix4();
+  /** The cut is as it was when stereo began, so that a gaze that rests ahead takes none of its handles; a button does. */
+  isCutAsleep = false;
   /** All that there are, um. */
   handles: readonly Handle[] = [];
   /** What a ray has met or dragged since this was last taken. */
@@ -38,7 +41,9 @@ export class HandleTarget implements Target {
     this.seen = handle.id;
     const place = new Vector3(...handle.position).applyMatrix4(this.specimen);
     const key = HANDLE + id;
-    return { key, place: key, distance_m: place.distanceTo(ray.origin), hold: "carry" };
+    const distance_m = place.distanceTo(ray.origin);
+    const isGlance = this.isCutAsleep && !isLampHandle(handle.id);
+    return { key, place: key, distance_m, hold: "carry", isGlance };
   }
 
   choose(): void {

@@ -65,6 +65,20 @@ describe("a handle under a gaze that rests", () => {
   });
 });
 
+describe("a handle of a cut that was there when stereo began", () => {
+  it("is not taken by a gaze that rests ahead, but by the button", () => {
+    const person = new LookingPerson(4, boxed);
+    person.handles.isCutAsleep = true;
+    person.lookUp();
+    person.lookAtHandle("x-max");
+    person.rest(LONG_S);
+    expect(person.hands.pointed).toBe("handle:x-max");
+    expect(person.isCarrying).toBe(false);
+    person.press();
+    expect(person.isCarrying).toBe(true);
+  });
+});
+
 describe("a point to measure under a gaze that rests", () => {
   it("is set once, and the next one where the gaze rests then, in the same tile, too", () => {
     const person = new LookingPerson(4, measuring);

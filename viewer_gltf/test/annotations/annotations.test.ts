@@ -262,13 +262,16 @@ describeInChromium("marks", () => {
     const meet = () => page.evaluate(() => window.bench?.meet());
     await gaze(903);
     const met = await meet();
-    expect(met).toMatchObject({ key: "handle:x-max", hold: "carry" });
+    // as the cut was before stereo began, only a button takes it
+    expect(met).toMatchObject({ key: "handle:x-max", hold: "carry", isGlance: true });
     expect(met?.distance_m).toBeCloseTo(Math.hypot(1.6, 0.48), 3);
     await gaze(250);
     expect(await meet()).toBeNull();
     await gaze(700);
     await page.evaluate(() => window.bench?.carry("handle:x-max"));
     expect((await stateNow()).clip.box?.max[0]).toBeCloseTo(700, 3);
+    await gaze(703);
+    expect(await meet()).toMatchObject({ key: "handle:x-max", isGlance: false });
     await page.evaluate(() => {
       window.bench?.dispatch({ type: "set-clip", clip: { box: null, plane: null } });
       window.bench?.carry("handle:x-max");
