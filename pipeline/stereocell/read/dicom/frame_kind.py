@@ -16,6 +16,7 @@ from typing import Any
 from stereocell.read.dicom.header_values import (
     find_number,
     find_text,
+    find_texts,
     find_value,
     find_words,
     private_number,
@@ -94,6 +95,7 @@ _CONTRASTS = {
     "INV1": "first inversion",
     "INV2": "second inversion",
     "VMI": "virtual monoenergetic",
+    **dict.fromkeys(("SWI", "SWAN", "SWIP"), "susceptibility-weighted"),
 }
 # contrasts of gradient echoes that only the echo time shows (read/dicom/echo_phase.py)
 IN_PHASE, OPPOSED_PHASE = "in phase by its echo time", "opposed phase by its echo time"
@@ -106,6 +108,7 @@ _CONTRAST_RANKS = {
     "water": 1,
     "virtual monoenergetic": 1,
     "second inversion": 1,
+    "susceptibility-weighted": 1,
     "opposed phase": 2,
     OPPOSED_PHASE: 2,
     "first inversion": 2,
@@ -166,7 +169,7 @@ class FrameKind:
     role             a key of _RANKS; empty: an image as it was acquired
     contrasts        contrasts for the user: keys of _CONTRAST_RANKS
     image_type       ImageType, compared and never shown
-    kernel           ConvolutionKernel, shown only in the form of a maker's code
+    kernel           values of ConvolutionKernel (read/dicom/kernel_names.py)
     has_agent        a contrast agent is stated
     is_attenuation_corrected  of PET
     energy_kev       of a virtual monoenergetic image
@@ -181,7 +184,7 @@ class FrameKind:
     role: str = ""
     contrasts: tuple[str, ...] = ()
     image_type: tuple[str, ...] = ()
-    kernel: str = ""
+    kernel: tuple[str, ...] = ()
     has_agent: bool = False
     is_attenuation_corrected: bool | None = None
     kvp: float | None = None
@@ -203,14 +206,19 @@ class FrameKind:
 
     @property
     def rank(self) -> int:
-        """Lower ranks are shown first: images and magnitudes have 0.
+        """Lower ranks are shown first: images and magnitudes have 0."""
+        uncorrected = _UNCORRECTED_RANK * (self.is_attenuation_corrected is False)
+        return max(
+            _PART_RANKS.get(self.part, 0), _RANKS[self.role], int(self.is_derived), uncorrected
+        )
 
-        Water and fat are computed from the echoes, so that DERIVED doesn't make them lesser images.
+    @property
+    def is_derived(self) -> bool:
+        """Whether ImageType says DERIVED and no contrast: water and fat are computed from echoes,
+        and are no lesser images.
         """
         is_named = any(word in _CONTRASTS.values() for word in self.contrasts)
-        is_derived = self.image_type[:1] == ("DERIVED",) and not is_named
-        uncorrected = _UNCORRECTED_RANK * (self.is_attenuation_corrected is False)
-        return max(_PART_RANKS.get(self.part, 0), _RANKS[self.role], int(is_derived), uncorrected)
+        return self.image_type[:1] == ("DERIVED",) and not is_named
 
     @property
     def contrast_rank(self) -> int:
@@ -249,7 +257,7 @@ def kind_of(header: Any, groups: Sequence[Any]) -> FrameKind:
     def number(sequence: str, key: str) -> float | None:
         return find_number(header, groups, sequence, key)
 
-    kernel = find_text(header, groups, "CTReconstructionSequence", "ConvolutionKernel")
+    kernel = find_texts(header, groups, "CTReconstructionSequence", "ConvolutionKernel")
     cardiac = "CardiacSynchronizationSequence"
     return FrameKind(
         part=_part(header, groups, words) if is_mr else "",

@@ -42,10 +42,15 @@ def find_value(header: Any, groups: Sequence[Any], sequence: str, key: str) -> A
 
 def find_words(header: Any, groups: Sequence[Any], key: str) -> tuple[str, ...]:
     """Return the words of a coded attribute, in capitals; none where it can't be read."""
+    return tuple(word.upper() for word in find_texts(header, groups, "", key))
+
+
+def find_texts(header: Any, groups: Sequence[Any], sequence: str, key: str) -> tuple[str, ...]:
+    """Return the values of an attribute that may have several; none where it can't be read."""
     try:
-        found = find_value(header, groups, "", key) or ()
-        words = (found,) if isinstance(found, str) else tuple(found)
-        return tuple(str(word).strip().upper() for word in words)
+        found = find_value(header, groups, sequence, key) or ()
+        texts = (found,) if isinstance(found, str) else tuple(found)
+        return tuple(str(text).strip() for text in texts)
     except DICOM_FAULTS:
         return ()
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from stereocell.read.anatomical_axes import plane_name
 from stereocell.read.dicom.frame_kind import LOCALIZER
-from stereocell.read.dicom.split_kinds import NAMED, Property, by_value
+from stereocell.read.dicom.split_kinds import NAMED, Property, by_value, value_names
 from stereocell.read.dicom.stack import Stack
 from stereocell.read.plane_stack import normal_of
 
@@ -51,9 +51,10 @@ def _named(members: Sequence[Stack]) -> list[Stack]:
         if places is None or named == _MOST_NAMED:
             continue
         named += 1
+        of_place = {place: one.find(s.first) for place, s in zip(places, found, strict=True)}
+        names = value_names(one, [of_place[place] for place in sorted(of_place)])
         for index, place in enumerate(places):
-            stack = found[index]
-            word = one.words(one.find(stack.first), place)
+            stack, word = found[index], names[place]
             words = stack.words if word in ("", *stack.words) else (*stack.words, word)
             found[index] = replace(stack, words=words, among=(*stack.among, place))
     return found

@@ -8,7 +8,7 @@ as the last one does of an acquisition that was stopped, is incomplete: it is se
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,14 +21,16 @@ AreEqual = Callable[[Frame, Frame], bool]
 Place = Sequence[Frame]  # frames at one place, by instance number
 
 BY_REPETITION = "RepetitionTime"
+BY_POSITION = "TemporalPositionIdentifier"
+BY_IMAGE_INDEX = "ImageIndex"
 # attributes that number points in time: field of FrameKind, name in the standard
 _NUMBERED = (
-    ("temporal", "TemporalPositionIdentifier"),
+    ("temporal", BY_POSITION),
     ("cardiac", "NominalPercentageOfCardiacPhase"),
     ("trigger_time", "TriggerTime"),
     ("acquisition", "AcquisitionNumber"),
     ("reference_time", "FrameReferenceTime"),
-    ("time_slice", "ImageIndex"),
+    ("time_slice", BY_IMAGE_INDEX),
     ("repetition_time", BY_REPETITION),
 )
 BY_NUMBER = "InstanceNumber"
@@ -42,6 +44,8 @@ class Points:
     whole       for each point one frame per place
     incomplete  frames of points that lack some places
     attribute   the one that tells the points apart
+    whole_places, incomplete_places  of these points among all, in the order of time, from 0
+    values      of the attribute for all points, in that order; empty: it has none for each point
     duplicates  number of frames that are neither
     differ      duplicates have other pixels than the frames that are taken
     """
@@ -49,6 +53,9 @@ class Points:
     whole: tuple[tuple[Frame, ...], ...]
     incomplete: tuple[tuple[Frame, ...], ...] = ()
     attribute: str = ""
+    whole_places: tuple[int, ...] = ()
+    incomplete_places: tuple[int, ...] = ()
+    values: tuple[float, ...] = ()
     duplicates: int = 0
     differ: bool = False
 
@@ -82,9 +89,10 @@ def _numbered(places: Sequence[Place]) -> Points | None:
                 classes[getattr(frame.kind, field)].append((index, frame))
         if None in classes or len(classes) < 2:
             continue
-        points = _sorted_out([classes[value] for value in sorted(classes)], len(places), name)
+        values = sorted(classes)
+        points = _sorted_out([classes[value] for value in values], len(places), name)
         if points is not None:
-            return points
+            return replace(points, values=tuple(values))
     return None
 
 
@@ -134,6 +142,9 @@ def _sorted_out(
     if any(len({index for index, _ in point}) < len(point) for point in points):
         return None
     in_order = [tuple(frame for _, frame in sorted(p, key=lambda pair: pair[0])) for p in points]
-    whole = tuple(point for point in in_order if len(point) == places)
-    rest = tuple(point for point in in_order if len(point) < places)
-    return Points(whole, rest, attribute) if whole else None
+    whole = tuple(i for i, point in enumerate(in_order) if len(point) == places)
+    rest = tuple(i for i, point in enumerate(in_order) if len(point) < places)
+    if not whole:
+        return None
+    chosen, others = (tuple(in_order[i] for i in group) for group in (whole, rest))
+    return Points(chosen, others, attribute, whole, rest)

@@ -29,7 +29,7 @@ from stereocell.read.dicom.group_frames import (
 from stereocell.read.dicom.name_series import name_apart
 from stereocell.read.dicom.points_in_time import AreEqual, find_points
 from stereocell.read.dicom.stack import Stack
-from stereocell.read.dicom.time_notes import time_notes
+from stereocell.read.dicom.time_notes import point_name, time_notes
 from stereocell.read.plane_stack import (
     SAME_PLACE,
     NoStackError,
@@ -109,7 +109,7 @@ def _stacks(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> l
         _stack(points.whole, group, notes, words, (kind.rank, kind.contrast_rank, *group.order))
     ]
     for place, point in enumerate(points.incomplete):
-        rest = f"incomplete point in time {len(points.whole) + place + 1}"
+        rest = f"incomplete {point_name(points, points.incomplete_places[place])}"
         order = (_LAST, kind.contrast_rank, *group.order, place)
         stacks.append(_stack((point,), group, [], (*words, rest), order))
     return stacks

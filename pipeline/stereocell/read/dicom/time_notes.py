@@ -2,10 +2,23 @@
 
 from stereocell.model.counted import agreeing, counted
 from stereocell.read.dicom.frame import Frame
-from stereocell.read.dicom.points_in_time import BY_NUMBER, BY_REPETITION, Points
+from stereocell.read.dicom.points_in_time import (
+    BY_IMAGE_INDEX,
+    BY_NUMBER,
+    BY_POSITION,
+    BY_REPETITION,
+    Points,
+)
 from stereocell.read.statements import omission
 
-_MOST_COUNTS = 4  # most incomplete points whose slices are counted one by one
+_MOST_COUNTS = 4  # most points that a note lists one by one
+_MOST_SHOWN = 9999  # larger values of an attribute are not shown: they may be dates
+_UNITS = {
+    "TriggerTime": " ms",
+    "FrameReferenceTime": " ms",
+    BY_REPETITION: " ms",
+    "NominalPercentageOfCardiacPhase": " %",
+}
 
 
 def time_notes(points: Points) -> list[str]:
@@ -27,7 +40,39 @@ def time_notes(points: Points) -> list[str]:
             f"{images} images at a place are {what} ({points.attribute} tells them apart) and "
             "count as points in time; --time picks one"
         )
-    return [*notes, *([_incomplete(points)] if points.incomplete else [])]
+    notes += [_incomplete(points)] if points.incomplete else []
+    return [*notes, *_renumbered(points)]
+
+
+def point_name(points: Points, place: int) -> str:
+    """Return a point's name for the user: its number among all, from 1, and its stated value.
+
+    place  among all points, in the order of time
+    """
+    name = f"point in time {place + 1}"
+    # the number of a volume by ImageIndex is computed, and stated nowhere
+    is_stated = points.values and points.attribute != BY_IMAGE_INDEX
+    if not is_stated or not 0 <= points.values[place] <= _MOST_SHOWN:
+        return name
+    value = f"{points.values[place]:g}{_UNITS.get(points.attribute, '')}"
+    return f"{name} ({points.attribute} {value})"
+
+
+def _renumbered(points: Points) -> list[str]:
+    """Return a note where `--time` counts on over points that lack slices, or that are absent."""
+    images = len(points.whole) + len(points.incomplete)
+    keys, first = tuple(map(float, range(images))), 0.0
+    if points.attribute == BY_POSITION and points.values[-1] <= _MOST_SHOWN:
+        keys, first = points.values, min(points.values[0], 1.0)  # the standard counts from 1
+    moved = [
+        f"--time {time} is {point_name(points, place)}"
+        for time, place in enumerate(points.whole_places)
+        if keys[place] - first != time
+    ]
+    if not moved:
+        return []
+    more = ", ..." if len(moved) > _MOST_COUNTS else ""
+    return [f"--time counts whole points alone, from 0: {', '.join(moved[:_MOST_COUNTS])}{more}"]
 
 
 def _duplicates(points: Points) -> str:

@@ -40,7 +40,21 @@ export function chips(choice: Choice, width: number): Block {
   return captioned(choice.label, width, one(marks, unlessRefused(choice, regions)));
 }
 
-/** Many options, or long ones: the one before and the one after. */
+/** A few options with long names: a row for each. */
+export function optionRows(choice: Choice, width: number): readonly Block[] {
+  return choice.options.map(({ value, label }) => {
+    const row: Rect = { x: 0, y: 0, width, height: ROW };
+    const isChosen = value === choice.value;
+    const marks = [
+      box(row, isChosen ? "accent" : "raised"),
+      text(row, label, { tone: toneOf(choice, isChosen) }),
+    ];
+    const place = region(`${choice.id}=${value}`, label, row, () => choice.to(value));
+    return one(marks, unlessRefused(choice, [place]));
+  });
+}
+
+/** Many options: the one before and the one after. */
 export function stepper(choice: Choice, row: Rect): Block {
   const { options, value, id } = choice;
   const at = options.findIndex((each) => each.value === value);

@@ -2,7 +2,16 @@
  * The controls of a layout as rows of the panel on a canvas, each tall enough to be gazed at. Pure.
  */
 import type { Button, Choice, Colour, Control, Group, Search, Toggle } from "../controls";
-import { chips, mapBlock, nextSwatch, palettes, stepper, swatches, swatchMarks } from "./choices";
+import {
+  chips,
+  mapBlock,
+  nextSwatch,
+  optionRows,
+  palettes,
+  stepper,
+  swatches,
+  swatchMarks,
+} from "./choices";
 import {
   type Block,
   box,
@@ -37,6 +46,9 @@ export const ELSEWHERE: ReadonlySet<string> = new Set([
 ]);
 /** Width of a swatch in a channel's row: 6 degrees at 1.2 m. */
 const SWATCH = 110;
+/** Options with a name of more letters than fit between two arrows are listed, if there are so few. */
+const LONG = 16;
+const MAX_LISTED = 6;
 
 /** @param fanned the group whose colours lie over its name; null: none */
 export function blocksOf(
@@ -57,7 +69,8 @@ export function blocksOf(
     case "window":
       return [windowRow(item, 0, row), windowRow(item, 1, row)];
     case "choice":
-      return [item.isInline ? chips(item, width) : stepper(item, row)];
+      if (item.isInline) return [chips(item, width)];
+      return isWordy(item) ? optionRows(item, width) : [stepper(item, row)];
     case "colour":
       return item.palettes.length === 0 ? [nextSwatch(item, row)] : palettes(item, width);
     case "map":
@@ -73,6 +86,11 @@ export function blocksOf(
     case "link":
       return [textBlock(item.label, "It is in the page's address: take it from there.", width)];
   }
+}
+
+/** Whether its options are few, and too long for the space between two arrows. */
+function isWordy({ options }: Choice): boolean {
+  return options.length <= MAX_LISTED && options.some(({ label }) => label.length > LONG);
 }
 
 /** Nobody types by gaze: one hint after the other. */

@@ -112,7 +112,16 @@ describe("the panel on a plane", () => {
     const phone = ["lens-code", "scan", "measure-screen"];
     const files = OF_THE_SCREEN.filter((id) => !["next-view", "forget-views"].includes(id));
     expect(missing).toEqual(
-      ["stereo", "split", ...phone, ...files, "own-light", "help", "slice-pictures"].sort(),
+      [
+        "stereo",
+        "split",
+        ...phone,
+        ...files,
+        "own-light",
+        "help",
+        "letters",
+        "slice-pictures",
+      ].sort(),
     );
   });
 
@@ -131,7 +140,7 @@ describe("the panel on a plane", () => {
   it("reports why something is refused", () => {
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     const page = regionsOf(laidOut(off), "volumes");
-    const radius = find(page, "disc-radius");
+    const radius = find(regionsOf(laidOut(off), "volume-settings"), "disc-radius");
     expect(radius.isSlide).toBe(false);
     expect(radius.to(0.3)).toEqual({ canvas: "announce", text: "Only the mode Disc has one." });
     expect(find(page, "mode=disc").to(0)).toEqual({ type: "set", id: "mode", value: "disc" });

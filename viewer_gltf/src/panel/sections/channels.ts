@@ -103,9 +103,8 @@ function cardOf(
   }
   return {
     ...head,
-    controls: [
-      ownColour(channel, channels),
-      shownToggle(channel),
+    controls: [ownColour(channel, channels), shownToggle(channel)],
+    more: [
       controlOf(VOLUME, channel, id),
       {
         kind: "choice",
@@ -121,8 +120,6 @@ function cardOf(
         refusal: channel.volume ? "" : "Only volumes have one.",
         to: (each) => ({ type: "choose-transfer-function", channel: id, name: each }),
       },
-    ],
-    more: [
       ...CHANNEL.filter((row) => row !== COLOR && row !== VOLUME).map((row) =>
         controlOf(row, channel, id),
       ),
@@ -218,17 +215,10 @@ function addingOf(
   return items;
 }
 
-/** A card as a row of the list. Only the switch is there until the channel is shown and opened. */
+/** A card as a row of the list: swatch and switch, and the rest once the channel is shown and opened. */
 function rowOf(card: Group): Group {
-  const isSwitch = ({ id }: Control) => id === `${card.id}/shown`;
   const canOpen = !card.isDimmed || card.isOpen;
-  const rest = [...card.controls.filter((each) => !isSwitch(each)), ...card.more];
-  return {
-    ...card,
-    isCompact: true,
-    controls: card.controls.filter(isSwitch),
-    more: canOpen ? rest : [],
-  };
+  return { ...card, isCompact: true, more: canOpen ? card.more : [] };
 }
 
 export function channelItems(
