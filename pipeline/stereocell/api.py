@@ -53,7 +53,7 @@ def build(
     from stereocell.building import phases
     from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import require_build_or_nothing
-    from stereocell.building.preset_choice import load_for, print_choice
+    from stereocell.building.preset_choice import load_for
     from stereocell.building.setting_names import named_as_settings
     from stereocell.engine.run import Engine
     from stereocell.engine.worker_pool import leave_if_importing_main
@@ -102,8 +102,7 @@ def build(
         wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
-        phases.make(str(source), folder, wanted, engine=engine)
-        print_choice(choice)
+        phases.make(str(source), folder, wanted, choice=choice, engine=engine)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
         run_bundle(folder, engine)

@@ -117,3 +117,35 @@ def test_a_window_of_a_ct_console_is_refused_for_other_values(
     flags = ["--preset", "ct", "--iso-value", "0=724", "--window", "0=bone"]
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 2
     assert "the values of this CT are none: expected LOW:HIGH" in capsys.readouterr().err
+
+
+def _crop() -> NDArray[np.int16]:
+    """Return muscle and bone alone, in Hounsfield units."""
+    return _hounsfield()[:, 10:31, 14:35].clip(40, None).round().astype(np.int16)
+
+
+@pytest.mark.parametrize("preset", ["ct", "ct-bone"])
+def test_a_crop_without_air_is_in_hounsfield_units_where_the_user_says_so(
+    tmp_path: Path, preset: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source = _write(tmp_path, _crop())
+    command = ["plan", str(source), "-o", str(tmp_path / "out"), "--preset", preset]
+    assert main(command) == 0
+    assert (
+        f"{STAYS}, and a table or head holder is not looked for, so it stays (--as hounsfield"
+        in (capfd.readouterr().err.replace("\n", " "))
+    )
+    said = tmp_path / "said"
+    assert main([*command[:3], str(said), *command[4:], "--as", "hounsfield"]) == 0
+    assert "no Hounsfield units" not in capfd.readouterr().err
+    plan = json.loads((said / "plan.json").read_text("utf-8"))
+    assert (plan["modality"], plan["is_hounsfield"]) == ("CT", True)
+
+
+def test_hounsfield_units_that_the_user_states_choose_the_preset(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source = _write(tmp_path, _crop())
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--as", "hounsfield"]) == 0
+    assert "preset ct: the values are taken for Hounsfield units" in capfd.readouterr().err
+    assert json.loads((tmp_path / "out" / "plan.json").read_text("utf-8"))["modality"] == "CT"

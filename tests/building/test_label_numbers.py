@@ -53,6 +53,15 @@ def test_a_background_that_is_not_0_is_named_and_left_out_on_request(
     assert json.loads((tmp_path / "o/plan.json").read_text("utf-8"))["labels"][0]["background"]
 
 
+def test_a_background_below_0_is_left_out_on_request(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    voxels = numbered(background=-2, dtype=np.int32)
+    assert "3 objects" in planned(tmp_path, voxels, capsys, "--background", -2)
+    plan = json.loads((tmp_path / "o/plan.json").read_text("utf-8"))
+    assert plan["labels"][0]["background"] == -2
+
+
 @pytest.mark.parametrize(("covered", "is_told"), [(1, True), (8, False)])
 def test_a_background_that_misses_a_side_is_named_if_it_has_most_voxels(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], covered: int, is_told: bool

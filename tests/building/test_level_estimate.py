@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from stereocell.building.level_estimate import BLOCK, estimate_level
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.plan_notes import words_of_spacing
 from stereocell.building.survey_file import read_survey
 from stereocell.cli.__main__ import main
 from stereocell.transfer.joint_histogram import sample_boxes
@@ -36,11 +38,16 @@ def _planned(tmp_path: Path, voxels: NDArray[np.uint16], *flags: str) -> Path:
     return tmp_path / "out"
 
 
+def _level_notes(out: Path) -> list[str]:
+    """Return the notes of a plan on its only channel."""
+    return [note for note in OutFolder(out).plan().notes if note.startswith("Channel0")]
+
+
 def test_the_plan_names_the_near_levels_of_a_small_volume_as_a_build_finds_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = _planned(tmp_path, _cells((32, 64, 64), core=1200))
-    (note,) = OutFolder(out).plan().notes
+    (note,) = _level_notes(out)
     assert f"plan: {note}" in capsys.readouterr().err
     assert note in json.loads((out / "provenance.json").read_text("utf-8"))["notes"]
     assert main(["units", str(out), "--workers", "0"]) == 0
@@ -52,16 +59,92 @@ def test_the_plan_names_the_near_levels_of_a_small_volume_as_a_build_finds_them(
     assert note.endswith(f"near levels: {channel.near_levels}")
 
 
-@pytest.mark.parametrize("flags", [("--iso-value", "0=400"), ("--preset", "em")])
-def test_the_plan_names_no_levels_where_none_is_to_be_found(
-    tmp_path: Path, flags: tuple[str, str]
+@pytest.mark.parametrize(
+    ("flags", "expected"),
+    [
+        (("--iso-value", "0=400"), ["Channel0: level 400, as it is given"]),
+        (
+            ("--iso-value", "0=150+b"),
+            ["Channel0: level 150+b (+b: above the background), as it is given"],
+        ),
+        (
+            ("--preset", "em"),
+            ["Channel0: no surface is built by default (--surfaces Channel0=outer builds one)"],
+        ),
+        (
+            ("--surfaces", "0=900,inner"),
+            [
+                "Channel0 900: level 900, as it is given",
+                "Channel0 inner: the build finds the inner level",
+            ],
+        ),
+    ],
+)
+def test_the_plan_states_a_level_that_needs_no_voxel(
+    tmp_path: Path, flags: tuple[str, str], expected: list[str]
 ) -> None:
-    out = _planned(tmp_path, _cells((32, 64, 64), core=1200), *flags)
-    assert not [note for note in OutFolder(out).plan().notes if "level" in note]
+    assert _level_notes(_planned(tmp_path, _cells((32, 64, 64), core=1200), *flags)) == expected
 
 
-def test_a_lone_clear_level_is_not_mentioned(tmp_path: Path) -> None:
-    assert OutFolder(_planned(tmp_path, _cells((32, 64, 64), core=0))).plan().notes == ()
+def test_the_plan_states_a_lone_clear_level_and_the_voxel_size(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = _planned(tmp_path, _cells((32, 64, 64), core=0))
+    (note,) = _level_notes(out)
+    assert re.fullmatch(r"Channel0: clear level [0-9.]+ \([0-9.]+% of the voxels\)", note)
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"plan: {note}" in told
+    assert "32 x 64 x 64 voxels (z, y, x) of 1 x 1 x 1 um, 1 tile x 1 channel" in told
+
+
+def test_voxel_sizes_of_bodies_are_in_millimetres() -> None:
+    assert words_of_spacing((5000.0, 488.28125, 488.28125)) == "5 x 0.4883 x 0.4883 mm"
+    assert words_of_spacing((200.0, 50.0, 50.0)) == "200 x 50 x 50 um"
+
+
+def test_the_plan_says_that_noise_has_no_surface(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).poisson(200, (32, 64, 64)).astype(np.uint16)
+    (note,) = _level_notes(_planned(tmp_path, noise))
+    assert note.startswith("Channel0: no surface: neighbouring voxels have nothing to do")
+
+
+def test_the_plan_calls_a_level_unsure_that_no_tile_has_voxels_for(tmp_path: Path) -> None:
+    """A cube of 9 voxels a side holds less than .2 % of the volume."""
+    lone = np.random.default_rng(0).normal(200, 10, (64, 96, 96))
+    lone[20:29, 40:49, 40:49] += 2000
+    out = _planned(tmp_path, lone.round().astype(np.uint16))
+    (note,) = _level_notes(out)
+    assert note.startswith("Channel0: unsure level ")
+    assert "no tile by itself has enough voxels on both sides of it" in note
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    (channel,) = read_survey(OutFolder(out)).values()
+    assert channel.appearance.surface == "unsure"
+    assert "no tile by itself" in channel.appearance.surface_reason
+
+
+def test_the_plan_explains_how_the_build_chooses_between_levels(tmp_path: Path) -> None:
+    flags = ("--preset", "lightsheet", "--grid", "1x1")
+    (note,) = _level_notes(_planned(tmp_path, _cells((32, 64, 64), core=1200), *flags))
+    assert note.startswith("Channel0: the build takes one of ")
+    assert ": the one with the most separate pieces" in note
+    assert note.endswith(" (+b: above the background)") == ("+b (" in note)
+
+
+def test_the_plan_counts_the_channels_that_it_does_not_look_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stereocell.building.level_estimate.MAX_CHANNELS", 1)
+    voxels, scales = _cells((32, 64, 64), core=0), [dict.fromkeys("zyx", 1.0)]
+    source = phantoms.write_ome_zarr(
+        tmp_path / "a.ome.zarr", [np.stack([voxels] * 3)], axes="czyx", scales=scales
+    )
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
+    notes = OutFolder(tmp_path / "out").plan().notes
+    assert "the plan looks at no level of 2 other channels: the build finds these" in notes
+    monkeypatch.setattr("stereocell.building.level_estimate.MOST_VOXELS", 1000)
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
+    notes = OutFolder(tmp_path / "out").plan().notes
+    assert "the plan looks at no level of the channels: the build finds these" in notes
 
 
 def test_blocks_find_nearly_the_levels_of_all_voxels(tmp_path: Path) -> None:
@@ -81,7 +164,7 @@ def test_blocks_find_nearly_the_levels_of_all_voxels(tmp_path: Path) -> None:
 
 def test_estimated_levels_are_told_with_three_digits(tmp_path: Path) -> None:
     out = _planned(tmp_path, _cells((96, 160, 160), core=1200))
-    (note,) = OutFolder(out).plan().notes
+    (note,) = _level_notes(out)
     assert "level about" in note
     values = [word for word in note.split() if word.isdigit()]
     assert values == [f"{float(f'{float(value):.3g}'):g}" for value in values]

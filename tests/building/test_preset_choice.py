@@ -1,5 +1,6 @@
 """Which preset a source is built by where the user names none, and what the plan says of it."""
 
+import re
 from pathlib import Path
 
 import nibabel
@@ -26,7 +27,7 @@ def _body(air: float, tissue: float) -> NDArray[np.int16]:
     return (np.where(away < 9, tissue, air) + noise).round().astype(np.int16)
 
 
-def _nifti(path: Path, voxels: NDArray[np.int16]) -> Path:
+def _nifti(path: Path, voxels: NDArray[np.generic]) -> Path:
     image = nibabel.Nifti1Image(voxels, np.diag([1.0, 1.0, 1.0, 1.0]))
     image.header.set_xyzt_units("mm")
     nibabel.save(image, path)
@@ -37,14 +38,14 @@ def test_millimetres_with_hounsfield_units_are_a_ct(tmp_path: Path) -> None:
     source = _nifti(tmp_path / "a b.nii.gz", _body(-1000, 40))
     chosen, reason = choose_preset(open_dataset(source))
     assert chosen == "ct"
-    assert "1 mm" in reason
-    assert "Hounsfield" in reason
+    assert "1 mm" in reason[0]
+    assert "Hounsfield" in reason[0]
 
 
 def test_millimetres_without_are_an_mri(tmp_path: Path) -> None:
     chosen, reason = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400))))
     assert chosen == "mri"
-    assert "no Hounsfield units" in reason
+    assert "no Hounsfield units" in reason[0]
 
 
 @pytest.mark.parametrize(
@@ -65,15 +66,14 @@ def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_that_build_it_are_na
     window: str,
 ) -> None:
     source = _nifti(tmp_path / "a.nii", voxels)
-    chosen, reason = choose_preset(open_dataset(source))
+    chosen, (assumed, advice) = choose_preset(open_dataset(source))
     assert chosen == "mri"
-    assert f"{words}" in reason
-    assert "no modality is stated: MR is assumed; " in reason
-    assert "(for a CT --preset ct --iso-value 0=" in reason
-    assert ("no scaling to Hounsfield units is known" in reason) == (voxels.dtype == np.uint8)
-    assert ("plus 1024 would be those of a CT" in reason) == (voxels.dtype != np.uint8)
-    advice = reason[reason.index("--preset ct") :]
-    flags = advice[: min(advice.index(mark) for mark in (";", ", a") if mark in advice)].split()
+    assert words in assumed + advice
+    assert "no modality is stated: MR is assumed (--preset none: the defaults)" in assumed
+    assert "for a CT --preset ct --iso-value 0=" in advice
+    assert ("no scaling to Hounsfield units is known" in advice) == (voxels.dtype == np.uint8)
+    assert ("plus 1024 would be those of a CT" in advice) == (voxels.dtype != np.uint8)
+    flags = advice[advice.index("--preset ct") :].partition(";")[0].split()
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     assert "is assumed" not in capsys.readouterr().err
     plan = OutFolder(tmp_path / "out").plan()
@@ -86,7 +86,7 @@ def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_that_build_it_are_na
     ("preset", "voxels", "words"),
     [
         ("ct", _body(24, 1064), "plus 1024, and its level of -300 is meant for Hounsfield units"),
-        ("ct-bone", _body(24, 1064), "--preset ct-bone --iso-value 0=1324 --window 0=0:3024"),
+        ("ct-bone", _body(24, 1064), "(or --preset ct-bone --iso-value 0=1324 --window 0=0:3024)"),
         ("ct", _body(20, 180).astype(np.uint8), "8-bit values, which are no Hounsfield units"),
         ("ct-bone", _body(20, 180).astype(np.uint8), "--iso-value 0=VALUE"),
         ("ct", _body(-1000, 40), ""),
@@ -108,6 +108,55 @@ def test_a_preset_of_ct_for_other_values_is_doubted_with_the_flags_that_fit(
     assert "is meant for Hounsfield units" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("preset", ["ct", "ct-bone"])
+@pytest.mark.parametrize(
+    "voxels",
+    [
+        _body(24, 1064),
+        _body(20, 180).astype(np.uint8),
+        (_body(-1000, 40).astype(np.int32) + 32768).astype(np.uint16),
+        (_body(24, 1064) / 2000).astype(np.float32),
+    ],
+    ids=["offset", "8 bits", "unsigned", "normalised"],
+)
+def test_a_preset_of_ct_gives_no_level_to_values_that_are_no_hounsfield_units(
+    tmp_path: Path, preset: str, voxels: NDArray[np.generic]
+) -> None:
+    """As in DICOM: see tests/read/dicom/test_value_scales.py."""
+    out = tmp_path / "out"
+    source = _nifti(tmp_path / "a.nii", voxels)
+    assert main(["plan", str(source), "-o", str(out), "--preset", preset]) == 0
+    plan = OutFolder(out).plan()
+    assert (plan.settings.iso_values, plan.settings.windows) == ({}, {})
+    assert not plan.is_hounsfield
+    assert sum("the level and its window are not used" in note for note in plan.notes) == 1
+    own = ["--preset", preset, "--iso-value", "0=300", "--window", "0=0:900"]
+    assert main(["plan", str(source), "-o", str(tmp_path / "own"), *own]) == 0
+    settings = OutFolder(tmp_path / "own").plan().settings
+    assert (settings.iso_values, settings.windows) == ({"NIfTI": 300}, {"NIfTI": "0:900"})
+
+
+def test_a_part_of_a_body_without_air_keeps_the_level_of_bone(tmp_path: Path) -> None:
+    source = _nifti(tmp_path / "a.nii", _body(40, 900))
+    assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", "ct-bone"]) == 0
+    plan = OutFolder(tmp_path / "out").plan()
+    assert plan.settings.iso_values == {"NIfTI": 300}
+    assert any("is meant for Hounsfield units (--iso-value 0=VALUE" in note for note in plan.notes)
+
+
+def test_values_of_advice_are_short_and_hold_no_exponent(tmp_path: Path) -> None:
+    for voxels in (
+        (_body(-1000, 40).astype(np.int32) + 32768).astype(np.uint16),
+        (_body(20, 180) / 700).astype(np.float32),
+    ):
+        _, (_, advice) = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", voxels)))
+        numbers = re.findall(r"(?<=[=:])-?[0-9.e+]+", advice)
+        assert len(numbers) == 3
+        for number in numbers:
+            assert "e" not in number
+            assert len(number.strip("-").replace(".", "").strip("0")) <= 3
+
+
 def test_the_levels_that_are_shifted_are_those_of_the_presets() -> None:
     for preset, level in LEVELS_HU.items():
         settings = load(preset, None, flags={})
@@ -122,8 +171,9 @@ def test_a_ct_that_is_stated_without_a_sign_is_doubted(tmp_path: Path) -> None:
     (tmp_path / "a.mha").write_bytes(head.encode() + voxels.tobytes())
     chosen, reason = choose_preset(open_dataset(tmp_path / "a.mha"))
     assert chosen == "ct"
-    assert "plus 1024, and its level of -300 is meant for Hounsfield units" in reason
-    assert "--preset ct --iso-value 0=724 --window 0=0:3024" in reason
+    assert reason[0] == "preset ct: the input is CT (--preset none: the defaults)"
+    assert "plus 1024, and its level of -300 is meant for Hounsfield units" in reason[1]
+    assert "--preset ct --iso-value 0=724 --window 0=0:3024" in reason[1]
 
 
 def test_padding_darker_than_air_hides_no_ct(tmp_path: Path) -> None:
@@ -137,7 +187,7 @@ def test_few_negative_values_make_no_ct(tmp_path: Path) -> None:
     voxels[:4, :4, :4] = -610  # as an atlas has it, resampled by splines
     chosen, reason = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", voxels)))
     assert chosen == "mri"
-    assert "no Hounsfield units" in reason
+    assert "no Hounsfield units" in reason[0]
 
 
 def test_a_level_above_the_background_is_refused_of_ct(
@@ -163,7 +213,7 @@ def test_what_is_too_small_for_a_patient_follows_the_spacing(tmp_path: Path) -> 
     for modality in ("", "MR"):
         chosen, reason = choose_preset(dataset, modality=modality)
         assert chosen is None
-        assert "6.4 mm across, too small for a patient" in reason
+        assert "6.4 mm across, too small for a patient" in reason[0]
     assert main(["plan", str(tmp_path / "a.nii"), "-o", str(tmp_path / "o")]) == 0
 
 
@@ -214,7 +264,7 @@ def test_a_source_that_cannot_be_read_is_told_once(
     source = tmp_path / "a.nii"
     source.write_bytes(b"no image")
     settings, choice = load_for(source, None, None, flags={})
-    assert (settings.plan.modality, choice) == ("", "")
+    assert (settings.plan.modality, choice) == ("", ())
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err.count("\n") == 1
 

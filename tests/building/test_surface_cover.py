@@ -11,10 +11,11 @@ from scipy import ndimage
 from skimage.measure import marching_cubes
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.surface_cover import REMEDY
+from stereocell.building.surface_cover import NO_REMEDY, REMEDY, SurfaceCover
 from stereocell.building.unit_files import cover_of, load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.cover import measure_cover
+from stereocell.isosurface.lifted_by_noise import Lifted, count_lifted
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
@@ -157,3 +158,84 @@ def test_the_built_surface_of_a_thin_dome_is_whole(tmp_path: Path, slice_axis: i
 
 def _pieces(positions: NDArray[np.float32], triangles: NDArray[np.integer]) -> int:
     return len(trimesh.Trimesh(positions, triangles).split(only_watertight=False))
+
+
+def test_voxels_that_noise_lifts_are_counted_as_they_are_drawn() -> None:
+    rng = np.random.default_rng(0)
+    denoised = rng.normal(200, 4, 400_000)
+    level, noise = 221.0, 22.0
+    is_lifted = (denoised + rng.normal(0, noise, denoised.shape) > level) & (denoised <= level)
+    counts, edges = np.histogram(denoised, 500)
+    found = count_lifted(counts, edges, level=level, noise=noise)
+    is_far = denoised <= level - noise / 2
+    assert found.far == pytest.approx((is_lifted & is_far).sum(), rel=0.02)
+    assert found.far + found.near == pytest.approx(is_lifted.sum(), rel=0.02)
+    assert count_lifted(counts, edges, level=level, noise=0.0) == Lifted(0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("lifted", "expected"),
+    [
+        (Lifted(0.0, 0.0), Cover(200, 100, 110)),
+        (Lifted(60.0, 4.0), Cover(136, 100, 110)),
+        (Lifted(60.0, 30.0), Cover(130, 100, 110)),  # as many as lie below the level in the solid
+        (Lifted(500.0, 30.0), Cover(100, 100, 110)),  # no more than there are
+    ],
+)
+def test_voxels_that_noise_lifts_are_not_left_out(lifted: Lifted, expected: Cover) -> None:
+    found = SurfaceCover.of(Cover(200, 100, 110), lifted)
+    assert found.cover == expected
+    assert found.lifted == 200 - expected.source
+    assert found.words.startswith(expected.words)
+    assert (f"noise alone lifts about {found.lifted} others" in found.words) == bool(found.lifted)
+
+
+def test_the_remedy_is_named_where_it_keeps_more_structure_than_noise() -> None:
+    loss = Cover(200, 100, 110)
+    assert SurfaceCover.of(loss, Lifted(20.0, 0.0)).remedy == REMEDY
+    assert SurfaceCover.of(loss, Lifted(40.0, 0.0)).remedy == NO_REMEDY
+
+
+def _cover_after(
+    tmp_path: Path, voxels: NDArray[np.uint16], level: float, surface: str = ""
+) -> tuple[Cover, NDArray[np.bool_]]:
+    """Build the units of a volume; return how the solid covers it, and where it is above level."""
+    (tmp_path / "own.toml").write_text(f"[surface]\n{surface}\n")
+    scales = [{"z": 1.0, "y": 1.0, "x": 1.0}]
+    source = phantoms.write_ome_zarr(tmp_path / "one.ome.zarr", [voxels], scales=scales)
+    out, own = tmp_path / "out", str(tmp_path / "own.toml")
+    flags = ["--iso-value", f"0={level:g}", "--config", own, "--grid", "1x1"]
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+    assert main(["units", str(out), "--workers", "0"]) == 0
+    ((name, key),) = OutFolder(out).index().items()
+    cover = cover_of(load_record(OutFolder(out).unit_dir(*name.split("/"), key)))
+    assert cover is not None
+    return cover, voxels > level
+
+
+def test_noise_above_a_low_level_is_nothing_that_a_surface_leaves_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The level lies one deviation of the noise above the ground, as that of dim nuclei does."""
+    ball = phantoms.blurred_ball((32, 64, 64), (1.0, 1.0, 1.0), (15.5, 31.5, 31.5), 10.0, 1.5)
+    noisy = 200 + 60 * ball + np.random.default_rng(0).normal(0, 22, ball.shape)
+    cover, _ = _cover_after(tmp_path, noisy.round().astype(np.uint16), 222)
+    assert cover.missing > 0.5
+    assert "leaves out" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("noise", [20.0, 80.0])
+def test_a_torn_shell_is_reported_beside_noise(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: float
+) -> None:
+    """Smoothing may move a value by 20 deviations here, which removes a wall of two voxels."""
+    body, level = ThinBody("sphere", 1.5, 1, 0), (GROUND + BODY) / 2
+    noisy = body.voxels(noise).round().clip(0).astype(np.uint16)
+    cover, above = _cover_after(tmp_path, noisy, level, f"max_shift = {2000 / noise:g}")
+    said = " ".join(capsys.readouterr().err.split())
+    share = float(re.findall(r"leaves out (\d+)% of the source's", said)[0]) / 100
+    is_structure = above & (body.voxels() > level)
+    lost = is_structure.sum() - cover.covered
+    assert share == pytest.approx(lost / is_structure.sum(), abs=0.05)
+    assert share > 0.1
+    assert REMEDY in said

@@ -220,7 +220,7 @@ def test_an_own_attribute_separates_setups_of_one_channel(tmp_path: Path) -> Non
 def test_setups_of_one_channel_are_not_overlaid(tmp_path: Path) -> None:
     setups = [{"body": BODY + 9 * number, "channel": 0, "tile": 0} for number in (0, 1)]
     path = write(tmp_path, setups)
-    assert "setup 1" in list_series(path)[1]
+    assert "setup 1, 16 x 48 x 36" in list_series(path)[1]
     np.testing.assert_array_equal(voxels_of(read.open(path, series=2)), BODY + 9)
 
 
@@ -273,6 +273,54 @@ def test_channels_that_are_registered_apart_are_noted(tmp_path: Path) -> None:
     dataset = read.open(write(tmp_path, setups))
     assert len(dataset.channels) == 2
     assert any("differ by up to 3 voxels" in note for note in dataset.notes)
+
+
+@pytest.mark.parametrize(
+    ("affine", "spacing"),
+    [("0.4 0 0 0 0 0.4 0 0 0 0 0.5 0", (0.5, 0.4, 0.4)),
+     ("-0.2 0 0 7 0 0.2 0 0 0 0 0.5 0", (0.5, 0.2, 0.2)),
+     ("1 0 0 0 0 1 0 0 0 0 2.5 0", (2.5, 1.0, 1.0))],
+)  # fmt: skip
+@pytest.mark.parametrize("kind", ["hdf5", "n5"])
+def test_channels_of_another_scale_or_direction_are_images_of_their_own(
+    tmp_path: Path, kind: str, affine: str, spacing: tuple[float, ...]
+) -> None:
+    setups = [
+        {"body": BODY, "channel": 0, "affines": [PLAIN]},
+        {"body": BODY + 1, "channel": 1, "affines": [affine]},
+        {"body": BODY + 2, "channel": 2, "affines": ["0.2 0 0 0.6 0 0.2 0 0 0 0 0.5 0"]},
+    ]
+    path = write(tmp_path, setups, kind=kind)
+    first, second = list_series(path)
+    assert "setup 0, setup 2" in first
+    assert "setup 1, registered apart from others" in second
+    assert len(read.open(path).channels) == 2
+    other = read.open(path, series=2)
+    assert other.levels[0].spacing_um == pytest.approx(spacing)
+    mirrored = BODY[:, :, ::-1] if affine.startswith("-") else BODY
+    np.testing.assert_array_equal(voxels_of(other), mirrored + 1)
+
+
+@pytest.mark.parametrize("text", ["nan 0 0 0 0 inf 0 0 0 0 1 0", "1 0 0", "a b c"])
+def test_a_registration_of_no_numbers_is_left_out_with_a_note(tmp_path: Path, text: str) -> None:
+    setups = [
+        {"body": BODY, "channel": 0, "affines": [text]},
+        {"body": BODY, "channel": 1, "affines": [PLAIN]},
+    ]
+    dataset = read.open(write(tmp_path, setups))
+    assert any("has no three axes: it is not applied" in note for note in dataset.notes)
+
+
+def test_a_small_scale_or_angle_between_channels_is_named(tmp_path: Path) -> None:
+    setups = [
+        {"body": BODY, "channel": 0, "affines": [PLAIN]},
+        {"body": BODY, "channel": 1, "affines": ["0.206 0 0 0 0 0.206 0 0 0 0 0.5 0"]},
+        {"body": BODY, "channel": 2, "affines": ["0.197 -0.0347 0 0 0.0347 0.197 0 0 0 0 0.5 0"]},
+    ]
+    dataset = read.open(write(tmp_path, setups))
+    assert len(dataset.channels) == 3
+    (note,) = [note for note in dataset.notes if "registrations of the channels" in note]
+    assert "with a scale of 0.03 and an angle of 10 degrees" in note
 
 
 @pytest.mark.parametrize("kind", ["hdf5", "n5"])

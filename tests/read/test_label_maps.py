@@ -1,5 +1,6 @@
 """Label maps as their files have them: numbers of any kind, names, colours and columns."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,35 @@ def test_minus_one_and_nan_are_no_object(tmp_path: Path, dtype: str) -> None:
     found = labels.read(labels.dataset.levels[0].box)
     assert found[0, 0, 0] == 0
     assert np.unique(found).tolist() == [0, 5]
+
+
+@pytest.mark.parametrize("dtype", ["int8", "int32", "int64", "float32"])
+def test_a_background_below_0_is_no_object_where_the_user_names_it(
+    tmp_path: Path, dtype: str
+) -> None:
+    least = -128 if dtype == "int8" else -(2**31)
+    stored = np.array([least, 1, 7, -1], dtype)[np.arange(210).reshape(5, 6, 7) % 4]
+    tifffile.imwrite(tmp_path / "l.tif", stored, metadata={"axes": "ZYX"})
+    labels = labels_of(tmp_path / "l.tif")
+    box = labels.dataset.levels[0].box
+    found = replace(labels, background=least).read(box)
+    assert found.tolist() == np.where(stored < 0, 0, stored).astype(int).tolist()
+    with pytest.raises(SourceError, match=f"found {least}, .*: --background {least} if it is"):
+        labels.read(box)
+    with pytest.raises(SourceError, match=f"found {least}"):
+        replace(labels, background=-(2**53)).read(box)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_numbers_that_a_float_can_t_tell_apart_are_refused_with_the_reason(
+    tmp_path: Path, dtype: str
+) -> None:
+    stored = np.full((5, 6, 7), 2.0**53 + 2, dtype)
+    tifffile.imwrite(tmp_path / "l.tif", stored, metadata={"axes": "ZYX"})
+    labels = labels_of(tmp_path / "l.tif")
+    told = rf"found 900719925474099[24] in {dtype}, which rounds whole numbers .* int64"
+    with pytest.raises(SourceError, match=told):
+        labels.read(labels.dataset.levels[0].box)
 
 
 @pytest.mark.parametrize(("value", "told"), [(-2, "found -2"), (0.5, "found 0.5"), (np.inf, "inf")])

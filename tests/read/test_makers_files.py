@@ -1,6 +1,7 @@
 """CZI, LIF and ND2: CZI written by Zeiss's library, the others byte by byte; scenes, extras."""
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -143,6 +144,46 @@ def test_a_czi_whose_metadata_state_more_than_its_tiles_is_told(tmp_path: Path) 
     assert note.startswith("the metadata state 24 along Z, and tiles are there for 16")
 
 
+def test_a_czi_whose_metadata_state_phases_that_are_not_there_is_told(tmp_path: Path) -> None:
+    path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"<SizeZ>16</SizeZ>", b"<SizeH>16</SizeH>"))
+    (note,) = (note for note in read.open(path).notes if "metadata" in note)
+    assert note.startswith("the metadata state 16 along H (phases), and tiles are there for 1")
+
+
+def with_metadata(path: Path, old: bytes, new: bytes) -> None:
+    """Replace XML of a CZI; spaces before its last tag keep the length."""
+    content = path.read_bytes()
+    start = content.index(b"<ImageDocument")
+    end = content.index(b"</ImageDocument>", start)
+    xml = re.sub(rb">\s+<", b"><", content[start:end])
+    xml = re.sub(rb"<Document>.*</Application>", b"", xml).replace(old, new)
+    assert new in xml
+    assert len(xml) <= end - start
+    path.write_bytes(content[:start] + xml.ljust(end - start) + content[end:])
+
+
+def test_an_interval_of_a_czi_that_contradicts_its_scaling_is_told(tmp_path: Path) -> None:
+    path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
+    interval = b"<Dimensions><Z><Positions><Interval><Increment>9<"
+    interval += b"/Increment></Interval></Positions></Z>"
+    with_metadata(path, b"<Dimensions>", interval)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    (note,) = (note for note in dataset.notes if "spacing along z" in note)
+    assert "the interval of the planes states 9 um: Scaling is used" in note
+
+
+def test_a_distance_of_a_czi_that_is_stated_twice_is_told(tmp_path: Path) -> None:
+    path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
+    twice = b'</Distance><Distance Id="X"><Value>0.5</Value></Distance></Items>'
+    with_metadata(path, b"</Distance></Items>", twice)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert sum("element Distance in Items" in note for note in dataset.notes) == 1
+
+
 def test_a_czi_of_rgb_or_of_one_plane_is_refused(tmp_path: Path) -> None:
     with czi.create_czi(str(tmp_path / "a.czi")) as file:
         file.write(data=np.zeros((9, 9, 3), np.uint8), plane={"C": 0, "Z": 0, "T": 0})
@@ -250,6 +291,36 @@ def test_blocks_of_a_lif_that_share_a_name_are_refused(tmp_path: Path) -> None:
 ND2 = np.stack([np.stack([five(f_phantom() + 100 * p)[t] for p in (0, 1)]) for t in (0, 1)])
 ND2 = ND2.transpose(0, 1, 3, 2, 4, 5).astype(np.uint16)  # t, p, z, c, y, x
 ND2_UM = (0.5, 0.25, 0.25)
+
+
+SMALL = np.arange(4 * 8 * 8, dtype=np.uint16).reshape(1, 1, 4, 1, 8, 8)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "about"), [((0.0, 1.0, 1.0), {}), ((2.0, 1.0, 1.0), {"bCalibrated": False})]
+)
+def test_an_nd2_without_a_length_asks_for_it(
+    tmp_path: Path, spacing: Any, about: dict[str, Any]
+) -> None:
+    path = tmp_path / "a.nd2"
+    write_nd2(path, SMALL, spacing, about=about)
+    assert "--spacing-um" in refusal(path)
+    assert read.open(path, spacing_um=(2, 1, 1)).levels[0].spacing_um == (2, 1, 1)
+
+
+def test_planes_of_an_nd2_that_were_taken_downwards_are_noted(tmp_path: Path) -> None:
+    path = tmp_path / "a.nd2"
+    write_nd2(path, SMALL, (2.0, 1.0, 1.0))
+    assert read.open(path).notes == ()
+    write_nd2(path, SMALL, (2.0, 1.0, 1.0), depth_loop={"iType": 4})
+    (note,) = read.open(path).notes
+    assert "taken from the top to the bottom" in note
+
+
+def test_a_line_scan_of_an_nd2_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.nd2"
+    write_nd2(path, SMALL, (2.0, 1.0, 1.0), about={"ePictureYAxis": 2})
+    assert "axis y: found time (a line scan)" in refusal(path)
 
 
 @pytest.mark.parametrize("is_packed", [False, True])

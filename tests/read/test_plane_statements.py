@@ -152,3 +152,36 @@ def test_the_missing_value_of_gdal_is_no_measurement(tmp_path: Path) -> None:
     dataset = read.open(path, spacing_um=UM)
     assert voxels_of(dataset).min() == BODY.min() + 5
     assert any("GDAL_NODATA -9999" in note for note in dataset.notes)
+
+
+@pytest.mark.parametrize(
+    ("step_um", "unit", "told"),
+    [
+        (2.0, "\u00b5m", "differs by up to 30 um (120 voxels): the planes are not shifted along x"),
+        (0.002, "mm", "differs by up to 30 um (120 voxels)"),
+        (0.005, "\u00b5m", ""),
+        (2.0, "reference frame", ""),
+    ],
+)
+def test_planes_that_lie_beside_each_other_are_noted(
+    tmp_path: Path, step_um: float, unit: str, told: str
+) -> None:
+    path = tmp_path / "a.ome.tif"
+    aside = {"PositionX": [step_um * n for n in range(16)], "PositionXUnit": [unit] * 16}
+    sizes = {"PhysicalSizeX": 0.25, "PhysicalSizeY": 0.2, "PhysicalSizeZ": 0.5}
+    tifffile.imwrite(path, BODY, metadata={"axes": "ZYX", "Plane": aside, **sizes})
+    notes = read.open(path).notes
+    assert len(notes) == bool(told)
+    assert all("PositionX" in note and told in note for note in notes)
+
+
+def test_files_of_planes_that_lie_beside_each_other_are_noted(tmp_path: Path) -> None:
+    sizes = {"PhysicalSizeX": 0.25, "PhysicalSizeY": 0.2, "PhysicalSizeZ": 0.5}
+    for number, plane in enumerate(BODY):
+        aside = {"PositionY": [float(number)], "PositionYUnit": ["\u00b5m"]}
+        tifffile.imwrite(
+            tmp_path / f"a_z{number:02d}.tif", plane, ome=True,
+            metadata={"axes": "YX", "Plane": aside, **sizes},
+        )  # fmt: skip
+    (note,) = [note for note in read.open(tmp_path).notes if "PositionY" in note]
+    assert "differs by up to 15 um (75 voxels)" in note

@@ -117,6 +117,7 @@ def test_planes_of_a_folder_stand_as_their_orientation_states(
         ({"cf": 0, "c0": 0.0, "c1": 1.0, "vunit": "Gray Value"}, BODY, ""),
         ({"cf": 1, "c0": 0.0, "c1": 1.0, "c2": 2.0, "vunit": "OD"}, BODY, "no straight line"),
         ({"cf": 20}, BODY, ""),
+        ({"cf": 21, "vunit": "Uncalibrated OD"}, BODY, "(Uncalibrated OD) is no straight line"),
         ({"c0": -1024.0, "c1": 2.0}, BODY * 2.0 - 1024, "-1024 + 2"),
         ({}, BODY, ""),
     ],
@@ -241,10 +242,12 @@ def test_planes_at_one_position_whose_time_rises_are_noted(tmp_path: Path) -> No
 
 ANGLES = MODULO.format('<ModuloAlongZ Type="angle" Unit="degree" Start="0" End="90" Step="90"/>')
 STACKS = np.concatenate([BODY, OTHER])
-BY_TURNS = np.stack([BODY, OTHER], axis=1).reshape(32, 48, 36)
+ALTERNATELY = np.stack([BODY, OTHER], axis=1).reshape(32, 48, 36)
 
 
-@pytest.mark.parametrize(("stored", "told"), [(STACKS, "after another"), (BY_TURNS, "by turns")])
+@pytest.mark.parametrize(
+    ("stored", "told"), [(STACKS, "after another"), (ALTERNATELY, "alternately")]
+)
 def test_angles_along_z_are_images_of_their_own(tmp_path: Path, stored: Any, told: str) -> None:
     path = write_ome(tmp_path / "a.ome.tif", stored, after=ANGLES)
     first = read.open(path)
@@ -318,24 +321,6 @@ def test_the_resolution_in_the_tags_is_compared_with_the_ome_xml(
     assert dataset.levels[0].spacing_um == pytest.approx(UM)
     told = "voxel spacing along y: PhysicalSize of the OME-XML states 0.2 um"
     assert [note.startswith(told) for note in dataset.notes] == [True] * is_told
-
-
-def test_the_resolution_in_the_tags_is_compared_with_the_microscope_s(tmp_path: Path) -> None:
-    path = tmp_path / "a.tif"
-    plane = {"id": "spatial-calibration-state", "type": "bool", "value": "true"}
-    sides = [("units", "string", "um"), ("x", "float", "0.25"), ("y", "float", "0.2")]
-    props = [plane, *({"id": f"spatial-calibration-{n}", "type": t, "value": v}
-                      for n, t, v in sides)]  # fmt: skip
-    texts = (" ".join(f'{key}="{value}"' for key, value in one.items()) for one in props)
-    text = "".join(f"<prop {each}/>" for each in texts)
-    xml = f"<MetaData><PlaneInfo>{text}</PlaneInfo></MetaData>"
-    tifffile.imwrite(
-        path, BODY, description=xml, metadata=None, photometric="minisblack",
-        resolution=(1e4 / 0.5, 1e4 / 0.2), resolutionunit="CENTIMETER", software="MetaSeries",
-    )  # fmt: skip
-    notes = read.open(path, spacing_um=UM).notes
-    assert any("XResolution states 0.5 um" in note for note in notes)
-    assert not any("YResolution" in note for note in notes)
 
 
 def test_a_field_that_imagej_s_description_holds_twice_is_reported(tmp_path: Path) -> None:

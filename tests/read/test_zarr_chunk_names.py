@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,23 @@ def test_chunks_are_read_by_whichever_name_their_files_have(tmp_path: Path, vers
     voxels, notes = voxels_of(write(tmp_path / "same.zarr", version, forms[0], forms[0]))
     np.testing.assert_array_equal(voxels, BODY)
     assert notes == ()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_chunks_in_a_zip_file_are_read_by_whichever_name_they_have(
+    tmp_path: Path, version: int
+) -> None:
+    forms = NAMED[version]
+    for number, (lies, says) in enumerate((a, b) for a in forms for b in forms):
+        path = write(tmp_path / f"{number}.zarr", version, lies, says)
+        archive = tmp_path / f"{number}.ozx"
+        with zipfile.ZipFile(archive, "w") as file:
+            for member in sorted(path.rglob("*")):
+                file.write(member, member.relative_to(path))
+        voxels, notes = voxels_of(archive)
+        np.testing.assert_array_equal(voxels, BODY)
+        is_noted = any("the files are named as" in note for note in notes)
+        assert is_noted is (lies != says), (lies, says)
 
 
 def test_chunks_under_both_names_are_all_read(tmp_path: Path) -> None:

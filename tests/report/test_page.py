@@ -415,7 +415,7 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
         )
     }
     survey = {name: replace(facts.survey["empty"], appearance=look) for name, look in looks.items()}
-    plan = replace(facts.plan, channels=channels)
+    plan = replace(facts.plan, channels=channels, notes=())
     titles = {
         r.title: r.lines
         for r in find_remarks(replace(facts, units=units, survey=survey, plan=plan))
@@ -443,7 +443,7 @@ def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
     facts = gather(OutFolder(built))
     named = Channel(0, "CD31", (1.0, 0.0, 0.0))
     survey = {"CD31": next(iter(facts.survey.values()))}
-    facts = replace(facts, plan=replace(facts.plan, channels=(named,)), survey=survey)
+    facts = replace(facts, plan=replace(facts.plan, channels=(named,), notes=()), survey=survey)
     (remark,) = find_remarks(replace(facts, units=units))
     assert remark.is_note
     assert remark.title.startswith("1 channel with thin triangles in lod0")

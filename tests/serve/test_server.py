@@ -292,6 +292,36 @@ def test_pages_of_other_sites_may_lead_here_and_no_more(
     assert ask(port, "/index.html", **said)[0].status == status
 
 
+@pytest.fixture(scope="module")
+def framed(bundle: Path) -> Iterator[int]:
+    server = BundleServer(bundle.parent, 0, lan=False, frames=("https://lab.example",))
+    thread = Thread(target=server.run)
+    thread.start()
+    while not server.has_started:
+        time.sleep(0.01)
+    yield server.port
+    server.stop()
+    thread.join()
+
+
+def test_a_page_that_is_allowed_may_hold_the_viewer_in_a_frame(framed: int) -> None:
+    said = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
+    page, _ = ask(framed, "/", **said, **{"Sec-Fetch-Dest": "iframe"})
+    policy = page.headers["Content-Security-Policy"]
+    assert page.status == 200
+    assert "frame-ancestors https://lab.example;" in policy
+    data, _ = ask(framed, "/lod0.glb")
+    assert "frame-ancestors 'none'" in data.headers["Content-Security-Policy"]
+    image, _ = ask(framed, "/lod0.glb", **said, **{"Sec-Fetch-Dest": "image"})
+    assert image.status == 403
+
+
+@pytest.mark.parametrize("origin", ["lab.example", "https://lab.example/page", "*", "https://a;b"])
+def test_what_is_no_origin_may_not_frame(origin: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["serve", "out", "--allow-frame", origin]) == 2
+    assert "is no origin, expected a scheme and a host" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("path", "is_run"),
     [("/", True), ("/assets/index.js", True), ("/lod0.glb", False), ("/nothing", False)],

@@ -26,16 +26,21 @@ def write_nd2(
     is_packed: bool = False,
     without: Collection[int] = (),
     lights: Mapping[int, float] | None = None,
+    about: Mapping[str, Any] | None = None,
+    depth_loop: Mapping[str, Any] | None = None,
 ) -> dict[int, int]:
     """Write a file, and return the place of each frame's chunk.
 
     tpzcyx   voxels (t, p, z, c, y, x); a frame holds all channels of a plane
     without  frames that are left out, as an acquisition that ended early leaves them out
+    about       more fields of the image's metadata
+    depth_loop  more fields of the loop along z
     lights   emission, nm, of channels that then have no colour of their own
     """
     times, positions, depth, channels, height, width = tpzcyx.shape
     step, _, side = spacing_um
-    loops: dict[str, Any] = _loop(_DEPTH, {"uiCount": depth, "dZStep": step}, None)
+    along_z = {"uiCount": depth, "dZStep": step, **(depth_loop or {})}
+    loops: dict[str, Any] = _loop(_DEPTH, along_z, None)
     points = {f"p{i}": {"dPosX": 10.0 * i, "dPosY": 0.0} for i in range(positions)}
     loops = _loop(_POSITION, {"uiCount": positions, "Points": points}, loops)
     period = {"uiCount": times, "dStart": 0.0, "dPeriod": 1.0, "dDuration": 1.0}
@@ -61,7 +66,8 @@ def write_nd2(
         },
         b"ImageMetadataSeqLV|0!": {
             "SLxPictureMetadata": {
-                "bCalibrated": True, "dCalibration": side, "sPicturePlanes": picture
+                "bCalibrated": True, "dCalibration": side, "sPicturePlanes": picture,
+                **(about or {}),
             }
         },
         b"ImageMetadataLV!": loops,

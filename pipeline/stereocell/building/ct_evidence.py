@@ -24,7 +24,8 @@ WINDOW_HU = (-1024.0, 2000.0)  # window of the presets
 _LIKE_HU = "values like Hounsfield units"
 _OFFSET = 1024.0  # that scanners add to store Hounsfield units without a sign; some programs: 1000
 _PLANES = 8  # in the middle, that are looked at
-_NO_SCALE = "since no scaling to Hounsfield units is known"
+_LEAST_RANGE_HU = 20.0  # least range of 99.8 % of the voxels: normalised values have less
+NO_SCALE = "since no scaling to Hounsfield units is known"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +72,29 @@ def find_ct_evidence(dataset: Dataset) -> CtEvidence:
         words = "8-bit values, which are no Hounsfield units"
     low, high = (float(value) for value in np.quantile(voxels, (0.001, 0.999)))
     if low >= high:
-        return CtEvidence(False, words, "--preset ct", least=least, basis=_NO_SCALE)
+        return CtEvidence(False, words, "--preset ct", least=least, basis=NO_SCALE)
     level, origin = find_skin_level(middle)
-    flags, basis = _flags("ct", level, (low, high)), f"{origin}, {_NO_SCALE}"
+    # three digits: the level is one that a user looks at and moves
+    rounded = (float(f"{low:.3g}"), float(f"{high:.3g}"))
+    flags, basis = _flags("ct", float(f"{level:.3g}"), rounded), f"{origin}, {NO_SCALE}"
     return CtEvidence(False, words, flags, least=least, basis=basis)
+
+
+def is_other_scale(dataset: Dataset, level: float) -> bool:
+    """Return whether the voxels of a CT show that they are no Hounsfield units.
+
+    level  of the preset, Hounsfield units: values without a sign may still be ones that were cut
+           off at 0, as long as that level lies among them
+
+    A part of a body without air keeps its level: nothing shows that it is shifted.
+    """
+    if dataset.stored_dtype == np.uint8:
+        return True
+    voxels = read_middle(dataset).voxels
+    low, high = (float(value) for value in np.quantile(voxels, (0.001, 0.999)))
+    if high - low < _LEAST_RANGE_HU or _is_shifted(voxels, _OFFSET):
+        return True
+    return dataset.dtype.kind == "u" and level < float(np.min(voxels))
 
 
 def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:
@@ -102,7 +122,7 @@ def read_middle(dataset: Dataset) -> Volume:
 
 def _flags(preset: str, level: float, window: tuple[float, float]) -> str:
     low, high = window
-    return f"--preset {preset} --iso-value 0={level:.4g} --window 0={low:.5g}:{high:.5g}"
+    return f"--preset {preset} --iso-value 0={level:.6g} --window 0={low:.6g}:{high:.6g}"
 
 
 def _has_air(voxels: NDArray[Any], shift: float) -> bool:

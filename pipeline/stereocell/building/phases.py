@@ -4,7 +4,7 @@ The bundle and the report follow: bundle_phase.py, report/phase.py. Every phase 
 work: a result is named by everything that it depends on.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,13 +13,7 @@ from typing import Any
 from stereocell.building import stage_tasks
 from stereocell.building.channel_colors import choose_colors, lies_at_bone
 from stereocell.building.channels import PALETTE, Channel, with_surfaces
-from stereocell.building.ct_evidence import recognise_modality
-from stereocell.building.hounsfield import (
-    NOTE,
-    has_hounsfield,
-    require_no_console_window,
-    without_hounsfield,
-)
+from stereocell.building.hounsfield import believe, settle_modality
 from stereocell.building.input_files import open_anew, require_table, watch_table
 from stereocell.building.intensities import doubt_of, require_intensities
 from stereocell.building.label_maps import Labels, are_alone, find_labels
@@ -45,9 +39,11 @@ from stereocell.building.phase import (
 from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
 from stereocell.building.plan_notes import (
     changes_of,
-    told_in_vain,
+    ignored_notes,
+    print_notes,
     told_of_absent,
     told_of_gaps,
+    words_of_spacing,
 )
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
 from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
@@ -81,9 +77,17 @@ from stereocell.usd import written_files
 from stereocell.usd.written_files import AsWritten
 
 
-def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = None) -> Plan:
+def make(
+    source: str,
+    out: Path,
+    settings: Settings,
+    *,
+    choice: Sequence[str] = (),
+    engine: Engine | None = None,
+) -> Plan:
     """Write OUT/plan.json and the settings used (TOML). The same plan again changes nothing.
 
+    choice  notes on how the settings were chosen; see `load_for`
     engine  the workers of all other phases, where these follow at once: before anything is written,
             a cluster is joined, and the places of the phases are guarded; None: the plan alone
 
@@ -95,11 +99,8 @@ def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = 
     with phase_of(out_folder, "plan") as phase:
         if engine is not None:
             require_own_places(out_folder, is_same_plan=True)  # what no plan may replace
-        plan = settle(source, settings)
-        levels = notes_on_levels(plan)
-        for note in levels:
-            console.print(f"plan: {note}", markup=False, soft_wrap=True)
-        plan = replace(plan, notes=(*plan.notes, *levels))
+        plan = settle(source, settings, choice)
+        plan = replace(plan, notes=(*plan.notes, *notes_on_levels(plan)))
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()
         there = out_folder.replaced_plan(plan)
@@ -107,6 +108,7 @@ def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = 
         if engine is not None:
             require_own_places(out_folder, is_same_plan=there == plan)
             engine.join()
+        print_notes(plan)  # an error stands alone
         if there is not None and (changes := changes_of(there, plan)):
             console.print(f"plan: {changes}", markup=False, soft_wrap=True)
         phase.is_up_to_date = not out_folder.save_plan(plan)
@@ -114,15 +116,18 @@ def make(source: str, out: Path, settings: Settings, *, engine: Engine | None = 
         write_sealed(out_folder.provenance_file, provenance_record(plan))
     shape = " x ".join(str(n) for n in plan.region.shape)
     console.print(
-        f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x), "
+        f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x) of "
+        f"{words_of_spacing(plan.spacing_um)}, "
         f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
         + "".join(f", objects of {one.name}" for one in plan.labels)
     )
     return plan
 
 
-def settle(source: str, settings: Settings) -> Plan:
-    """Return the plan of a build, and print remarks about the source. Nothing is written.
+def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
+    """Return the plan of a build, with its notes. Nothing is written or printed.
+
+    choice  notes on how the settings were chosen; see `load_for`
 
     Raises StereoCellError where the source can't be read, or the settings don't fit it.
     """
@@ -133,25 +138,17 @@ def settle(source: str, settings: Settings) -> Plan:
     if settings.unwrap.maps:
         require_map_packages()
     _require_labels(settings)
-    dataset = open_anew(as_asked(location, options))
+    dataset = believe(open_anew(as_asked(location, options)), options.taken_as)
     alone = are_alone(settings.labels)
-    modality, recognised = dataset.modality or options.modality, ""
-    if not dataset.has_hounsfield_units:
-        settings, modality = without_hounsfield(settings), ""
-    elif not alone:
-        modality, recognised = recognise_modality(dataset, options.modality)
-    is_hounsfield = alone or has_hounsfield(dataset, modality)
-    if not is_hounsfield:
-        recognised = NOTE
-        require_no_console_window(settings)
+    settings, modality = settle_modality(dataset, settings, are_labels=alone)
     indices = dataset.find_channels(options.channels) if options.channels else None
     chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
     wanted = [dataset.channels[index] for index in chosen]
     colors = choose_colors(
         [(one.name, one.color) for one in wanted],
-        modality=modality,
+        modality=modality.code,
         is_alone=len(dataset.channels) == 1,
-        is_bone=lies_at_bone(settings.iso_values, is_hounsfield=is_hounsfield),
+        is_bone=lies_at_bone(settings.iso_values, is_hounsfield=modality.is_hounsfield),
     )
     channels = [
         Channel(index, one.name, color)
@@ -180,7 +177,7 @@ def settle(source: str, settings: Settings) -> Plan:
         channels=channels,
         level=level,
         settings=settings,
-        modality=modality,
+        modality=modality.code,
         placement=dataset.placement,
         slice_axis=dataset.slice_axis(level[0]),
         has_sides=dataset.has_sides,
@@ -202,12 +199,9 @@ def settle(source: str, settings: Settings) -> Plan:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
     # numbers of objects are read as they are
     read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
-    kind = [recognised] if recognised else []
-    notes = (*read, *kind, *gaps, *objects)
-    plan = replace(plan, notes=notes, is_hounsfield=is_hounsfield)
-    for note in (*plan.notes, *told_in_vain(settings, channels)):  # an error stands alone
-        console.print(f"plan: {note}", markup=False)
-    return plan
+    kind = [modality.note] if modality.note else []
+    notes = (*read, *choice, *kind, *gaps, *objects, *ignored_notes(settings, channels))
+    return replace(plan, notes=notes, is_hounsfield=modality.is_hounsfield)
 
 
 def _require_labels(settings: Settings) -> None:

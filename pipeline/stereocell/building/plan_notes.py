@@ -9,14 +9,17 @@ from stereocell.building.open_source import SourceRef
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings, to_dict
+from stereocell.engine.run import console
 from stereocell.isosurface.options import LADDER, NO_SURFACE, RUNGS
 from stereocell.model.errors import SourceError
+from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
 from stereocell.read.absent_chunks import count_absent
 from stereocell.transfer.joint_histogram import sample_boxes
 
 _MAX_CHANGES = 4  # most changed settings that a line names
+_BODY_UM = 100.0  # um: finest spacings from here on are told in mm
 _LOOKED_AT = 16_000_000  # voxels of all channels that are looked at for NaN
 
 
@@ -77,8 +80,20 @@ def _absent(
     ]
 
 
-def told_in_vain(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:
-    """Yield what is said of each setting that another one overrules."""
+def print_notes(plan: Plan) -> None:
+    """Print the notes of a plan, a line each."""
+    for note in plan.notes:
+        console.print(f"plan: {note}", markup=False, soft_wrap=True)
+
+
+def words_of_spacing(spacing_um: Spacing) -> str:
+    """Return a voxel spacing for a reader: `1 x 0.5 x 0.5 um`, or in mm where it is a body's."""
+    unit_um, unit = (1000.0, "mm") if min(spacing_um) >= _BODY_UM else (1.0, "um")
+    return " x ".join(f"{along / unit_um:.4g}" for along in spacing_um) + f" {unit}"
+
+
+def ignored_notes(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:
+    """Yield a note on each setting that another one overrules."""
     options = settings.isovalue
     for channel in channels:
         keys = (channel.name, str(channel.index), ALL)

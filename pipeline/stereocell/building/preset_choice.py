@@ -1,13 +1,19 @@
 """Choose the preset that suits a source, where the user names none."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from stereocell.building.channels import ALL
-from stereocell.building.ct_evidence import LEVELS_HU, CtEvidence, find_ct_evidence
+from stereocell.building.ct_evidence import (
+    LEVELS_HU,
+    NO_SCALE,
+    CtEvidence,
+    find_ct_evidence,
+    is_other_scale,
+)
 from stereocell.building.open_source import as_asked, open_source
-from stereocell.building.settings import NO_PRESET, Settings, load
+from stereocell.building.settings import HOUNSFIELD, NO_PRESET, Settings, load
 from stereocell.engine.run import console
 from stereocell.model.errors import StereoCellError
 from stereocell.read import Dataset
@@ -25,39 +31,47 @@ def load_for(
     *,
     flags: Mapping[str, Any],
     where: str = "command line",
-) -> tuple[Settings, str]:
+) -> tuple[Settings, tuple[str, ...]]:
     """Return the settings of a build, by the preset that suits the source where none is given.
 
-    As `settings.load` otherwise. A file of settings, `config`, leaves no choice. The text is the
-    choice with its reason, or a doubt about a preset of CT; empty where there was none. A source
-    that can't be read is left to the next reader.
+    As `settings.load` otherwise. A file of settings, `config`, leaves no choice. The notes for the
+    plan are the choice with its reason, or a doubt about a preset of CT; none where there was no
+    choice. A source that can't be read is left to the next reader.
     """
     if preset is not None or config is not None:
         settings = load(preset, config, flags=flags, where=where)
         has_level = set(settings.iso_values) - {ALL} or settings.surfaces
         doubts = preset in LEVELS_HU and config is None and not has_level
-        return settings, _doubt_of(source, preset or "", settings) if doubts else ""
+        return settings, _doubts_of(source, preset or "", settings) if doubts else ()
     settings = load(None, None, flags=flags, where=where)
     options = settings.plan
     try:
         location = Location.of(source).source
         dataset = open_source(as_asked(location, options))
-        chosen, reason = choose_preset(dataset, modality=options.modality)
+        if (
+            options.taken_as == HOUNSFIELD
+            and (dataset.modality or options.modality or "CT") == "CT"
+        ):
+            text = f"the values are taken for Hounsfield units (--as {HOUNSFIELD})"
+            return load("ct", None, flags=flags, where=where), _describe("ct", text)
+        chosen, notes = choose_preset(dataset, modality=options.modality)
     except StereoCellError:
-        return settings, ""
-    return (load(chosen, None, flags=flags, where=where) if chosen else settings), reason
+        return settings, ()
+    return (load(chosen, None, flags=flags, where=where) if chosen else settings), notes
 
 
-def _doubt_of(source: str | Path, preset: str, settings: Settings) -> str:
-    """Return the doubt about a preset of CT that the user names; empty: there is none."""
+def _doubts_of(source: str | Path, preset: str, settings: Settings) -> tuple[str, ...]:
+    """Return the note on a preset of CT that the user names and that the voxels do not fit."""
     try:
+        if settings.plan.taken_as == HOUNSFIELD:
+            return ()
         dataset = open_source(as_asked(Location.of(source).source, settings.plan))
         if dataset.modality and dataset.dtype.kind != "u":  # as the source states itself
-            return ""
+            return ()
         doubt = _doubt(dataset, preset)
     except StereoCellError:
-        return ""
-    return doubt and f"preset {preset}: {doubt}"
+        return ()
+    return (f"preset {preset}: {doubt}",) if doubt else ()
 
 
 def _doubt(dataset: Dataset, preset: str) -> str:
@@ -70,20 +84,23 @@ def _doubt(dataset: Dataset, preset: str) -> str:
     evidence = find_ct_evidence(dataset)
     if not evidence.has_no_air:
         return ""
-    flags = evidence.bone_flags if preset == "ct-bone" else evidence.flags
-    level = f"its level of {LEVELS_HU[preset]:g} is meant for Hounsfield units"
-    remedy = flags or "--iso-value 0=VALUE sets another, a voxel value"
-    return f"{evidence.words}, and {level} ({remedy})"
+    flags, level = evidence.flags, LEVELS_HU[preset]
+    if preset == "ct-bone":
+        flags = evidence.bone_flags or "--iso-value 0=VALUE sets one, a voxel value"
+    meant = f"{evidence.words}, and its level of {level:g} is meant for Hounsfield units"
+    if is_other_scale(dataset, level):
+        return f"{meant}: the level and its window are not used, others are found (or {flags})"
+    return f"{meant} ({flags})"
 
 
-def print_choice(choice: str) -> None:
+def print_choice(choice: Sequence[str]) -> None:
     """Print the choice of a preset, once the source proved to be one: errors stand alone."""
-    if choice:
-        console.print(f"plan: {choice}", markup=False)
+    for note in choice:
+        console.print(f"plan: {note}", markup=False)
 
 
-def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, str]:
-    """Return the name of a preset, or None for the defaults, and the reason in a sentence.
+def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, tuple[str, ...]]:
+    """Return the name of a preset, or None for the defaults, and the reasons, a sentence each.
 
     modality  the settings', where the input says none
     """
@@ -102,28 +119,28 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
         by_kind = _BY_MODALITY.get(known)
         is_unsigned_ct = by_kind == "ct" and dataset.dtype.kind == "u"
         doubt = _doubt(dataset, "ct") if is_unsigned_ct else ""
-        return by_kind, _describe(by_kind, f"the input is {known}" + (doubt and f": {doubt}"))
+        reasons = _describe(by_kind, f"the input is {known}")
+        return by_kind, (*reasons, f"preset {by_kind}: {doubt}") if doubt else reasons
     evidence = find_ct_evidence(dataset)
     chosen = "ct" if evidence.is_hounsfield else "mri"
     size = f"voxels of {finest / 1000:.3g} mm"
     if evidence.flags:
-        basis = f", a level {evidence.basis}" if evidence.basis else ""
-        return chosen, (
-            f"preset {chosen}: {size}, and no modality is stated: MR is assumed; "
-            f"{_may_be_ct(evidence)}(for a CT {evidence.flags}{basis}; "
-            f"--preset {NO_PRESET}: the defaults)"
-        )
+        known = f"{size}, {evidence.words}" if evidence.basis else size
+        assumed = f"{known}, and no modality is stated: MR is assumed"
+        return chosen, (*_describe(chosen, assumed), _advice(evidence))
     return chosen, _describe(chosen, f"{size} and {evidence.words}")
 
 
-def _may_be_ct(evidence: CtEvidence) -> str:
-    """Return words on values that speak for a CT; empty: they are no evidence."""
-    return (
-        f"{evidence.words} would be those of a CT " if not evidence.basis else evidence.words + " "
-    )
+def _advice(evidence: CtEvidence) -> str:
+    """Return the flags that build a volume as a CT after all, and where their level comes from."""
+    if not evidence.basis:
+        return f"{evidence.words} would be those of a CT: for a CT {evidence.flags}"
+    if evidence.basis == NO_SCALE:
+        return f"for a CT {evidence.flags}"
+    return f"for a CT {evidence.flags}; its level lies {evidence.basis}"
 
 
-def _describe(chosen: str | None, reason: str) -> str:
+def _describe(chosen: str | None, reason: str) -> tuple[str, ...]:
     if chosen is None:
-        return f"no preset: {reason}: lengths follow the voxel spacing (--preset names another)"
-    return f"preset {chosen}: {reason} (--preset {NO_PRESET}: the defaults)"
+        return (f"no preset: {reason}: lengths follow the voxel spacing (--preset names another)",)
+    return (f"preset {chosen}: {reason} (--preset {NO_PRESET}: the defaults)",)

@@ -39,7 +39,9 @@ if TYPE_CHECKING:
 
 EIGHT_BITS = 8
 MAX_INDEX = 2**31  # of levels, and of voxels along an axis
-INTENSITY = "intensity"  # value of taken_as: voxels are intensities, even if they look like labels
+# values of taken_as: voxels are intensities, even if they look like labels, or Hounsfield units,
+# even if neither the source nor air and fat among the voxels show it
+INTENSITY, HOUNSFIELD = "intensity", "hounsfield"
 NO_PRESET = "none"  # names the defaults
 PRESETS = Path(__file__).parent / "presets"
 # of a file of settings; tomllib's time grows with the square of a dotted key's length
@@ -150,8 +152,13 @@ class PlanOptions:
     )
     taken_as: str = setting(
         "",
-        "intensity: build what looks like a label map all the same",
-        flag=Flag("--as", "intensity: build what looks like a label map all the same"),
+        "intensity: build what looks like a label map all the same; hounsfield: values of a CT are "
+        "Hounsfield units",
+        flag=Flag(
+            "--as",
+            "intensity: build what looks like a label map all the same; hounsfield: the values of "
+            "a CT are Hounsfield units, though the source does not show it",
+        ),
     )
     neurological: bool = setting(
         False,
@@ -177,9 +184,10 @@ class PlanOptions:
             found = ",".join(f"{value:g}" for value in self.spacing_um)
             raise UsageError(f"plan.spacing_um: found {found}, expected z,y,x in um, each above 0")
         require_bounds("plan", self)
-        if self.taken_as not in ("", INTENSITY):
+        if self.taken_as not in ("", INTENSITY, HOUNSFIELD):
             raise UsageError(
-                f"plan.taken_as is {self.taken_as!r:.40}, expected {INTENSITY}, or nothing"
+                f"plan.taken_as is {self.taken_as!r:.40}, expected {INTENSITY} or "
+                f"{HOUNSFIELD}, or nothing"
             )
         if self.modality and self.modality not in MODALITIES:
             raise UsageError(

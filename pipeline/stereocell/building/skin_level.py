@@ -15,7 +15,7 @@ from stereocell.isosurface.array_levels import find_array_levels
 from stereocell.model.volume import Volume
 
 BASIS_OF_AIR = "half-way between the air, which the window cut off, and the dimmest tissue"
-BASIS_OF_LEVEL = "at which its outermost surface lies"
+BASIS_OF_LEVEL = "at its outermost surface"
 BASIS_OF_CLASSES = "half-way between its dark and bright voxels"
 # Air is cut off where this share of the voxels has the darkest value, and where the range next to
 # it, this share of all values, holds so much fewer. Air that has noise, beside padding, fills it.

@@ -14,7 +14,7 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.level import Level
-from stereocell.isosurface.near_levels import find_near_levels, words_of
+from stereocell.isosurface.near_levels import ABOVE_BACKGROUND, MARK, find_near_levels, words_of
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance
 from stereocell.transfer.channel_statistics import ChannelStatistics
@@ -82,8 +82,9 @@ class ChannelSurvey:
         near = find_near_levels(
             self.ladder, None if level is None else level.iso, is_unsure=surface == "unsure"
         )
-        mark = "" if self.statistics.background is None else "+b"
-        return words_of(near, mark) if near else ""
+        if not near or self.statistics.background is None:
+            return words_of(near) if near else ""
+        return words_of(near, MARK) + ABOVE_BACKGROUND
 
     def thinning(self, plan: Plan) -> str:
         """Return what is said of a surface that other planes carry than asked for; empty: none."""

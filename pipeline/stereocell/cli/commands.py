@@ -132,12 +132,11 @@ def plan(options: argparse.Namespace) -> Answer:
 def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
     """Write the plan; with the workers of all other phases, where these follow at once."""
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for, print_choice
+    from stereocell.building.preset_choice import load_for
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    made = phases.make(options.input, options.out, wanted, engine=engine)
-    print_choice(choice)
+    made = phases.make(options.input, options.out, wanted, choice=choice, engine=engine)
     return Answer(
         {
             "out": str(options.shown),
@@ -251,7 +250,8 @@ def slices(options: argparse.Namespace) -> Answer:
     if listed := _series(options):
         return listed
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for, print_choice
+    from stereocell.building.plan_notes import print_notes
+    from stereocell.building.preset_choice import load_for
     from stereocell.preview.png_slices import (
         require_slices_or_nothing,
         without_surface,
@@ -263,8 +263,8 @@ def slices(options: argparse.Namespace) -> Answer:
     require_slices_or_nothing(options.out)
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    plan = phases.settle(options.input, without_surface(wanted))
-    print_choice(choice)
+    plan = phases.settle(options.input, without_surface(wanted), choice)
+    print_notes(plan)
     written = write_slices(plan, options.out, plane=options.plane)
     print_unless_json(options, f"wrote to {options.out}: {written.line}")
     return Answer({"out": str(options.out), "slices": written.count, "plane": written.plane})
@@ -425,6 +425,7 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
             lan=options.lan,
             open_browser=open_browser,
             for_program=options.json,
+            frames=tuple(options.allow_frame),
         )
     except BrokenPipeError as error:  # the reader of the address has gone
         raise StdoutLost(error) from error

@@ -1,6 +1,7 @@
 """The flags of each command, and what they say as settings."""
 
 import argparse
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import Field
 from functools import partial
@@ -153,6 +154,15 @@ def _port(text: str) -> int:
     if not text.isdecimal() or int(text) > 0xFFFF:
         raise argparse.ArgumentTypeError(f"{text!r} is no port, expected 0 to 65535")
     return int(text)
+
+
+def _origin(text: str) -> str:
+    found = re.fullmatch(r"https?://[a-z0-9.-]+(:\d{1,5})?", text.rstrip("/"), re.IGNORECASE)
+    if found is None:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no origin, expected a scheme and a host, such as https://lab.example"
+        )
+    return found.group().lower()
 
 
 def _number_or_auto(kind: type[int] | type[float], text: str) -> float | str:
@@ -361,6 +371,15 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         "--lan",
         action="store_true",
         help="also for phones in this network: TLS, and a QR code that lets one device in",
+    )
+    parser.add_argument(
+        "--allow-frame",
+        type=_origin,
+        action="append",
+        default=[],
+        metavar="ORIGIN",
+        help="a page of this origin (https://lab.example) may hold the viewer in a frame; may be "
+        "given several times",
     )
 
 

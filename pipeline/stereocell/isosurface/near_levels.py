@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from stereocell.isosurface.level import Level, clear_of
 
 MAX_NEAR = 3
+MARK = "+b"  # stands after a level that counts from the background, as flags have it
+ABOVE_BACKGROUND = f" ({MARK}: above the background)"  # explains it, at the end of a line
 # Confidence from which a doubtful level is named beside a surface that is unsure. Below, hardly
 # anything speaks for it.
 LIKELY = 0.2

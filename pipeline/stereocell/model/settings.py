@@ -36,6 +36,7 @@ class Bounds:
 LENGTH_UM = Bounds(0, MAX_LENGTH_UM)
 COUNT = Bounds(1, MAX_COUNT)
 COUNT_OR_NONE = Bounds(0, MAX_COUNT)
+WHOLE_NUMBER = Bounds(-MAX_COUNT, MAX_COUNT)
 
 
 def setting(
@@ -65,6 +66,8 @@ def require_bounds(section: str, options: Any) -> None:
 def _words(bounds: Bounds) -> str:
     if bounds == LENGTH_UM:
         return f"a length in um, 0 to {bounds.most:g}"
+    if bounds == WHOLE_NUMBER:
+        return "a whole number from -2^53 to 2^53"
     if bounds.most == MAX_COUNT:
         return f"{bounds.least:g} or more, at most 2^53"
     return f"{bounds.least:g} to {bounds.most:g}"

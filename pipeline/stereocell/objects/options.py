@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from stereocell.meshes.options import MAX_ERROR, MAX_SAMPLES
 from stereocell.model.errors import UsageError
-from stereocell.model.settings import COUNT, COUNT_OR_NONE, Bounds, Flag, require_bounds, setting
+from stereocell.model.settings import COUNT, WHOLE_NUMBER, Bounds, Flag, require_bounds, setting
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +29,15 @@ class ObjectOptions:
     )
     background: int = setting(
         0,
-        "number of the voxels that are no object, as 65535 or 255 in some files; 0, -1 and NaN are "
-        "none either",
+        "number of the voxels that are no object, as 65535, 255 or -2 in some files; 0, -1 and NaN "
+        "are none either",
         flag=Flag(
             "--background",
-            "the number of the voxels of label maps that are no object, as 65535 in some files "
-            "(0, -1 and NaN are none either)",
+            "the number of the voxels of label maps that are no object, as 65535 or -2 in some "
+            "files (0, -1 and NaN are none either)",
             "NUMBER",
         ),
-        bounds=COUNT_OR_NONE,
+        bounds=WHOLE_NUMBER,
     )
     table: str = setting(
         "",

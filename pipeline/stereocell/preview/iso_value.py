@@ -26,6 +26,7 @@ from stereocell.building.open_source import open_source
 from stereocell.building.other_levels import ends_of, find_other_levels, take
 from stereocell.building.phases import settle
 from stereocell.building.plan import Plan
+from stereocell.building.plan_notes import print_notes
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
 from stereocell.building.survey_tasks import evidence_task, statistics_task
@@ -111,6 +112,7 @@ def preview(
     if out is not None and out.suffix.lower() != ".png":
         raise UsageError(f"-o is {str(out)!r}, expected a file named .png")
     plan = settle(source, settings)
+    print_notes(plan)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
     require_picture_or_nothing(path)

@@ -1,39 +1,15 @@
 """The axes of an array that its format leaves open: given, named by attributes, or assumed."""
 
-import re
 from collections.abc import Sequence
 
 from stereocell.model.axes import AXES, axes_of, is_axes
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.read.axis_names import axes_of_names
 from stereocell.read.series import counted
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
 _ORDER = Subject("order of the axes", remedy="--axes names another one")
-_WORDS = {
-    "time": "t", "timepoint": "t", "frame": "t",
-    "channel": "c", "band": "c", "wavelength": "c",
-    "depth": "z", "slice": "z", "plane": "z", "section": "z", "level": "z",
-    "row": "y", "lat": "y", "latitude": "y",
-    "column": "x", "col": "x", "lon": "x", "longitude": "x",
-}  # fmt: skip
 _ANGLES = ("theta", "angle", "tilt", "projection", "rotation")
-_LETTER = re.compile(
-    r"(?:dim|axis|coord|pos|n|p)?[_\- ]?([tczyx])"
-    r"(?:[_\- ]?(?:dim|axis|space|coord|coordinate|pos|position|c|um|nm|mm|px|pixels?|index))?"
-)
-
-
-def axis_of(name: str) -> str:
-    """Return the axis that a name of a dimension means; the name in lower case: it means none.
-
-    >>> [axis_of(name) for name in ("Z", "x_um", "Time", "columns", "zspace", "phony_dim_0")]
-    ['z', 'x', 't', 'x', 'z', 'phony_dim_0']
-    """
-    text = name.strip().lower()
-    if (word := _WORDS.get(text) or _WORDS.get(text.removesuffix("s"))) is not None:
-        return word
-    found = _LETTER.fullmatch(text)
-    return found[1] if found else text
 
 
 def given_axes(where: str, shape: Sequence[int], given: str) -> tuple[str, ...]:
@@ -63,14 +39,16 @@ def settle_stated_axes(
 
     given   the user's `--axes`; empty: none
     stated  the names of the axes, slowest first, by each field that names them; a field counts
-            where all its names are of t, c, z, y and x (see `axis_of`), z, y and x among them
+            where all its names are of t, c, z, y and x (see read/axis_names.py), z, y and x among
+            them
 
-    Without any, three axes longer than 1 are taken for z, y, x; others may have length 1. Raises
-    UsageError where `given` doesn't fit, SourceError where the axes can't be told.
+    Where no field does, names that mean axes keep them, and z, y, x are assumed in this order for
+    the others; axes of length 1 may have no name. Raises UsageError where `given` doesn't fit,
+    SourceError where the axes can't be told.
     """
     found = f"found {counted(len(shape), 'dimension')} {tuple(int(n) for n in shape)}"
-    long = [index for index, size in enumerate(shape) if size > 1]
-    if len(shape) < 3 or (len(long) < 3 < len(shape)):
+    long = sum(size > 1 for size in shape)
+    if len(shape) < 3 or (long < 3 < len(shape)):
         raise SourceError(
             f"{where}: one plane (2D): a volume needs at least 2 planes: {found}, expected z, y, x"
         )
@@ -85,20 +63,64 @@ def settle_stated_axes(
     for one, axes in lists:
         if one.trust is not Trust.ASSUMED:
             _require_space(where, axes)
-    if len(long) != 3 and len(shape) == 3:
-        long = [0, 1, 2]
-    if len(long) != 3:
+    named, best = max(
+        lists, key=lambda pair: (_count(pair[1]), bool(_quoted(pair[0]))), default=(None, ())
+    )
+    axes = with_assumed(best or ("",) * len(shape), shape)
+    if not axes:
+        names = f"the names {_quoted(named)}" if named and _count(best) else "no names of axes"
         raise SourceError(
-            f"{where}: {found} and no names of axes, expected three, or give them with "
+            f"{where}: {found} and {names}, expected three, or give them with "
             f"--axes {_example(shape, stated)} (t time, c channel)"
         )
-    names = dict(zip(long, "zyx", strict=True))
-    assumed = tuple(names.get(place, "_") for place in range(len(shape)))
-    reason = "no names of axes"
-    unknown = [axes for _, axes in lists if any(axis.strip("_") for axis in axes)]
-    if unknown:
-        reason = f"the names {', '.join(filter(None, unknown[0])):.100} are no axes of a volume"
-    return assumed, (f"{reason}: z, y, x are assumed (else give --axes)",)
+    return axes, (_assumption(axes, best, named),)
+
+
+def with_assumed(axes: Sequence[str], shape: Sequence[int]) -> tuple[str, ...]:
+    """Return axes of which z, y and x stand in this order where no name means an axis.
+
+    axes   t, c, z, y or x for each dimension, slowest first; another text: its name means none
+
+    Empty: the dimensions without such a name are not as many as the axes that none has.
+    """
+    known = [axis for axis in axes if axis in tuple(AXES)]
+    missing = [axis for axis in "zyx" if axis not in known]
+    unknown = [place for place, axis in enumerate(axes) if axis not in tuple(AXES)]
+    long = [place for place in unknown if shape[place] > 1]
+    places = long if len(long) == len(missing) else unknown
+    if len(places) != len(missing) or len(set(known)) != len(known):
+        return ()
+    assumed = dict(zip(places, missing, strict=True))
+    return tuple(
+        assumed.get(place, axis if axis in tuple(AXES) else "_") for place, axis in enumerate(axes)
+    )
+
+
+def _count(axes: Sequence[str]) -> int:
+    """Return the number of dimensions whose name means an axis."""
+    return sum(axis in tuple(AXES) for axis in axes)
+
+
+def _quoted(named: Statement) -> str:
+    names = named.value if isinstance(named.value, tuple) else (named.value,)
+    return ", ".join(str(name) for name in names if str(name).strip())[:100]
+
+
+def _assumption(axes: Sequence[str], by_names: Sequence[str], named: Statement | None) -> str:
+    """Return the note on axes of which some are assumed."""
+    if named is None or not _quoted(named):
+        return "no names of axes: z, y, x are assumed (else give --axes)"
+    if not _count(by_names):
+        reason = f"the names {_quoted(named)} are no axes of a volume"
+        return f"{reason}: z, y, x are assumed (else give --axes)"
+    guessed = [
+        axis for axis, own in zip(axes, by_names, strict=True) if axis != own and axis != "_"
+    ]
+    return (
+        f"{named.place}: the names {_quoted(named)} are not all axes of a volume: "
+        f"{', '.join(guessed)} {'is' if len(guessed) == 1 else 'are'} assumed for the others, in "
+        "this order (else give --axes)"
+    )
 
 
 def _axes_by(one: Statement, shape: Sequence[int]) -> tuple[str, ...]:
@@ -106,9 +128,9 @@ def _axes_by(one: Statement, shape: Sequence[int]) -> tuple[str, ...]:
     names = one.value if isinstance(one.value, tuple) else (one.value,)
     if len(names) != len(shape):
         return ()
-    axes = [axis_of(str(name)) for name in names]
+    axes = axes_of_names([str(name) for name in names])
     return tuple(
-        "_" if axis not in AXES and size == 1 else axis
+        "_" if axis not in tuple(AXES) and size == 1 else axis
         for axis, size in zip(axes, shape, strict=True)
     )
 

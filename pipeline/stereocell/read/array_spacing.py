@@ -11,6 +11,7 @@ import numpy as np
 
 from stereocell.read.spacing import Triple, um_per
 from stereocell.read.stated_numbers import numbers_of
+from stereocell.read.stated_texts import text_of
 
 _SIZES = ("resolution", "spacing", "voxel_size", "voxel_spacing", "pixel_size", "pixelSize")
 _UNITS = ("units", "unit")
@@ -40,17 +41,13 @@ def spacing_of(sizes: Sequence[float], unit: Any, axes: Sequence[str]) -> Triple
     unit  a text, or one for each size
     """
     along = [axis for axis in axes if axis in "zyx"] if len(sizes) == 3 else list(axes)
-    units = [unit] * len(sizes) if isinstance(unit, str) else list(np.atleast_1d(unit))
+    every = text_of(unit)
+    units = [every] * len(sizes) if every else list(np.atleast_1d(unit))
     if len(along) != len(sizes) or len(units) != len(sizes):
         return None
-    um = {a: (s, um_per(_text(u))) for a, s, u in zip(along, sizes, units, strict=True)}
+    um = {a: (s, um_per(text_of(u))) for a, s, u in zip(along, sizes, units, strict=True)}
     found = [size * per for size, per in (um[axis] for axis in "zyx") if per is not None]
     return (found[0], found[1], found[2]) if len(found) == 3 else None
-
-
-def _text(value: Any) -> str:
-    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
-    return text.strip()
 
 
 def _numbers(value: Any) -> list[float]:

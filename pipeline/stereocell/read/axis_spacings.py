@@ -96,6 +96,14 @@ class AxisSpacings:
             why = f"in {unit:.20}" if unit else "without a unit"
             self._hints.append(f"positions of {name} have steps of {size:.5g} {why}")
 
+    def add_sense(self, dimension: int, name: str, positive: str) -> None:
+        """Add CF's `positive` of the positions along a dimension: up or down."""
+        if self.axes[dimension] == "z" and positive.strip().lower() == "down":
+            self._notes.append(
+                f"positions of {name} count downwards (`positive`): the planes are read in this "
+                "order, so the volume is a mirror image where y points north"
+            )
+
     def _add_odd(self, name: str, positions: NDArray[np.float64], count: int) -> None:
         """Note positions that are as many as voxels, and neither rise nor fall throughout.
 

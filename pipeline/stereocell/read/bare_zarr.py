@@ -1,8 +1,9 @@
 """A Zarr array (v2 or v3) without the metadata of OME-Zarr.
 
-Its axes come from `--axes`, from the names of dimensions (v3, or xarray's `_ARRAY_DIMENSIONS` in
-v2), else three dimensions are z, y, x. Its spacing comes from `--spacing-um`, from arrays of
-positions beside it (read/zarr_coordinates.py), or from the attributes of read/array_spacing.py.
+Its axes come from `--axes`, from the names of dimensions (v3, or attributes of
+read/axis_names.py), else three dimensions are z, y, x. Its spacing comes from `--spacing-um`, from
+arrays of positions beside it (read/zarr_coordinates.py), or from the attributes of
+read/array_spacing.py.
 """
 
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
 from stereocell.read.array_axes import settle_stated_axes
+from stereocell.read.axis_names import NAME_LISTS, listed_names
 from stereocell.read.axis_spacings import AxisSpacings, SettledSpacing
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.flipped_array import FlippedArray
@@ -77,8 +79,13 @@ def _named_axes(array: "zarr.Array[Any]", around: Beside) -> list[Statement]:
     """
     axes = {one.name: one.axis for one in around.positions if one is not None and one.axis}
     return [
-        Statement(tuple(axes.get(name, name.lower()) for name in named), place)
+        Statement(tuple(axes.get(name, name) for name in named), place)
         for place, named in named_dimensions(array).items()
+    ] + [
+        Statement(names, f"{field} of {of}", Trust.REPEATED)
+        for of, attributes in around.attributes
+        for field in NAME_LISTS
+        if (names := listed_names(attributes.get(field), array.ndim))
     ]
 
 
@@ -89,6 +96,7 @@ def _spacing(array: "zarr.Array[Any]", axes: Sequence[str], around: Beside) -> S
         if one is not None:
             size = array.shape[dimension]
             spacings.add_positions(dimension, one.name, one.values, one.unit, size)
+            spacings.add_sense(dimension, one.name, one.sense)
     spacings.add_attributes(dict(array.attrs), "the array")
     for of, attributes in around.attributes:
         spacings.add_attributes(attributes, of, Trust.REPEATED)

@@ -6,6 +6,7 @@ channels.
 References: https://imagej.net/plugins/bdv/index
 """
 
+import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import islice
@@ -20,9 +21,23 @@ from stereocell.read.spacing import Triple
 _OF_A_VIEW = ("tile", "angle", "illumination")  # attributes of which no two make one image
 _OF_A_CHANNEL = ("channel", "displaysettings")  # attributes that may differ within one image
 _CHANNEL = "channel"
+_OTHER_SCALE = 0.05  # share by which channels' scales differ; chromatic aberration has under 0.01
+_OTHER_DIRECTION = math.cos(math.radians(45))  # cosine between an axis of two channels
 _SHOWN = 8  # numbers in a message
 
 Matrix = NDArray[np.float64]  # (4, 4) for columns, from voxels (x, y, z, 1) to the world
+
+
+def have_one_grid(first: Matrix, other: Matrix) -> bool:
+    """Return whether two registrations have one scale and direction; they may be shifted."""
+    if not (np.isfinite(first).all() and np.isfinite(other).all()):
+        return True  # the reader reports it
+    relative = np.linalg.pinv(first[:3, :3]) @ other[:3, :3]
+    lengths = np.linalg.norm(relative, axis=0)
+    return bool(
+        np.abs(lengths - 1.0).max() <= _OTHER_SCALE
+        and (np.diag(relative) > _OTHER_DIRECTION * lengths).all()
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +75,7 @@ class Described:
 
         The setups of a view are its channels, so two setups of one channel are two views. An own
         attribute counts where setups of one channel differ in it; else it describes the channel.
+        Setups that are registered at another scale or in another direction are views of their own.
         """
         found: dict[tuple[object, ...], list[int]] = {}
         repeated = self._repeated(setups)
@@ -67,7 +83,25 @@ class Described:
         for number in setups:
             key = self._values(number, names)
             found.setdefault((*key, number) if number in repeated else key, []).append(number)
-        return list(found.values())
+        return [view for group in found.values() for view in self._by_registration(group)]
+
+    def _by_registration(self, setups: Sequence[int]) -> list[list[int]]:
+        """Return setups by the scale and direction of their registrations, at their first time."""
+        placed: dict[int, Matrix] = {}
+        for time, setup in sorted(self.registrations):
+            if (time, setup) not in self.missing:
+                placed.setdefault(setup, self.registrations[time, setup])
+        views: list[list[int]] = []
+        for setup in setups:
+            own = placed.get(setup)
+            for view in views:
+                first = placed.get(view[0])
+                if own is None or first is None or have_one_grid(first, own):
+                    view.append(setup)
+                    break
+            else:
+                views.append([setup])
+        return views
 
     def _repeated(self, setups: Sequence[int]) -> set[int]:
         """Return the setups of which an earlier one has the same attributes and channel."""
@@ -112,7 +146,15 @@ class Described:
         every = sorted(self.setups)
         names = [name for name in self._view_names(every) if name in own.attributes]
         shown = [f"{name:.20} {own.attributes[name]:.20}" for name in names]
-        shown += [f"setup {number}" for number in view if number in self._repeated(every)]
+        alike = [
+            other
+            for other in self.views(every)
+            if self._values(other[0], names) == self._values(view[0], names)
+        ]
+        if len(alike) > 1:
+            shown += [f"setup {number}" for number in view]
+            is_repeated = any(self._repeated(every).intersection(other) for other in alike)
+            shown += [] if is_repeated else ["registered apart from others"]
         label = ", ".join([*shown, found.label])
         return Candidate(label, found.voxels)
 

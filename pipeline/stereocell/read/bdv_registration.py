@@ -1,10 +1,10 @@
 """The registration of a BigDataViewer view: a scale, a mirror and an order of axes are applied.
 
 A view has several transforms, of which the first is applied last. Together they lead from voxels
-(x, y, z) of level 0 to the world. The world's unit is that of `voxelSize`, or one voxel of its
-smallest size, as BigStitcher has it. A registration without a scale, such as the identity or a
-mirror alone, states no spacing. A rotation or a shear is not applied, and a note says so: the view
-is read as it was acquired.
+(x, y, z) of level 0 to the world. The world's unit is that of `voxelSize`, or one voxel of the
+smallest size of all setups, as BigStitcher has it. A registration without a scale, such as the
+identity or a mirror alone, states no spacing. A rotation or a shear is not applied, and a note says
+so: the view is read as it was acquired.
 
 References: https://imagej.net/plugins/bdv/, package mpicbg.spim.data.registration
 """
@@ -88,7 +88,7 @@ def registered(image: Image, described: Described, setups: Sequence[int], time: 
     if parts is None:
         note = "the registration of the view has no three axes: it is not applied"
         return replace(image, notes=(*image.notes, note))
-    spacing, spacing_notes = _spacing(own, parts)
+    spacing, spacing_notes = _spacing(own, parts, _voxel_of_world(described, time))
     before = image.grids[0].spacing_um
     grids = tuple(_scaled(grid, before, spacing, parts, own) for grid in image.grids)
     notes = (*spacing_notes, *_turn_notes(parts), *_channel_notes(described, setups, time))
@@ -97,15 +97,29 @@ def registered(image: Image, described: Described, setups: Sequence[int], time: 
     return turned_image(found, parts.turn if is_plain else _unturned(matrix, parts))
 
 
-def _spacing(setup: Setup, parts: Parts) -> tuple[Triple | None, tuple[str, ...]]:
-    """Return the spacing (z, y, x), um, and notes; None: no unit of length is stated."""
+def _voxel_of_world(described: Described, time: int) -> float | None:
+    """Return the length of a voxel, um, in whose number the world counts; None: it counts lengths.
+
+    It counts voxels where the smallest scale of all setups is 1.
+    """
+    placed = [one for (at, _), one in described.registrations.items() if at == time]
+    smallest = min(float(np.linalg.norm(one[:3, :3], axis=0).min()) for one in placed)
+    sizes = [min(one.spacing_um) for one in described.setups.values() if one.spacing_um is not None]
+    return min(sizes) if sizes and abs(smallest - 1.0) <= _ALMOST else None
+
+
+def _spacing(
+    setup: Setup, parts: Parts, voxel_um: float | None
+) -> tuple[Triple | None, tuple[str, ...]]:
+    """Return the spacing (z, y, x), um, and notes; None: no unit of length is stated.
+
+    voxel_um  by `_voxel_of_world`
+    """
     if setup.spacing_um is None or setup.unit_um is None:
         return None, ()
     if np.allclose(parts.scale, 1.0, atol=_SKEW):
         return setup.spacing_um, ()
-    unit = setup.unit_um
-    if abs(min(parts.scale) - 1.0) <= _ALMOST:  # the world is one of voxels
-        unit = min(setup.spacing_um)
+    unit = setup.unit_um if voxel_um is None else voxel_um
     chosen, notes = [], list[str]()
     for axis, stated, scale in zip("zyx", setup.spacing_um, reversed(parts.scale), strict=True):
         subject = Subject(f"voxel spacing along {axis}", "um", _TOLERANCE)
@@ -166,17 +180,28 @@ def _channel_notes(described: Described, setups: Sequence[int], time: int) -> tu
     """Return a note where the channels of a view are registered to different places."""
     found = [described.registrations.get((time, setup)) for setup in setups]
     first = found[0]
-    if first is None or any(matrix is None for matrix in found):
+    if first is None or any(one is None or not np.isfinite(one).all() for one in found):
         return ()
     inverse = np.linalg.pinv(first)
     size = np.array([*(described.setups[setups[0]].size or (1, 1, 1))], float)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * size
     placed = np.c_[corners, np.ones(8)].T
-    moved = [np.abs((inverse @ matrix @ placed - placed)[:3]).max() for matrix in found[1:]
-             if matrix is not None]  # fmt: skip
+    relative = [inverse @ matrix for matrix in found[1:] if matrix is not None]
+    moved = [float(np.abs((one @ placed - placed)[:3]).max()) for one in relative]
     if max(moved, default=0.0) <= _SHIFT:
         return ()
     return (
-        f"the registrations of the channels differ by up to {max(moved):.3g} voxels: the channels "
-        "are not shifted",
+        f"the registrations of the channels differ by up to {max(moved):.3g} voxels"
+        f"{_differences(relative)}: the channels are read as they are stored, so they don't "
+        "coincide",
     )
+
+
+def _differences(relative: Sequence[Matrix]) -> str:
+    """Return the scales and angles by which channels differ, for a note; empty: only shifts."""
+    parts = [one for one in map(taken_apart, relative) if one is not None]
+    scale = max((abs(size - 1.0) for one in parts for size in one.scale), default=0.0)
+    angle = max((max(one.angle_deg, one.shear_deg) for one in parts), default=0.0)
+    found = [f"a scale of {scale:.2g}"] * (scale > _SKEW)
+    found += [f"an angle of {angle:.2g} degrees"] * (angle > 0)
+    return f", with {' and '.join(found)}" if found else ""

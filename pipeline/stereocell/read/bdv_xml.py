@@ -13,7 +13,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from stereocell.read.bdv_described import Described, Matrix, Setup
+from stereocell.read.repeats import record_xml
 from stereocell.read.spacing import Triple, um_per
+from stereocell.read.stated_numbers import numbers_of
 from stereocell.storage.location import is_own
 
 _MAX_FILES = 50  # most XML files of the folder that are looked into
@@ -36,6 +38,7 @@ def read_described(path: str, xml: str = "") -> Described:
         root = _parsed(file.read_text(encoding="utf-8", errors="replace"))
         if root is None:
             continue
+        record_xml(root, file.name)
         loader = root.find("SequenceDescription/ImageLoader")
         named = [(node.text or "").strip() for node in loader] if loader is not None else []
         if xml or container.name in (Path(name).name for name in named if name):
@@ -76,7 +79,7 @@ def _counts(text: str) -> Triple | None:
 
 
 def _registrations(root: ElementTree.Element) -> Mapping[tuple[int, int], Matrix]:
-    """Return the registration of each view, by time point and setup; others are left out."""
+    """Return the registration of each view, by time point and setup; NaN: it is not readable."""
     found: dict[tuple[int, int], Matrix] = {}
     for node in root.findall("ViewRegistrations/ViewRegistration"):
         time, setup = node.get("timepoint", ""), node.get("setup", "")
@@ -84,14 +87,17 @@ def _registrations(root: ElementTree.Element) -> Mapping[tuple[int, int], Matrix
             continue
         matrix = np.eye(4)
         for text in node.findall("ViewTransform/affine"):
-            try:
-                rows = np.array([float(part) for part in (text.text or "").split()])
-                matrix = matrix @ np.vstack([rows.reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
-            except ValueError:
-                break
-        else:
-            found[int(time), int(setup)] = matrix
+            matrix = matrix @ _affine(text.text or "")
+        found[int(time), int(setup)] = matrix
     return found
+
+
+def _affine(text: str) -> Matrix:
+    """Return the matrix (4, 4) of an affine transform; NaN: it has not 12 finite numbers."""
+    rows = np.array(numbers_of(text.split()))
+    if rows.size != 12 or not np.isfinite(rows).all():
+        return np.full((4, 4), np.nan)
+    return np.vstack([rows.reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
 
 
 def _missing(root: ElementTree.Element) -> frozenset[tuple[int, int]]:

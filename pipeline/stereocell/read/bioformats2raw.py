@@ -5,7 +5,6 @@ and further axes (`ModuloAlongZ`). The OME-Zarr metadata have only the sizes, so
 compared with them and read by the code of OME-TIFF.
 """
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -18,6 +17,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.ome_depth import settle_depth
+from stereocell.read.repeats import load_json
 from stereocell.read.spacing import Grid, PartialTriple
 from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.storage.library_errors import one_line
@@ -73,7 +73,7 @@ def _index_of(container: Path, name: str) -> int:
     for file in ("zarr.json", ".zattrs"):
         path = container / "OME" / file
         if path.is_file() and path.stat().st_size <= _MAX_BYTES:
-            about: Any = json.loads(path.read_text(encoding="utf-8"))
+            about: Any = load_json(path.read_text(encoding="utf-8"), f"OME/{file}")
             about = about.get("attributes", about) if isinstance(about, Mapping) else {}
             listed = about.get("ome", about).get("series")
             if isinstance(listed, list) and name in listed:

@@ -8,6 +8,7 @@ Scenes are series. The library decodes in C++, so it runs in a child process
 References: https://zeiss.github.io/libczi/
 """
 
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -26,8 +27,10 @@ from stereocell.read.czi_file import CziFacts, CziFile, Rectangle
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
+from stereocell.read.repeats import record_xml
 from stereocell.read.series import Candidate, candidate, lines, read_chosen
-from stereocell.read.spacing import Grid, Triple
+from stereocell.read.spacing import PartialTriple, grid_of
+from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.storage.child_process import Child
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
@@ -36,6 +39,8 @@ _TYPES = {"Gray8": "u1", "Gray16": "u2", "Gray32Float": "f4"}
 _OTHERS = {"V": "views", "H": "phases", "I": "illuminations", "R": "rotations", "B": "blocks"}
 _UM_PER_METER = 1e6
 _ABSENT = "read as 0, as the format has it for tiles that were not acquired, and as lost ones are"
+_INTERVAL = "Metadata/Information/Image/Dimensions/Z/Positions/Interval/Increment"
+_DEPTH = Subject("voxel spacing along z", "um", 0.01, "--spacing-um z,y,x replaces it")
 _MAX_DIGITS = 10  # of a size in the metadata
 
 
@@ -54,7 +59,7 @@ class _File:
         x, y = self.bounds.get("X", (0, 0)), self.bounds.get("Y", (0, 0))
         all_of_it = (x[0], y[0], x[1] - x[0], y[1] - y[0])
         self.scenes: Sequence[tuple[int | None, Rectangle]] = facts.scenes or [(None, all_of_it)]
-        self.spacing = _spacing(self.metadata)
+        self.spacing, self.spacing_notes = _spacing(self.metadata)
 
     def read(self, window: Rectangle, plane: dict[str, int], scene: int | None) -> NDArray[Any]:
         """Return the pixels of a window of a plane. Raises SourceError, ChildError."""
@@ -95,7 +100,7 @@ class _File:
                 (self.size("Z"), height, width),
                 channels=self.size("C"),
                 times=self.size("T"),
-                spacing_um=self.spacing,
+                spacing_um=grid_of((1, 1, 1), self.spacing).spacing_um,
             )
             for _, (_, _, width, height) in self.scenes
         ]
@@ -147,12 +152,12 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
     names, colors = _channels(file.metadata, shape[1])
     return Image(
         (array,),
-        (Grid(array.shape, file.spacing),),
+        (grid_of(array.shape, file.spacing),),
         names,
         colors,
         1,
         stack.close,
-        notes=(*notes, *_size_notes(file)),
+        notes=(*notes, *_size_notes(file), *file.spacing_notes),
         notes_at=partial(file.absent_notes, scene),
     )
 
@@ -160,36 +165,63 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
 def _size_notes(file: _File) -> tuple[str, ...]:
     """Return a note for each axis along which the metadata state more than the tiles have."""
     notes = []
-    for axis in "CZT":
+    sizes = {axis: file.size(axis) for axis in ("C", "Z", "T", *_OTHERS)}
+    for axis, held in {**sizes, "S": len(file.scenes)}.items():
         text = file.metadata.findtext(f"Metadata/Information/Image/Size{axis}", "")
         stated = int(text) if text.isdecimal() and len(text) < _MAX_DIGITS else 0
-        if stated > file.size(axis):
+        if stated and stated != held:
+            why = "the acquisition ended early, or a part is missing"
+            reason = why if stated > held else "all of them are read"
             notes.append(
-                f"the metadata state {stated} along {axis}, and tiles are there for "
-                f"{file.size(axis)}: the acquisition ended early, or a part is missing"
+                f"the metadata state {stated} along {_named(axis)}, and tiles are there for "
+                f"{held}: {reason}"
             )
     return tuple(notes)
+
+
+def _named(axis: str) -> str:
+    kind = {**_OTHERS, "S": "scenes"}.get(axis)
+    return f"{axis} ({kind})" if kind else axis
 
 
 def _parsed(text: str) -> ElementTree.Element:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise ValueError("metadata with a DOCTYPE")
     try:
-        return ElementTree.fromstring(text)
+        root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise ValueError(f"metadata: {error}") from None
+    record_xml(root, "the metadata")
+    return root
 
 
-def _spacing(metadata: ElementTree.Element) -> Triple | None:
-    """Return the spacing (z, y, x), um; the file has m. None: not stated, or 0."""
-    found = dict.fromkeys("ZYX", 0.0)
+def _spacing(metadata: ElementTree.Element) -> tuple[PartialTriple, tuple[str, ...]]:
+    """Return the spacing (z, y, x), um, and notes. None each: not stated, or 0.
+
+    The scaling is in m. The interval of the planes, in um, states the spacing along z as well.
+    """
+    found: dict[str, float | None] = dict.fromkeys("ZYX")
     for node in metadata.findall("Metadata/Scaling/Items/Distance"):
-        try:
-            found[str(node.get("Id"))] = float(node.findtext("Value", "")) * _UM_PER_METER
-        except ValueError:
-            continue
-    z, y, x = (found[axis] for axis in "ZYX")
-    return (z, y, x) if min(z, y, x) > 0 else None
+        axis, length = str(node.get("Id")), _number(node.findtext("Value", "")) * _UM_PER_METER
+        if length > 0 and found.get(axis) is None:
+            found[axis] = length
+    statements = [] if found["Z"] is None else [Statement(found["Z"], "Scaling")]
+    step = abs(_number(metadata.findtext(_INTERVAL, "")))
+    if step > 0:
+        statements.append(Statement(step, "the interval of the planes", Trust.REPEATED))
+    if not statements:
+        return (None, found["Y"], found["X"]), ()
+    settled = settle(_DEPTH, statements)
+    return (settled.number, found["Y"], found["X"]), settled.notes
+
+
+def _number(text: str) -> float:
+    """Return a finite number; 0: it is none."""
+    try:
+        number = float(text)
+    except ValueError:
+        return 0.0
+    return number if math.isfinite(number) else 0.0
 
 
 def _channels(

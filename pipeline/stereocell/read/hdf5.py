@@ -17,6 +17,7 @@ from stereocell.read.array_axes import settle_stated_axes
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.hdf5_dimensions import describe, require_plain
+from stereocell.read.hdf5_itk import is_of_itk, itk_image
 from stereocell.read.hdf5_spacing import settle_spacing
 from stereocell.read.hdf5_tree import Hdf5Array, Hdf5Tree
 from stereocell.read.hdf5_values import value_attributes
@@ -58,6 +59,8 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
     dataset, notes = _choose(tree, location.key)
     where = f"{location.path}:{dataset.name}"
     require_plain(where, dataset)
+    if not axes and is_of_itk(dataset):
+        return itk_image(tree, dataset, notes)
     described = describe(tree, dataset)
     stored = Hdf5Array(dataset, where)
     statements = [one.names for one in described]

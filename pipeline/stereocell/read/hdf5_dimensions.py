@@ -7,7 +7,7 @@
 | netCDF-4, xarray, HDF5's dimension scales | the scales' names, and CF's `axis` | the scales |
 | NeXus | `axes` of the group or of its signal | the fields of these names |
 | EMD of NCEM and tomviz | `name` of `dim1`, `dim2`, ... | `dim1`, `dim2`, ... |
-| Zarr's xarray convention | `_ARRAY_DIMENSIONS` | |
+| Zarr's xarray, funlib and others | `_ARRAY_DIMENSIONS`, `axis_names`, ... (read/axis_names.py) | |
 | MATLAB, Octave | columns first: an array V(y, x, z) is stored as z, x, y | |
 | Velox | y, x, frame | |
 | Data Exchange | theta, y, x where angles lie beside the dataset | |
@@ -16,15 +16,15 @@ References: https://docs.unidata.ucar.edu/nug/, https://emdatasets.com/format/,
 https://manual.nexusformat.org/classes/base_classes/NXdata.html, HDF5 Dimension Scale Specification.
 """
 
-import json
 from dataclasses import dataclass
 from typing import Any
 
 import h5py
 
 from stereocell.model.errors import SourceError
-from stereocell.read.array_axes import axis_of
+from stereocell.read.axis_names import NAME_LISTS, axis_of, listed_names
 from stereocell.read.hdf5_tree import Hdf5Tree
+from stereocell.read.repeats import load_json
 from stereocell.read.statements import Statement, Trust
 
 _EMD = "emd_group_type"
@@ -57,7 +57,7 @@ def describe(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
         _labels(tree, dataset),
         _nexus(tree, dataset),
         _emd(tree, dataset),
-        _arrays(tree, dataset),
+        *_listed(tree, dataset),
         _velox(dataset),
         _projections(dataset),
         _by_columns(dataset),
@@ -70,7 +70,7 @@ def _vigra(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
     if not isinstance(tags, str):
         return None
     try:
-        axes: list[dict[str, Any]] = json.loads(tags)["axes"]
+        axes: list[dict[str, Any]] = load_json(tags, "axistags")["axes"]
         names = tuple(str(axis["key"]) for axis in axes)
         steps = tuple(
             (float(axis.get("resolution") or 0), str(axis.get("description", ""))) for axis in axes
@@ -142,9 +142,16 @@ def _emd(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
     return Described(Statement(names, f"the list of names dim1 to dim{dataset.ndim}"), scales)
 
 
-def _arrays(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
-    names = tree.texts(dataset, "_ARRAY_DIMENSIONS")
-    return Described(Statement(names, "_ARRAY_DIMENSIONS")) if names else None
+def _listed(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
+    """Return the dimensions by each attribute that lists names of axes."""
+    found = []
+    for name in NAME_LISTS:
+        texts = tree.texts(dataset, name) if name in dataset.attrs else ()
+        names = listed_names(texts, dataset.ndim)
+        # NeXus has the fields of positions beside its `axes`, see _nexus
+        if names and not (name == "axes" and len(texts) == dataset.ndim):
+            found.append(Described(Statement(names, name)))
+    return found
 
 
 def _velox(dataset: h5py.Dataset) -> Described | None:

@@ -54,3 +54,5 @@ def _add_positions(
     unit = tree.attribute(scale, "units")
     text = unit if isinstance(unit, str) else ""
     spacings.add_positions(place, str(scale.name), positions, text, count)
+    positive = tree.attribute(scale, "positive")
+    spacings.add_sense(place, str(scale.name), positive if isinstance(positive, str) else "")

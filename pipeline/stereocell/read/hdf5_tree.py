@@ -107,23 +107,25 @@ class Hdf5Tree:
         raise SourceError(f"{self.where}: {path!r:.200}: links in a circle, expected a dataset")
 
     def attribute(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
-        """Return an attribute; text as str, also Imaris's arrays of characters; None: absent."""
+        """Return an attribute; text as str, several texts as a tuple of them; None: absent.
+
+        An array of one text, as netCDF's NC_STRING is, and Imaris's arrays of characters are text.
+        """
         value = self._attribute(node, name)
         if isinstance(value, bytes):
             return value.decode("utf-8", "replace")
-        if getattr(value, "dtype", None) is not None and value.dtype.kind == "S":
+        kind = value.dtype if isinstance(value, np.ndarray) else np.dtype(float)
+        if kind == np.dtype("S1"):
             return b"".join(value.ravel().tolist()).decode("utf-8", "replace")
-        return value
+        if kind.kind not in "SUO":
+            return value
+        texts = _texts(value)
+        return texts[0] if len(texts) == 1 else texts
 
     def texts(self, node: h5py.Group | h5py.Dataset, name: str) -> tuple[str, ...]:
         """Return the texts of an attribute, one for each element; none where it is absent."""
         value = self._attribute(node, name)
-        if value is None:
-            return ()
-        return tuple(
-            one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one)
-            for one in np.ravel(np.asarray(value, dtype=object)).tolist()
-        )
+        return () if value is None else _texts(value)
 
     def _attribute(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
         if name not in node.attrs:
@@ -181,6 +183,13 @@ class Hdf5Tree:
 def is_volume(dataset: h5py.Dataset) -> bool:
     """Whether a dataset holds numbers along three axes longer than 1."""
     return dataset.dtype.kind in _NUMBERS and sum(n > 1 for n in dataset.shape or ()) >= 3
+
+
+def _texts(value: Any) -> tuple[str, ...]:
+    return tuple(
+        one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one)
+        for one in np.ravel(np.asarray(value, dtype=object)).tolist()
+    )
 
 
 def _steps(path: str) -> list[str]:

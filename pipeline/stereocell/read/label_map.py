@@ -1,12 +1,14 @@
 """A label map: voxels that hold their object's number, of any integer type, or whole floats."""
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.model.object_notes import ObjectNotes
+from stereocell.model.settings import MAX_COUNT
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset
 
@@ -17,7 +19,7 @@ _MAX_EXACT = 2.0**53  # whole numbers below are exact as float64
 class LabelMap:
     """One channel of a dataset, at its finest level: coarser ones may be averages of numbers.
 
-    background  the number of the voxels that are no object, beside 0, -1 and NaN
+    background  a number of voxels that are no object, beside 0, -1 and NaN; it may be negative
     """
 
     dataset: Dataset
@@ -40,26 +42,35 @@ class LabelMap:
         -1 and NaN are no object either, as some programs write it, nor is `background`. Raises
         SourceError for other numbers below 0, for fractions, and where a chunk can't be decoded.
         """
-        numbers = self._numbers(box)
-        # larger ones than the type holds are in no voxel
-        if not 0 < self.background <= np.iinfo(numbers.dtype).max:
-            return numbers
-        return np.where(numbers == self.background, numbers.dtype.type(0), numbers)
-
-    def _numbers(self, box: Box) -> NDArray[np.unsignedinteger]:
-        stored = self.dataset.read_stored(self.channel, box)
-        if stored.dtype.kind == "b":
-            return stored.astype(np.uint8)
-        if stored.dtype.kind == "f":
-            stored = self._whole(stored)
+        stored = self._without_background(self._integers(box))
         if stored.dtype.kind == "i":
             least = int(stored.min(initial=0))
             if least < -1:
-                raise SourceError(f"{self._where}: found {least}, expected 0 or more in labels")
+                way = f"--background {least} if it is the background, else other numbers"
+                if least < -MAX_COUNT:
+                    way = "another number in its place"
+                raise SourceError(
+                    f"{self._where}: found {least}, expected 0 or more in labels: {way}"
+                )
             if least < 0:
                 stored = np.where(stored < 0, 0, stored)
             stored = stored.view(f"u{stored.itemsize}")
-        return stored
+        return cast("NDArray[np.unsignedinteger]", stored)
+
+    def _integers(self, box: Box) -> NDArray[np.integer]:
+        stored = self.dataset.read_stored(self.channel, box)
+        if stored.dtype.kind == "b":
+            return stored.astype(np.uint8)
+        return self._whole(stored) if stored.dtype.kind == "f" else stored
+
+    def _without_background(self, stored: NDArray[np.integer]) -> NDArray[np.integer]:
+        """Return numbers with 0 in the place of `background`."""
+        limits = np.iinfo(stored.dtype)
+        # a number that the type can't hold is in no voxel
+        if not self.background or not limits.min <= self.background <= limits.max:
+            return stored
+        kind = stored.dtype.type
+        return np.where(stored == kind(self.background), kind(0), stored)
 
     def _whole(self, stored: NDArray[np.floating]) -> NDArray[np.int64]:
         numbers = np.where(np.isnan(stored), 0, stored)
@@ -67,11 +78,22 @@ class LabelMap:
             numbers = numbers.astype(np.float32)
         is_whole = (np.abs(numbers) < _MAX_EXACT) & (np.floor(numbers) == numbers)
         if not is_whole.all():
-            found = float(numbers[~is_whole][0])
-            raise SourceError(f"{self._where}: found {found:g}, expected whole numbers in labels")
+            raise SourceError(f"{self._where}: {_not_whole(numbers[~is_whole], stored.dtype)}")
         return numbers.astype(np.int64)
 
     @property
     def _where(self) -> str:
         name = self.dataset.channels[self.channel].name
         return f"{self.dataset.shown}: channel {name!r}"
+
+
+def _not_whole(numbers: NDArray[np.floating], stored: np.dtype[np.floating]) -> str:
+    """Return the message on numbers that are no labels: fractions, infinity, or too large ones."""
+    large = numbers[np.isfinite(numbers) & (np.abs(numbers) >= _MAX_EXACT)]
+    if not len(large):
+        return f"found {float(numbers[0]):g}, expected whole numbers in labels"
+    return (
+        f"found {float(large[0]):.0f} in {stored.name}, which rounds whole numbers beyond "
+        f"{int(_MAX_EXACT):,}, so that objects of neighbouring numbers are one: expected labels "
+        "that are saved as int64 or uint64"
+    )

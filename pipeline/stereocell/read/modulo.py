@@ -109,7 +109,7 @@ def split(where: str, image: Image, root: ElementTree.Element | None, series: in
         is_interleaved = _is_interleaved(image.arrays[0], one, root)
         count = image.arrays[0].size(one.axis) // len(one.labels)
         image = _part(image, one, place, is_interleaved=is_interleaved)
-        order = "by turns" if is_interleaved else "one stack after another"
+        order = "alternately" if is_interleaved else "one stack after another"
         shown = f"{count} along {one.axis} each" + (f" ({order})" if count > 1 else "")
         notes.append(
             f"ModuloAlong{one.axis.upper()}: {one.counted}, {shown}: {one.kind} "

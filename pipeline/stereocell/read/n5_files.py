@@ -1,6 +1,5 @@
 """The files of an N5 container, on this machine or at an address: none outside the source."""
 
-import json
 import os
 from collections.abc import Mapping
 from functools import lru_cache
@@ -9,6 +8,7 @@ from typing import Any
 import fsspec
 
 from stereocell.model.errors import SourceError
+from stereocell.read.repeats import load_json
 from stereocell.storage.first_bytes import pointer_words
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own, require_own_key
@@ -109,7 +109,7 @@ class N5Files:
 
 
 def _parsed(content: bytes | None) -> Mapping[str, Any]:
-    found = json.loads(content[:_MAX_BYTES]) if content is not None else {}
+    found = load_json(content[:_MAX_BYTES], _NAME) if content is not None else {}
     if not isinstance(found, Mapping):
         raise SourceError(f"{_NAME}: found {type(found).__name__}, expected a table")
     return found

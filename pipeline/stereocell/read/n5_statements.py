@@ -3,6 +3,7 @@
 | field | axes | spacing |
 |---|---|---|
 | `axes` | fastest first, as all of N5 | |
+| `_ARRAY_DIMENSIONS`, `axis_names` and others, as Python writes them | slowest first | |
 | `pixelResolution`, `resolution` with `units` | | fastest first |
 | `transform` of COSEM | slowest first | in this order |
 
@@ -14,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from stereocell.read.array_spacing import spacing_of
+from stereocell.read.axis_names import NAME_LISTS, listed_names
 from stereocell.read.axis_spacings import AxisSpacings
 from stereocell.read.spacing import Triple
 from stereocell.read.stated_numbers import numbers_of
@@ -26,6 +28,7 @@ _SLOWEST_FIRST = ("x", "y", "z")  # axes, slowest first, if `axes` lists z, y, x
 def named_axes(level: Attributes, group: Attributes) -> list[Statement]:
     """Return the names of a dataset's axes, slowest first, by each field that names them."""
     found = []
+    rank = len(numbers_of(level.get("dimensions")))
     for attributes, place, trust in (
         (level, "axes of the dataset", Trust.STATED),
         (group, "axes of the group", Trust.REPEATED),
@@ -33,6 +36,11 @@ def named_axes(level: Attributes, group: Attributes) -> list[Statement]:
         if isinstance(listed := attributes.get("axes"), list):
             names = tuple(str(axis).lower() for axis in reversed(listed))
             found.append(Statement(names, place, trust))
+        for field in NAME_LISTS if rank else ():
+            if field != "axes" and (slowest_first := listed_names(attributes.get(field), rank)):
+                found.append(
+                    Statement(slowest_first, f"{field}{place.removeprefix('axes')}", trust)
+                )
     for transform, place, trust in _transforms(level, group):
         names = tuple(str(axis).lower() for axis in transform["axes"])
         found.append(Statement(names, f"axes of {place}", trust))

@@ -16,7 +16,7 @@ from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.nd2_frames import BEGIN, Nd2Frames
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.series import Candidate, candidate, lines, read_chosen
-from stereocell.read.spacing import Grid, Triple
+from stereocell.read.spacing import PartialTriple, grid_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file
 
@@ -48,8 +48,9 @@ class _File:
 
     def candidates(self) -> list[Candidate]:
         z, y, x = (self.size(axis) for axis in "ZYX")
+        spacing = grid_of((z, y, x), self.spacing).spacing_um
         one = candidate(
-            (z, y, x), channels=self.size("C"), times=self.size("T"), spacing_um=self.spacing
+            (z, y, x), channels=self.size("C"), times=self.size("T"), spacing_um=spacing
         )
         return [one] * self.size("P")
 
@@ -101,6 +102,9 @@ def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack)
             )
     if (count := file.size("C")) > MAX_CHANNELS:
         raise SourceError(f"{file.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+    with one_line(file.where, "an ND2 file with metadata of its axes"):
+        _require_distances(file)
+        notes = (*notes, *_order_notes(file))
     loops = [axis for axis in file.sizes if axis not in _IN_FRAME]
     lengths = [file.sizes[axis] for axis in loops]
 
@@ -122,7 +126,7 @@ def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack)
     numbers = [[number(t, z) for z in range(file.size("Z"))] for t in range(file.size("T"))]
     return Image(
         (array,),
-        (Grid(array.shape, file.spacing),),
+        (grid_of(array.shape, file.spacing),),
         names,
         colors,
         1,
@@ -157,11 +161,44 @@ def _missing_notes(file: _File, numbers: list[list[int]], time: int) -> tuple[st
     return (note,) if missing else ()
 
 
-def _spacing(nd2: Any, sizes: dict[str, int]) -> Triple | None:
-    """Return the spacing (z, y, x), um; None: not stated. The library has 1 where z is missing."""
+def _spacing(nd2: Any, sizes: dict[str, int]) -> PartialTriple:
+    """Return the spacing (z, y, x), um; None each: not stated, where the library has 1."""
     size = nd2.voxel_size()
-    z, y, x = (float(value) for value in (size.z, size.y, size.x))
-    return (z, y, x) if min(z, y, x) > 0 and "Z" in sizes else None
+    z, y, x = (float(value) if value > 0 else None for value in (size.z, size.y, size.x))
+    volume = _volume(nd2)
+    if volume is not None:
+        x, y, z = (
+            one if is_stated else None
+            for one, is_stated in zip((x, y, z), volume.axesCalibrated, strict=True)
+        )
+    return (z if "Z" in sizes else None), y, x
+
+
+def _volume(nd2: Any) -> Any:
+    """Return the library's description of the axes; None: the file has none."""
+    channels = getattr(nd2.metadata, "channels", None) or [None]
+    return getattr(channels[0], "volume", None)
+
+
+def _require_distances(file: _File) -> None:
+    """Raise SourceError where an axis of the images is time, as in a line scan."""
+    volume = _volume(file.nd2)
+    for axis, kind in zip("xy", volume.axesInterpretation if volume else (), strict=False):
+        if kind != "distance":
+            raise SourceError(
+                f"{file.where}: axis {axis}: found {kind} (a line scan), expected a distance"
+            )
+
+
+def _order_notes(file: _File) -> tuple[str, ...]:
+    """Return a note where planes were taken downwards, so that a volume may be a mirror image."""
+    loops = [loop.parameters for loop in file.nd2.experiment if loop.type == "ZStackLoop"]
+    if all(loop.bottomToTop for loop in loops):
+        return ()
+    return (
+        "the planes were taken from the top to the bottom (the Z loop states it): they are read in "
+        "the order of the file",
+    )
 
 
 def _channels(nd2: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:

@@ -11,7 +11,8 @@ from typing import Any
 
 from stereocell.model.axes import AXES
 from stereocell.model.errors import SourceError
-from stereocell.read.array_axes import axis_of, given_axes
+from stereocell.read.array_axes import given_axes
+from stereocell.read.axis_names import axes_of_names
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
 _OF_ZARR_V2 = ("0.1", "0.2", "0.3", "0.4")
@@ -22,7 +23,8 @@ def dimension_names(array: Any) -> tuple[str, ...]:
     """Return the names of an array's dimensions, as letters; empty: not stated, or no axes."""
     named = getattr(array.metadata, "dimension_names", None)
     named = named or array.attrs.get("_ARRAY_DIMENSIONS", ())
-    listed = tuple(axis_of(str(name)) for name in named) if isinstance(named, list | tuple) else ()
+    is_list = isinstance(named, list | tuple)
+    listed = axes_of_names([str(name) for name in named]) if is_list else ()
     return listed if listed and set(listed) <= set(AXES) else ()
 
 

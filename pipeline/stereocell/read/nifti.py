@@ -25,6 +25,7 @@ from stereocell.model.errors import SourceError
 from stereocell.model.object_notes import ObjectNotes
 from stereocell.read.acquired import Acquired
 from stereocell.read.anatomical_axes import Canonical, canonical_of
+from stereocell.read.b_values import image_order
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.image import Image
 from stereocell.read.label_notes import notes_of_nifti
@@ -85,7 +86,15 @@ def read_image(location: Location) -> Image:
     z, y, x = (grid[axis] for axis in canonical.order)
     times = shape[3] if len(shape) > 3 else 1
     counts: dict[int, int] = {}
-    load = partial(_load, location, canonical, skewed, dtype, counts)
+    images = image_order(location, times)
+    notes += images.notes
+
+    def load(time: int) -> NDArray[Any]:
+        place = images.order[time]
+        values, count = _load(location, canonical, skewed, dtype, place)
+        counts[time] = count
+        return values
+
     voxels = WholeArray((times, z, y, x), dtype, load)
     notes += require_whole(image, where)
     return Image(
@@ -101,7 +110,7 @@ def read_image(location: Location) -> Image:
         objects=notes_of_nifti(_tables(header)) if is_nifti else ObjectNotes(),
         acquired=Acquired(_image_axis(header.get_dim_info()[2] if is_nifti else None, canonical)),
         notes=tuple(notes),
-        files=tuple(files_of(image)),
+        files=(*files_of(image), *images.files),
         notes_at=partial(_count_nan, voxels, counts) if stored.kind == "f" else None,
     )
 
@@ -158,9 +167,10 @@ def _load(
     canonical: Canonical,
     skewed: NDArray[np.float64] | None,
     dtype: np.dtype[Any],
-    counts: dict[int, int],
     time: int,
-) -> NDArray[Any]:
+) -> tuple[NDArray[Any], int]:
+    """Return one image of the file, and its number of voxels that are no number."""
+    count = 0
     try:
         image = open_image(location)
         data = image.dataobj
@@ -176,10 +186,10 @@ def _load(
             found = str(error)
         raise SourceError(f"{location.shown}: {found}, expected {NAME} that is whole") from None
     if values.dtype.kind == "f":
-        values, counts[time] = _without_gaps(values, is_measured, location.shown)
+        values, count = _without_gaps(values, is_measured, location.shown)
     if skewed is not None:
         values, _ = resample_sheared(values, skewed)
-    return canonical.apply(values)
+    return canonical.apply(values), count
 
 
 def _without_gaps(

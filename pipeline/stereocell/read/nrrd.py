@@ -25,6 +25,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.file_array import FileArray, PackedArray, notes_on_rest, unpack_array
 from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.nrrd_labels import labelled_axes, names_by_labels, notes_beside_directions
 from stereocell.read.nrrd_segments import segments_of
 from stereocell.read.nrrd_statements import (
     axis_lengths,
@@ -33,9 +34,11 @@ from stereocell.read.nrrd_statements import (
     units_um,
     value_notes,
 )
+from stereocell.read.nrrd_values import ValueAxis, value_axis
+from stereocell.read.ordered_array import OrderedArray
 from stereocell.read.patient_grid import place
 from stereocell.read.plausible_size import size_notes
-from stereocell.read.spacing import PartialTriple, grid_of
+from stereocell.read.spacing import Grid, PartialTriple, grid_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_file, require_own
 
@@ -69,13 +72,15 @@ def read_image(location: Location) -> Image:
     require_file(location)
     fields, end = _header(location)
     shape = [int(n) for n in np.atleast_1d(fields["sizes"])]
-    directions = _directions(where, fields, shape)
-    names = _axes(where, fields, shape, directions)
-    array = _array(location, fields, end, shape[::-1])
-    axes = tuple(reversed(names))
+    labelled = labelled_axes(fields, shape)
+    directions = _directions(where, fields, shape, labelled)
+    names = _axes(where, fields, shape, directions, labelled)
     sizes = [shape[names.index(axis)] for axis in "ijk"]
     if (count := shape[names.index("c")] if "c" in names else 1) > MAX_CHANNELS:
         raise SourceError(f"{where}: sizes: found {count} values, expected at most {MAX_CHANNELS}")
+    stored: StoredArray = _array(location, fields, end, shape[::-1])
+    array, names, values = _with_values(fields, stored, names)
+    axes = tuple(reversed(names))
     at = [names.index(axis) for axis in "ijk"]
     to_lps, files = _to_lps(where, fields), _files(location, fields)
     factors, unit_notes = units_um(fields, at, is_patient=to_lps is not None)
@@ -86,17 +91,14 @@ def read_image(location: Location) -> Image:
         *kind_notes(fields, at),
         *unit_notes,
         *value_notes(fields),
-        *notes_on_rest(array),
+        *values.notes,
+        *notes_on_rest(stored),
     )
     if to_lps is None:
-        swapped = {"i": "x", "j": "y", "k": "z"}
-        voxels = VoxelArray(array, tuple(swapped.get(axis, axis) for axis in axes))
-        z, y, x = reversed(sizes)
-        grid = grid_of((z, y, x), _spacing(spatial))
-        unnamed = (None,) * count
-        notes = (*notes, *_turned(fields, directions[at]))
+        voxels, grid, stack_notes = _stacked(fields, array, names, directions, spatial)
+        notes = (*notes, *stack_notes)
         return Image(
-            (voxels,), (grid,), unnamed, unnamed, 1, notes=notes, files=files,
+            (voxels,), (grid,), values.names, values.colors, 1, notes=notes, files=files,
             labels=labels, objects=objects,
         )  # fmt: skip
     affine = np.eye(4)
@@ -104,11 +106,56 @@ def read_image(location: Location) -> Image:
     origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
     origin = np.where(np.isfinite(origin), origin, 0.0) * factors.max(axis=0)
     affine[:3, 3] = to_lps @ origin / 1000.0
-    notes = (*notes, *size_notes(np.linalg.norm(affine[:3, :3], axis=0).tolist(), sizes))
+    label_notes = notes_beside_directions([labelled[index] for index in at if labelled], affine)
+    notes = (
+        *notes,
+        *label_notes,
+        *size_notes(np.linalg.norm(affine[:3, :3], axis=0).tolist(), sizes),
+    )
     image = place(where, array, axes, affine, "space directions").image(
         NAME, notes=notes, has_sides=_names_sides(fields)
     )
+    if len(values.names) > 1:
+        image = replace(image, names=values.names, colors=values.colors)
     return replace(image, files=files, labels=labels, objects=objects)
+
+
+def _with_values(
+    fields: Mapping[str, Any], array: StoredArray, names: list[str]
+) -> tuple[StoredArray, list[str], ValueAxis]:
+    """Return the voxels and the names of the axes (fastest first), with the axis of values."""
+    if "c" not in names:
+        return array, names, ValueAxis(names=(None,), colors=(None,))
+    index = names.index("c")
+    at = len(names) - 1 - index
+    kind = str([*fields.get("kinds", ()), *[""] * len(names)][index])
+    values = value_axis(fields, kind, array.shape[at])
+    if values.is_time and "t" in names:
+        unnamed = (None,) * array.shape[at]
+        return array, names, replace(values, names=unnamed, colors=unnamed)
+    if not values.is_time:
+        return array, names, values
+    if list(values.order) != sorted(values.order):
+        array = OrderedArray(array, at, values.order)
+    return array, ["t" if name == "c" else name for name in names], values
+
+
+def _stacked(
+    fields: Mapping[str, Any], array: StoredArray, names: Sequence[str],
+    directions: NDArray[np.float64], spatial: NDArray[np.float64],
+) -> tuple[VoxelArray, Grid, tuple[str, ...]]:  # fmt: skip
+    """Return the voxels of a stack that lies in no patient, their grid, and notes.
+
+    names    of the axes, fastest first
+    spatial  rows of `directions` of i, j, k, in um
+    """
+    shape = [int(n) for n in fields["sizes"]]
+    stacked, notes = names_by_labels(names, labelled_axes(fields, shape), shape)
+    voxels = VoxelArray(array, tuple(reversed(stacked)))
+    at = [names.index(axis) for axis in "ijk"]
+    rows = [at.index(stacked.index(axis)) for axis in "xyz"]
+    grid = grid_of(voxels.shape, _spacing(spatial[rows]))
+    return voxels, grid, (*notes, *_turned(fields, directions[at][rows]))
 
 
 def _header(location: Location) -> tuple[Mapping[str, Any], int]:
@@ -132,8 +179,13 @@ def _header(location: Location) -> tuple[Mapping[str, Any], int]:
     return fields, blank.end() if blank else len(content)
 
 
-def _directions(where: str, fields: Mapping[str, Any], shape: Sequence[int]) -> NDArray[np.float64]:
-    """Return a row of the directions for each axis, (n, 3); NaN: an axis of no direction."""
+def _directions(
+    where: str, fields: Mapping[str, Any], shape: Sequence[int], labelled: Sequence[str]
+) -> NDArray[np.float64]:
+    """Return a row of the directions for each axis, (n, 3); NaN: an axis of no direction.
+
+    labelled  by `labelled_axes`
+    """
     stated = fields.get("space directions")
     found = np.full((len(shape), 3), np.nan)
     if stated is None:  # only lengths; the axes of space are the first three that have one
@@ -141,6 +193,8 @@ def _directions(where: str, fields: Mapping[str, Any], shape: Sequence[int]) -> 
         kinds = list(fields.get("kinds", ()))
         known = [i for i, kind in enumerate(kinds[: len(shape)]) if kind in ("domain", "space")]
         count = len(shape)
+        if not known and set("xyz") <= set(labelled):
+            known = [i for i in range(count) if labelled[i] in tuple("xyz")]
         known = known or [i for i in range(count) if np.isfinite(lengths[i]) or count == 3]
         for row, index in enumerate(known[:3]):
             found[index] = 0.0
@@ -156,8 +210,9 @@ def _directions(where: str, fields: Mapping[str, Any], shape: Sequence[int]) -> 
 
 
 def _axes(
-    where: str, fields: Mapping[str, Any], shape: Sequence[int], directions: NDArray[np.float64]
-) -> list[str]:
+    where: str, fields: Mapping[str, Any], shape: Sequence[int], directions: NDArray[np.float64],
+    labelled: Sequence[str],
+) -> list[str]:  # fmt: skip
     """Return the names of the axes, fastest first: i, j, k of space, t and c."""
     spatial = [index for index in range(len(shape)) if np.isfinite(directions[index]).all()]
     if len(spatial) != 3:
@@ -170,7 +225,8 @@ def _axes(
     for name, index in zip("ijk", spatial, strict=True):
         names[index] = name
     for index in set(range(len(shape))) - set(spatial):
-        name = "t" if str(kinds[index]) == "time" else "c"
+        is_time = str(kinds[index]) == "time" or (labelled and labelled[index] == "t")
+        name = "t" if is_time else "c"
         if name in names and shape[index] > 1:
             raise SourceError(
                 f"{where}: kinds: found {kinds[: len(shape)]}, expected one axis of time, and one "
@@ -217,7 +273,8 @@ def _spacing(spatial: NDArray[np.float64]) -> PartialTriple:
 def _turned(fields: Mapping[str, Any], spatial: NDArray[np.float64]) -> tuple[str, ...]:
     """Note directions that are not along x, y, z: outside a patient they are not followed."""
     notes = []
-    if not np.array_equal(spatial, np.diag(np.abs(np.diag(spatial)))):
+    is_stated = fields.get("space directions") is not None
+    if is_stated and not np.array_equal(spatial, np.diag(np.abs(np.diag(spatial)))):
         notes.append("axes turned or mirrored by `space directions`: as stored")
     if "left-handed" in str(fields.get("space", "")).lower():
         notes.append("space: its axes are left-handed: as stored, so the volume may be mirrored")

@@ -1,12 +1,13 @@
-"""The depth of voxels by the positions of the planes in OME-XML, compared with its other fields."""
+"""The positions of the planes in OME-XML: the depth of voxels by them, and a drift sideways."""
 
 from collections.abc import Sequence
 from itertools import pairwise
 from xml.etree import ElementTree
 
 from stereocell.read import ome_xml
-from stereocell.read.plane_positions import settle_places
+from stereocell.read.plane_positions import drift_notes, settle_places
 from stereocell.read.spacing import um_per
+from stereocell.read.stated_numbers import numbers_of
 from stereocell.read.statements import Statement
 
 
@@ -20,7 +21,20 @@ def settle_depth(
     places, has_unit = positions_of(root)
     depth, notes = settle_places(places, stated, "PositionZ", has_unit=has_unit)
     are_same = len(places) > 2 and len(set(places.values())) == 1
-    return depth, (*notes, *(_SAME,) * (are_same and _times_rise(root)))
+    notes = (*notes, *(_SAME,) * (are_same and _times_rise(root)))
+    return depth, (*notes, *(note for axis in "XY" for note in _drift_notes(root, axis)))
+
+
+def _drift_notes(root: ElementTree.Element, axis: str) -> tuple[str, ...]:
+    """Return a note where the planes lie at different places along x or y."""
+    pixels = ome_xml.pixels_of(root)
+    places, _ = positions_of(root, axis)
+    if pixels is None or len(places) < 2:
+        return ()
+    per = um_per(pixels.get(f"PhysicalSize{axis}Unit", "um"))
+    sizes = numbers_of([pixels.get(f"PhysicalSize{axis}")])
+    pixel_um = sizes[0] * per if sizes and per is not None else None
+    return drift_notes(places, f"Position{axis}", axis.lower(), pixel_um)
 
 
 _SAME = (
@@ -36,19 +50,19 @@ def _planes(root: ElementTree.Element) -> list[ElementTree.Element]:
     return [p for p in planes if (p.get("TheT", "0"), p.get("TheC", "0")) == first]
 
 
-def positions_of(root: ElementTree.Element) -> tuple[dict[int, float], bool]:
-    """Return PositionZ in um by TheZ, and whether a unit of length is stated.
+def positions_of(root: ElementTree.Element, axis: str = "Z") -> tuple[dict[int, float], bool]:
+    """Return PositionZ, or that of X or Y, in um by TheZ, and whether a unit of length is stated.
 
     Without any unit um are assumed. The unit `reference frame` is no length.
     """
     found: dict[int, float] = {}
-    planes = _planes(root)
-    has_unit = any("PositionZUnit" in plane.attrib for plane in planes)
+    planes, field = _planes(root), f"Position{axis}"
+    has_unit = any(f"{field}Unit" in plane.attrib for plane in planes)
     for plane in planes:
-        unit = plane.get("PositionZUnit") if has_unit else "um"
+        unit = plane.get(f"{field}Unit") if has_unit else "um"
         per, place = um_per(unit), plane.get("TheZ", "")
         try:
-            value = float(plane.get("PositionZ", ""))
+            value = float(plane.get(field, ""))
         except ValueError:
             continue
         if per is not None and place.isdecimal() and abs(value) < 1e12:

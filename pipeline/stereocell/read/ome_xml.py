@@ -8,11 +8,13 @@ References: https://docs.openmicroscopy.org/ome-model/latest/ome-xml/
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from xml.etree import ElementTree
 
 from stereocell.model.emission_color import color_of_channel, color_of_light
 from stereocell.model.errors import SourceError
 from stereocell.read.image import Color
+from stereocell.read.repeats import record_xml
 from stereocell.read.spacing import PartialTriple, um_per
 
 _HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
@@ -63,6 +65,7 @@ def parse(text: str, where: str) -> ElementTree.Element:
         ) from error
     if _local(root) != "OME":
         raise SourceError(f"{where}: OME-XML: found <{_local(root):.40}>, expected <OME>")
+    record_xml(root, f"the OME-XML of {Path(where).name}")
     return root
 
 

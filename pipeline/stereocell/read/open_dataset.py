@@ -17,6 +17,7 @@ from stereocell.read.level_spacing import settle_levels
 from stereocell.read.plausible_size import ratio_notes
 from stereocell.read.readers import find_reader
 from stereocell.read.remarks import cast_note
+from stereocell.read.repeats import collected
 from stereocell.read.spacing import Triple, levels_of
 from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location
@@ -59,7 +60,10 @@ def open(
     """
     location, reader = find_reader(source)
     with library_boundary(location.shown, f"{reader.name} that is whole"):
-        image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
+        with collected() as repeats:
+            image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
+        notes = (note for _, note in sorted(repeats.items()))
+        image = replace(image, notes=(*image.notes, *notes))
         try:
             image = _at_time(location.shown, image, time)
             if dark:

@@ -1,4 +1,4 @@
-"""The depth of voxels by the positions of the planes, compared with the stated depth."""
+"""The depth of voxels by the positions of the planes, compared with the stated depth; drift."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -8,6 +8,7 @@ from stereocell.read.statements import Statement, Subject, Trust, settle
 _EVEN = 0.1  # largest difference of a step from the mean, as its share: rounding, and a drive's
 _TOLERANCE = 0.01  # relative difference of two depths that needs no note
 _MOST_APART = 50.0  # a larger ratio of two depths is one of units
+_MOST_ASIDE = 0.5  # voxels by which a plane may lie beside the others without a note
 _SUBJECT = Subject(
     "voxel spacing along z", "um", _TOLERANCE, remedy="--spacing-um z,y,x replaces it"
 )
@@ -20,6 +21,25 @@ def falling_notes(field: str, first_um: float, last_um: float) -> tuple[str, ...
     return (
         f"the planes' {field} falls from {first_um:.5g} to {last_um:.5g} um: the planes are read "
         "in the order of the file",
+    )
+
+
+def drift_notes(
+    places: Mapping[int, float], field: str, axis: str, pixel_um: float | None
+) -> tuple[str, ...]:
+    """Return a note where planes were taken at different places within the plane.
+
+    places    where planes lie along x or y, um, by their numbers
+    axis      x or y
+    pixel_um  the voxel spacing along this axis; None: not stated
+    """
+    apart = max(places.values(), default=0.0) - min(places.values(), default=0.0)
+    if apart <= _MOST_ASIDE * (pixel_um or 0.0):
+        return ()
+    share = f" ({apart / pixel_um:.3g} voxels)" if pixel_um else ""
+    return (
+        f"the planes' {field} differs by up to {apart:.4g} um{share}: the planes are not shifted "
+        f"along {axis}, so the specimen is sheared or jumps if the stage moved",
     )
 
 

@@ -21,6 +21,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read.dataset import StoredArray
 from stereocell.read.rescale import dtype_for, rescale
 from stereocell.read.stated_numbers import number_of, numbers_of
+from stereocell.read.stated_texts import text_of
 
 _FILLS = ("_FillValue", "missing_value")
 _SEPARATORS = re.compile(r"[,;\s]+")
@@ -121,7 +122,8 @@ def _factor(where: str, name: str, value: Any, default: float) -> float:
 
 def _sign(stored: np.dtype[Any], attributes: Mapping[str, Any], notes: list[str]) -> ValueScale:
     """Return a scale with the sign of the integers, by `_Unsigned`."""
-    said = str(attributes.get("_Unsigned", "")).strip().lower()
+    stated = attributes.get("_Unsigned", "")
+    said = (text_of(stated) or str(stated)).lower()
     other = {"i": "true", "u": "false"}.get(stored.kind)
     if said != other or stored.itemsize > 4:
         return ValueScale()

@@ -3,15 +3,18 @@
 A copy through another program or an edited `.zarray` leaves chunks `0.0.0` behind metadata that
 state `0/0/0`, or the reverse. Zarr then reads each chunk as absent, and the volume as empty. Both
 separators of both encodings are looked for, and a chunk without a file of the stated name is read
-from a file of the other name. On this machine the folder is listed when it is opened; at an address
-the other names are tried when a chunk is absent, which costs no request before.
+from a file of the other name. On this machine the folder, or the zip file, is listed when it is
+opened. At an address the other names are tried when a chunk is absent, which costs no request
+before.
 
 References: Zarr 3 specification, section on chunk key encodings; Zarr 2, `dimension_separator`
 """
 
 import os
 import re
+from collections.abc import Set
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import zarr
@@ -75,18 +78,37 @@ def possible_names(array: "zarr.Array[Any]") -> tuple[OtherNames, ...]:
     return tuple(OtherNames(array.path, first, one) for one in others)
 
 
-def names_on_disk(location: Location, array: "zarr.Array[Any]") -> OtherNames | None:
+def names_on_disk(
+    location: Location, array: "zarr.Array[Any]", members: Set[str] | None
+) -> OtherNames | None:
     """Return the names by which chunks lie that the metadata name otherwise; None: there are none.
 
-    The array is on this machine, in a folder that can be listed.
+    The array is on this machine, in a folder that can be listed, or in a zip file.
+
+    members  of the zip file; None: it is a folder
     """
-    forms, count = _listed(location, array), len(array.shape)
+    count = len(array.shape)
+    forms = _listed(location, array) if members is None else _among(members, array)
     return next((one for one in possible_names(array) if _form(one.found, count) in forms), None)
 
 
 def _form(encoding: ChunkKeyEncoding, dimensions: int) -> str:
     """Return the name that identifies an encoding."""
     return encoding.encode_chunk_key((0,) * dimensions)
+
+
+def _among(members: Set[str], array: "zarr.Array[Any]") -> set[str]:
+    """Return the forms of the names of an array's chunks among the members of a zip file."""
+    prefix, count = f"{array.path}/" if array.path else "", len(array.shape)
+    below = (name.removeprefix(prefix) for name in members if name.startswith(prefix))
+    found = filter(None, map(_KEY.fullmatch, islice(below, _MOST_LISTED)))
+    forms: set[str] = set()
+    for name in found:
+        parts = re.split(r"[./]", name[1])
+        between = name[1][len(parts[0])] if len(parts) > 1 else ""
+        if len(parts) == count and between:
+            forms.add(between.join(["c"] * name[0].startswith("c") + ["0"] * count))
+    return forms
 
 
 def _listed(location: Location, array: "zarr.Array[Any]") -> set[str]:

@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
+from stereocell.read.axis_names import NAME_LISTS, listed_names
 from stereocell.read.axis_spacings import MAX_POSITIONS
 from stereocell.read.coordinates import steps_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Triple, um_per
+from stereocell.read.stated_texts import text_of
 from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.read.zarr_store import GuardedStore, files_of, open_array, open_store, quiet
 from stereocell.read.zarr_values import with_values
@@ -36,12 +38,14 @@ class Positions:
     values  one for each voxel
     unit    of the values; empty: not stated
     axis    `t`, `z`, `y` or `x`, by CF's attribute; empty: not stated
+    sense   up or down, by CF's attribute `positive`; empty: not stated
     """
 
     name: str
     values: NDArray[np.float64]
     unit: str
     axis: str
+    sense: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,15 +64,11 @@ class Beside:
 
 def named_dimensions(array: "zarr.Array[Any]") -> dict[str, tuple[str, ...]]:
     """Return the names of an array's dimensions, by each field that states them."""
-    fields = {
-        "dimension_names": getattr(array.metadata, "dimension_names", None),
-        "_ARRAY_DIMENSIONS": array.attrs.get("_ARRAY_DIMENSIONS"),
-    }
-    return {
-        place: tuple(str(name) for name in named)
-        for place, named in fields.items()
-        if isinstance(named, list | tuple) and len(named) == array.ndim
-    }
+    fields = {name: array.attrs.get(name) for name in NAME_LISTS}
+    stated = getattr(array.metadata, "dimension_names", None)
+    fields["dimension_names"] = stated or fields["dimension_names"]
+    found = {place: listed_names(named, array.ndim) for place, named in fields.items()}
+    return {place: names for place, names in found.items() if names}
 
 
 def beside(location: Location, store: Store, path: str, array: "zarr.Array[Any]") -> Beside:
@@ -187,12 +187,13 @@ def _positions(
             array = open_array(one.location, one.store, path, title="positions")
             values = with_values(one.location.shown, VoxelArray(array, ("x",)))[0].array
             attributes = dict(array.attrs)
-            axis = str(attributes.get("axis", "")).strip().lower()
+            axis = text_of(attributes.get("axis")).lower()
             found = Positions(
                 name,
                 np.asarray(values[(slice(None),)], np.float64),
-                str(attributes.get("units") or ""),
+                text_of(attributes.get("units")),
                 axis if axis in tuple("tzyx") else "",
+                text_of(attributes.get("positive")),
             )
         return found, files_of(one.location, [path])
     return None

@@ -25,6 +25,7 @@ from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
 from stereocell.model.errors import SourceError
 from stereocell.read import zarr_ending  # noqa: F401  (it registers a function for Python's end)
+from stereocell.read.repeats import record_json
 from stereocell.read.zarr_chunk_names import OtherNames, names_on_disk, possible_names
 from stereocell.read.zarr_zip import ZippedStore, is_zipped, open_zipped
 from stereocell.storage.first_bytes import HEAD_BYTES, pointer_words
@@ -127,7 +128,9 @@ class GuardedStore(WrapperStore[Store]):
         value = await self._store.get(key, prototype, byte_range)
         if value is None and array and not await self._store.exists(array):
             raise OSError(f"{array} is gone since it was opened")
-        if value is not None and not is_metadata and byte_range is None and size is not None:
+        if value is not None and is_metadata and byte_range is None:
+            record_json(value.to_bytes(), key)
+        elif value is not None and byte_range is None and size is not None:
             if words := pointer_words(value[:HEAD_BYTES].to_bytes()):
                 raise OSError(f"chunk {key}: found {words}")
             self._require_fit(key, value)
@@ -306,7 +309,7 @@ def open_array(
         # not `path`, which may end in a slash
         names = possible_names(array)
         if location.is_local:
-            found = None if is_zipped(location) else names_on_disk(location, array)
+            found = names_on_disk(location, array, guard.members)
             names = (found,) if found is not None else ()
         chunks = Chunks(codecs, size, f"{array.path}/{named}".lstrip("/"), names)
         guard = GuardedStore(store, location, chunks)

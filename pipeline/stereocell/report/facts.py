@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -12,8 +12,10 @@ import numpy as np
 from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
+from stereocell.building.surface_cover import lifted_by_tile
 from stereocell.building.survey_file import Survey, TileIso, read_survey
 from stereocell.building.unit_files import cover_of, find_seconds, load_record, lod_file
+from stereocell.isosurface.lifted_by_noise import Lifted
 from stereocell.model.tiling import Tile
 from stereocell.model.unit import Cover
 from stereocell.storage.workspace import sizes_below
@@ -53,6 +55,7 @@ class UnitFacts:
     voxels      (x, y, z) of the stored volume, with its apron
     volume_bytes, ktx2_bytes  stored 8-bit voxels; volume and bricks in the bundle (0: none yet)
     cover       of the source's voxels by the surface; None: the channel has no level
+    lifted      how many of these voxels only noise lifts above the level; None: not known
     seconds     by step; empty where they were lost
     """
 
@@ -71,6 +74,7 @@ class UnitFacts:
     cavities_filled: int
     cover: Cover | None
     seconds: dict[str, float]
+    lifted: Lifted | None = None
 
     @property
     def name(self) -> str:
@@ -145,6 +149,8 @@ def gather(out_folder: OutFolder) -> Facts:
         for tile in plan.tiles
         for channel in plan.channels
     ]
+    lifted = {one.id: lifted_by_tile(out_folder, plan, survey[one.id]) for one in plan.channels}
+    units = [replace(unit, lifted=lifted[unit.channel.id].get(unit.tile.id)) for unit in units]
     phases = out_folder.phases()
     return Facts(
         plan=plan,

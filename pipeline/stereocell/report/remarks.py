@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from stereocell.building.surface_cover import SurfaceCover, sum_lifted
 from stereocell.model.counted import counted
 from stereocell.model.unit import MAX_MISSING, Cover
 from stereocell.report.facts import Facts, UnitFacts
@@ -60,20 +61,25 @@ def find_remarks(facts: Facts) -> list[Remark]:
         _remark(
             "with pieces apart from the body left out", _holders(facts), "channel", is_note=True
         ),
-        _remark("on how the source was read", facts.plan.notes, "note", is_note=True),
+        _remark("on how the source is read and built", facts.plan.notes, "note", is_note=True),
         _counts(("fragment", "fragments"), "dropped", units, lambda u: u.fragments_dropped),
         _counts(("cavity", "cavities"), "filled", units, lambda u: u.cavities_filled),
     ]
     return [remark for remark in found if remark is not None]
 
 
-def _covers(units: Iterable[UnitFacts]) -> list[tuple[str, Cover]]:
+def _covers(units: Iterable[UnitFacts]) -> list[tuple[str, SurfaceCover]]:
     """Return a line for each channel with a surface, and how it covers the source's voxels."""
-    found: dict[str, Cover] = {}
+    by_channel: dict[str, list[UnitFacts]] = {}
     for unit in units:
-        if unit.cover is not None:
-            found[unit.channel.name] = found.get(unit.channel.name, Cover(0, 0, 0)) + unit.cover
-    return [(f"{name}: {cover.words}", cover) for name, cover in found.items() if cover.source]
+        if unit.cover is not None and unit.cover.source:
+            by_channel.setdefault(unit.channel.name, []).append(unit)
+    lines = []
+    for name, built in by_channel.items():
+        total = sum((unit.cover for unit in built if unit.cover is not None), Cover(0, 0, 0))
+        cover = SurfaceCover.of(total, sum_lifted(unit.lifted for unit in built if unit.lifted))
+        lines.append((f"{name}: {cover.words}", cover))
+    return lines
 
 
 def _holders(facts: Facts) -> list[str]:

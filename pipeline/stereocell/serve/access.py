@@ -62,9 +62,17 @@ class Access:
     It is the outermost layer: all answers get the protective headers of serve/headers.py.
     """
 
-    def __init__(self, app: ASGIApp, names: Collection[str], gate: Gate | None) -> None:
-        """names: hosts that this server answers to, in lower case; gate: None on localhost."""
+    def __init__(
+        self, app: ASGIApp, names: Collection[str], gate: Gate | None, frames: Collection[str] = ()
+    ) -> None:
+        """Wrap an application.
+
+        names   hosts that this server answers to, in lower case
+        gate    None on localhost
+        frames  origins whose pages may hold the viewer in a frame
+        """
         self._app = app
+        self._frames = tuple(frames)
         self._names = frozenset(names)
         self._gate = gate
 
@@ -75,7 +83,7 @@ class Access:
 
         async def send_protected(message: Message) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = protect(message.get("headers", []))
+                message["headers"] = protect(message.get("headers", []), self._frames)
             await send(message)
 
         answer = self._judge(scope)
@@ -93,7 +101,7 @@ class Access:
         host = headers.get("host", "").lower()
         if _name(host) not in self._names:
             return PlainTextResponse("this server answers to its own names only", 403)
-        if not (_is_own_origin(headers, host) and _is_own_fetch(headers)):
+        if not (_is_own_origin(headers, host) and _is_own_fetch(headers, bool(self._frames))):
             return PlainTextResponse("pages of other origins may not ask this server", 403)
         return None if self._gate is None else self._judge_session(scope, headers, self._gate)
 
@@ -121,12 +129,16 @@ def _is_own_origin(headers: Headers, host: str) -> bool:
         return False
 
 
-def _is_own_fetch(headers: Headers) -> bool:
-    """Return whether the request comes from this server's page, a person or no browser."""
+def _is_own_fetch(headers: Headers, may_be_framed: bool) -> bool:
+    """Return whether the request comes from this server's page, a person or no browser.
+
+    may_be_framed  a frame of another page may ask, too: the browser then asks the page's policy
+    """
     if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
         return True
     goes = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
-    return goes == ("navigate", "document")  # a link, on a page or in a chat
+    a_link = ("navigate", "document")  # on a page or in a chat
+    return goes == a_link or (may_be_framed and goes == ("navigate", "iframe"))
 
 
 def _name(host: str) -> str:

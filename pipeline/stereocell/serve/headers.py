@@ -17,16 +17,21 @@ _EVERYWHERE = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
 }
-_PAGE = "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; object-src 'none'"
-_DATA = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox"
+_NO_FRAME = "frame-ancestors 'none'"
+_PAGE = f"base-uri 'none'; form-action 'none'; {_NO_FRAME}; object-src 'none'"
+_DATA = f"default-src 'none'; style-src 'unsafe-inline'; {_NO_FRAME}; sandbox"
 _RUN = ("text/html", "text/javascript")
 
 RawHeaders = list[tuple[bytes, bytes]]
 
 
-def protect(headers: Iterable[tuple[bytes, bytes]]) -> RawHeaders:
-    """Return an answer's headers (names in lower case) with the common ones added."""
-    made = list(headers)
+def protect(headers: Iterable[tuple[bytes, bytes]], frames: Iterable[str] = ()) -> RawHeaders:
+    """Return an answer's headers (names in lower case) with the common ones added.
+
+    frames  origins whose pages may hold the viewer's page in a frame
+    """
+    allowed = " ".join(frames)
+    made = [(name, _framed(value, allowed)) for name, value in headers]
     found = {name for name, _ in made}
     for name, value in (_EVERYWHERE | policy("")).items():
         if (raw := name.lower().encode()) not in found:
@@ -38,3 +43,10 @@ def policy(content_type: str) -> dict[str, str]:
     """Return the policy of a file; its 304 must repeat it, since caches take a 304's headers."""
     runs = content_type.partition(";")[0] in _RUN
     return {"Content-Security-Policy": _PAGE if runs else _DATA}
+
+
+def _framed(value: bytes, allowed: str) -> bytes:
+    """Return the page's policy with the origins that may frame it; every other value as it is."""
+    if not allowed or value != _PAGE.encode():
+        return value
+    return value.replace(_NO_FRAME.encode(), f"frame-ancestors {allowed}".encode())

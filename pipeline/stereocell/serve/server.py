@@ -43,12 +43,19 @@ _OWN_NAMES = (LOCALHOST, "localhost")  # with any port: it may be forwarded
 
 
 def serve(
-    out: Path, port: int, *, lan: bool, open_browser: bool, for_program: bool = False
+    out: Path,
+    port: int,
+    *,
+    lan: bool,
+    open_browser: bool,
+    for_program: bool = False,
+    frames: tuple[str, ...] = (),
 ) -> None:
     """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one. OUT may be a bundle.
 
     for_program  print lines of JSON in place of texts for a person: first the address, then, with
                  `lan`, an address that admits one device, a new one after each admission
+    frames       origins whose pages may hold the viewer in a frame
 
     Returns when the running transfers have finished, or STOP_S later. Raises KeyboardInterrupt at
     once at a second Ctrl+C; StereoCellError where there is no bundle, its manifest was changed, the
@@ -57,7 +64,7 @@ def serve(
     bundle, _ = _places(out)
     if (bundle / MANIFEST).is_file():
         read_manifest(bundle)  # raises where it was changed
-    server = BundleServer(out, port, lan, for_program)
+    server = BundleServer(out, port, lan, for_program, frames)
     # a running uvicorn handles SIGTERM itself: it ends, then raises the signal again
     before = signal.signal(signal.SIGTERM, lambda *_: server.stop())
     try:
@@ -80,6 +87,7 @@ def make_app(
     *,
     names: tuple[str, ...],
     gate: Gate | None,
+    frames: tuple[str, ...] = (),
 ) -> ASGIApp:
     """Return the application: the bundle's files, `/bricks` and `/values`.
 
@@ -87,6 +95,7 @@ def make_app(
     stage    the folder of the stage beside the bundle in OUT; None: there is no `/values`
     names    the hosts that it answers to, in lower case
     gate     tokens and sessions on the LAN; None: all clients of this machine have access
+    frames   origins whose pages may hold the viewer in a frame
     """
     values = None if library is None or stage is None else MeasuredValues(library, stage)
     endpoint = None if library is None else BrickEndpoint(library)
@@ -108,7 +117,7 @@ def make_app(
         routes.insert(0, Route("/values/{tile}/{channel}", values.answer, methods=["GET"]))
     app = Starlette(routes=routes, lifespan=lifespan)
     app.router.redirect_slashes = False  # paths with a line break match no route
-    return Access(app, names, gate)
+    return Access(app, names, gate, frames)
 
 
 def _places(out: Path) -> tuple[Path, Path | None]:
@@ -128,7 +137,14 @@ def _places(out: Path) -> tuple[Path, Path | None]:
 class BundleServer:
     """A bound server: `address` is where it listens; run() until stop()."""
 
-    def __init__(self, out: Path, port: int, lan: bool, for_program: bool = False) -> None:
+    def __init__(
+        self,
+        out: Path,
+        port: int,
+        lan: bool,
+        for_program: bool = False,
+        frames: tuple[str, ...] = (),
+    ) -> None:
         """Raises StereoCellError where there is no bundle, the port is taken, or no network."""
         bundle, bricks = _places(out)
         library = stage = None
@@ -157,7 +173,7 @@ class BundleServer:
         self.port: int = self._socket.getsockname()[1]
         self.address = f"{scheme}://{host}:{self.port}/"
         config = uvicorn.Config(
-            make_app(bundle, library, stage, names=names, gate=self.gate),
+            make_app(bundle, library, stage, names=names, gate=self.gate, frames=frames),
             log_config=None,
             log_level="error",
             access_log=False,

@@ -1,6 +1,6 @@
 """`stereocell check OUT --deep`: compare stage with source and bundle with stage, as a table."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,9 +10,11 @@ from stereocell.building.input_unchanged import require_added, require_input, re
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import unit_tasks
 from stereocell.building.plan import Plan
+from stereocell.building.surface_cover import SurfaceCover, lifted_by_tile, sum_lifted
 from stereocell.building.survey_file import read_survey
 from stereocell.bundle.manifest import MANIFEST
 from stereocell.engine.run import Engine
+from stereocell.isosurface.lifted_by_noise import Lifted
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.unit import Cover
 from stereocell.usd.read_appearances import read_appearances
@@ -60,7 +62,8 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
         yield CheckLine("stage against source", False, _one_line(error))
     else:
         for channel in plan.channels if findings else ():
-            yield from _channel_lines(channel, findings, odd)
+            lifted = lifted_by_tile(out_folder, plan, read_survey(out_folder)[channel.id])
+            yield from _channel_lines(channel, findings, odd, lifted)
         for labels in plan.labels:
             yield _line(
                 f"{labels.name} against source",
@@ -149,9 +152,15 @@ def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, Sour
 
 
 def _channel_lines(
-    channel: Channel, findings: Sequence[UnitFinding], odd: Sequence[str]
+    channel: Channel,
+    findings: Sequence[UnitFinding],
+    odd: Sequence[str],
+    lifted: Mapping[str, Lifted],
 ) -> Iterator[CheckLine]:
-    """Yield a row for each level of a channel's surface, and one for its volumes and problems."""
+    """Yield a row for each level of a channel's surface, and one for its volumes and problems.
+
+    lifted  how many voxels noise lifts above the channel's level, by tile ID
+    """
     units = [unit for unit in findings if unit.name.split("/")[1] == channel.id]
     for level in range(max(len(unit.levels) for unit in units)):
         rows = [unit.levels[level] for unit in units if level < len(unit.levels)]
@@ -167,10 +176,11 @@ def _channel_lines(
 
     def sum_up() -> str:
         raise_on(problems)
-        covers = [unit.cover for unit in units if unit.cover is not None]
-        total = sum(covers, Cover(0, 0, 0))
-        told = f"; {total.words}" if total.source else ""
-        return f"{len(units)} units: surfaces as stated, volumes equal, also as measured{told}"
+        total = sum((unit.cover for unit in units if unit.cover is not None), Cover(0, 0, 0))
+        tiles = {unit.name.split("/")[0] for unit in units}
+        noise = sum_lifted(lifted[tile] for tile in tiles & set(lifted))
+        shares = f"; {SurfaceCover.of(total, noise).words}" if total.source else ""
+        return f"{len(units)} units: surfaces as stated, volumes equal, also as measured{shares}"
 
     yield _line(f"{channel.name} against source", sum_up)
 

@@ -152,17 +152,6 @@ def test_localizers_of_one_series_are_not_said_to_interleave(tmp_path: Path) -> 
     assert not any("among" in line for line in lines)
 
 
-def test_a_series_for_each_slice_is_said(tmp_path: Path) -> None:
-    def change(ds: pydicom.Dataset) -> None:
-        ds.SeriesInstanceUID = generate_uid()
-
-    write_series(tmp_path / "s", AFFINE, SHAPE, change=change)
-    with pytest.raises(SourceError) as caught:
-        read.open(tmp_path / "s")
-    line = str(caught.value)
-    assert "found 10 stacks of one slice each, told apart by SeriesInstanceUID; expected" in line
-
-
 def new_reference(ds: pydicom.Dataset) -> None:
     ds.FrameOfReferenceUID = generate_uid()
 

@@ -176,3 +176,13 @@ def test_philipss_scale_slope_is_said(tmp_path: Path) -> None:
         block.add_new(0x0E, "FL", 0.125)
 
     assert any("scale slope of 0.125 (2005,100e)" in n for n in opened(tmp_path, change).notes)
+
+
+def test_a_ct_without_a_rescale_is_in_hounsfield_units_where_the_user_says_so(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    opened(tmp_path, without_rescale, modality="CT")
+    out = tmp_path / "out"
+    command = ["plan", str(tmp_path / "s"), "-o", str(out), "--preset", "ct", "--as", "hounsfield"]
+    assert main(command) == 0
+    assert "-300" in (out / "plan.json").read_text("utf-8")

@@ -30,7 +30,7 @@ import type { Cone, Probed } from "./probe";
 import { Reading, type ReadingOptions } from "./probe_reader";
 import { Ruler } from "./ruler";
 import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
-import { type Sight, screenZoom } from "./style";
+import { type Sight, STEREO_TEXT, screenZoom } from "./style";
 
 /** Why no point is set. */
 const NOTHING_MET = "Nothing there to measure: no surface, no volume and no slice.";
@@ -69,6 +69,8 @@ export type MarksView = Readonly<{
   disc: Cone | null;
   /** The panel lies beside the specimen, and ruler and axes would lie across it. */
   isPanelOpen: boolean;
+  /** The bar of stereo hangs below the specimen. */
+  isBarBelow: boolean;
   dt_s: number;
 }>;
 
@@ -88,13 +90,15 @@ export class Marks {
   private readonly reading: Reading;
   private readonly toSpecimen = new Matrix4();
   /** From where the last frame was seen. */
-  sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1 };
+  sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1, textZoom: 1 };
   /** The lamp that the ray which drags it has lost over its rim. */
   private beside: HandleId | null = null;
   /** The clip that the page opens with. */
   private readonly opening: Clip;
   /** Whether somebody has pointed at the picture. */
   private isPointedAt = false;
+  /** The cut when stereo began; null: there is no stereo. */
+  private cutAtEntry: ViewerState["clip"] | null = null;
   /** How many surfaces are on screen. */
   private surfaces = 0;
   private isDisposed = false;
@@ -145,8 +149,10 @@ export class Marks {
     eye_um.setFromMatrixPosition(view.head).applyMatrix4(this.toSpecimen);
     up.setFromMatrixColumn(view.head, 1).transformDirection(this.toSpecimen);
     const zoom = view.screen === null ? 1 : screenZoom(pxPerRad(view.screen));
-    this.sight = { eye_um, up, zoom };
+    this.sight = { eye_um, up, zoom, textZoom: view.screen === null ? STEREO_TEXT : zoom };
     this.target.specimen = view.specimen;
+    this.cutAtEntry = view.screen === null ? (this.cutAtEntry ?? this.state.clip) : null;
+    this.target.isCutAsleep = this.cutAtEntry === this.state.clip;
     this.reading.specimen = view.specimen;
     this.reading.disc = view.disc;
     const m_per_um = view.specimen.getMaxScaleOnAxis();
@@ -155,7 +161,7 @@ export class Marks {
     this.surfaces = surfaces;
     this.name.follow(view.gaze, TREMBLE_M / m_per_um, view.dt_s, () => this.nameOf(view.gaze));
     if (this.state.measured.length > 0) this.showMeasured(); // volumes come and refine
-    if (view.screen === null) this.updateInRoom(view.isPanelOpen);
+    if (view.screen === null) this.updateInRoom(view);
     else this.updateOnScreen(view, view.screen, m_per_um);
     this.handles.update(this.sight);
     this.lamps.update(this.sight);
@@ -236,13 +242,13 @@ export class Marks {
     return this.options.manifest.specimen.bounds_um;
   }
 
-  private updateInRoom(isPanelOpen: boolean): void {
+  private updateInRoom({ isPanelOpen, isBarBelow }: MarksView): void {
     const { sight, shown } = this;
     this.showHandles();
     this.mean(this.target.takeSeen());
     this.scaleBar.update(null);
     this.orientation.root.style.display = "none";
-    this.ruler.update(shown, sight);
+    this.ruler.update(shown, sight, isBarBelow);
     if (isPanelOpen) this.ruler.group.visible = false;
     this.axes.group.visible = !isPanelOpen;
     this.axes.update(shown, sight);

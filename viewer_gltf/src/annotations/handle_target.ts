@@ -2,7 +2,9 @@
 import { Matrix4, Vector3 } from "three";
 import type { Hit, RoomRay, Target } from "../interaction/ray_pointer";
 import { rayAlong } from "../interaction/rays";
+import { placeText } from "../interaction/tile_target";
 import { type Handle, type HandleId, pickHandle } from "./clip_handles";
+import { isLampHandle } from "./lamp_handles";
 
 const HANDLE = "handle:";
 
@@ -11,11 +13,19 @@ export class HandleTarget implements Target {
   readonly isOnTop = true;
   /** From um to the room. */
   specimen = new Matrix4();
+  /** The cut is as it was when stereo began, so that a gaze that rests ahead takes none of its handles; a button does. */
+  isCutAsleep = false;
   /** All that there are, um. */
   handles: readonly Handle[] = [];
   /** What a ray has met or dragged since this was last taken. */
   private seen: HandleId | null = null;
   private readonly toSpecimen = new Matrix4();
+
+  /** The handles and where they are: one that comes under a resting gaze was not looked for. */
+  get layout(): string {
+    const places = this.handles.map(({ id, position }) => `${id} ${position}`);
+    return `handles ${places} ${placeText(this.specimen)}`;
+  }
 
   constructor(
     private readonly tolerance_rad: number,
@@ -30,7 +40,10 @@ export class HandleTarget implements Target {
     if (handle === undefined) return null;
     this.seen = handle.id;
     const place = new Vector3(...handle.position).applyMatrix4(this.specimen);
-    return { key: HANDLE + id, distance_m: place.distanceTo(ray.origin), hold: "carry" };
+    const key = HANDLE + id;
+    const distance_m = place.distanceTo(ray.origin);
+    const isGlance = this.isCutAsleep && !isLampHandle(handle.id);
+    return { key, place: key, distance_m, hold: "carry", isGlance };
   }
 
   choose(): void {

@@ -64,9 +64,9 @@ export class Label {
   }
 
   /** At a point, um. */
-  place(point: Vector3, sight: Sight): void {
+  place(point: Vector3, { eye_um, textZoom }: Sight): void {
     if (!this.sprite.visible) return;
-    const line = lengthAt(point, sight, this.height_rad);
+    const line = lengthAt(point, { eye_um, zoom: textZoom }, this.height_rad);
     const height = line * this.lines;
     this.sprite.position.copy(point);
     this.sprite.scale.set((height * this.canvas.width) / this.canvas.height, height, 1);

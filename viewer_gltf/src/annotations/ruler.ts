@@ -1,5 +1,5 @@
 /**
- * The scale bar of a headset: a ruler of round length that lies under the specimen and turns and
+ * The scale bar of a headset: a ruler of round length that lies under or over the specimen and turns and
  * grows with it. um, world.
  */
 import { BoxGeometry, Object3D, Vector3 } from "three";
@@ -35,11 +35,12 @@ export class Ruler {
     this.group.add(this.bar, this.label.sprite);
   }
 
-  /** Under the front edge of the box of what is shown. */
-  update(shown: Box, sight: Sight): void {
+  /** Under the front edge of the box of what is shown, or over it, where something hangs below. */
+  update(shown: Box, sight: Sight, isAbove = false): void {
     const { min, max } = shown;
     const gap = GAP * Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
-    this.at.set((min[0] + max[0]) / 2, min[1] - gap, max[2]);
+    this.at.set((min[0] + max[0]) / 2, isAbove ? max[1] + gap : min[1] - gap, max[2]);
+    this.label.turnTo(isAbove ? "above" : "below");
     const chosen = rulerLength(this.at.distanceTo(sight.eye_um));
     this.group.visible = chosen !== null;
     if (chosen === null) return;

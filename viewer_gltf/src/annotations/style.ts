@@ -49,7 +49,16 @@ export const LABEL_HEIGHT = 1.15 * RADIANS;
 export const LABEL_PX = 20;
 
 /** Where the eye is, um; where up is to it, of any length; how much larger than in a headset angles are. */
-export type Sight = Readonly<{ eye_um: Vector3; up: Vector3; zoom: number }>;
+export type Sight = Readonly<{
+  eye_um: Vector3;
+  up: Vector3;
+  /** Factor to the angles of marks. */
+  zoom: number;
+  /** Factor to the angles of labels: in stereo a phone's few pixels need large letters. */
+  textZoom: number;
+}>;
+/** Of labels in stereo: letters of 32 mm at 1 m, as on the panel. */
+export const STEREO_TEXT = 2.25;
 
 /** Of a flat screen: how much larger angles are, at so many CSS pixels to a radian. */
 export function screenZoom(px_per_rad: number): number {

@@ -28,7 +28,7 @@ import { Panel } from "../panel/html/panel";
 import { isRefusal, type KeyContext } from "../panel/key";
 import { isWritten, listenForKeys } from "../panel/key_events";
 import { wishOf } from "../panel/keys";
-import { type Facts, layOut } from "../panel/layout";
+import { type Facts, layOut, MORE } from "../panel/layout";
 import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
 import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
@@ -79,6 +79,15 @@ function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
   }
 }
 
+const OPEN_KEY = "stereocell-open";
+const LETTERS_KEY = "stereocell-letters";
+
+/** The sections of the panel that the reader had open on the visit before. */
+function rememberedOpen(): readonly string[] {
+  const text = remembered(OPEN_KEY);
+  return text === null ? START_VIEW.open : text.split(" ");
+}
+
 const SCREEN_KEY = "stereocell-screen";
 const EYES_KEY = "stereocell-eyes";
 
@@ -124,7 +133,6 @@ function rememberLens(lens: Pick<PanelView, "lenses" | "code">): void {
 
 export type ControllerOptions = Readonly<{
   subtitle: string;
-  isPhone: boolean;
   /** Enter stereo; called from within a click or a key, as is the other. */
   onStereo: () => void;
   /** Enter the user's own room. */
@@ -135,7 +143,12 @@ export type ControllerOptions = Readonly<{
 
 export class Controller {
   readonly panel: Panel;
-  private view: PanelView = { ...START_VIEW, ...rememberedLens() };
+  private view: PanelView = {
+    ...START_VIEW,
+    ...rememberedLens(),
+    open: rememberedOpen(),
+    hasLetters: remembered(LETTERS_KEY) !== "off",
+  };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
   private readonly help: Help;
   /** Once it was asked for. */
@@ -158,10 +171,6 @@ export class Controller {
   ) {
     const { manifest } = viewer.bundle;
     const unit = unitOf(manifest);
-    if (options.isPhone) {
-      // it comes first there, where it would hide the channels
-      this.view = { ...this.view, open: this.view.open.filter((id) => id !== "stereo") };
-    }
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
@@ -222,6 +231,8 @@ export class Controller {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
       if (laysOutCards(wish)) this.view = { ...this.view, channelsWithCard: null };
+      if (wish.panel === "unfold") remember(OPEN_KEY, this.view.open.join(" "));
+      if (wish.panel === "letters") remember(LETTERS_KEY, wish.areOn ? "on" : "off");
       this.refresh();
     } else this.viewer.dispatch(wish);
   }
@@ -280,8 +291,7 @@ export class Controller {
   }
 
   private unfold(section: string): void {
-    const open = this.view.open.filter((id) => id !== section);
-    this.view = { ...this.view, open: [...open, section] };
+    this.view = { ...this.view, open: [...new Set([...this.view.open, section, MORE])] };
     this.refresh();
   }
 
@@ -361,6 +371,7 @@ export class Controller {
 
   private press(name: string): boolean {
     const { viewer, view } = this;
+    if (!view.hasLetters && isWritten(name) && name !== "?") return false;
     const context: KeyContext = {
       state: viewer.state,
       view,
@@ -519,7 +530,7 @@ export class Controller {
     return {
       title: specimen.name,
       subtitle: this.options.subtitle,
-      isPhone: this.options.isPhone,
+      isPatient: specimen.sides !== undefined,
       shown: this.shown,
       ranges: this.ranges,
       histogram: hasHistogram ? viewer.histogram(picked) : null,

@@ -299,6 +299,8 @@ export class FrameLoop {
     const { specimen } = room;
     const { group } = specimen;
     const isMoving = specimen.advance(dt_s);
+    this.picture.fade.advance(fade_s);
+    if (specimen.takeJump() && stereo.kind !== null) this.picture.fade.begin();
     const isReady = (tile: string) => contents.volumes.isReady(tile);
     if (hybrid.look(state, head, group.matrixWorld, isReady, dt_s)) onFollow();
     const screen = {
@@ -313,6 +315,7 @@ export class FrameLoop {
       gaze: rayAhead(head, group),
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
       isPanelOpen: stereo.hands.panel.isOpen,
+      isBarBelow: !stereo.isInUsersRoom,
       dt_s,
     };
     const isFading = contents.advance(seen, fade_s);
@@ -330,7 +333,7 @@ export class FrameLoop {
       volumes,
       traced,
       panes: surfaces.blended,
-      overlays: [...marks.overlays, ...slices.overlays, ...stereo.hands.overlays],
+      overlays: [...marks.overlays, ...slices.overlays, ...stereo.overlays],
       bounds: this.options.bounds,
       solids: surfaces.triangles + slices.solid,
     };

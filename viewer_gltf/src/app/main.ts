@@ -13,11 +13,13 @@ import type { Manifest } from "../bundle/generated/bundle";
 import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
+import { leaveWheelToHolder } from "../interaction/frame_wheel";
 import { keepOffline } from "../offline/register";
 import { isKept } from "../offline/request_plan";
 import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
 import { opensAr, WaysIn } from "../panel/html/ways_in";
 import { flightAsked } from "../share/bench_parameter";
+import { panelOf } from "../share/page_parameters";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
 import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
@@ -94,6 +96,10 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
   let notebook: NotebookPart | null = null;
+  const isFramed = window.parent !== window;
+  if (isFramed) leaveWheelToHolder(stage);
+  const { search, hash } = new URL(page);
+  document.documentElement.dataset.panel = panelOf(search);
   const viewer: Viewer = new Viewer(
     bundle,
     stage,
@@ -111,7 +117,6 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   );
   controller = new Controller(viewer, parent, said, {
     subtitle: describeSize(manifest),
-    isPhone: isTouch,
     onStereo: () => void enterStereo(viewer, "immersive-vr"),
     onRoom: () => void enterStereo(viewer, "immersive-ar"),
     onSplit: (lenses) => void viewer.startSplit(lenses).catch((error) => viewer.report(error)),
@@ -119,7 +124,6 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const { layOut } = controller;
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
-  const { search, hash } = new URL(page);
   controller.followAddress(search, hash);
   hint.update(viewer.state);
   whenTouched(() => {
@@ -137,6 +141,10 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   if (globalThis.stereocellHost !== undefined) {
     const part = await import("./notebook_part");
     notebook = new part.NotebookPart(viewer, globalThis.stereocellHost.port);
+  } else if (isFramed && new URLSearchParams(search).has("embed")) {
+    const [part, way] = await Promise.all([import("./notebook_part"), import("./frame_port")]);
+    const port = way.portToHolder(search, manifest);
+    if (port !== null) notebook = new part.NotebookPart(viewer, port);
   }
   const flight_s = flightAsked(search);
   if (flight_s !== null) await offerBench(viewer, parent, flight_s, support.isAvailable);

@@ -1,6 +1,6 @@
 /**
- * The view, shared with the notebook that holds the page: what changes here is told through a port, what
- * changes there is shown. Numbers are the specimen's: micrometres, values of the source.
+ * The view, shared with the notebook or the page that holds this one: what changes here is sent through a port,
+ * what changes there is shown. Numbers are the specimen's: micrometres, values of the source.
  */
 import { Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -95,6 +95,12 @@ export function channelActions(
 
 const isSame = (a: unknown, b: unknown) => JSON.stringify(a) === JSON.stringify(b);
 
+/** A way for messages: to a notebook, or to the page that holds this one in a frame. */
+export type Port = Readonly<{
+  addEventListener: (type: "message", listener: (event: MessageEvent) => void) => void;
+  postMessage: MessagePort["postMessage"];
+}>;
+
 export class NotebookPart {
   private picked: Picked | null = null;
   /** What both sides know. */
@@ -107,7 +113,7 @@ export class NotebookPart {
 
   constructor(
     private readonly viewer: Viewer,
-    private readonly port: MessagePort,
+    private readonly port: Port,
   ) {
     this.manifest = viewer.bundle.manifest;
     viewer.stopTurning(); // it would be news without end

@@ -72,7 +72,10 @@ const OBJECT_IN_ROOM_M = 0.15;
 const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
 const NEXT_KEPT = "` goes to the next.";
 
-const NO_LAYOUT: Layout = { title: "", subtitle: "", sections: [], status: "", isHidden: true };
+const NO_LAYOUT: Layout = {
+  ...{ title: "", subtitle: "", sections: [], status: "", isHidden: true },
+  more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
+};
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -198,9 +201,17 @@ export class Viewer {
       },
       signal,
     );
-    listenForClicks(canvas, (point) => {
-      if (this.stereo.kind === null) this.tap(rayAt(point));
-    });
+    listenForClicks(
+      canvas,
+      (point) => {
+        if (this.stereo.kind === null) this.tap(rayAt(point));
+      },
+      (point) => {
+        if (this.stereo.kind !== null) return;
+        if (this.state.tool === "measure") this.tap(rayAt(point));
+        else void this.flyAlong(rayAt(point));
+      },
+    );
     const lost = "The graphics driver has dropped the picture: it is drawn anew.";
     canvas.addEventListener("webglcontextlost", () => {
       this.dispatch({ type: "notify", text: lost });
@@ -653,19 +664,32 @@ export class Viewer {
       const larger = Math.max(1, OBJECT_IN_ROOM_M / edge_m);
       const pose = zoomAbout(specimen.pose, middle, larger);
       pose.position.add(specimen.anchor).sub(middle);
-      specimen.moveTo(pose, new Vector3().setFromMatrixPosition(this.loop.head));
+      specimen.jumpTo(pose, new Vector3().setFromMatrixPosition(this.loop.head));
     }
+    this.loop.change();
+  }
+
+  /** To what a ray (um) meets; where it meets nothing the view stays. */
+  private async flyAlong(ray: Ray): Promise<void> {
+    const met = await this.contents.marks.probe(ray);
+    if (met === null || this.disposed.signal.aborted) return;
+    this.steps.note();
+    this.navigation.flyTowards(new Vector3(...met.point).applyMatrix4(this.specimen));
     this.loop.change();
   }
 
   private enterStereo(): void {
     const { isInUsersRoom, head } = this.stereo;
     const table = isInUsersRoom && head !== null ? this.tableBefore(head) : null;
+    const { specimen } = this.room;
     this.transition.enter(this.state.specimenSize_m / START_TOOLS.specimenSize_m, table);
+    specimen.isJumping = true;
+    specimen.takeJump(); // there is no picture yet to fade from
     this.onState(this.state);
   }
 
   private leaveStereo(): void {
+    this.room.specimen.isJumping = false;
     this.transition.leave();
     this.fit();
     this.onState(this.state);

@@ -1,5 +1,5 @@
 /** Brings linear light to the screen: colours are encoded here, once, after all that is blended. */
-import { Camera, Vector4, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import { Camera, type Texture, Vector4, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import { nothing } from "./float_targets";
 import { ScreenPass } from "./screen_pass";
 import { ENCODE_FRAGMENT } from "./shaders/sources";
@@ -7,12 +7,23 @@ import { ENCODE_FRAGMENT } from "./shaders/sources";
 const NOBODY = new Camera();
 
 export class EncodePass {
-  private readonly pass = new ScreenPass(ENCODE_FRAGMENT, { uLight: nothing() });
+  private readonly pass = new ScreenPass(ENCODE_FRAGMENT, {
+    uLight: nothing(),
+    uBefore: nothing(),
+    uShareBefore: { value: 0 },
+  });
   private readonly kept = new Vector4();
 
   /** Whether what lies behind the picture shows where it is empty. */
   set isSeeThrough(is: boolean) {
     this.pass.define("SEE_THROUGH", is ? 1 : null);
+  }
+
+  /** Mix a share, 0..1, of an earlier picture into the next ones. */
+  mix(before: Texture, share: number): void {
+    const { uBefore, uShareBefore } = this.pass.uniforms;
+    uBefore.value = share > 0 ? before : null;
+    uShareBefore.value = share;
   }
 
   /** Over the whole of a target that is as large as the light's; null: the canvas. */

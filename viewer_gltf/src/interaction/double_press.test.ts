@@ -6,6 +6,7 @@ const SAMPLE: RaySample = {
   target: "a",
   place: "upper",
   layout: "before",
+  layouts: ["before"],
   direction: [0, 0, -1],
   isGradual: false,
 };
@@ -39,17 +40,19 @@ describe("the second of two quick presses", () => {
   });
 
   it("does nothing on a control that has come under the ray meanwhile, steps or not", () => {
-    const other = { target: "b", layout: "after" };
+    const other = { target: "b", layout: "after", layouts: ["after"] };
     expect(isSecondPress(first, pressed(1150, other))).toBe(true);
     expect(isSecondPress(first, pressed(1150, other, true))).toBe(true);
-    expect(isSecondPress(first, pressed(1150, { place: "lower", layout: "after" }))).toBe(true);
+    expect(
+      isSecondPress(first, pressed(1150, { place: "lower", layout: "after", layouts: ["after"] })),
+    ).toBe(true);
   });
 
   it("counts on another control to which the ray has moved", () => {
     expect(isSecondPress(first, pressed(1150, { target: "b", place: "lower" }, false, 2))).toBe(
       false,
     );
-    const other = { target: "b", place: "lower", layout: "after" };
+    const other = { target: "b", place: "lower", layout: "after", layouts: ["after"] };
     expect(isSecondPress(first, pressed(1150, other, false, 5))).toBe(false);
   });
 });

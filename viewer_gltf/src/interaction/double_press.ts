@@ -23,5 +23,5 @@ export function isSecondPress(before: TimedPress | null, press: TimedPress): boo
   if (then.target === now.target && then.place === now.place) return !press.isStep;
   // the ray has not moved, and another target has come under it
   const isStill = angleBetween(then.direction, now.direction) <= TREMBLE_RAD;
-  return isStill && then.layout !== now.layout;
+  return isStill && then.layouts.join() !== now.layouts.join();
 }

@@ -6,6 +6,7 @@ import {
   dwellProgress,
   NO_DWELL,
   type RaySample,
+  RING_S,
   spend,
 } from "./dwell";
 
@@ -17,7 +18,9 @@ const MIDDLES: Readonly<Record<string, number>> = { a: 0, b: 2, far: 20 };
 function seen(target: string | null, more: Partial<RaySample> = {}, at_deg?: number): RaySample {
   const angle = ((at_deg ?? (target === null ? 10 : MIDDLES[target])) * Math.PI) / 180;
   const direction = [Math.sin(angle), 0, -Math.cos(angle)] as const;
-  return { target, place: null, layout: "", direction, isGradual: false, ...more };
+  const { layout = "" } = more;
+  const own = { target, place: null, layout, layouts: [layout], direction, isGradual: false };
+  return { ...own, ...more };
 }
 
 /** Look at each sample for so many seconds; the targets that fired, in order. */
@@ -74,8 +77,10 @@ describe("gaze that lasts", () => {
   it("fills a ring evenly, which vanishes when it fires", () => {
     const { progress } = watch([["a", DWELL_S]]);
     expect(progress[0]).toBe(0);
-    expect(progress[48]).toBe(0.5);
-    expect(progress[95]).toBeCloseTo(95 / 96);
+    expect(progress[Math.floor(RING_S / FRAME_S)]).toBe(0); // a gaze that passes by
+    const middle = (48 * FRAME_S - RING_S) / (DWELL_S - RING_S);
+    expect(progress[48]).toBeCloseTo(middle);
+    expect(progress[95]).toBeGreaterThan(0.98);
     expect(progress[96]).toBe(0);
     expect(dwellProgress(NO_DWELL)).toBe(0);
   });

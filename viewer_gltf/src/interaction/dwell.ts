@@ -12,10 +12,12 @@ import { dot, type Vec3 } from "../math/vec3";
 export type RaySample = Readonly<{
   /** The key of the target; null: nothing that can be chosen. */
   target: string | null;
-  /** Where the target lies in its layout; null: it belongs to no layout, as a tile does. */
+  /** Where the target lies in its layout; null: it belongs to no layout. */
   place: string | null;
-  /** Changes whenever any target comes, goes or moves in its layout. */
+  /** The layout that the target belongs to: another text whenever a part of it comes, goes or moves. */
   layout: string;
+  /** All layouts, among them that of the target. */
+  layouts: readonly string[];
   /** Direction of the ray, of unit length. */
   direction: Vec3;
   /** Each point of the target chooses another value, as on a slider. */
@@ -39,6 +41,8 @@ export type Dwell = Readonly<{
 }>;
 
 export const DWELL_S = 1.5;
+/** Time after which the ring shows, s: a gaze that passes by starts no ring. */
+export const RING_S = 0.4;
 /** Longest time that a frame counts, s: a stall of the page is no gaze. */
 const LONGEST_FRAME_S = 0.1;
 /** Largest turn of a resting head, radians, from one of its directions to another. */
@@ -78,9 +82,9 @@ export function spend(dwell: Dwell): Dwell {
   return { sample, elapsed_s: 0, spent: { direction, target, hasFired: true } };
 }
 
-/** Share of the ring that is filled, 0..1; 0 while the dwell is spent, so the ring is hidden. */
-export function dwellProgress(dwell: Dwell): number {
-  return Math.min(1, dwell.elapsed_s / DWELL_S);
+/** Share of the ring that is filled, 0..1; 0 before the ring shows, and while the dwell is spent. */
+export function dwellProgress({ elapsed_s }: Dwell): number {
+  return Math.min(1, Math.max(0, (elapsed_s - RING_S) / (DWELL_S - RING_S)));
 }
 
 /** The angle between two directions of unit length, radians. */
@@ -89,12 +93,12 @@ export function angleBetween(a: Vec3, b: Vec3): number {
 }
 
 /**
- * Whether another control is under the gaze because the layout has changed, and not because the gaze has
- * moved. At the first sample this is so for each control, and not for what belongs to no layout.
+ * Whether another target is under the gaze because its layout, or that of the target before, has changed, and
+ * not because the gaze has moved. At the first sample this is so for each target of a layout.
  */
 function hasLayoutChanged(before: RaySample | null, now: RaySample): boolean {
   if (before === null) return now.place !== null;
-  if (before.layout === now.layout) return false;
+  if (now.layouts.includes(before.layout) && before.layouts.includes(now.layout)) return false;
   return before.target !== now.target || before.place !== now.place;
 }
 

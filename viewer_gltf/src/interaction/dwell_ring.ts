@@ -66,14 +66,14 @@ export class Ring {
     return this.group.visible;
   }
 
-  /** @param progress 0..1; at 0 there is the dot alone, unless something can be chosen */
-  show(at: Vector3, eye: Vector3, progress: number, canChoose: boolean): void {
+  /** @param progress 0..1; at 0 there is the dot alone */
+  show(at: Vector3, eye: Vector3, progress: number): void {
     const radius_m = at.distanceTo(eye) * Math.tan((DIAMETER_DEG / 2) * RADIANS);
     this.group.position.copy(at);
     this.group.scale.setScalar(radius_m);
     this.group.lookAt(eye);
     this.group.visible = true;
-    const full = canChoose ? PARTS : 0;
+    const full = progress > 0 ? PARTS : 0;
     this.dark.geometry.setDrawRange(0, DOT_INDICES + INDICES_PER_PART * full);
     const filled = Math.round(progress * PARTS);
     this.light.geometry.setDrawRange(0, DOT_INDICES + INDICES_PER_PART * filled);

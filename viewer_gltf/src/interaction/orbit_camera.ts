@@ -20,6 +20,8 @@ const LEFT_AFTER_A_SECOND = 0.88 ** 60;
 /** Turn by one key press, radians. */
 const TURN_RAD = Math.PI / 12;
 const ZOOM = 0.8;
+/** Time of a flight to a place, s. */
+const FLIGHT_S = 0.4;
 /** Move by one key press, as a share of the picture's height. */
 const PAN = 0.1;
 
@@ -60,6 +62,7 @@ export class Navigation {
   private stand: Stand | null = "opening";
   /** Since the turn of the opening began, s; null: there is none. */
   private swayed_s: number | null = null;
+  private flight: Readonly<{ from: Look; to: Look; elapsed_s: number }> | null = null;
   private readonly reach: Vector3;
   /** Outermost points of what is there of the specimen, room: the opening is framed on them. */
   private occupied: readonly Vec3[];
@@ -84,11 +87,13 @@ export class Navigation {
     });
     this.controls.addEventListener("start", () => {
       this.stand = null;
+      this.flight = null;
     });
   }
 
   /** Go on with a glide, as long in seconds however few the frames; after so many of them. */
   update(dt_s: number): void {
+    this.fly(dt_s);
     if (this.swayed_s !== null) {
       this.swayed_s += dt_s;
       this.standAt("opening");
@@ -163,7 +168,39 @@ export class Navigation {
   lookFrom({ position, target }: Look): void {
     this.stand = null;
     this.swayed_s = null;
+    this.flight = null;
     this.place({ position, target });
+  }
+
+  /** Towards a point of the room, half of the way, so that it comes into the middle. */
+  flyTowards(point: Vector3): void {
+    const { position } = this.camera;
+    const away = position.clone().sub(point);
+    const eye = away.setLength(Math.max(NEAREST_M, away.length() / 2)).add(point);
+    const to = { position: eye.toArray(), target: point.toArray() };
+    this.stopTurning();
+    this.stand = null;
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.place(to);
+    else this.flight = { from: this.lookNow, to, elapsed_s: 0 };
+  }
+
+  private fly(dt_s: number): void {
+    if (this.flight === null) return;
+    const { from, to } = this.flight;
+    const elapsed_s = this.flight.elapsed_s + dt_s;
+    const part = Math.min(1, elapsed_s / FLIGHT_S);
+    const share = part * part * (3 - 2 * part); // it begins and ends slowly
+    const between = (a: Vec3, b: Vec3) =>
+      new Vector3(...a).lerp(new Vector3(...b), share).toArray() as Vec3;
+    this.place({
+      position: between(from.position, to.position),
+      target: between(from.target, to.target),
+    });
+    this.flight = part < 1 ? { from, to, elapsed_s } : null;
+  }
+
+  get isFlying(): boolean {
+    return this.flight !== null;
   }
 
   private place({ position, target }: Look): void {

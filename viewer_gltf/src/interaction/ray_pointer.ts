@@ -25,6 +25,10 @@ export type Hit = Readonly<{
   place?: string;
   /** Each press moves on by a step, so quick presses all count. */
   isStep?: boolean;
+  /** A gaze that rests on it chooses nothing: what it shows comes by itself. */
+  isGlance?: boolean;
+  /** Each point of it chooses something else, as on a slider. */
+  isGradual?: boolean;
 }>;
 
 /** Something that rays meet: the panel, handles, the specimen's tiles. */
@@ -64,18 +68,15 @@ export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null 
   return first;
 }
 
-function layoutOf(targets: readonly Target[]): string {
-  return targets.map(({ layout = "" }) => layout).join("\n");
-}
-
 /** @param met null: nothing can be chosen */
 function sampleOf({ direction }: RoomRay, met: Met | null, targets: readonly Target[]): RaySample {
   return {
-    target: met?.key ?? null,
+    target: met?.isGlance ? null : (met?.key ?? null),
     place: met?.place ?? null,
-    layout: layoutOf(targets),
+    layout: met?.target.layout ?? "",
+    layouts: ["", ...targets.map(({ layout = "" }) => layout)],
     direction: direction.toArray(),
-    isGradual: met?.hold === "slide",
+    isGradual: met?.isGradual === true || met?.hold === "slide",
   };
 }
 
@@ -123,7 +124,7 @@ export class Pointer {
     this.dwell = spend(this.dwell);
     const sample = sampleOf(met.ray, met, targets);
     // The second press on a tile isolates it, and a slider may be taken again, however soon.
-    const isStep = met.isStep === true || met.place === undefined || met.hold !== undefined;
+    const isStep = met.isStep === true || met.hold !== undefined;
     const press = { time_ms, sample, isStep };
     const isSecond = isSecondPress(this.lastPress, press);
     this.lastPress = press;

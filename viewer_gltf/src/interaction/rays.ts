@@ -3,6 +3,9 @@ import { Matrix4, type Object3D, type PerspectiveCamera, Vector2, Vector3 } from
 import type { Ray } from "../math/vec3";
 import type { RoomRay } from "./ray_pointer";
 
+/** Longest time and way between the clicks of a double click or the taps of a double tap. */
+const DOUBLE_MS = 400;
+const DOUBLE_PX = 24;
 /** Most px between down and up of a click; a pointer that moves further orbits. */
 const CLICK_PX = 5;
 
@@ -37,13 +40,17 @@ export function rayAlong({ origin, direction }: RoomRay, toSpecimen: Matrix4): R
 /**
  * Calls `onClick` with the place in -1..1, y up, of every click or tap that does not drag. Two
  * fingers zoom and move: neither taps.
+ *
+ * @param onDouble the second of two quick clicks on one place, which is no click then
  */
 export function listenForClicks(
   canvas: HTMLCanvasElement,
   onClick: (point: Vector2) => void,
+  onDouble: (point: Vector2) => void,
 ): void {
   const down = new Map<number, Vector2>();
   let isTap = false;
+  let before: Readonly<{ at: Vector2; time_ms: number }> | null = null;
   canvas.addEventListener("pointerdown", (event) => {
     down.set(event.pointerId, new Vector2(event.clientX, event.clientY));
     isTap = down.size === 1;
@@ -57,6 +64,13 @@ export function listenForClicks(
     const box = canvas.getBoundingClientRect();
     const x = ((event.clientX - box.left) / box.width) * 2 - 1;
     const y = 1 - ((event.clientY - box.top) / box.height) * 2;
-    onClick(new Vector2(x, y));
+    const at = new Vector2(event.clientX, event.clientY);
+    const { timeStamp: time_ms } = event;
+    const isSecond =
+      before !== null &&
+      time_ms - before.time_ms < DOUBLE_MS &&
+      at.distanceTo(before.at) < DOUBLE_PX;
+    before = isSecond ? null : { at, time_ms };
+    (isSecond ? onDouble : onClick)(new Vector2(x, y));
   });
 }

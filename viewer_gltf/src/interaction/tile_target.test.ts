@@ -37,7 +37,7 @@ it("an object in a tile is met before its tile, and is of that tile", () => {
   target.tiles = [{ id: "r0_c0", bounds_um: { min: [-1, -1, -2], max: [1, 1, -1] } }];
   const ray = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
   target.objectAlong = ({ direction }) => ({ id: "cells/7", distance: 1.5 * -direction[2] });
-  expect(target.meet(ray)).toEqual({ key: "tile:r0_c0/cells/7", distance_m: 1.5 });
+  expect(target.meet(ray)).toMatchObject({ key: "tile:r0_c0/cells/7", distance_m: 1.5 });
   target.choose({ key: "tile:r0_c0/cells/7", distance_m: 1.5 }, ray, true);
   expect(chosen.map(([, tile, isByGaze]) => [tile, isByGaze])).toEqual([["r0_c0", true]]);
   target.objectAlong = () => null;

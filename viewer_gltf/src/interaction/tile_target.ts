@@ -6,6 +6,7 @@ import { Matrix4, type Object3D } from "three";
 import { type Clip, WHOLE } from "../math/clip";
 import { type BoxedTile, pickTile } from "../math/pick";
 import type { Ray } from "../math/vec3";
+import type { ViewerState } from "../state/viewer_state";
 import type { Hit, RoomRay, Target } from "./ray_pointer";
 import { rayAlong } from "./rays";
 
@@ -15,10 +16,14 @@ const OF = "/";
 
 export class TileTarget implements Target {
   readonly isOnTop = false;
-  /** The names of the tiles that are shown. */
-  layout = "";
+  private names = "";
   private shown: readonly BoxedTile[] = [];
-  clip: Clip = WHOLE;
+  private clip: Clip = WHOLE;
+  /** What shows within the tiles, and how often that has changed. */
+  private content: readonly unknown[] = [];
+  private changes = 0;
+  /** Points are measured, so that each point of a tile is another choice. */
+  private isMeasuring = false;
   /** The object along a ray, in um of the specimen: its name, and where; null: none. */
   objectAlong: (ray: Ray) => Readonly<{ id: string; distance: number }> | null = () => null;
   private readonly toSpecimen = new Matrix4();
@@ -33,7 +38,24 @@ export class TileTarget implements Target {
   set tiles(tiles: readonly BoxedTile[]) {
     if (tiles === this.shown) return;
     this.shown = tiles;
-    this.layout = tiles.map(({ id }) => id).join();
+    this.names = tiles.map(({ id }) => id).join();
+  }
+
+  /** Other objects may show now, or another part of the specimen. */
+  follow({ objects, clip, channels, tool }: ViewerState): void {
+    const content = [objects, clip, channels];
+    if (content.some((each, i) => each !== this.content[i])) this.changes++;
+    this.content = content;
+    this.clip = clip;
+    this.isMeasuring = tool === "measure";
+  }
+
+  /**
+   * The tiles that are shown, where they are, and what shows within: what comes under a resting gaze was not
+   * looked for.
+   */
+  get layout(): string {
+    return `tiles ${this.names} ${this.changes} ${placeText(this.specimen.matrixWorld)}`;
   }
 
   meet(ray: RoomRay): Hit | null {
@@ -41,9 +63,11 @@ export class TileTarget implements Target {
     const inside = rayAlong(ray, this.toSpecimen);
     const met = pickTile(inside, this.shown, this.clip);
     const object = met && this.objectAlong(inside);
-    if (object) return { key: `${TILE}${met.id}${OF}${object.id}`, distance_m: object.distance };
+    if (met === null) return null;
+    const key = TILE + (object ? `${met.id}${OF}${object.id}` : met.id);
     // The ray's direction is one metre long, whatever it is in um.
-    return met && { key: TILE + met.id, distance_m: met.distance };
+    const { distance } = object ?? met;
+    return { key, place: key, distance_m: distance, isStep: true, isGradual: this.isMeasuring };
   }
 
   choose({ key }: Hit, ray: RoomRay, isByGaze: boolean): void {
@@ -51,4 +75,9 @@ export class TileTarget implements Target {
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
     this.onChoose(rayAlong(ray, this.toSpecimen), key.slice(TILE.length).split(OF)[0], isByGaze);
   }
+}
+
+/** A pose as text, to a tenth of a millimetre. */
+export function placeText({ elements }: Matrix4): string {
+  return elements.map((each) => each.toPrecision(5)).join(" ");
 }

@@ -32,3 +32,17 @@ export function fromHex(hex: string): Rgb {
 export function surfaceColor(glb: Rgb, original: Rgb, chosen: Rgb): Rgb {
   return chosen.every((v, i) => v === original[i]) ? glb : chosen;
 }
+
+/** Lightness and two axes of hue, of Ottosson, "A perceptual color space for image processing", 2020. */
+export function toOklab([r, g, b]: Rgb): Rgb {
+  const [l, m, s] = [
+    0.4122214708 * r + 0.5363325363 * g + 0.0514459929 * b,
+    0.2119034982 * r + 0.6806995451 * g + 0.1073969566 * b,
+    0.0883024619 * r + 0.2817188376 * g + 0.6299787005 * b,
+  ].map(Math.cbrt);
+  return [
+    0.2104542553 * l + 0.793617785 * m - 0.0040720468 * s,
+    1.9779984951 * l - 2.428592205 * m + 0.4505937099 * s,
+    0.0259040371 * l + 0.7827717662 * m - 0.808675766 * s,
+  ];
+}

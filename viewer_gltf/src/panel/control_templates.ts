@@ -79,6 +79,7 @@ export function controlOf<On>(row: Parameter<On>, on: On, channel?: string): Con
       return {
         ...base,
         ...inline(base.id, row.label, row.get(on), row.names, optionsOf(row, on), to),
+        isInline: row.isListed !== true,
       };
     }
     case "colour":

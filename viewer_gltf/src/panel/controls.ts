@@ -36,6 +36,8 @@ export type PanelChange =
   | Readonly<{ panel: "lenses"; lenses: Lenses }>
   /** Of the phone viewer's lenses, as its QR code has it. */
   | Readonly<{ panel: "code"; text: string }>
+  /** Whether keys that write a character do anything (WCAG 2.1.4). */
+  | Readonly<{ panel: "letters"; areOn: boolean }>
   | Readonly<{ panel: "hide" }>
   | Readonly<{ panel: "help" }>;
 
@@ -62,6 +64,7 @@ export type PanelView = Readonly<{
   open: readonly string[];
   lenses: Lenses;
   code: string;
+  hasLetters: boolean;
   isHidden: boolean;
   isHelpOpen: boolean;
   /** The last link that was shared; "": none. */
@@ -79,9 +82,10 @@ export const START_VIEW: PanelView = {
   shape: null,
   grasp: null,
   shapeNumber: null,
-  open: ["channels", "objects", "volumes", "light", "tiles", "view", "stereo"],
+  open: ["channels", "objects", "volumes"],
   lenses: "v2",
   code: "",
+  hasLetters: true,
   isHidden: false,
   isHelpOpen: false,
   link: "",
@@ -127,7 +131,7 @@ export type Choice = Base &
     kind: "choice";
     value: string;
     options: readonly Option[];
-    /** Few and short: side by side. */
+    /** Few and short: side by side. Otherwise a list to open. */
     isInline: boolean;
     to: (value: string) => Wish;
   }>;
@@ -141,6 +145,8 @@ export type Colour = Base &
     kind: "colour";
     value: string;
     palettes: readonly Palette[];
+    /** Eight colours that no other channel has, where there are other channels. */
+    free?: readonly string[];
     /** Colours that it shows instead of its own; none or absent: nothing else. */
     shows?: readonly string[];
     to: (hex: string) => Wish;
@@ -254,6 +260,8 @@ export type Group = Readonly<{
 export type Section = Readonly<{
   id: string;
   label: string;
+  /** On a flat screen it is listed under *More*. */
+  isDeeper: boolean;
   isOpen: boolean;
   opener: PanelChange;
   items: readonly (Control | Group)[];
@@ -263,7 +271,9 @@ export type Layout = Readonly<{
   title: string;
   subtitle: string;
   sections: readonly Section[];
-  /** Triangles, level, frame time: one line that is always in view. */
+  /** Opens and closes the list of the deeper sections. */
+  more: Readonly<{ isOpen: boolean; opener: PanelChange }>;
+  /** What is shown and whether it is complete: one line that is always in view. */
   status: string;
   isHidden: boolean;
 }>;
@@ -300,6 +310,8 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
       return change.lenses === view.lenses ? view : { ...view, lenses: change.lenses };
     case "code":
       return change.text === view.code ? view : { ...view, code: change.text };
+    case "letters":
+      return change.areOn === view.hasLetters ? view : { ...view, hasLetters: change.areOn };
     case "hide":
       return { ...view, isHidden: !view.isHidden };
     case "help":

@@ -187,6 +187,7 @@ describe("the keys", () => {
       help: true,
       find: false,
       code: false,
+      letters: false, // a key could not switch it back on
       unfold: false,
     };
     for (const [panel, isWanted] of Object.entries(wanted)) {

@@ -54,22 +54,48 @@ describe("the panel's layout", () => {
   it("has no sections of volumes where there are only objects", () => {
     const names = (state: ViewerState) => laid(state).sections.map(({ id }) => id);
     const [all, left] = [names(start()), names(ofObjects(start()))];
-    expect(all.filter((id) => !left.includes(id))).toEqual(["volumes", "light", "slices"]);
+    expect(all.filter((id) => !left.includes(id))).toEqual([
+      "volumes",
+      "slices",
+      "volume-settings",
+      "light",
+    ]);
     const [first, ...others] = start().channels;
     const mixed = { ...start(), channels: [...ofObjects(start()).channels, first, ...others] };
     expect(names(mixed)).toEqual(all);
   });
 
-  it("begins with stereo on a phone, whatever a bundle has, and keeps it where it is elsewhere", () => {
-    const objects = [{ id: "c0", name: "Cells", colors: [], items: [] }];
+  it("opens with at most twelve rows, and lists the rest under More", () => {
+    const layout = laid(start(4));
+    const first = layout.sections.filter(({ isDeeper }) => !isDeeper);
+    const rows = first.map(({ isOpen, items }) => (isOpen ? items.length : 1));
+    expect(rows.reduce((sum, each) => sum + each, 1)).toBeLessThanOrEqual(12); // and More
+    expect(layout.more.isOpen).toBe(false);
+    const names = first.map(({ id }) => id);
+    expect(names).toEqual(["channels", "volumes", "tiles", "cut", "slices", "save", "stereo"]);
+    const deeper = layout.sections.filter(({ isDeeper }) => isDeeper).map(({ id }) => id);
+    expect(deeper).toEqual(
+      expect.arrayContaining(["view", "measure", "light", "share", "quality"]),
+    );
+  });
+
+  it("begins with the slices of a patient", () => {
     const names = (facts: Partial<typeof FACTS>) =>
-      laid(start(), START_VIEW, { ...FACTS, objects, ...facts }).sections.map(({ id }) => id);
-    const [onScreen, onPhone] = [names({}), names({ isPhone: true })];
-    expect(onPhone[0]).toBe("stereo");
-    expect(onScreen.indexOf("stereo")).toBeGreaterThan(onScreen.indexOf("view"));
-    expect(onPhone.slice(1)).toEqual(onScreen.filter((id) => id !== "stereo"));
-    const inStereo = names({ isPhone: true, isStereo: true });
-    expect(inStereo[0]).toBe("channels");
+      laid(start(), START_VIEW, { ...FACTS, ...facts }).sections.map(({ id }) => id);
+    expect(names({ isPatient: true })[0]).toBe("slices");
+    expect(names({ isPatient: true }).toSorted()).toEqual(names({}).toSorted());
+    expect(names({ isPatient: true, isStereo: true })[0]).toBe("channels");
+  });
+
+  it("reports what is shown, whether it is complete, and that nothing is", () => {
+    const status = (state: ViewerState, facts: Partial<Facts> = {}) =>
+      laid(state, START_VIEW, { ...FACTS, ...facts }).status;
+    expect(status(start())).toBe("Surfaces; volumes when near · complete");
+    expect(status(start(), { isLoading: true })).toBe("Surfaces; volumes when near · loading …");
+    const off = reduce(start(), { type: "set", id: "mode", value: "off" });
+    expect(status(off)).toBe("Surfaces · complete");
+    const none = { ...off, channels: off.channels.map((each) => ({ ...each, shown: false })) };
+    expect(status(none)).toBe("All channels are hidden: switch one on.");
   });
 
   it("gives every control an id of its own, and a name", () => {
@@ -209,7 +235,8 @@ describe("the panel's layout", () => {
   });
 
   it("gives each of several label maps a section of its own", () => {
-    const map = (id: string) => ({ id, name: id.toUpperCase(), colors: [], items: [] });
+    const items = [{ kind: "text", id: "objects-count", label: "Objects", value: "3" } as const];
+    const map = (id: string) => ({ id, name: id.toUpperCase(), colors: [], items });
     const named = (ids: readonly string[]) =>
       laid(start(), START_VIEW, { ...FACTS, objects: ids.map(map) })
         .sections.filter(({ id }) => id.startsWith("objects"))
@@ -304,11 +331,15 @@ describe("the panel's layout", () => {
     for (const id of ["front", "side", "top", "reset", "share"] as const) {
       expect(find(layout, "button", id).to()).toBe(id);
     }
-    expect(layout.status).toBe("12 k triangles · volumes at 1/2 detail · 12 ms");
-    const statusOf = (facts: Partial<Facts>) =>
-      laid(start(), START_VIEW, { ...FACTS, ...facts }).status;
-    expect(statusOf({ triangles: 0, volumeLevel: 0 })).toBe("volumes in full detail · 12 ms");
-    expect(statusOf({ triangles: 12, volumeLevel: null })).toBe("12 triangles · 12 ms");
+    const figures = (facts: Partial<Facts>) => {
+      const measured = laid(start(), START_VIEW, { ...FACTS, ...facts });
+      return ["triangles", "volume-detail", "frame-time"].map(
+        (id) => find(measured, "text", id).value,
+      );
+    };
+    expect(figures({})).toEqual(["12 k triangles", "at 1/2 detail", "12 ms"]);
+    expect(figures({ triangles: 0, volumeLevel: 0 })).toEqual(["", "in full detail", "12 ms"]);
+    expect(figures({ triangles: 12, volumeLevel: null })).toEqual(["12 triangles", "", "12 ms"]);
     expect(find(layout, "text", "settings").value).toBe("64 steps a ray, 50 % resolution");
   });
 });

@@ -4,13 +4,14 @@ import type { ClipPlane } from "../math/clip";
 import { MAX_DISC_TILES } from "../state/focus_tiles";
 import { groupNotices } from "../state/notice_groups";
 import { QUALITY_PARAMETERS } from "../state/parameters/tools";
-import { VOLUMES } from "../state/parameters/volumes";
+import { MODE, VOLUMES } from "../state/parameters/volumes";
 import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import type { QualitySettings } from "../state/quality_controller";
 import type { StereoSupport } from "../state/stereo";
+import { tileName } from "../state/tile_name";
 import { hasVolumes, type ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
-import { command, controlsOf } from "./control_templates";
+import { command, controlOf, controlsOf } from "./control_templates";
 import type { Control, Layout, PanelView, Section } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
 import { measureItems } from "./sections/measure";
@@ -38,8 +39,8 @@ export type Facts = StereoSupport &
     /** Where the limit of tiles in the disc ends it; null or absent: it covers no more. */
     discLimit_deg?: number | null;
     isStereo: boolean;
-    /** Whether this is a screen that is touched, as a phone's, which a viewer of lenses holds. */
-    isPhone?: boolean;
+    /** Whether the specimen is a patient, whose slices most people look for first. */
+    isPatient?: boolean;
     /** null: not known yet. */
     frame_ms: number | null;
     settings: QualitySettings | null;
@@ -88,62 +89,108 @@ export function middlePlane({ min, max }: Box): ClipPlane {
   return { normal: [0, 0, 1], offset_um: (min[2] + max[2]) / 2 };
 }
 
+/** The section that lists the deeper ones. */
+export const MORE = "more";
+
+/**
+ * The whole panel. A flat screen lists the sections that most people come for, and the others under *More*; for a
+ * patient the slices come first.
+ */
 export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layout {
-  const section = (id: string, label: string, items: Section["items"]): Section => ({
-    id,
-    label,
+  const make = (isDeeper: boolean) => (id: string, label: string, items: Section["items"]) => ({
+    ...{ id, label, items, isDeeper },
     isOpen: view.open.includes(id),
-    opener: { panel: "unfold", section: id },
-    items,
+    opener: { panel: "unfold", section: id } as const,
   });
-  const stereo = section("stereo", "Stereo", stereoItems(state, facts, view));
-  // on a phone, whose panel shows little at once, before all that a bundle has much of
-  const isFirst = facts.isPhone === true && !facts.isStereo;
-  const ofVolumes = (...sections: readonly Section[]) => (hasVolumes(state) ? sections : []);
+  const sections = [
+    ...firstSections(make(false), state, facts, view),
+    ...deeperSections(make(true), state, facts, view),
+  ];
   return {
     title: facts.title,
     subtitle: facts.subtitle,
     isHidden: view.isHidden,
-    sections: [
-      ...(facts.isStereo && state.notices.length > 0
-        ? [section("notices", "Notices", noticeItems(state))]
-        : []),
-      ...(isFirst ? [stereo] : []),
-      section("channels", "Channels", channelItems(state, facts, view)),
-      ...(facts.objects ?? []).map(({ id, name, items }, _, { length }) =>
-        length === 1
-          ? section("objects", "Objects", items)
-          : section(`objects/${id}`, `Objects: ${name}`, items),
-      ),
-      ...ofVolumes(
-        section("volumes", "Volumes", [...controlsOf(VOLUMES, state), discNow(state, facts)]),
-        section("light", "Light", lightItems(state, view, facts.isStereo)),
-      ),
-      section("tiles", "Tiles", tileItems(state, facts.focusTile)),
-      section("view", "View", [
-        command("front", "Front"),
-        command("side", "Side"),
-        command("top", "Top"),
-        command("reset", "Reset"),
-        ...historyItems(facts),
-      ]),
-      // a screen has fingers, wheel and arrow keys for it
-      ...(facts.isStereo ? [section("move", "Move", MOVES)] : []),
-      ...(isFirst ? [] : [stereo]),
-      section("measure", "Measure", measureItems(state, facts.values)),
-      section("cut", "Cut open", cutItems(state, facts.shown)),
-      ...ofVolumes(section("slices", "Slices", sliceItems(state, facts.sliceValues))),
-      section("quality", "Quality", qualityItems(state, facts)),
-      section("save", "Pictures and video", saveItems(state, facts.isFilming)),
-      section("share", "Share", [
-        command("share", "Copy a link to this view"),
-        ...(view.link === ""
-          ? []
-          : [{ kind: "link", id: "link", label: "Link", value: view.link } as const]),
-        { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
-      ]),
-    ],
-    status: statusOf(facts),
+    sections: sections.filter(({ items }) => items.length > 0),
+    more: { isOpen: view.open.includes(MORE), opener: { panel: "unfold", section: MORE } },
+    status: statusOf(state, facts),
+  };
+}
+
+type Make = (id: string, label: string, items: Section["items"]) => Section;
+
+function firstSections(
+  section: Make,
+  state: ViewerState,
+  facts: Facts,
+  view: PanelView,
+): readonly Section[] {
+  const hasAny = hasVolumes(state);
+  const slices = section("slices", "Slices", hasAny ? sliceItems(state, facts.sliceValues) : []);
+  const { isStereo, isPatient = false } = facts;
+  return [
+    section("notices", "Notices", isStereo ? noticeItems(state) : []),
+    ...(isPatient && !isStereo ? [slices] : []),
+    section("channels", "Channels", channelItems(state, facts, view)),
+    ...(facts.objects ?? []).map(({ id, name, items }, _, { length }) =>
+      length === 1
+        ? section("objects", "Objects", items)
+        : section(`objects/${id}`, `Objects: ${name}`, items),
+    ),
+    section("volumes", "Surfaces and volumes", hasAny ? [controlOf(MODE, state)] : []),
+    section("tiles", "Tiles", tileItems(state, facts.focusTile)),
+    section("cut", "Cut open", cutItems(state, facts.shown)),
+    ...(isPatient && !isStereo ? [] : [slices]),
+    section("save", "Pictures and video", saveItems(state, facts.isFilming)),
+    section("stereo", "Stereo", stereoItems(state, facts, view)),
+  ];
+}
+
+function deeperSections(
+  section: Make,
+  state: ViewerState,
+  facts: Facts,
+  view: PanelView,
+): readonly Section[] {
+  const ofVolumes = (items: Section["items"]) => (hasVolumes(state) ? items : []);
+  const settings = VOLUMES.filter((row) => row !== MODE);
+  return [
+    section("view", "View", [
+      command("front", "Front"),
+      command("side", "Side"),
+      command("top", "Top"),
+      command("reset", "Reset"),
+      ...historyItems(facts),
+    ]),
+    // a screen has fingers, wheel and arrow keys for it
+    section("move", "Move", facts.isStereo ? MOVES : []),
+    section("measure", "Measure", measureItems(state, facts.values)),
+    section(
+      "volume-settings",
+      "Volume settings",
+      ofVolumes([...controlsOf(settings, state), discNow(state, facts)]),
+    ),
+    section("light", "Light", ofVolumes(lightItems(state, view, facts.isStereo))),
+    section("share", "Share and keys", [
+      command("share", "Copy a link to this view"),
+      ...(view.link === ""
+        ? []
+        : [{ kind: "link", id: "link", label: "Link", value: view.link } as const]),
+      { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
+      ...(facts.isStereo ? [] : [lettersToggle(view)]),
+    ]),
+    section("quality", "Quality and speed", qualityItems(state, facts)),
+  ];
+}
+
+/** For people who speak to their computer, or whose hands come upon keys. */
+function lettersToggle({ hasLetters: value }: PanelView): Control {
+  return {
+    kind: "toggle",
+    id: "letters",
+    label: "Keys of one character",
+    about: "Off: only ?, arrows, Escape and keys with Ctrl work.",
+    value,
+    to: (areOn) => ({ panel: "letters", areOn }),
   };
 }
 
@@ -175,6 +222,7 @@ function discNow({ mode }: ViewerState, { discLimit_deg = null }: Facts): Contro
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */
 function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
+  if (notices.length === 0) return [];
   const groups = groupNotices(notices).slice(-MAX_NOTICES);
   const items = groups.flatMap(({ text, of }, i): Control[] => [
     { kind: "text", id: `notice-${i}`, label: "Notice", value: text },
@@ -215,7 +263,8 @@ function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
   ];
 }
 
-function qualityItems(state: ViewerState, { settings, frame_ms }: Facts): readonly Control[] {
+function qualityItems(state: ViewerState, facts: Facts): readonly Control[] {
+  const { settings, frame_ms, triangles, volumeLevel } = facts;
   const items: Control[] = [
     ...controlsOf(QUALITY_PARAMETERS, state),
     {
@@ -223,6 +272,13 @@ function qualityItems(state: ViewerState, { settings, frame_ms }: Facts): readon
       id: "frame-time",
       label: "Frame",
       value: frameText(frame_ms) || "not measured yet",
+    },
+    { kind: "text", id: "triangles", label: "Surfaces", value: trianglesText(triangles) },
+    {
+      kind: "text",
+      id: "volume-detail",
+      label: "Volumes",
+      value: volumeLevel === null ? "" : volumesText(volumeLevel),
     },
   ];
   if (settings !== null) {
@@ -254,17 +310,25 @@ function trianglesText(triangles: number): string {
 
 /** Each level has half of the voxels along an edge. */
 function volumesText(level: number): string {
-  return level === 0 ? "volumes in full detail" : `volumes at 1/${2 ** level} detail`;
+  return level === 0 ? "in full detail" : `at 1/${2 ** level} detail`;
 }
 
-function statusOf({ triangles, volumeLevel, samples, frame_ms, isLoading }: Facts): string {
-  return [
-    trianglesText(triangles),
-    volumeLevel === null ? "" : volumesText(volumeLevel),
-    samples === null ? "" : samplesText(samples),
-    frameText(frame_ms),
-    isLoading ? "refining …" : "",
-  ]
-    .filter((part) => part !== "")
-    .join(" · ");
+/** What is shown, and whether that is all of it. */
+function statusOf({ channels, mode, isolated }: ViewerState, facts: Facts): string {
+  const { samples, isLoading } = facts;
+  if (channels.every(({ shown }) => !shown)) return "All channels are hidden: switch one on.";
+  const alone = isolated === null ? "" : `${tileName(isolated)} alone`;
+  const parts = [channels.some(({ hasObjects }) => !hasObjects) ? STATUS[mode] : "Objects", alone];
+  if (isLoading) parts.push("loading …");
+  else parts.push(samples === null ? "complete" : samplesText(samples));
+  return parts.filter((part) => part !== "").join(" · ");
 }
+
+const STATUS: Readonly<Record<ViewerState["mode"], string>> = {
+  disc: "Surfaces; volumes when near",
+  tile: "Surfaces; one tile as volume when near",
+  all: "Volumes",
+  stage: "As the stage has it",
+  traced: "Volumes, path-traced",
+  off: "Surfaces",
+};

@@ -24,6 +24,7 @@ import type { TracedVolume } from "../pathtrace/traced_volume";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "../surfaces/blend_material";
 import { makeFrame, REST_STEPS } from "../volumes/tile_raymarch";
 import type { VolumeSet } from "../volumes/volume_set";
+import { CrossFade } from "./cross_fade";
 import { DepthPass } from "./depth_pass";
 import type { Hybrid } from "./gaze_focus";
 import { MarchPass } from "./raymarch_pass";
@@ -86,6 +87,10 @@ export class Picture {
   /** The same where edges aren't smoothed. */
   private readonly draft: WebGLRenderTarget;
   private readonly encode = new EncodePass();
+  /** From the picture before a jump to the one after it. */
+  readonly fade: CrossFade;
+  /** The target of the last picture. */
+  private last: WebGLRenderTarget | null = null;
   /** Where a channel is a volume beyond the disc too: the picture within it, and its march. */
   private readonly within: WebGLRenderTarget;
   private readonly marchWithin: MarchPass;
@@ -111,6 +116,7 @@ export class Picture {
     this.surfaceFrame = makeSurfaceFrame(disc, this.march.picture, this.cuts, this.both);
     this.light = linearTarget(renderer, { hasDepth: true, isMultisampled: true });
     this.draft = linearTarget(renderer, { hasDepth: true });
+    this.fade = new CrossFade(renderer);
     this.within = linearTarget(renderer, { hasDepth: true, isMultisampled: true });
     this.marchWithin = new MarchPass(renderer, this.marchFrame);
     const { uSceneDepth } = this.marchFrame;
@@ -247,7 +253,9 @@ export class Picture {
 
   /** Draw the room's light, and encode it for the present target; `isMixed`: with that within the disc. */
   private show(light: WebGLRenderTarget, isMixed: boolean): void {
-    const { renderer, eyes, hybrid, marchFrame } = this;
+    const { renderer, eyes, hybrid, marchFrame, fade } = this;
+    fade.keep(this.last);
+    this.last = light;
     const before = this.drawInto(light);
     if (isMixed) {
       marchFrame.uDisc.value.set(...hybrid.cosines);
@@ -257,6 +265,7 @@ export class Picture {
       drawWhole(renderer, this.mixed, light, eyes.width_px, eyes.height_px);
       renderer.autoClear = autoClear;
     }
+    this.encode.mix(fade.texture, fade.shareIn(light));
     this.encode.render(renderer, light, before);
   }
 
@@ -287,6 +296,7 @@ export class Picture {
     this.light.dispose();
     this.draft.dispose();
     this.encode.dispose();
+    this.fade.dispose();
     this.marchFrame.uNoise.value.dispose();
   }
 }

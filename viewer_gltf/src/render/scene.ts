@@ -52,9 +52,10 @@ export class Room {
     aim(this.fill, eye, FILL_AT);
   }
 
-  /** Outline a tile, or none. */
+  /** Outline a tile among others, or none. */
   mark(tile: string | null): void {
-    const found = this.manifest.tiles.find(({ id }) => id === tile);
+    const { tiles } = this.manifest;
+    const found = tiles.length > 1 ? tiles.find(({ id }) => id === tile) : undefined;
     this.outline.visible = found !== undefined;
     if (found === undefined) return;
     this.outline.box.min.set(...found.bounds_um.min);

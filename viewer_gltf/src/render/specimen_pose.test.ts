@@ -44,4 +44,26 @@ describe("the specimen in the room", () => {
     specimen.goHome();
     expect(at(specimen, 50, -20, 10).length()).toBeCloseTo(0, 6);
   });
+
+  it("jumps in stereo, where it would glide on a screen, and tells of each jump once", () => {
+    const specimen = new Specimen(mutable(WHOLE));
+    specimen.takeJump();
+    specimen.show(mutable(TILE));
+    expect(specimen.takeJump()).toBe(false);
+    specimen.advance(MOVE_S);
+    specimen.isJumping = true;
+    const jumps = [
+      () => specimen.show(null),
+      () => specimen.goHome(),
+      () => specimen.anchorAt(new Vector3(0, 0, -1)),
+      () => specimen.jumpTo({ ...specimen.pose, scale: 2 }, new Vector3()),
+    ];
+    for (const jump of jumps) {
+      jump();
+      expect(specimen.advance(0.1)).toBe(false);
+      expect([specimen.takeJump(), specimen.takeJump()]).toEqual([true, false]);
+    }
+    specimen.moveTo({ ...specimen.pose, scale: 1.5 }, new Vector3());
+    expect(specimen.takeJump()).toBe(false); // hands carry it
+  });
 });

@@ -25,6 +25,9 @@ export class Specimen {
   readonly anchor = new Vector3();
   /** As a factor to how large it opens. */
   size = 1;
+  /** In stereo it does not glide to another place, which makes sick: it is there at once, and the picture fades. */
+  isJumping = false;
+  private hasJumped = false;
   private readonly facing = new Quaternion();
   private readonly base: Matrix4;
   private focus: Bounds | null = null;
@@ -60,13 +63,17 @@ export class Specimen {
     this.anchor.copy(point);
     this.facing.copy(facing);
     this.size = size;
-    this.settle(this.home);
+    this.goHome();
   }
 
   /** Bring a tile to the middle, as large as fits where the whole was; null: the whole again. */
   show(tile: Bounds | null): void {
     if (tile === this.focus) return;
     this.focus = tile;
+    if (this.isJumping) {
+      this.goHome();
+      return;
+    }
     this.isMoved = false;
     this.start = this.pose;
     this.goal = this.home;
@@ -90,7 +97,21 @@ export class Specimen {
   }
 
   goHome(): void {
+    this.hasJumped = true;
     this.settle(this.home);
+  }
+
+  /** To another place at once, where no hand carries it. */
+  jumpTo(pose: SpecimenPose, viewer: Vector3): void {
+    this.hasJumped = true;
+    this.moveTo(pose, viewer);
+  }
+
+  /** Whether it has jumped since this was asked last. */
+  takeJump(): boolean {
+    const { hasJumped } = this;
+    this.hasJumped = false;
+    return hasJumped;
   }
 
   /** Moved by hand; `viewer` is where the eyes are, room. */

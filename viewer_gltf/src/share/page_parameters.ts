@@ -1,6 +1,6 @@
 /**
  * What the page's address asks for: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
- * high), `switch` (metres of the room), `disc` (degrees), `view` (front, side, top). Pure.
+ * high), `switch` (metres of the room), `disc` (degrees), `view` (front, side, top), `panel` (off). Pure.
  */
 import { STANDS, type Stand } from "../interaction/orbit_camera";
 import type { Action } from "../state/actions";
@@ -18,6 +18,11 @@ export const SETTINGS: readonly string[] = [
 export function standOf(search: string): Stand | null {
   const asked = new URLSearchParams(search).get("view");
   return STANDS.find((stand) => stand === asked) ?? null;
+}
+
+/** Whether the page has a panel: `panel=off` leaves it out, for a page that holds this one in a frame. */
+export function panelOf(search: string): "on" | "off" {
+  return new URLSearchParams(search).get("panel") === "off" ? "off" : "on";
 }
 
 /** null: none of the parameter's. */

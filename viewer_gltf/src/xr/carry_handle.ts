@@ -20,6 +20,11 @@ export class GazeCarry implements Target {
     return this.carried !== null;
   }
 
+  /** The name of what is carried; null: nothing is. */
+  get key(): string | null {
+    return this.carried?.key ?? null;
+  }
+
   take(met: Met): void {
     this.carried = met;
     this.rest = null;

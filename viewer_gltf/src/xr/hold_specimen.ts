@@ -26,6 +26,8 @@ const HEIGHT_OF_VIEW = 2 * Math.tan(MathUtils.degToRad(40));
 /** So near and so far the middle of what is shown may come, m: no way in leads out at the back. */
 const NEAREST_M = 0.1;
 const FARTHEST_M = 5;
+/** So near to straight up or down a gaze carries the specimen no further, radians. */
+const STEEPEST_RAD = MathUtils.degToRad(5);
 /** Tilt of a head that holds the specimen. */
 const HALF_NEARER_RAD = MathUtils.degToRad(12);
 /** Steps in a second of a move that goes on. */
@@ -72,6 +74,11 @@ const FACING: Readonly<Partial<Record<Command, Quaternion>>> = {
   side: about(UP, -Math.PI / 2),
   top: about(RIGHT, Math.PI / 2),
 };
+/** Whether a command turns the specimen at once, however far: the others go on by small steps. */
+export function isFacing(command: Command): boolean {
+  return FACING[command] !== undefined;
+}
+
 /** Where the camera would go to the left, the specimen turns to the right: about which axis. */
 const TURNS: Readonly<Partial<Record<Command, readonly [Vector3, number]>>> = {
   "turn-left": [UP, STEP_RAD],
@@ -166,6 +173,29 @@ export function moveByHead({ pose, pivot, gaze: before }: HeadHold, gaze: Gaze):
   const carried = moveByOneHand(pose, still, { position: eye, orientation: turn });
   const at = pivot.clone().sub(before.origin).applyQuaternion(turn).add(eye);
   return bringNearer(carried, at, eye, 2 ** ((pitch - pitchBefore) / HALF_NEARER_RAD));
+}
+
+/**
+ * The specimen goes as far aside, up or down as the gaze that carries it, the same side to the eye and at the
+ * same distance.
+ */
+export function moveByGaze({ pose, pivot, gaze: before }: HeadHold, gaze: Gaze): SpecimenPose {
+  const [yaw, pitch] = bearingOf(gaze);
+  const [yawBefore, pitchBefore] = bearingOf(before);
+  const away = pivot.clone().sub(before.origin);
+  const [yawOfPivot, pitchOfPivot] = bearingOf({ origin: before.origin, direction: away });
+  const steepest = Math.PI / 2 - STEEPEST_RAD;
+  const up = MathUtils.clamp(pitchOfPivot + pitch - pitchBefore, -steepest, steepest);
+  const aside = yawOfPivot + yaw - yawBefore;
+  const at = new Vector3(
+    -Math.sin(aside) * Math.cos(up),
+    Math.sin(up),
+    -Math.cos(aside) * Math.cos(up),
+  )
+    .multiplyScalar(away.length())
+    .add(gaze.origin);
+  const turned = turnAbout(pose, about(UP, yaw - yawBefore), pivot);
+  return { ...turned, position: turned.position.clone().add(at).sub(pivot) };
 }
 
 /** With the pivot's distance from the eye multiplied by a factor, within limits. */

@@ -13,7 +13,7 @@ import {
   type Target,
 } from "../interaction/ray_pointer";
 import { TILE, TileTarget } from "../interaction/tile_target";
-import { type HandPose, zoomAbout } from "../math/grab";
+import type { HandPose } from "../math/grab";
 import { shownTiles } from "../math/pick";
 import type { Command } from "../state/commands";
 import { DWELL } from "../state/parameters/tools";
@@ -24,16 +24,16 @@ import { Controllers, type Hand, type HandEvent } from "./controllers";
 import type { HandsOptions } from "./hands_options";
 import {
   type HeadHold,
-  moveByCommand,
-  moveByFingers,
+  moveByGaze,
   moveByHead,
   moveByHolders,
   moveByStick,
   STEPS_PER_S,
 } from "./hold_specimen";
+import { LastChoice } from "./last_choice";
 import { RoomNotice } from "./panel/notice";
 import { PANEL, RoomPanel } from "./panel/panel";
-import { hullOf, middleOf } from "./shown_hull";
+import { SpecimenMover } from "./specimen_mover";
 
 /** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
 const HOLD_S = 0.35;
@@ -44,6 +44,12 @@ const HEAD_HOLD_S = 0.6;
 /** By gaze alone it is not switched off: nothing would be left to switch it on by. */
 const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
 const KEEPS_GAZE = "Switch this off by the button: where there is none, the gaze is all there is.";
+
+const CARRY = "It moves with your gaze. Rest to put it down.";
+/** The bar's button that undoes the last choice. */
+const UNDO = `${PANEL}undo-choice`;
+/** The bar's button by which the gaze takes the specimen. */
+const CARRY_BUTTON = `${PANEL}bar-move`;
 
 /** A trigger that is down. */
 type Press = {
@@ -66,6 +72,7 @@ export class Hands {
   readonly panel: RoomPanel;
   readonly ring = new Ring();
   readonly notice: RoomNotice;
+  private readonly mover: SpecimenMover;
   private readonly controllers = new Controllers();
   private readonly pointer = new Pointer();
   readonly tiles: TileTarget;
@@ -86,10 +93,14 @@ export class Hands {
   private headHold: HeadHold | null = null;
   /** What is gone on with. */
   private goesOn: GoesOn | null = null;
-
+  private readonly lastChoice = new LastChoice();
+  /** The specimen as it was taken by the bar. */
+  private barHold: HeadHold | null = null;
+  private state: ViewerState | null = null;
   constructor(private readonly options: HandsOptions) {
     const { scene, specimen, handles = [], layOut, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
+    this.mover = new SpecimenMover(specimen, options.tiles);
     this.notice = new RoomNotice(isPainted);
     this.panel = new RoomPanel({
       layOut,
@@ -97,6 +108,8 @@ export class Hands {
       onLenses,
       isPainted,
       onAnnounce: (text) => this.announce(text),
+      onUndo: () => this.undo(),
+      onCarry: (ray, isStart) => this.carrySpecimen(ray, isStart),
       onWish: (wish) => {
         if (typeof wish === "string") options.onCommand(wish);
         else options.onAction(wish);
@@ -120,6 +133,18 @@ export class Hands {
   /** Of the dwell, 0..1. */
   get progress(): number {
     return this.pointer.progress;
+  }
+
+  /** Whether the gaze carries a handle or the specimen. */
+  get isCarrying(): boolean {
+    return this.carry.isCarrying;
+  }
+
+  /** Whether the gaze or the head carries something of the scene, not a part of the open menu. */
+  private get isCarryingInScene(): boolean {
+    const { key } = this.carry;
+    const isOfMenu = key?.startsWith(PANEL) === true && key !== CARRY_BUTTON;
+    return this.headHold !== null || (key !== null && !isOfMenu);
   }
 
   get isHolding(): boolean {
@@ -146,6 +171,7 @@ export class Hands {
     this.touched = null;
     this.goesOn = null;
     this.headHold = null;
+    this.lastChoice.take();
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
@@ -168,21 +194,12 @@ export class Hands {
 
   /** What would move the camera of a flat screen, by a step; false: the command is another's. */
   run(command: Command, state: ViewerState, share = 1): boolean {
-    const { specimen } = this.options;
-    const pivot = middleOf(this.around(state));
-    const pose = moveByCommand(specimen.pose, command, pivot, this.gaze.origin, share);
-    if (pose === null) return false;
-    specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.run(command, state, this.gaze.origin, share);
   }
 
   /** The specimen becomes so much larger about its middle. */
   resize(factor: number, state: ViewerState): void {
-    const { specimen } = this.options;
-    specimen.moveTo(
-      zoomAbout(specimen.pose, middleOf(this.around(state)), factor),
-      this.gaze.origin,
-    );
+    this.mover.resize(factor, state, this.gaze.origin);
   }
 
   /**
@@ -194,8 +211,9 @@ export class Hands {
     if (!this.isRunning) return false;
     const { xr } = this.options;
     this.gaze = gazeOf(head);
+    this.state = state;
     this.tiles.tiles = shownTiles(this.options.tiles, state.isolated);
-    this.tiles.clip = state.clip;
+    this.tiles.follow(state);
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
     for (const event of this.controllers.take()) this.handle(event);
     const hasTouched = this.followFingers(state);
@@ -204,6 +222,11 @@ export class Hands {
     const hasHeld = this.hold(dt_s);
     const hasFollowed = this.followHead(dt_s, state);
     const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
+    const isGoingOn = this.goesOn !== null || this.carry.isCarrying;
+    const now = { state, pose: this.mover.pose };
+    const isAsked = this.pointer.gaze?.key === UNDO;
+    this.panel.canUndo = this.lastChoice.advance(dt_s, now, isGoingOn, isAsked);
+    this.panel.isCarrying = this.isCarryingInScene;
     const isRepainted = this.panel.update(dt_s, head, state);
     const isNoticeNew = this.notice.update(read_s, head);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
@@ -282,8 +305,7 @@ export class Hands {
 
   /** What fingers on the split screen have done since the frame before; whether anything has moved. */
   private followFingers(state: ViewerState): boolean {
-    const { specimen } = this.options;
-    const before = specimen.pose;
+    const before = this.mover.pose;
     for (const [gesture, time_ms] of this.gestures.splice(0)) {
       if (gesture.kind === "press") {
         const met = meetFirst(this.gaze, this.free);
@@ -293,12 +315,10 @@ export class Hands {
       else if (gesture.kind === "tap") {
         if (this.touched?.isUsed === false) this.tap(time_ms);
       } else {
-        const pivot = middleOf(this.around(state));
-        const pose = moveByFingers(specimen.pose, gesture, pivot, this.gaze.origin);
-        specimen.moveTo(pose, this.gaze.origin);
+        this.mover.byFingers(gesture, state, this.gaze.origin);
       }
     }
-    return specimen.pose !== before;
+    return this.mover.pose !== before;
   }
 
   /** The button: what the ray meets, or if that is nothing, what is gazed at. */
@@ -311,8 +331,27 @@ export class Hands {
     if (met.key === null) return;
     const counts = this.pointer.press(met, this.free, time_ms);
     if (!counts && !isByGaze) return;
+    const { pose } = this.mover;
+    if (met.key !== UNDO && this.state) this.lastChoice.remember({ state: this.state, pose });
     met.target.choose(met, met.ray, isByGaze);
     if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
+  }
+
+  private undo(): void {
+    const before = this.lastChoice.take();
+    if (before === null) return;
+    this.options.onAction({ type: "restore", state: before.state });
+    this.mover.backTo(before.pose, this.gaze.origin);
+  }
+
+  /** The bar is taken hold of, and the specimen moves as the gaze does until it rests. */
+  private carrySpecimen(gaze: RoomRay, isStart: boolean): void {
+    if (isStart && this.state !== null) {
+      this.barHold = this.mover.holdBy(gaze, this.state);
+      this.announce(CARRY);
+    } else if (this.barHold !== null) {
+      this.mover.to(moveByGaze(this.barHold, gaze), gaze.origin);
+    }
   }
 
   /** Input sources come and go, also while they hold something. */
@@ -328,12 +367,9 @@ export class Hands {
   private hold(dt_s: number): boolean {
     for (const [source, press] of this.presses) this.advance(source, press, dt_s);
     const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
-    const { specimen } = this.options;
-    const pose = moveByHolders(specimen.pose, this.held, now);
+    const pose = moveByHolders(this.mover.pose, this.held, now);
     this.held = now;
-    if (pose === specimen.pose) return false;
-    specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.to(pose, this.gaze.origin);
   }
 
   private advance(source: XRInputSource, press: Press, dt_s: number): void {
@@ -385,39 +421,30 @@ export class Hands {
       this.headHold = null;
       return false;
     }
-    const { specimen } = this.options;
     const { gaze } = this;
     press.isUsed = true; // letting go of it chooses nothing
     if (this.headHold === null) {
-      this.headHold = { pose: specimen.pose, pivot: middleOf(this.around(state)), gaze };
+      this.headHold = this.mover.holdBy(gaze, state);
       return false;
     }
-    specimen.moveTo(moveByHead(this.headHold, gaze), gaze.origin);
+    this.mover.to(moveByHead(this.headHold, gaze), gaze.origin);
     return true;
   }
 
   private moveBySticks(dt_s: number, state: ViewerState): boolean {
     if (this.isHolding) return false;
-    const { specimen } = this.options;
-    let { pose } = specimen;
+    let { pose } = this.mover;
     for (const { stick, ray } of this.tracked) {
       if (stick.x === 0 && stick.y === 0) continue;
       const met = this.tileAlong(ray) ?? this.tileAlong(this.gaze);
-      pose = moveByStick(pose, stick, met ?? middleOf(this.around(state)), dt_s);
+      pose = moveByStick(pose, stick, met ?? this.mover.middle(state), dt_s);
     }
-    if (pose === specimen.pose) return false;
-    specimen.moveTo(pose, this.gaze.origin);
-    return true;
+    return this.mover.to(pose, this.gaze.origin);
   }
 
   private tileAlong(ray: RoomRay | null): Vector3 | null {
     const hit = ray && this.tiles.meet(ray);
     return hit && pointOn({ ...hit, ray });
-  }
-
-  private around({ isolated }: ViewerState): readonly Vector3[] {
-    const { tiles, specimen } = this.options;
-    return hullOf(shownTiles(tiles, isolated), specimen.group.matrixWorld);
   }
 
   /** Ring, rays, and the light on what is pointed at. */
@@ -429,7 +456,7 @@ export class Hands {
     this.panel.light(leading?.key ?? null);
     const eye = new Vector3().setFromMatrixPosition(head);
     if (leading === null) this.ring.hide();
-    else this.ring.show(pointOn(leading), eye, progress, leading.key !== null);
+    else this.ring.show(pointOn(leading), eye, progress);
     const shown = `${leading?.key} ${leading?.distance_m} ${progress}`;
     const isChanged = shown !== this.shown;
     this.shown = shown;

@@ -70,7 +70,7 @@ describe("every control of every page", () => {
   it("is part of these tests", () => {
     const ids = PAGES.flatMap(([, , , all]) => all);
     expect(ids.length).toBeGreaterThan(100);
-    expect(ids).toEqual(expect.arrayContaining(["leave", "tab=cut", "c0/shown", "dwell", "more"]));
+    expect(ids).toEqual(expect.arrayContaining(["leave", "c0/shown", "dwell", "more"]));
   });
 
   it.each(PAGES)("changes one thing under a gaze that rests on it for 6 s more: %s", (...page) => {
@@ -155,9 +155,9 @@ describe("the rows of the panel", () => {
     const person = new LookingPerson(70);
     person.open("channels");
     const ids = () => person.regions.flatMap(({ id }) => (id.endsWith("/shown") ? [id] : []));
-    expect(ids()).toEqual(["c0", "c1", "c2", "c3", "c4", "c5", "c6"].map((id) => `${id}/shown`));
+    expect(ids()).toEqual(["c0", "c1", "c2", "c3"].map((id) => `${id}/shown`));
     const before = ids();
-    for (const id of ["c6/shown", "c0/shown", "c5/shown"]) {
+    for (const id of ["c3/shown", "c0/shown", "c2/shown"]) {
       person.lookAt(id);
       person.press();
       person.rest(1);
@@ -167,7 +167,7 @@ describe("the rows of the panel", () => {
     person.press();
     person.open("channels");
     const shown = person.state.channels.filter((channel) => channel.shown);
-    expect(ids().slice(0, 4)).toEqual(shown.map(({ id }) => `${id}/shown`));
+    expect(ids().slice(0, shown.length)).toEqual(shown.map(({ id }) => `${id}/shown`));
   });
 });
 
@@ -190,8 +190,8 @@ describe("a gaze that opens or closes the panel", () => {
     person.hands.stop();
     person.hands.start(null);
     person.rest(6);
-    expect(person.hands.pointed).toBe("opener");
-    expect(person.hands.panel.isOpen).toBe(false);
+    expect(person.hands.pointed).toMatch(/^panel:bar-/); // it has come to where the head faces
+    expect([person.hands.panel.isOpen, person.wishes]).toEqual([false, []]);
     person.lookUp();
     person.lookAt("opener");
     person.rest(2);

@@ -1,5 +1,5 @@
 /** Stereo, whichever way: a headset's session, or a split screen in a phone's viewer. */
-import { type Camera, MathUtils, Matrix4, Vector3, type WebGLRenderer } from "three";
+import { type Camera, MathUtils, Matrix4, type Object3D, Vector3, type WebGLRenderer } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Eyes } from "../gpu/eyes";
 import type { Command } from "../state/commands";
@@ -7,10 +7,11 @@ import type { ViewerState } from "../state/viewer_state";
 import type { SplitSession } from "./cardboard/split_session";
 import { askInTap } from "./cardboard/user_gesture";
 import type { Profile } from "./cardboard/viewer_profile";
+import { Ground } from "./ground";
 import type { HandsOptions } from "./hands_options";
 import { betweenEyes } from "./head_pose";
 import { Hands } from "./interaction";
-import { bearingOf, headBearing } from "./panel/placement";
+import { bearingOf, headBearing, type Setting } from "./panel/placement";
 import { XrSession } from "./session";
 import { spreadEyes } from "./stereo_strength";
 
@@ -33,9 +34,12 @@ export type EyeSettings = Readonly<{
   cssPixelsPerInch: number | null;
 }>;
 
-/** On a card before the eyes when stereo begins. */
-export const HOW_IT_WORKS = "Look down: menu.\nPress: choose.\nHold: it follows you.";
-/** Whoever has seen it so often knows. */
+/** On a card before the eyes when stereo begins. Before a head that looks at a table the bar is higher than the gaze. */
+export function howItWorks(setting: Setting): string {
+  const way = setting === "over-table" ? "up" : "down";
+  return `Look ${way}: the bar.\nRest or press: choose.\nHold: it follows you.`;
+}
+/** Times that the card is shown on a device. */
 const TOLD_OFTEN = 3;
 const TOLD_KEY = "stereocell-told";
 
@@ -56,6 +60,7 @@ const NOT_LOADED =
 export class Stereo {
   readonly headset: XrSession;
   readonly hands: Hands;
+  private readonly ground = new Ground();
   private split: SplitSession | null = null;
   private eyes: EyeSettings = { distance_m: 0.063, strength: 1, cssPixelsPerInch: null };
   /** A split screen that is being asked for. */
@@ -68,6 +73,7 @@ export class Stereo {
     private readonly renderer: WebGLRenderer,
     private readonly options: StereoOptions,
   ) {
+    options.scene.add(this.ground.lines);
     this.hands = new Hands({ ...options, xr: renderer.xr, onLeave: () => this.end() });
     this.headset = new XrSession(
       renderer,
@@ -136,6 +142,11 @@ export class Stereo {
       (gesture) => this.hands.touch(gesture),
       this.splitOptions,
     );
+  }
+
+  /** Everything but what is opaque, which the pass for the depth has to leave out. */
+  get overlays(): readonly Object3D[] {
+    return [this.ground.lines, ...this.hands.overlays];
   }
 
   /** Where the eyes are in this frame. Returns the camera to draw with; null: no stereo. */
@@ -251,20 +262,23 @@ export class Stereo {
 
   private begin(session: XRSession | null): void {
     const isInHand = session?.interactionMode === "screen-space";
-    this.hands.panel.isTableBelow = this.isInUsersRoom;
-    this.hands.panel.isOverTable = this.isInUsersRoom && !isInHand;
+    const onTable = isInHand ? "in-hand" : "over-table";
+    this.hands.panel.setting = this.isInUsersRoom ? onTable : "before-eyes";
+    this.ground.show(!this.isInUsersRoom);
     this.options.onStart();
     this.hands.start(session);
-    if (isToBeTold()) this.hands.announce(HOW_IT_WORKS);
+    if (isToBeTold()) this.hands.announce(howItWorks(this.hands.panel.setting));
   }
 
   private leave(): void {
     this.isArriving = false;
+    this.ground.show(false);
     this.hands.stop();
     this.options.onEnd();
   }
 
   dispose(): void {
+    this.ground.dispose();
     this.hands.dispose();
     this.split?.dispose();
   }

@@ -2,7 +2,7 @@
 import { readFile } from "node:fs/promises";
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
-import { LABEL_HEIGHT, LABEL_PX } from "../../src/annotations/style";
+import { LABEL_HEIGHT, LABEL_PX, STEREO_TEXT } from "../../src/annotations/style";
 import type { Vec3 } from "../../src/math/vec3";
 import { bundled } from "../support/browser/bundled";
 import type { Browser } from "../support/browser/chromium";
@@ -231,7 +231,7 @@ describeInChromium("marks", () => {
     for (const angle of angles) expect(angle * px_per_rad).toBeCloseTo(LABEL_PX, 1);
     await look([0, 0, 2], [0, 0, 0], { isStereo: true });
     const inRoom = (await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0;
-    expect(inRoom).toBeCloseTo(LABEL_HEIGHT, 5);
+    expect(inRoom).toBeCloseTo(STEREO_TEXT * LABEL_HEIGHT, 5);
   });
 
   it("let a handle be dragged: the face follows the pointer, and the camera does not", async () => {
@@ -262,13 +262,16 @@ describeInChromium("marks", () => {
     const meet = () => page.evaluate(() => window.bench?.meet());
     await gaze(903);
     const met = await meet();
-    expect(met).toMatchObject({ key: "handle:x-max", hold: "carry" });
+    // as the cut was before stereo began, only a button takes it
+    expect(met).toMatchObject({ key: "handle:x-max", hold: "carry", isGlance: true });
     expect(met?.distance_m).toBeCloseTo(Math.hypot(1.6, 0.48), 3);
     await gaze(250);
     expect(await meet()).toBeNull();
     await gaze(700);
     await page.evaluate(() => window.bench?.carry("handle:x-max"));
     expect((await stateNow()).clip.box?.max[0]).toBeCloseTo(700, 3);
+    await gaze(703);
+    expect(await meet()).toMatchObject({ key: "handle:x-max", isGlance: false });
     await page.evaluate(() => {
       window.bench?.dispatch({ type: "set-clip", clip: { box: null, plane: null } });
       window.bench?.carry("handle:x-max");
@@ -348,6 +351,10 @@ describeInChromium("marks", () => {
     const ruler = await page.evaluate(() => window.bench?.ruler());
     expect(ruler?.isVisible).toBe(true);
     expect(ruler?.length_um).toBeGreaterThan(100);
+    await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isInUsersRoom: true });
+    const onTable = await page.evaluate(() => window.bench?.ruler());
+    const { up_um = Number.NaN } = ruler ?? {};
+    expect(up_um).toBeGreaterThan(onTable?.up_um ?? Number.NaN); // else the bar would lie before it
     await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isPanelOpen: true });
     const behindPanel = await page.evaluate(() => window.bench?.ruler());
     expect(behindPanel).toMatchObject({ isVisible: false, hasAxes: false });

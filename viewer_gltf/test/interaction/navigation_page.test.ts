@@ -45,6 +45,33 @@ describeInChromium("a view that is moved and zoomed", () => {
     expect(seen / (picture.width * picture.height)).toBeGreaterThan(SEEN);
   }
 
+  it("flies to what is double-clicked, isolates nothing, and stays where nothing is hit", async () => {
+    const look = async () => (await stand.viewer.snapshot()).look;
+    const away = ({ position, target }: Awaited<ReturnType<typeof look>>) =>
+      Math.hypot(...position.map((v, i) => v - target[i]));
+    const picture = await takePicture(page());
+    const spots = Array.from({ length: picture.width * picture.height }, (_, i) => i)
+      .map((i) => [i % picture.width, Math.floor(i / picture.width)] as const)
+      .filter(([x, y]) => !isBackground(picture.at(x, y)));
+    const stage = await page().locator(".stage canvas").boundingBox();
+    if (stage === null) throw new Error("no stage");
+    const scale = stage.width / picture.width;
+    const [x, y] = spots[Math.floor(spots.length / 2)];
+    const before = await look();
+    await page().mouse.dblclick(stage.x + scale * x, stage.y + scale * y);
+    await expect.poll(async () => away(await look())).toBeLessThan(0.75 * away(before));
+    await stand.viewer.still();
+    expect((await stand.viewer.snapshot()).state.isolated).toBeNull();
+    const there = await look();
+    await page().keyboard.press("r"); // back to where nothing fills the corner
+    await stand.viewer.still();
+    const whole = await look();
+    expect(away(whole)).toBeGreaterThan(away(there));
+    await page().mouse.dblclick(stage.x + 2, stage.y + stage.height / 2);
+    await stand.viewer.still();
+    expect(await look()).toEqual(whole);
+  });
+
   it("is not turned by the right button, though it goes beyond the specimen's end", async () => {
     const before = await axes();
     const start = await takePicture(page());

@@ -66,9 +66,13 @@ async function only(stand: Stand, id: string, as: "surface" | "volume"): Promise
       for (const { id } of window.stereocell?.snapshot().state.channels ?? []) {
         set("shown", id, id === wanted);
       }
+      const card = document.querySelector<HTMLElement>(`[data-channel="${wanted}"] [data-opener]`);
+      if (card?.ariaExpanded === "false") card.click();
       set("volume", wanted, isVolume);
-      const all = document.querySelector<HTMLInputElement>('[data-mode="all"]');
-      if (isVolume && all?.checked === false) all.click();
+      const modes = document.querySelector<HTMLSelectElement>("select[data-mode]");
+      if (!isVolume || modes === null) return;
+      modes.value = "all";
+      modes.dispatchEvent(new Event("change"));
     },
     [id, as === "volume"] as const,
   );

@@ -216,6 +216,15 @@ describeInChromium("the objects of a label map", () => {
       await page.waitForTimeout(200);
     }
     const ahead = rowAt(0, 3, 0, 1);
+    await page.waitForTimeout(2500); // what has come under a resting gaze was not looked for
+    expect((await view())?.picked).toBeUndefined();
+    for (const alpha of [0, 20, 0]) {
+      await page.evaluate((degrees) => {
+        const turn = { alpha: degrees, beta: 90, gamma: 0 };
+        dispatchEvent(new DeviceOrientationEvent("deviceorientation", turn));
+      }, alpha);
+      await page.waitForTimeout(700); // the first time so that it is ahead
+    }
     await expect.poll(async () => (await view())?.picked).toBe(ahead);
     expect((await stand.viewer.snapshot()).told).toContain(`Object ${labelOf(ahead)}`);
     await page.waitForTimeout(2500); // it goes on resting there: the card stays

@@ -10,7 +10,7 @@ import { needsOf } from "../../src/surfaces/required_decoders";
 import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "../support/browser/stand";
 
-const CODE_GZIP_BYTES = 368_000;
+const CODE_GZIP_BYTES = 380_000;
 const TOLD_IN = ["docs/viewer.md", "docs/decisions.md", "CHANGELOG.md"];
 /** Page, code, style and bundle, from a host that compresses nothing. */
 const ON_THE_WIRE_BYTES = 500_000;
@@ -98,7 +98,7 @@ describe("the viewer's code", () => {
     }
   });
 
-  it("without optional parts is at most 368 kB gzip", async () => {
+  it("without optional parts is at most 380 kB gzip", async () => {
     const sizes = await gzipBytes();
     const needed = [...sizes].filter(([name]) => !OPTIONAL.test(name));
     expect(needed.length).toBeGreaterThan(4); // page, style, main, decoders, workers

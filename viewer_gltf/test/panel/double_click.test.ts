@@ -14,7 +14,7 @@ describeInChromium("a double click on the panel", () => {
   const state = async () => (await stand.viewer.snapshot()).state;
   const places = () =>
     page()
-      .locator(".panel .channel")
+      .locator('[data-section="channels"] .channel')
       .evaluateAll((all) => all.map((each) => [each.ariaLabel, (each as HTMLElement).offsetTop]));
 
   beforeAll(async () => {

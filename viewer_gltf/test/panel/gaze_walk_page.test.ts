@@ -18,6 +18,7 @@ async function walk(stand: Stand, only = "") {
     const { stereocell: api, frameClock: clock } = window;
     if (api === undefined || clock === undefined) throw new Error("no viewer, or no clock");
     const DWELL_S = 1.5;
+    const UNDO = "undo-choice";
     /** The head rests there by the second report: where it will be is told from the last two. */
     const turn = (alpha: number, beta: number) => {
       for (let k = 0; k < 2; k++) {
@@ -44,12 +45,11 @@ async function walk(stand: Stand, only = "") {
       turn(alpha, 150);
       pass(0.1);
     };
-    /** What there is to be seen of an answer. */
+    /** What there is to be seen of an answer. *Undo* goes by itself, so it is none. */
     const seen = () => {
       const { state, told, specimenAt, specimenTurn, isStereo } = api.snapshot();
       const onPage = [...document.querySelectorAll("input")].map((each) => each.checked);
-      // the label of the control that leads to the next page counts the pages: More (1 of 2)
-      const labels = menu().map(({ id, label }) => [id, label]);
+      const labels = menu().flatMap(({ id, label }) => (id === UNDO ? [] : [[id, label]]));
       return JSON.stringify([state, told, specimenAt, specimenTurn, isStereo, labels, onPage]);
     };
     const gaze = (id: string) => {
@@ -59,51 +59,111 @@ async function walk(stand: Stand, only = "") {
       lookAway();
       return after;
     };
+    const tryOut = (id: string) => {
+      const before = seen();
+      return gaze(id) !== before;
+    };
     const walked: string[] = [];
     const silent: string[] = [];
-    turn(0, 90);
-    pass(0.2);
-    const before = ids();
-    gaze("opener");
-    for (const tab of ids().filter((id) => id.startsWith(`tab=${only}`))) {
-      gaze(tab);
-      const ofTab = new Set(["leave", "close", "more", "opener"]);
-      const isNew = (id: string) => !id.startsWith("tab=") && !ofTab.has(id);
-      let stale = 0;
-      for (let pages = 0; pages < 40; pages++) {
+    const ofBar = new Set([UNDO, "up", "more", "leave", "close", "opener"]);
+    const ofPage = () => ids().filter((id) => !ofBar.has(id) && !id.startsWith("tab="));
+
+    /** Each control of each page of a section, of a group of it, or of the closed panel's bar. */
+    const walkPages = async (name: string) => {
+      const done = new Set<string>();
+      const pages = new Set<string>();
+      const next = () => ofPage().find((id) => !done.has(id));
+      // what is chosen may move others to an earlier page: once round again
+      for (let stale = 0; stale <= pages.size; stale = next() === undefined ? stale + 1 : 0) {
+        pages.add(ofPage().join());
         const again: string[] = [];
-        const tryOut = (id: string) => {
-          const before = seen();
-          return gaze(id) !== before;
-        };
         // what is chosen may bring others, or take some away
-        for (let id = ids().find(isNew); id !== undefined; id = ids().find(isNew)) {
-          ofTab.add(id);
-          if (!tryOut(id)) again.push(id);
+        for (let id = next(); id !== undefined; id = next()) {
+          done.add(id);
+          if (id.endsWith("/open")) await walkGroup(name, id);
+          else if (!tryOut(id)) again.push(id);
           walked.push(id);
           await new Promise((resolve) => setTimeout(resolve)); // what loads may come
         }
         // what was chosen already, or told for another control, comes after another
         for (const id of again) {
-          const next = walked[walked.lastIndexOf(id) + 1];
-          if (ids().includes(next)) gaze(next);
+          const following = walked[walked.lastIndexOf(id) + 1];
+          if (ids().includes(following)) gaze(following);
           pass(6); // what was told has gone
-          if (ids().includes(id) && !tryOut(id)) silent.push(`${tab} ${id}`);
+          if (ids().includes(id) && !tryOut(id)) silent.push(`${name} ${id}`);
         }
+        pass(3); // what the gaze carries is put down
         if (!ids().includes("more")) break;
         gaze("more");
-        // what is chosen may move others to an earlier page: once round again
-        stale = ids().some(isNew) ? 0 : stale + 1;
-        if (stale > 10) break;
       }
+    };
+    /** The colours that a look at a swatch lays over the name, and the page of the channel or lamp. */
+    const walkGroup = async (name: string, swatch: string) => {
+      const group = swatch.slice(0, -"/open".length);
+      const look = () => {
+        lookAt(swatch);
+        pass(0.6);
+      };
+      look();
+      const colours = ids().filter((id) => id.startsWith(`${group}/color=`));
+      const answered = new Set<string>();
+      // the first once more, since a channel may have had that colour
+      for (const id of [...colours, ...colours.slice(0, 1)]) {
+        look();
+        if (!ids().includes(id)) continue;
+        if (tryOut(id)) answered.add(id);
+        walked.push(id);
+        pass(0.6); // the colours have gone
+      }
+      silent.push(...colours.filter((id) => !answered.has(id)).map((id) => `${name} ${id}`));
+      look();
+      const more = `${group}/more`;
+      if (ids().includes(more)) lookAt(more);
+      pass(DWELL_S);
+      lookAway();
+      await walkPages(`${name} ${group}`);
+      gaze("up");
+    };
+    const toList = () => {
+      while (ids().includes("up")) gaze("up");
+    };
+    const sections = () => {
+      toList();
+      const found = new Set<string>();
+      for (let before = -1; found.size > before; ) {
+        before = found.size;
+        for (const id of ids().filter((each) => each.startsWith("tab="))) found.add(id);
+        if (ids().includes("more")) gaze("more");
+      }
+      return [...found];
+    };
+
+    turn(0, 90);
+    pass(0.1);
+    await new Promise((resolve) => setTimeout(resolve, 600)); // it has come to rest: that is ahead
+    pass(0.1);
+    const before = ids();
+    if (only === "") await walkPages("bar");
+    gaze("opener");
+    for (const tab of sections().filter((id) => id.startsWith(`tab=${only}`))) {
+      toList();
+      while (!ids().includes(tab)) gaze("more");
+      gaze(tab);
+      await walkPages(tab);
     }
     gaze("close");
+    pass(6); // nothing can be undone any more
     const closed = ids();
     gaze("opener");
     gaze("leave");
     return { before, walked, silent, closed, isStereo: api.snapshot().isStereo };
   }, only);
 }
+
+/** The bar while the panel is closed. */
+const BAR = ["nearer", "farther", "roll-left", "roll-right", "move"]
+  .map((id) => `bar-${id}`)
+  .concat("opener");
 
 describeInChromium("in a Cardboard, by gaze alone", () => {
   const stand = prepareStand(SMALL);
@@ -115,12 +175,23 @@ describeInChromium("in a Cardboard, by gaze alone", () => {
     expect(found.silent).toEqual([]);
     expect(found.walked.length).toBeGreaterThan(150);
     for (const id of [
-      ...["Balls/color", "mode=disc", "switch-distance", "trace", "isolate", "reset", "nearer"],
+      ...[
+        "Balls/shown",
+        "Balls/volume",
+        "mode=disc",
+        "switch-distance",
+        "trace",
+        "isolate",
+        "reset",
+        "nearer",
+      ],
       ...["lenses=before", "stereo-strength", "tool=measure", "clip-box", "slice-x", "quality=low"],
     ]) {
       expect(found.walked).toContain(id);
     }
-    expect([found.before, found.closed]).toEqual([["opener"], ["opener"]]);
+    expect(found.before).toEqual(expect.arrayContaining(BAR));
+    expect(found.closed).toEqual(expect.arrayContaining(BAR));
+    expect(found.walked).toEqual(expect.arrayContaining(BAR.filter((id) => id !== "opener")));
     expect(found.isStereo).toBe(false);
   });
 });

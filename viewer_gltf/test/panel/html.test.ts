@@ -152,9 +152,31 @@ describeInChromium("the panel", () => {
     await press("h");
     expect(await page().locator(".panel .body").isVisible()).toBe(false);
     await press("h");
+    await stand.viewer.openCard(FIRST);
     await control(`${FIRST}/transfer-function`).focus();
     await press("o");
     expect((await first()).opacity).toBeCloseTo(0.9, 5);
+  });
+
+  it("switches the keys of one character off, also for the next visit, and on again", async () => {
+    const { channels } = await state();
+    await stand.viewer.unfold("share");
+    await control("letters").uncheck();
+    const press = (key: string) => page().keyboard.press(key);
+    for (const key of ["1", "x", "m", "B"]) await press(key);
+    expect((await state()).channels).toEqual(channels);
+    await stand.open();
+    await press("1");
+    expect((await state()).channels).toEqual(channels);
+    await press("?"); // the list of keys names the switch's place
+    expect(await page().getByRole("dialog").isVisible()).toBe(true);
+    await press("Escape");
+    await control("letters").check();
+    await page()
+      .locator(".stage canvas")
+      .click({ position: { x: 3, y: 3 } });
+    await press("1");
+    expect((await state()).channels[0].shown).toBe(!channels[0].shown);
   });
 
   it("leaves the keys alive whatever was clicked", async () => {
@@ -290,6 +312,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     await page().keyboard.press("/");
     expect(await focused()).toBe("find-channel");
     await control("find-channel").fill("marker 42");
+    await page().keyboard.press("Tab"); // its swatch
     await page().keyboard.press("Tab");
     await page().keyboard.press("Space");
     const shown = (await state()).channels.filter((channel) => channel.shown);

@@ -322,7 +322,7 @@ describeInChromium("surface or volume", () => {
     const next = gazed === one ? other : one;
     await stand.viewer.page.locator(`[data-tile-choice="${next}"]`).click();
     await stand.viewer.page.waitForTimeout(500);
-    await stand.viewer.page.locator('[data-mode="off"]').setChecked(true, { force: true });
+    await stand.viewer.page.locator("select[data-mode]").selectOption("off");
     await expect.poll(() => aborted.some((url) => url.includes(`/volumes/${next}/`))).toBe(true);
     expect((await stand.viewer.snapshot()).state.notices).toEqual([]);
   });

@@ -66,6 +66,8 @@ describeInChromium("the share link", () => {
     };
     /** What is announced before the eyes has gone. */
     const silent = () => expect.poll(told).toEqual([]);
+    /** The name of what is looked at has come. */
+    const rested = () => page().waitForTimeout(1500);
     const told = async () => (await stand.viewer.snapshot()).told;
     const expectSame = (found: readonly number[], wanted: readonly number[]) => {
       expect(found).toHaveLength(wanted.length);
@@ -83,6 +85,7 @@ describeInChromium("the share link", () => {
     expectSame(await written(), flat); // nobody has moved it there
     await press("ArrowRight", "+");
     await silent();
+    await rested();
     const inHeadset = await takePicture(page());
     expect(difference(unmoved, inHeadset)).toBeGreaterThan(4 * SAME_IN_HEADSET);
     const moved = await written();
@@ -104,6 +107,7 @@ describeInChromium("the share link", () => {
     await stand.viewer.still();
     expect(difference(left, await takePicture(page()))).toBeLessThan(SAME);
     await stand.viewer.enterStereo();
+    await rested();
     expect(difference(inHeadset, await takePicture(page()))).toBeLessThan(SAME_IN_HEADSET);
     expectSame(await written(), moved);
   });

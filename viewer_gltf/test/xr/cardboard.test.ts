@@ -66,6 +66,13 @@ describeInChromium("stereo without WebXR", () => {
     );
   const lookAt = (at: At, radius_m: number): Promise<Spot[]> =>
     page.evaluate(([at, radius]) => window.stand.lookAt(at, radius), [at, radius_m] as const);
+  /** Keep looking there until that is ahead. */
+  const rest = async () => {
+    for (let k = 0; k < 2; k++) {
+      await lookAt([0, 0, -2], 0.04);
+      if (k === 0) await page.waitForTimeout(600);
+    }
+  };
   const lookThroughLens = (at: At, radius_m: number): Promise<Spot[]> =>
     page.evaluate(([at, r]) => window.stand.lookThroughLens(at, r), [at, radius_m] as const);
 
@@ -89,6 +96,24 @@ describeInChromium("stereo without WebXR", () => {
       const middle = WIDTH / 4 + (at[0] / -at[2]) * PIXELS_PER_TANGENT;
       expect(Math.abs((left.x + right.x) / 2 - middle)).toBeLessThan(1);
     }
+  });
+
+  it("asks to turn an upright phone, and begins as soon as it lies on its side", async () => {
+    const sign = page.getByText("Turn the phone on its side");
+    await page.setViewportSize({ width: HEIGHT, height: WIDTH });
+    await page.click("button");
+    await sign.waitFor();
+    expect((await status()).isRunning).toBe(false);
+    await page.setViewportSize({ width: WIDTH, height: HEIGHT });
+    expect(await page.evaluate(() => window.started)).toBe("started");
+    expect((await status()).isRunning).toBe(true);
+    expect(await sign.isVisible()).toBe(false);
+    await page.setViewportSize({ width: HEIGHT, height: WIDTH });
+    await sign.waitFor();
+    await page.getByRole("button", { name: "Leave stereo" }).click();
+    expect((await status()).isRunning).toBe(false);
+    expect(await sign.count()).toBe(0);
+    await page.setViewportSize({ width: WIDTH, height: HEIGHT });
   });
 
   it("shows what lies on a lens's axis at the lens's centre", async () => {
@@ -161,6 +186,7 @@ describeInChromium("stereo without WebXR", () => {
     await start();
     const at: At = [0, 0, -2];
     await turnTo(0, 90, 0);
+    await rest();
     const [ahead] = await lookAt(at, 0.04);
 
     // Twenty degrees to the left about the neck, 8 cm behind the eyes: the mark goes to the right.
@@ -183,11 +209,21 @@ describeInChromium("stereo without WebXR", () => {
     expect(rolled.x).toBeLessThan(ahead.x - 5);
   });
 
-  it("takes the way ahead from the first look", async () => {
+  it("takes the way ahead from where the head rests, not from where the hands held the phone", async () => {
     await start();
+    const middle = async () => {
+      const [left, right] = await lookAt([0, 0, -2], 0.04);
+      return (left.x + right.x) / 2 - WIDTH / 4;
+    };
+    await turnTo(40, 90, 0); // across and level, in a hand
+    expect(Math.abs(await middle())).toBeLessThan(1);
     await turnTo(137, 90, 0);
-    const [left, right] = await lookAt([0, 0, -2], 0.04);
-    expect(Math.abs((left.x + right.x) / 2 - WIDTH / 4)).toBeLessThan(1);
+    await rest();
+    expect(Math.abs(await middle())).toBeLessThan(1);
+    await turnTo(127, 90, 0);
+    expect(await middle()).toBeLessThan(-20);
+    await turnTo(137, 90, 0);
+    expect(Math.abs(await middle())).toBeLessThan(1);
   });
 
   it("reports that the orientation was refused, and leaves the page as it was", async () => {

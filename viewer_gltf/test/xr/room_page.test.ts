@@ -117,20 +117,31 @@ describeInChromium("the specimen in the user's room", () => {
   );
 
   it.each([
-    ["a headset's panel over it", false],
-    ["a phone's panel before it, as its picture shows no more", true],
+    ["a headset's bar and panel over it, in a head's reach", false],
+    ["a phone's panel before it, as its picture shows no more, and the bar at its foot", true],
   ])("has %s", async (_, isPhone) => {
     await enter("&mode=off", isPhone);
+    const angles = async () => (await stand.viewer.snapshot()).menu.map(({ up_deg }) => up_deg);
+    const closed = await angles();
+    expect(closed.length).toBeGreaterThan(4);
     await page().keyboard.press("h");
-    const menu = async () =>
-      (await stand.viewer.snapshot()).menu.filter(({ id }) => id !== "opener");
-    await expect.poll(async () => (await menu()).length).toBeGreaterThan(3);
+    const ids = async () => (await stand.viewer.snapshot()).menu.map(({ id }) => id);
+    await expect.poll(ids).toContain("close");
     if (SHOTS) await page().screenshot({ path: join(SHOTS, `room_panel_${isPhone}.png`) });
-    const up_deg = (await menu()).map((each) => each.up_deg);
-    const [lowest, highest] = [Math.min(...up_deg), Math.max(...up_deg)];
+    const opened = await angles();
+    expect(opened.length).toBeGreaterThan(6);
     // its middle is 0.65 m under the eyes and 0.9 m ahead: 36 degrees down, and it is 0.48 m long
-    if (isPhone) expect(highest).toBeLessThan(-15);
-    else expect(lowest).toBeGreaterThan(-16);
+    for (const up_deg of [closed, opened]) {
+      const [lowest, highest] = [Math.min(...up_deg), Math.max(...up_deg)];
+      if (isPhone) {
+        expect(highest).toBeLessThan(-15);
+        expect(lowest).toBeGreaterThan(-62);
+      } else {
+        expect(lowest).toBeGreaterThan(-16);
+        expect(highest).toBeLessThan(35);
+      }
+    }
+    if (isPhone) expect(Math.max(...closed)).toBeLessThan(-54); // below its lower edge
   });
 
   it("is one picture on a phone, and a key leads out of it again", async () => {

@@ -149,10 +149,12 @@ describeInChromium("the gaze in stereo", () => {
     await hands().gazeOnly();
     await hands().lookAt(await hands().tileAt("r0_c2"));
     expect((await hands().status()).pointed).toBe("tile:r0_c2");
-    await hands().wait(0.75);
+    await hands().wait(0.4);
+    expect((await hands().status()).progress).toBe(0); // a gaze that passes by starts no ring
+    await hands().wait(0.55);
     expect((await hands().status()).progress).toBeCloseTo(0.5, 6);
     expect((await hands().status()).isRingShown).toBe(true);
-    await hands().wait(0.65);
+    await hands().wait(0.45);
     expect(await hands().chosen()).toEqual([]);
     await hands().wait(0.1);
     expect((await hands().chosen()).map(({ tile }) => tile)).toEqual(["r0_c2"]);
@@ -246,8 +248,7 @@ describeInChromium("the page of moves", () => {
   async function openMoves(): Promise<void> {
     await hands().openPanel();
     await hands().wait(0.1);
-    await hands().lookAt(await hands().controlAt("tab=move"));
-    await hands().tap();
+    await hands().openSection("move");
     await hands().wait(0.1);
   }
 
@@ -275,6 +276,7 @@ describeInChromium("the page of moves", () => {
   it("takes a tap as one step, and what is held by a trigger as many", async () => {
     await hands().gazeOnly();
     await openMoves();
+    await hands().reach("shift-right");
     const at = await hands().controlAt("shift-right");
     await hands().lookAt(at);
     const x = async () => (await hands().status()).position[0];

@@ -40,7 +40,7 @@ describeInChromium("a headset's frame", () => {
     for (const mode of ["off", "all", "disc", "slices"]) {
       if (mode === "slices")
         await viewer.page.keyboard.press("|"); // and the disc
-      else await viewer.page.locator(`[data-mode="${mode}"]`).dispatchEvent("click");
+      else await viewer.page.locator("select[data-mode]").selectOption(mode);
       await viewer.settled();
       await viewer.page.waitForTimeout(500);
       const { drawCalls, volumes, state } = await viewer.snapshot();

@@ -27,12 +27,14 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.dicom.frame import Frame
 from stereocell.read.dicom.header import SEGMENTATION, is_dicom, read_frames
 from stereocell.read.dicom.label_stack import stack_labels
+from stereocell.read.dicom.lesser_kind import lesser_notes
 from stereocell.read.dicom.no_plane import NoPlaneError
 from stereocell.read.dicom.pixels import decode, dtype_of
-from stereocell.read.dicom.scale_notes import reaches_air, scale_notes
 from stereocell.read.dicom.segmentation import LABELMAP, free_labels
-from stereocell.read.dicom.series import Stack, find_stacks, is_other_kind
+from stereocell.read.dicom.series import find_stacks, is_other_kind
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.dicom.stack import Stack
+from stereocell.read.dicom.twice_rescaled import describe_values
 from stereocell.read.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.plane_stack import NoStackError, StackLayout
@@ -95,11 +97,9 @@ def read_image(location: Location, *, series: int = 0) -> Image:
     voxels = WholeArray((len(stack.times), z, y, x), dtype, load)
     read = {frame.file for frames in stack.times for frame in frames}
     modality = stack.first.modality
-    frames = [frame for frames in stack.times for frame in frames]
-    is_hounsfield = modality != "CT" or reaches_air(
-        frames, lambda: _lowest(stack, found.paths, dtype, location.shown)
+    is_hounsfield, values = describe_values(
+        stack, lambda frames: decode(frames, found.paths, dtype, location.shown)
     )
-    values = scale_notes(frames, is_hounsfield=is_hounsfield)
     return Image(
         arrays=(VoxelArray(voxels, ("t", "z", "y", "x")),),
         grids=(Grid((z, y, x), canonical.spacing_um),),
@@ -116,18 +116,13 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         notes=(
             *_choice(found, stack, series),
             *stack.elsewhere,
+            *lesser_notes(stack, found.stacks),
             *stack.notes,
             *values,
             *_left_out(found.left_out),
         ),
         files=tuple(str(found.paths[index]) for index in sorted(read)),
     )
-
-
-def _lowest(stack: Stack, paths: Sequence[Path], dtype: np.dtype[Any], shown: str) -> float:
-    """Return the lowest grey value of the slice in the middle."""
-    frames = stack.times[0]
-    return float(decode([frames[len(frames) // 2]], paths, dtype, shown).min())
 
 
 def _require_parts(stack: Stack, shown: str) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from stereocell.read.dicom.frame_kind import FrameKind
 from stereocell.read.dicom.modality_table import ModalityTable
+from stereocell.read.dicom.origin import Origin
 from stereocell.read.dicom.segmentation import Segmentation
 from stereocell.read.dicom.stated import Stated
 from stereocell.read.dicom.value_scale import ValueScale
@@ -70,6 +71,7 @@ class Frame:
     kind               magnitude, projection, echo and the like; of a segmentation nothing
     stated             values that repeat the geometry
     scale              what is stated about the values
+    origin             study and series, beside their UIDs
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
@@ -98,3 +100,4 @@ class Frame:
     kind: FrameKind = FrameKind()  # noqa: RUF009  (frozen)
     stated: Stated = Stated()  # noqa: RUF009  (frozen)
     scale: ValueScale = ValueScale()  # noqa: RUF009  (frozen)
+    origin: Origin = Origin()  # noqa: RUF009  (frozen)

@@ -5,7 +5,7 @@ echoes. The kind tells them apart (read/dicom/split_kinds.py). Words for the use
 tables here and never from the file, whose texts may identify a patient.
 
 References: DICOM PS3.3 C.7.6.1.1.2 (Image Type), C.8.3.1.1.1 (MR), C.8.13.3.1 (Complex Image
-Component), C.8.16.2.1.3 (Volume Based Calculation Technique), C.8.15.3 (CT), C.8.9.1 (PET).
+Component), C.8.16.2.1.3 (Volume Based Calculation Technique), C.8.15.3 (CT).
 """
 
 import re
@@ -16,9 +16,18 @@ from typing import Any
 from stereocell.read.dicom.header_values import (
     find_number,
     find_text,
+    find_texts,
     find_value,
+    find_words,
     private_number,
     private_tags,
+)
+from stereocell.read.dicom.pet_kind import (
+    NOT_CORRECTED,
+    PET_TAGS,
+    is_attenuation_corrected,
+    is_reprojection,
+    time_slice,
 )
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS
 
@@ -51,6 +60,7 @@ _RANKS = {
 }
 # ranks of the parts of a complex image; a magnitude has 0
 _PART_RANKS = {REAL: 2, IMAGINARY: 3, PHASE: 3}
+_UNCORRECTED_RANK = 2  # of PET without attenuation correction
 # patterns of words of ImageType -> role, the first that matches
 _ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), role)
@@ -85,18 +95,25 @@ _CONTRASTS = {
     "INV1": "first inversion",
     "INV2": "second inversion",
     "VMI": "virtual monoenergetic",
+    **dict.fromkeys(("SWI", "SWAN", "SWIP"), "susceptibility-weighted"),
 }
+# contrasts of gradient echoes that only the echo time shows (read/dicom/echo_phase.py)
+IN_PHASE, OPPOSED_PHASE = "in phase by its echo time", "opposed phase by its echo time"
 # contrast -> rank; an image without such a word has 0. In phase and uniform images look like
 # conventional ones and come first. The others are computed from them, or show less.
 _CONTRAST_RANKS = {
     "in phase": 0,
+    IN_PHASE: 0,
     "uniform": 0,
     "water": 1,
     "virtual monoenergetic": 1,
     "second inversion": 1,
+    "susceptibility-weighted": 1,
     "opposed phase": 2,
+    OPPOSED_PHASE: 2,
     "first inversion": 2,
     "fat": 3,
+    NOT_CORRECTED: 3,
 }
 _FRAME_TYPES = (
     "MRImageFrameTypeSequence",
@@ -119,7 +136,6 @@ KIND_TAGS: list[Any] = [
     "ComplexImageComponent",
     "VolumeBasedCalculationTechnique",
     "ConvolutionKernel",
-    "CorrectedImage",
     "KVP",
     "MonoenergeticEnergyEquivalent",
     "ContrastBolusAgent",
@@ -130,11 +146,17 @@ KIND_TAGS: list[Any] = [
     "EchoNumbers",
     "InversionTime",
     "FlipAngle",
+    "RepetitionTime",
+    "MagneticFieldStrength",
+    "ScanningSequence",
+    "EchoPulseSequence",
+    "EchoPlanarPulseSequence",
     "AcquisitionNumber",
     "TemporalPositionIdentifier",
     "NominalPercentageOfCardiacPhase",
     "TriggerTime",
     "FrameReferenceTime",
+    *PET_TAGS,
     *(tag for group, element, *_ in (_GE_PART, *_B_VALUES) for tag in private_tags(group, element)),
 ]
 
@@ -145,22 +167,24 @@ class FrameKind:
 
     part             of a complex signal: a name above
     role             a key of _RANKS; empty: an image as it was acquired
-    contrasts        contrasts that ImageType names, for the user: keys of _CONTRAST_RANKS
+    contrasts        contrasts for the user: keys of _CONTRAST_RANKS
     image_type       ImageType, compared and never shown
-    kernel           ConvolutionKernel, shown only in the form of a maker's code
+    kernel           values of ConvolutionKernel (read/dicom/kernel_names.py)
     has_agent        a contrast agent is stated
-    is_attenuation_corrected  of PET, by CorrectedImage
+    is_attenuation_corrected  of PET
     energy_kev       of a virtual monoenergetic image
-    echo_time, inversion_time, trigger_time, reference_time  ms
-    temporal, cardiac, acquisition  number of the point in time, of the cardiac phase (%), of the
-                     acquisition
+    echo_time, repetition_time, inversion_time, trigger_time, reference_time  ms
+    is_gradient_echo  of MR: a gradient echo that is not echo-planar; None: not stated
+    field_t          strength of the magnetic field
+    temporal, cardiac, acquisition, time_slice  number of the point in time, of the cardiac phase
+                     (%), of the acquisition, of PET's volume
     """
 
     part: str = ""
     role: str = ""
     contrasts: tuple[str, ...] = ()
     image_type: tuple[str, ...] = ()
-    kernel: str = ""
+    kernel: tuple[str, ...] = ()
     has_agent: bool = False
     is_attenuation_corrected: bool | None = None
     kvp: float | None = None
@@ -170,25 +194,41 @@ class FrameKind:
     echo_number: float | None = None
     inversion_time: float | None = None
     flip_angle: float | None = None
+    repetition_time: float | None = None
+    is_gradient_echo: bool | None = None
+    field_t: float | None = None
     acquisition: float | None = None
     temporal: float | None = None
     cardiac: float | None = None
     trigger_time: float | None = None
     reference_time: float | None = None
+    time_slice: float | None = None
 
     @property
     def rank(self) -> int:
-        """Lower ranks are shown first: images and magnitudes have 0.
+        """Lower ranks are shown first: images and magnitudes have 0."""
+        uncorrected = _UNCORRECTED_RANK * (self.is_attenuation_corrected is False)
+        return max(
+            _PART_RANKS.get(self.part, 0), _RANKS[self.role], int(self.is_derived), uncorrected
+        )
 
-        Water and fat are computed from the echoes, so that DERIVED doesn't make them lesser images.
+    @property
+    def is_derived(self) -> bool:
+        """Whether ImageType says DERIVED and no contrast: water and fat are computed from echoes,
+        and are no lesser images.
         """
-        is_derived = self.image_type[:1] == ("DERIVED",) and not self.contrasts
-        return max(_PART_RANKS.get(self.part, 0), _RANKS[self.role], int(is_derived))
+        is_named = any(word in _CONTRASTS.values() for word in self.contrasts)
+        return self.image_type[:1] == ("DERIVED",) and not is_named
 
     @property
     def contrast_rank(self) -> int:
         """Among equal `rank`, lower ones are shown first: in phase, water, opposed phase, fat."""
         return min((_CONTRAST_RANKS[word] for word in self.contrasts), default=0)
+
+    @property
+    def part_is_angle(self) -> bool:
+        """Whether the frame is the phase of a complex signal, and no intensity."""
+        return self.part == PHASE
 
     @property
     def is_diffusion(self) -> bool:
@@ -207,21 +247,26 @@ def kind_of(header: Any, groups: Sequence[Any]) -> FrameKind:
     groups  the frame's functional groups and the shared ones, each a dataset or None
     """
     words = _image_type(header, groups)
-    is_mr = str(header.get("Modality", "")).strip() == "MR"
+    modality = str(header.get("Modality", "")).strip()
+    is_mr = modality == "MR"
+    is_corrected = is_attenuation_corrected(header, groups) if modality == "PT" else None
+    contrasts = [_CONTRASTS[word] for word in words if word in _CONTRASTS]
+    if is_corrected is False:
+        contrasts.append(NOT_CORRECTED)
 
     def number(sequence: str, key: str) -> float | None:
         return find_number(header, groups, sequence, key)
 
-    kernel = find_text(header, groups, "CTReconstructionSequence", "ConvolutionKernel")
+    kernel = find_texts(header, groups, "CTReconstructionSequence", "ConvolutionKernel")
     cardiac = "CardiacSynchronizationSequence"
     return FrameKind(
         part=_part(header, groups, words) if is_mr else "",
         role=_role(header, groups, words),
-        contrasts=tuple(dict.fromkeys(_CONTRASTS[w] for w in words if w in _CONTRASTS)),
+        contrasts=tuple(dict.fromkeys(contrasts)),
         image_type=words,
         kernel=kernel,
         has_agent=bool(_has_agent(header, groups)),
-        is_attenuation_corrected=_is_attenuation_corrected(header),
+        is_attenuation_corrected=is_corrected,
         kvp=number("CTXRayDetailsSequence", "KVP"),
         energy_kev=number("MultienergyCTCharacteristicsSequence", "MonoenergeticEnergyEquivalent"),
         b_value=_b_value(header, groups) if is_mr else None,
@@ -233,6 +278,9 @@ def kind_of(header: Any, groups: Sequence[Any]) -> FrameKind:
             number("MRModifierSequence", "InversionTimes"), number("", "InversionTime")
         ),
         flip_angle=number("MRTimingAndRelatedParametersSequence", "FlipAngle"),
+        repetition_time=number("MRTimingAndRelatedParametersSequence", "RepetitionTime"),
+        is_gradient_echo=_is_gradient_echo(header, groups) if is_mr else None,
+        field_t=number("", "MagneticFieldStrength") if is_mr else None,
         acquisition=_first_of(
             number("FrameContentSequence", "FrameAcquisitionNumber"),
             number("", "AcquisitionNumber"),
@@ -245,7 +293,10 @@ def kind_of(header: Any, groups: Sequence[Any]) -> FrameKind:
         trigger_time=_first_of(
             number(cardiac, "NominalCardiacTriggerDelayTime"), number("", "TriggerTime")
         ),
-        reference_time=number("", "FrameReferenceTime"),
+        reference_time=_first_of(
+            number("", "FrameReferenceTime"), number("FrameContentSequence", "FrameReferenceTime")
+        ),
+        time_slice=time_slice(header, groups) if modality == "PT" else None,
     )
 
 
@@ -259,7 +310,8 @@ def _image_type(header: Any, groups: Sequence[Any]) -> tuple[str, ...]:
     try:
         for sequence in _FRAME_TYPES:
             found = found or find_value({}, groups, sequence, "FrameType")
-        found = found or header.get("ImageType") or ()
+        if not found:
+            return find_words(header, (), "ImageType")
         words = (found,) if isinstance(found, str) else tuple(found)
         return tuple(str(word).strip().upper() for word in words)
     except DICOM_FAULTS:
@@ -284,6 +336,8 @@ def _part(header: Any, groups: Sequence[Any], words: Sequence[str]) -> str:
 
 
 def _role(header: Any, groups: Sequence[Any], words: Sequence[str]) -> str:
+    if is_reprojection(header, groups):
+        return "projection"
     stated = [
         find_text(header, groups, sequence, "VolumeBasedCalculationTechnique").upper()
         for sequence in (*_FRAME_TYPES, "")
@@ -308,14 +362,15 @@ def _has_agent(header: Any, groups: Sequence[Any]) -> bool:
         return False
 
 
-def _is_attenuation_corrected(header: Any) -> bool | None:
-    """Return whether PET's CorrectedImage names the correction; None: it is not stated."""
-    try:
-        words = header.get("CorrectedImage") or ()
-        words = (words,) if isinstance(words, str) else tuple(words)
-        return "ATTN" in [str(word).strip().upper() for word in words] if words else None
-    except DICOM_FAULTS:
+def _is_gradient_echo(header: Any, groups: Sequence[Any]) -> bool | None:
+    """Return whether the sequence is a gradient echo that is not echo-planar; None: not stated."""
+    codes = find_words(header, groups, "ScanningSequence")
+    pulse = find_text(header, groups, "", "EchoPulseSequence").upper()
+    planar = find_text(header, groups, "", "EchoPlanarPulseSequence").upper()
+    if not codes and not pulse:
         return None
+    is_gradient = pulse == "GRADIENT" or ("GR" in codes and "SE" not in codes)
+    return is_gradient and "EP" not in codes and planar != "YES"
 
 
 def _b_value(header: Any, groups: Sequence[Any]) -> float | None:

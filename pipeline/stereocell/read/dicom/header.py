@@ -31,6 +31,7 @@ from stereocell.read.dicom.header_values import find_value, first_item
 from stereocell.read.dicom.modality_table import TABLE_TAGS
 from stereocell.read.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.dicom.no_plane import NoPlaneError
+from stereocell.read.dicom.origin import ORIGIN_TAGS, origin_of
 from stereocell.read.dicom.segmentation import (
     LABELMAP,
     Segmentation,
@@ -79,6 +80,7 @@ _TAGS: list[Any] = [
     "SharedFunctionalGroupsSequence",
     "PerFrameFunctionalGroupsSequence",
     *KIND_TAGS,
+    *ORIGIN_TAGS,
     *STATED_TAGS,
     *SCALE_TAGS,
     *TABLE_TAGS,
@@ -183,6 +185,7 @@ def _frames(
         instance = f"{file}".encode()
     modality = str(header.get("Modality", "")).strip()
     is_quadruped = str(header.get("AnatomicalOrientationType", "")).strip() == "QUADRUPED"
+    origin = origin_of(header)
     offsets = None
     if (own or count > 1) and len(own) != count:
         if has_offsets(header):
@@ -227,6 +230,7 @@ def _frames(
                 kind,
                 stated,
                 scale,
+                origin,
             )
             for number, tile in enumerate(mosaic.tiles)
         ]

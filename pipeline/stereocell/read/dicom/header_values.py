@@ -13,6 +13,10 @@ from typing import Any
 from stereocell.read.dicom.silence_logs import DICOM_FAULTS
 
 _BLOCKS = (0x10, 0x11, 0x12)  # blocks of a private group that are searched for a creator
+_CONVERTED = (
+    "UnassignedPerFrameConvertedAttributesSequence",
+    "UnassignedSharedConvertedAttributesSequence",
+)
 _PACKED = {"SS": "h", "FL": "f", "FD": "d"}  # VR of a binary number -> code of `struct`
 
 
@@ -24,13 +28,31 @@ def first_item(sequence: Any) -> Any:
 def find_value(header: Any, groups: Sequence[Any], sequence: str, key: str) -> Any:
     """Return a value from the frame's group, the shared one, or the header itself; None: nowhere.
 
-    An enhanced image states the values of its frames in functional groups. Raises DICOM_FAULTS.
+    An enhanced image states the values of its frames in functional groups. One that was converted
+    from single frames keeps other attributes of them in groups of their own. Raises DICOM_FAULTS.
     """
-    for group in groups:
-        item = None if group is None else first_item(group.get(sequence))
-        if item is not None and item.get(key) is not None:
-            return item[key].value
+    stated = [group for group in groups if group is not None]
+    for name in (sequence, *_CONVERTED) if stated else ():
+        for group in stated:
+            item = first_item(group.get(name))
+            if item is not None and item.get(key) is not None:
+                return item[key].value
     return header.get(key)
+
+
+def find_words(header: Any, groups: Sequence[Any], key: str) -> tuple[str, ...]:
+    """Return the words of a coded attribute, in capitals; none where it can't be read."""
+    return tuple(word.upper() for word in find_texts(header, groups, "", key))
+
+
+def find_texts(header: Any, groups: Sequence[Any], sequence: str, key: str) -> tuple[str, ...]:
+    """Return the values of an attribute that may have several; none where it can't be read."""
+    try:
+        found = find_value(header, groups, sequence, key) or ()
+        texts = (found,) if isinstance(found, str) else tuple(found)
+        return tuple(str(text).strip() for text in texts)
+    except DICOM_FAULTS:
+        return ()
 
 
 def find_number(header: Any, groups: Sequence[Any], sequence: str, key: str) -> float | None:

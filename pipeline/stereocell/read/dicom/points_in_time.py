@@ -1,13 +1,14 @@
 """Find the points in time of a stack: several pictures of the same slices, in the order of time.
 
-The points are told apart by the attribute that gives each place one frame per value. Without such
-an attribute the frames at a place are counted by their instance numbers. A point that lacks slices,
+The points are told apart by the attribute that gives each place one frame per value, or else by one
+that puts the frames of each place in an order. Without such an attribute the frames at a place are
+counted by their instance numbers. A point that lacks slices,
 as the last one does of an acquisition that was stopped, is incomplete: it is set apart.
 """
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,18 @@ from stereocell.read.dicom.split_kinds import find_runs
 AreEqual = Callable[[Frame, Frame], bool]
 Place = Sequence[Frame]  # frames at one place, by instance number
 
+BY_REPETITION = "RepetitionTime"
+BY_POSITION = "TemporalPositionIdentifier"
+BY_IMAGE_INDEX = "ImageIndex"
 # attributes that number points in time: field of FrameKind, name in the standard
 _NUMBERED = (
-    ("temporal", "TemporalPositionIdentifier"),
+    ("temporal", BY_POSITION),
     ("cardiac", "NominalPercentageOfCardiacPhase"),
     ("trigger_time", "TriggerTime"),
     ("acquisition", "AcquisitionNumber"),
     ("reference_time", "FrameReferenceTime"),
+    ("time_slice", BY_IMAGE_INDEX),
+    ("repetition_time", BY_REPETITION),
 )
 BY_NUMBER = "InstanceNumber"
 _LEAST_OF_RUN = 0.5  # least share of the slices in a run of instance numbers that is a point
@@ -38,6 +44,8 @@ class Points:
     whole       for each point one frame per place
     incomplete  frames of points that lack some places
     attribute   the one that tells the points apart
+    whole_places, incomplete_places  of these points among all, in the order of time, from 0
+    values      of the attribute for all points, in that order; empty: it has none for each point
     duplicates  number of frames that are neither
     differ      duplicates have other pixels than the frames that are taken
     """
@@ -45,6 +53,9 @@ class Points:
     whole: tuple[tuple[Frame, ...], ...]
     incomplete: tuple[tuple[Frame, ...], ...] = ()
     attribute: str = ""
+    whole_places: tuple[int, ...] = ()
+    incomplete_places: tuple[int, ...] = ()
+    values: tuple[float, ...] = ()
     duplicates: int = 0
     differ: bool = False
 
@@ -64,7 +75,8 @@ def find_points(
     pairs = ((place[0], other) for place in places for other in place[1:])
     if all(are_equal(a, b) for a, b in pairs):  # stops at the first pair that differs
         return Points((first,), duplicates=extra)
-    numbered = _numbered(places) or _by_runs(places, normal, near_mm) or _by_rank(places)
+    numbered = _numbered(places) or _ranked(places)
+    numbered = numbered or _by_runs(places, normal, near_mm) or _by_rank(places)
     return numbered or Points((first,), duplicates=extra, differ=True)
 
 
@@ -77,9 +89,26 @@ def _numbered(places: Sequence[Place]) -> Points | None:
                 classes[getattr(frame.kind, field)].append((index, frame))
         if None in classes or len(classes) < 2:
             continue
-        points = _sorted_out([classes[value] for value in sorted(classes)], len(places), name)
+        values = sorted(classes)
+        points = _sorted_out([classes[value] for value in values], len(places), name)
         if points is not None:
-            return points
+            return replace(points, values=tuple(values))
+    return None
+
+
+def _ranked(places: Sequence[Place]) -> Points | None:
+    """Return the points by the first attribute that puts the frames of each place in an order.
+
+    Values of one point may differ from slice to slice, as trigger times do with the heart rate.
+    """
+    if len({len(place) for place in places}) > 1:
+        return None
+    for field, name in _NUMBERED:
+        orders = [[getattr(frame.kind, field) for frame in place] for place in places]
+        if any(None in values or len(set(values)) < len(values) for values in orders):
+            continue
+        in_order = [sorted(p, key=lambda frame: getattr(frame.kind, field)) for p in places]
+        return Points(tuple(zip(*in_order, strict=True)), (), name)
     return None
 
 
@@ -113,6 +142,9 @@ def _sorted_out(
     if any(len({index for index, _ in point}) < len(point) for point in points):
         return None
     in_order = [tuple(frame for _, frame in sorted(p, key=lambda pair: pair[0])) for p in points]
-    whole = tuple(point for point in in_order if len(point) == places)
-    rest = tuple(point for point in in_order if len(point) < places)
-    return Points(whole, rest, attribute) if whole else None
+    whole = tuple(i for i, point in enumerate(in_order) if len(point) == places)
+    rest = tuple(i for i, point in enumerate(in_order) if len(point) < places)
+    if not whole:
+        return None
+    chosen, others = (tuple(in_order[i] for i in group) for group in (whole, rest))
+    return Points(chosen, others, attribute, whole, rest)

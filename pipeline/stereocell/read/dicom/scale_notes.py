@@ -67,7 +67,8 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
             why = f" (RescaleType is {kinds[0]})"
         notes.append(
             f"this CT states no Hounsfield units{why}: its levels and window are found as for any "
-            "other volume (--iso-value and --window set them in voxel values)"
+            "other volume (--iso-value and --window set them in voxel values; --as hounsfield: "
+            "they are Hounsfield units all the same)"
         )
     elif first.modality == "CT" and not first.scale.has_rescale:
         notes.append(
@@ -80,8 +81,7 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
             "those of air (--iso-value and --window set other levels)"
         )
     if first.modality == "PT":
-        unit = _PET_UNITS.get(first.scale.units, "of an unknown unit (no Units)")
-        notes.append(f"PET values are {unit}")
+        notes += _pet_notes(first)
     if first.modality == "RTDOSE":
         notes.append(_dose_note(first))
     if first.scale.philips is not None:
@@ -90,6 +90,20 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
             "is not applied: values compare within this series alone"
         )
     return tuple(notes)
+
+
+def _pet_notes(first: Frame) -> list[str]:
+    """Return notes on the unit of PET. No other unit is computed, such as SUV from activity."""
+    scale = first.scale
+    unit = _PET_UNITS.get(scale.units, "of an unknown unit (no Units)")
+    by = f", SUVType {scale.suv_type}" if scale.suv_type and scale.units in ("GML", "CM2ML") else ""
+    notes = [f"PET values are {unit}{by}"]
+    if scale.suv_factor and scale.units != "GML":
+        notes.append(
+            f"Philips states a factor of {scale.suv_factor:.4g} from these values to standardized "
+            "uptake values (7053,1000), which is not applied"
+        )
+    return notes
 
 
 def _dose_note(first: Frame) -> str:

@@ -12,92 +12,33 @@ contrast that looks like a conventional image: in phase, water, opposed phase, f
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from stereocell.model.counted import agreeing, counted
-from stereocell.read.anatomical_axes import plane_name
 from stereocell.read.dicom.contradictions import geometry_notes
+from stereocell.read.dicom.echo_phase import with_echo_phases
 from stereocell.read.dicom.frame import Frame
+from stereocell.read.dicom.frame_group import Group
 from stereocell.read.dicom.frame_kind import LOCALIZER
 from stereocell.read.dicom.group_frames import (
-    Group,
     describe_elsewhere,
     describe_neighbours,
     find_groups,
 )
-from stereocell.read.dicom.points_in_time import BY_NUMBER, AreEqual, Points, find_points
+from stereocell.read.dicom.name_series import name_apart
+from stereocell.read.dicom.points_in_time import AreEqual, find_points
+from stereocell.read.dicom.stack import Stack
+from stereocell.read.dicom.time_notes import point_name, time_notes
 from stereocell.read.plane_stack import (
     SAME_PLACE,
     NoStackError,
-    StackLayout,
     lay_out,
     normal_of,
 )
-from stereocell.read.statements import omission
 
 _LAST = 6  # rank of a stack that lacks slices of a point in time
 _SIDE = 2  # from this rank on a series is no image, and follows the others however large it is
-
-
-@dataclass(frozen=True, slots=True)
-class Stack:
-    """Frames of one orientation and kind.
-
-    times    for each time point the frames along the normal; each point has the same number
-    layout   the planes' grid; None: they make no volume, and `problem` gives the reason
-    notes    changes and omissions, a sentence each
-    words    what separates it from other stacks of the series, such as `magnitude`
-    order    sorts it among those: rank of its kind, rank of its contrast, places of other values
-    elsewhere  a sentence on other images of the series that lie beside these; empty: there are none
-    """
-
-    times: tuple[tuple[Frame, ...], ...]
-    layout: StackLayout | None
-    problem: str
-    notes: tuple[str, ...]
-    words: tuple[str, ...] = ()
-    order: tuple[int, ...] = ()
-    elsewhere: tuple[str, ...] = ()
-
-    @property
-    def first(self) -> Frame:
-        """The first frame of the first time point."""
-        return self.times[0][0]
-
-    @property
-    def frames(self) -> int:
-        """The number of frames."""
-        return sum(map(len, self.times))
-
-    @property
-    def rank(self) -> int:
-        """Lower ranks are shown first."""
-        return self.order[0] if self.order else 0
-
-    @property
-    def voxels(self) -> int:
-        """The number of voxels of the volume; without a volume, that of the frames' pixels."""
-        if self.layout is not None:
-            return int(np.prod(self.layout.shape, dtype=np.int64))
-        return len(self.times[0]) * self.first.rows * self.first.columns
-
-    @property
-    def label(self) -> str:
-        """Modality, kind, orientation, size and spacing, without any description from the file."""
-        frame = self.first
-        normal = normal_of(frame.along_row, frame.along_column)
-        segment = f", segment {frame.segment}" if frame.segment else ""
-        kind = "".join(f", {word}" for word in self.words)
-        name = f"{frame.modality or 'DICOM'}{segment}{kind}, {plane_name(normal)}"
-        planes = len(self.times[0]) if self.layout is None else self.layout.shape[0]
-        size = f"{planes} x {frame.rows} x {frame.columns}"
-        if self.layout is None:
-            return f"{name}, {size}: no volume ({self.problem})"
-        spacing = " x ".join(f"{value:.4g}" for value in self.layout.spacing_mm)
-        times = f", {len(self.times)} points in time" if len(self.times) > 1 else ""
-        return f"{name}, {size} voxels (slices, rows, columns), {spacing} mm{times}"
 
 
 def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ...]:
@@ -105,13 +46,13 @@ def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ..
 
     are_equal  compares the pixels of two frames; it is called only for frames at one place
     """
-    groups = find_groups(frames)
+    groups = find_groups(with_echo_phases(frames))
     stacks = [
         replace(stack, elsewhere=describe_elsewhere(group, groups))
         for group in groups
         for stack in _stacks(group, are_equal, describe_neighbours(group, groups))
     ]
-    return _sorted(_explain_single(stacks, groups))
+    return _sorted(_explain_single(name_apart(stacks), groups))
 
 
 def is_other_kind(other: Stack, stack: Stack) -> bool:
@@ -122,7 +63,7 @@ def is_other_kind(other: Stack, stack: Stack) -> bool:
 
 def _sorted(stacks: Sequence[Stack]) -> tuple[Stack, ...]:
     def own(stack: Stack) -> tuple[object, ...]:
-        kind = stack.order[:2]
+        kind = (*stack.order[:2], stack.among)
         return (kind, -stack.voxels, stack.order, stack.first.file, stack.first.index)
 
     best: dict[bytes, Stack] = {}
@@ -133,7 +74,8 @@ def _sorted(stacks: Sequence[Stack]) -> tuple[Stack, ...]:
         leader = best[stack.first.series]
         side = leader.rank if leader.rank >= _SIDE else 0
         total = -leader.voxels * len(leader.times)
-        place = (side, total, leader.order[:2], leader.first.file, leader.first.index)
+        among = (leader.order[:2], leader.among)
+        place = (side, total, among, leader.first.file, leader.first.index)
         return (stack.layout is None, stack.first.segmentation is not None, place, own(stack))
 
     return tuple(sorted(stacks, key=key))
@@ -162,12 +104,12 @@ def _stacks(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> l
     slices = 1 + max(frame.tile for frame in group.frames)
     if slices > 1:
         notes.append(f"mosaics of {slices} slices in one image: taken apart")
-    notes += _time_notes(points)
+    notes += time_notes(points)
     stacks = [
         _stack(points.whole, group, notes, words, (kind.rank, kind.contrast_rank, *group.order))
     ]
     for place, point in enumerate(points.incomplete):
-        rest = f"incomplete point in time {len(points.whole) + place + 1}"
+        rest = f"incomplete {point_name(points, points.incomplete_places[place])}"
         order = (_LAST, kind.contrast_rank, *group.order, place)
         stacks.append(_stack((point,), group, [], (*words, rest), order))
     return stacks
@@ -204,41 +146,6 @@ def _contrasts(group: Group) -> tuple[str, ...]:
     shared = {frame.kind.contrasts for frame in group.frames}
     named = ", ".join(group.words)
     return tuple(w for w in next(iter(shared)) if w not in named) if len(shared) == 1 else ()
-
-
-def _time_notes(points: Points) -> list[str]:
-    """Return what is said of frames that are in no whole point in time."""
-    if points.duplicates:
-        what = "the same pixels as"
-        if points.differ:
-            what = agreeing(points.duplicates, "other pixels than", "not all the same pixels as")
-        return [
-            f"{counted(points.duplicates, 'duplicate slice')} with {what} the one that is taken: "
-            "the first by instance number"
-        ]
-    notes = []
-    if points.attribute == BY_NUMBER:
-        is_diffusion = points.whole[0][0].kind.is_diffusion
-        what = "directions or b-values of diffusion" if is_diffusion else "points in time"
-        images = len(points.whole) + len(points.incomplete)
-        notes.append(
-            f"{images} images at a place: {BY_NUMBER} alone tells them apart, {what} are assumed; "
-            "--time picks one"
-        )
-    if not points.incomplete:
-        return notes
-    total, places = len(points.whole) + len(points.incomplete), len(points.whole[0])
-    counts = ", ".join(str(len(point)) for point in points.incomplete[:4])
-    more = ", ..." if len(points.incomplete) > 4 else ""
-    lacking = len(points.incomplete)
-    found = f"{lacking} of {total} points in time ({points.attribute})"
-    reason = f"slices are missing ({counts}{more} of {places} are there)"
-    return [
-        *notes,
-        omission(
-            found, reason, f"{agreeing(lacking, 'it', 'each')} is a series of `--series list`"
-        ),
-    ]
 
 
 def _places(group: Group) -> list[list[Frame]]:

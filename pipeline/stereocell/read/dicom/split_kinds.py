@@ -10,7 +10,6 @@ Acquisitions, and runs of instance numbers, are points in time where they have t
 are so thin that the one fills the gaps of the other, as interleaved acquisitions do.
 """
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -20,6 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.read.dicom.frame import Frame
+from stereocell.read.dicom.kernel_names import kernel_of, kernel_words
+from stereocell.read.dicom.pet_kind import NOT_CORRECTED
+from stereocell.read.dicom.type_names import type_of, type_words
 
 _SHARED = 0.5  # least share of the fewer slices that compete
 _MIN_WOVEN = 3  # fewest slices of a volume between the slices of another one
@@ -27,11 +29,6 @@ _GAPS = 1.5  # an interleaved acquisition's own slices lie at least this many sl
 _FILLS = 1.25  # and are at most this many slice distances thick
 _MAX_VALUES = 256  # most values of a property that separates volumes
 _MAX_RUNS = 8  # most runs of instance numbers; more are numbers in no order
-# makers' codes of kernels: `B30f`, `Br40d`, `FC08`, `YB`, `LUNG`; any other text is not shown
-_KERNEL = re.compile(
-    r"[A-Z][a-z]?\d{1,3}[a-z]?|FC\d\d|Y?[A-E]|STANDARD|SOFT|DETAIL|CHEST|LUNG|BONE(PLUS)?|EDGE"
-)
-_SHARP = re.compile(r"DETAIL|CHEST|LUNG|BONE(PLUS)?|EDGE")  # GE's kernels that sharpen edges
 _NUMBER_MOST = 9999  # larger numbers of acquisitions are not shown: they may be dates
 
 
@@ -59,33 +56,17 @@ def _measured(form: str) -> Callable[[Any, int], str]:
     return lambda value, _: "" if value is None else form.format(value)
 
 
-def _kernel_of(frame: Frame) -> tuple[bool, str]:
-    """Return a value that sorts soft kernels first, as the numbers of other makers' codes do."""
-    kernel = frame.kind.kernel
-    return _SHARP.fullmatch(kernel) is not None, kernel
-
-
-def _kernel_words(value: Any, place: int) -> str:
-    _, kernel = value
-    if not kernel:
-        return "no kernel stated"
-    return f"kernel {kernel}" if _KERNEL.fullmatch(kernel) else f"kernel no. {place + 1}"
-
-
 def _correction_of(frame: Frame) -> int | None:
     is_corrected = frame.kind.is_attenuation_corrected
     return None if is_corrected is None else int(not is_corrected)
 
 
 def _correction_words(value: Any, _: int) -> str:
-    return {0: "attenuation corrected", 1: "not attenuation corrected"}.get(value, "")
+    return {0: "attenuation corrected", 1: NOT_CORRECTED}.get(value, "")
 
 
-def _type_words(value: Any, place: int) -> str:
-    contrasts, origin, _ = value
-    if contrasts:
-        return ", ".join(contrasts)
-    return f"{origin.lower() or 'unknown'} image type no. {place + 1}"
+def _units_of(frame: Frame) -> str:
+    return frame.scale.units if frame.modality == "PT" else ""
 
 
 def _acquisition_words(value: Any, place: int) -> str:
@@ -93,15 +74,9 @@ def _acquisition_words(value: Any, place: int) -> str:
     return f"acquisition {value:g}" if is_shown else f"acquisition no. {place + 1}"
 
 
-def _type_of(frame: Frame) -> tuple[tuple[str, ...], str, tuple[str, ...]]:
-    words = frame.kind.image_type
-    origin = words[0] if words and words[0] in ("ORIGINAL", "DERIVED") else ""
-    return frame.kind.contrasts, origin, words
-
-
 _ACQUISITION = Property(_kind("acquisition"), _acquisition_words, is_time=True)
 PROPERTIES = (
-    Property(_kernel_of, _kernel_words),
+    Property(kernel_of, kernel_words),
     Property(_correction_of, _correction_words),
     Property(_kind("energy_kev"), _measured("{:g} keV"), 0.01),
     Property(_kind("kvp"), _measured("{:g} kV"), 0.01),
@@ -113,10 +88,13 @@ PROPERTIES = (
     Property(_kind("echo_number"), _measured("echo {:g}")),
     Property(_kind("inversion_time"), _measured("inversion time {:g} ms"), 0.01),
     Property(_kind("flip_angle"), _measured("flip angle {:g} degrees"), 0.01),
-    Property(_type_of, _type_words),
+    Property(_units_of, lambda value, _: f"Units {value}" if value else "no Units"),
+    Property(type_of, type_words),
     Property(lambda frame: frame.stated.thickness_mm, _measured("slices {:g} mm thick"), 0.05),
     _ACQUISITION,
 )
+# properties that tell series apart; types and acquisitions have no word that a user knows
+NAMED = tuple(one for one in PROPERTIES if one.find is not type_of and one is not _ACQUISITION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +143,7 @@ def find_runs(
 
 
 def _split(part: Part, one: Property, normal: NDArray[np.float64], near_mm: float) -> list[Part]:
-    values = _by_value(part.frames, one)
+    values = by_value(part.frames, one)
     if not 2 <= len(values) <= _MAX_VALUES:
         return [part]
     return _separate(part, values, one, (normal, near_mm))
@@ -199,17 +177,23 @@ def _separate(
             merged[place] = _Slices((*merged[place].frames, *frames), *measure)
     if len(merged) == 1:
         return [part]
+    names = value_names(one, [one.find(slices.frames[0]) for slices in merged])
     return [
-        Part(
-            slices.frames,
-            (*part.words, *filter(None, [one.words(one.find(slices.frames[0]), place)])),
-            (*part.order, place),
-        )
-        for place, slices in enumerate(merged)
+        Part(slices.frames, (*part.words, *filter(None, [name])), (*part.order, place))
+        for place, (slices, name) in enumerate(zip(merged, names, strict=True))
     ]
 
 
-def _by_value(frames: Sequence[Frame], one: Property) -> list[tuple[Frame, ...]]:
+def value_names(one: Property, values: Sequence[Any]) -> list[str]:
+    """Return the values for the user; equal words, of values that differ, are numbered."""
+    words = [one.words(value, place) for place, value in enumerate(values)]
+    return [
+        f"{word} no. {place + 1}" if word and words.count(word) > 1 else word
+        for place, word in enumerate(words)
+    ]
+
+
+def by_value(frames: Sequence[Frame], one: Property) -> list[tuple[Frame, ...]]:
     """Return the frames by their value, values in rising order, those without one first."""
     pairs = [(one.find(frame), frame) for frame in frames]
     absent = tuple(frame for value, frame in pairs if value is None)

@@ -23,6 +23,9 @@ STATED_TAGS: list[Any] = [
     "PatientPosition",
     "PatientOrientation",
     "NumberOfSlices",
+    "NumberOfTimeSlices",
+    "NumberOfTimeSlots",
+    "NumberOfTemporalPositions",
     "PixelAspectRatio",
 ]
 _COUNT = Subject("number of frames in a file")
@@ -41,6 +44,7 @@ class Stated:
     position     PatientPosition, one of the standard's codes
     directions   PatientOrientation: where rows and columns lead, as ("L", "P")
     slices       NumberOfSlices of the volume
+    volumes      number of points in time, and the attribute that states it
     aspect       PixelAspectRatio: spacing of rows over that of columns
     count_notes  contradictions in the number of the file's frames
     """
@@ -55,6 +59,7 @@ class Stated:
     position: str = ""
     directions: tuple[str, ...] = ()
     slices: float | None = None
+    volumes: tuple[float, str] | None = None
     aspect: float | None = None
     count_notes: tuple[str, ...] = ()
 
@@ -95,6 +100,7 @@ def stated_of(header: Any, groups: Sequence[Any], count_notes: tuple[str, ...] =
         position=position if _POSITION.fullmatch(position) else "",
         directions=_directions(header),
         slices=find_number(header, groups, "", "NumberOfSlices"),
+        volumes=_volumes(header),
         aspect=_aspect(header),
         count_notes=count_notes,
     )
@@ -128,3 +134,11 @@ def _directions(header: Any) -> tuple[str, ...]:
         return ()
     axes = {next(axis for axis in ("LR", "AP", "HF") if word[0] in axis) for word in words}
     return words if len(axes) == 2 else ()  # a row and a column can't lead the same way
+
+
+def _volumes(header: Any) -> tuple[float, str] | None:
+    for name in ("NumberOfTimeSlices", "NumberOfTimeSlots", "NumberOfTemporalPositions"):
+        number = find_number(header, (), "", name)
+        if number is not None and number > 1:
+            return number, name
+    return None

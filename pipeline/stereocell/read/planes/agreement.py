@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stereocell.model.errors import SourceError
-from stereocell.read.plane_positions import settle_places
+from stereocell.read.plane_positions import drift_notes, settle_places
 from stereocell.read.planes.head import Head
 from stereocell.read.spacing import PartialTriple
 from stereocell.read.statements import Statement, Subject, settle
@@ -61,6 +61,18 @@ def settle_depth_of_planes(
     return settle_places(
         places, stated, heads[0].z_field, has_unit=all(head.has_z_unit for head in heads)
     )
+
+
+def drift_notes_of_planes(heads: Sequence[Head], spacing_um: PartialTriple) -> tuple[str, ...]:
+    """Return notes where planes of one stack were taken at different places along y or x."""
+    notes: list[str] = []
+    for place, axis in enumerate("yx"):
+        found = {n: head.yx_um[place] for n, head in enumerate(heads)}
+        known = {n: um for n, um in found.items() if um is not None}
+        if len(known) == len(heads):
+            field = f"Position{axis.upper()}"
+            notes += drift_notes(known, field, axis, spacing_um[1 + place])
+    return tuple(notes)
 
 
 def require_one_kind(where: str, heads: Mapping[str, Head]) -> None:

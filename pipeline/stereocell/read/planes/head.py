@@ -19,6 +19,7 @@ class Head:
     z_um        where the plane lies along z, um; None: not stated
     z_field     the name of the field that states z_um
     has_z_unit  whether z_um is in a stated unit of length; else um are assumed
+    yx_um       where the plane lies along y and x, um; None each: not stated
     values      how stored numbers become values
     is_inverse  the file states that 0 is white
     notes       on the pixels, for the user
@@ -31,6 +32,7 @@ class Head:
     z_um: float | None = None
     z_field: str = "position along z"
     has_z_unit: bool = True
+    yx_um: tuple[float | None, float | None] = (None, None)
     values: ValueScale = ValueScale()  # noqa: RUF009  (frozen)
     is_inverse: bool = False
     notes: tuple[str, ...] = ()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from stereocell.model.errors import SourceError
 from stereocell.read.image import Color, Image
 from stereocell.read.planes.agreement import (
+    drift_notes_of_planes,
     dtype_of_planes,
     notes_of_planes,
     require_one_kind,
@@ -52,6 +53,7 @@ def image_of_planes(files: VolumeFiles, notes: list[str]) -> Image:
     (z, y, x), size_notes = settle_sizes({name: one.spacing_um for name, one in by_name.items()})
     one_stack = [heads[0, 0, n] for n in range(len(volume.planes))]
     depth, depth_notes = settle_depth_of_planes(one_stack, z)
+    depth_notes += drift_notes_of_planes(one_stack, (depth, y, x))
     log = find_log(files.location.source, files.name((0, 0, 0)))
     spacing, log_notes = with_log((depth, y, x), log, volume.planes)
     image = files.image(array, spacing, channels, [*notes, *size_notes, *depth_notes, *log_notes])

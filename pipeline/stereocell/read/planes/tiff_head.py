@@ -1,5 +1,6 @@
 """The head of a TIFF file of a folder of planes."""
 
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 
@@ -24,7 +25,7 @@ def tiff_head(path: str, named: str) -> Head:
         page = tiff.pages.first
         if page.dtype is None:
             raise SourceError(f"{named}: found pixels of no known type, expected numbers")
-        stated = stated_by(tiff)
+        stated = stated_by(tiff, page)
         turn, turn_notes = turn_of(page)
         sizes = (0, page.imagelength, page.imagewidth)
         _, rows, columns = (sizes[axis] for axis in turn.order)
@@ -72,10 +73,16 @@ def _with_ome(head: Head, text: str, named: str) -> Head:
     except SourceError:  # the pixels are a plane all the same
         return head
     places, has_unit = positions_of(root)
+    y_um, x_um = (_only(positions_of(root, axis)[0]) for axis in "YX")
     return replace(
         head,
         spacing_um=images[0].spacing_um if images else head.spacing_um,
-        z_um=next(iter(places.values())) if len(places) == 1 else None,
+        z_um=_only(places),
         z_field="PositionZ",
         has_z_unit=has_unit,
+        yx_um=(y_um, x_um),
     )
+
+
+def _only(places: Mapping[int, float]) -> float | None:
+    return next(iter(places.values())) if len(places) == 1 else None

@@ -87,7 +87,7 @@ def read_ome(
     image, depth_notes = _with_depth(image, root)
     _, turn_notes = turn_of(series.keyframe, is_applied=False)
     _, y, x = images[0].spacing_um
-    size_notes = tag_notes(tiff, (y, x), "PhysicalSize of the OME-XML")
+    size_notes = tag_notes(series.keyframe, (y, x), "PhysicalSize of the OME-XML")
     described = (*size_notes, *depth_notes, *turn_notes, *_type_notes(root, series.keyframe))
     notes = (*image.notes, *described, *_undescribed(tiff, chosen.others), *note_absent(pages))
     return replace(image, notes=notes, files=files_of(location, chain(*pages)))

@@ -70,7 +70,7 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
                 require_same_tags(where, tiff, level.pages)
         arrays = [array_of(series, index) for index in range(len(series.levels))]
         page = series.keyframe
-        stated = stated_by(tiff)
+        stated = stated_by(tiff, page)
         files = files_of(location, (page for level in series.levels for page in level.pages))
         absent = note_absent(level.pages for level in series.levels)
         if series.kind == "ndtiff":

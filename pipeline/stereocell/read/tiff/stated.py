@@ -5,6 +5,7 @@ Texts that a user typed (labels of slices, image names, descriptions) are not re
 channels' names.
 """
 
+import json
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from tifffile import TiffFile
+from tifffile import TiffFile, TiffPage
 
 from stereocell.model.color import linear_color
 from stereocell.read.image import Color
@@ -32,7 +33,7 @@ _IMAGEJ_FIELDS = {
     "c0", "c1", "cf", "vunit",
 }  # fmt: skip
 _PIXEL = Subject("voxel spacing", "um", 0.01, "--spacing-um z,y,x replaces it")
-_STRAIGHT, _UNCALIBRATED = 0, (20, 21)  # kinds of ImageJ's functions, as `cf` has them
+_STRAIGHT, _NO_FUNCTION = 0, 20  # kinds of ImageJ's functions, as `cf` has them
 _INCH_UM = 25_400.0
 _SCREEN_DPI = (72, 96, 100, 150, 200, 300, 600, 1200)  # of screens and printers
 _NOTHING: PartialTriple = (None, None, None)
@@ -57,20 +58,24 @@ class Stated:
     notes: tuple[str, ...] = ()
 
 
-def stated_by(tiff: TiffFile) -> Stated:
-    """Return the metadata of an open file; a garbled entry counts as not stated."""
+def stated_by(tiff: TiffFile, page: TiffPage) -> Stated:
+    """Return the metadata of an open file; a garbled entry counts as not stated.
+
+    page  the first one of the image, whose tags count
+    """
     for flag, read in _READERS.items():
         if getattr(tiff, flag):
-            stated = read(tiff)
+            stated = read(tiff, page)
             break
     else:
         stated = Stated()
     z, y, x = stated.spacing_um
-    notes = tag_notes(tiff, (y, x), "the program's metadata") if not tiff.is_imagej else ()
+    place = "ImageJ's unit with the resolution" if tiff.is_imagej else "the program's metadata"
+    notes = tag_notes(page, (y, x), place)
     if y is None and x is None:
-        _, y, x = _by_tags(tiff)
+        _, y, x = _by_tags(page)
     stated = replace(stated, spacing_um=(z, y, x), notes=(*stated.notes, *notes))
-    by_gdal = gdal_scale(tiff.pages.first)
+    by_gdal = gdal_scale(page)
     if not by_gdal.notes:
         return stated
     values = by_gdal if stated.values.is_plain else stated.values
@@ -78,7 +83,7 @@ def stated_by(tiff: TiffFile) -> Stated:
 
 
 def tag_notes(
-    tiff: TiffFile, pixel_um: tuple[float | None, float | None], place: str
+    page: TiffPage, pixel_um: tuple[float | None, float | None], place: str
 ) -> tuple[str, ...]:
     """Compare the pixel (y, x) that metadata state with the tags, where they are per centimetre.
 
@@ -87,7 +92,7 @@ def tag_notes(
     A resolution of screens and printers is stated for any image, and is not compared.
     """
     notes: list[str] = []
-    _, *by_tags = _by_tags(tiff)
+    _, *by_tags = _by_tags(page)
     for axis, own, tag in zip("yx", pixel_um, by_tags, strict=True):
         if own and tag and round(_INCH_UM / tag) not in _SCREEN_DPI:
             name = f"the TIFF tag {axis.upper()}Resolution"
@@ -96,13 +101,13 @@ def tag_notes(
     return tuple(notes)
 
 
-def _imagej(tiff: TiffFile) -> Stated:
+def _imagej(tiff: TiffFile, page: TiffPage) -> Stated:
     meta = _mapping(tiff.imagej_metadata)
     unit = meta.get("unit")
     per = {axis: _um(meta.get(f"{axis}unit", unit)) for axis in "zyx"}
-    if unit is None and _resolution_unit(tiff) == _CENTIMETRE:
+    if unit is None and _resolution_unit(page) == _CENTIMETRE:
         per = dict.fromkeys("zyx", um_per("cm"))
-    y, x = (_over(per[axis], _resolution(tiff, axis)) for axis in "yx")
+    y, x = (_over(per[axis], _resolution(page, axis)) for axis in "yx")
     z = _times(per["z"], meta.get("spacing"))
     step_notes: tuple[str, ...] = ()
     if z is not None and z < 0:  # the sign is that of the stage's way; ImageJ leaves it out, too
@@ -130,7 +135,7 @@ def _imagej_calibration(meta: Mapping[str, Any]) -> tuple[ValueScale, tuple[str,
     """Return the scale of ImageJ's values, and notes. `cf` is the kind of function."""
     # ImageJ takes factors without a function for a straight line
     kind = meta.get("cf", _STRAIGHT if {"c0", "c1"} <= meta.keys() else None)
-    if kind is None or kind in _UNCALIBRATED:
+    if kind is None or kind == _NO_FUNCTION:
         return ValueScale(), ()
     factors = [_times(1.0, meta.get(name)) for name in ("c0", "c1")]
     intercept, slope = factors
@@ -199,7 +204,7 @@ def _lut_color(lut: Any) -> Color | None:
     return None if red == green == blue else linear_color((red, green, blue))
 
 
-def _lsm(tiff: TiffFile) -> Stated:
+def _lsm(tiff: TiffFile, page: TiffPage) -> Stated:
     meta = _mapping(tiff.lsm_metadata)
     z, y, x = (_times(1e6, meta.get(f"VoxelSize{axis}")) for axis in "ZYX")  # metres
     channels = _mapping(meta.get("ChannelColors"))
@@ -208,7 +213,7 @@ def _lsm(tiff: TiffFile) -> Stated:
     return Stated((z, y, x), names, colors)
 
 
-def _stk(tiff: TiffFile) -> Stated:
+def _stk(tiff: TiffFile, page: TiffPage) -> Stated:
     meta = _mapping(tiff.stk_metadata)
     per = _um(meta.get("CalibrationUnits")) if meta.get("SpatialCalibration", 1) else None
     y, x = (_times(per, meta.get(f"{axis}Calibration")) for axis in "YX")
@@ -218,7 +223,7 @@ def _stk(tiff: TiffFile) -> Stated:
     return Stated((z, y, x))
 
 
-def _metaseries(tiff: TiffFile) -> Stated:
+def _metaseries(tiff: TiffFile, page: TiffPage) -> Stated:
     plane = _mapping(_mapping(tiff.metaseries_metadata).get("PlaneInfo"))
     is_set = plane.get("spatial-calibration-state", False)
     per = _um(plane.get("spatial-calibration-units")) if is_set else None
@@ -226,7 +231,7 @@ def _metaseries(tiff: TiffFile) -> Stated:
     return Stated((None, y, x))
 
 
-def _micromanager(tiff: TiffFile) -> Stated:
+def _micromanager(tiff: TiffFile, page: TiffPage) -> Stated:
     summary = _mapping(_mapping(tiff.micromanager_metadata).get("Summary"))
     side = _times(1.0, summary.get("PixelSize_um") or None)  # 0: not calibrated
     z = _times(1.0, summary.get("z-step_um") or None)
@@ -234,23 +239,28 @@ def _micromanager(tiff: TiffFile) -> Stated:
     return Stated((z, side, side), tuple(map(_name, names)) if isinstance(names, list) else ())
 
 
-def _scanimage(tiff: TiffFile) -> Stated:
+def _scanimage(tiff: TiffFile, page: TiffPage) -> Stated:
     frame = _mapping(_mapping(tiff.scanimage_metadata).get("FrameData"))
     step = frame.get("SI.hStackManager.stackZStepSize")
     return Stated((_times(1.0, step or None), None, None))
 
 
-def _shaped(tiff: TiffFile) -> Stated:
+def _shaped(tiff: TiffFile, page: TiffPage) -> Stated:
     """tifffile's own JSON; a caller of `imwrite` may have put ImageJ's words into it."""
-    described = tiff.shaped_metadata
-    meta = _mapping(described[0]) if described else {}
+    try:  # each image of a file has its own
+        meta = _mapping(json.loads(page.description))
+    except (ValueError, RecursionError):
+        meta = {}
     per = _um(meta.get("unit"))
-    y, x = (_over(per, _resolution(tiff, axis)) for axis in "yx")
-    return Stated((_times(per, meta.get("spacing")), y, x))
+    z = _times(per, meta.get("spacing"))
+    if _resolution_unit(page) == _CENTIMETRE:  # the tag states the unit of the resolution itself
+        return Stated((z, None, None))
+    y, x = (_over(per, _resolution(page, axis)) for axis in "yx")
+    return Stated((z, y, x))
 
 
 # by tifffile's flags; the first that fits
-_READERS: dict[str, Callable[[TiffFile], Stated]] = {
+_READERS: dict[str, Callable[[TiffFile, TiffPage], Stated]] = {
     "is_lsm": _lsm,
     "is_stk": _stk,
     "is_metaseries": _metaseries,
@@ -261,20 +271,20 @@ _READERS: dict[str, Callable[[TiffFile], Stated]] = {
 }
 
 
-def _by_tags(tiff: TiffFile) -> PartialTriple:
+def _by_tags(page: TiffPage) -> PartialTriple:
     """Return y and x where the tags state them per centimetre."""
-    per = um_per("cm") if _resolution_unit(tiff) == _CENTIMETRE else None
-    y, x = (_over(per, _resolution(tiff, axis)) for axis in "yx")
+    per = um_per("cm") if _resolution_unit(page) == _CENTIMETRE else None
+    y, x = (_over(per, _resolution(page, axis)) for axis in "yx")
     return None, y, x
 
 
-def _resolution_unit(tiff: TiffFile) -> int:
-    return int(tiff.pages.first.tags.valueof("ResolutionUnit", default=0))
+def _resolution_unit(page: TiffPage) -> int:
+    return int(page.tags.valueof("ResolutionUnit", default=0))
 
 
-def _resolution(tiff: TiffFile, axis: str) -> float | None:
+def _resolution(page: TiffPage, axis: str) -> float | None:
     """Return the pixels per unit along y or x."""
-    value = tiff.pages.first.tags.valueof(f"{axis.upper()}Resolution")
+    value = page.tags.valueof(f"{axis.upper()}Resolution")
     if not isinstance(value, tuple) or len(value) != 2 or not value[0] or not value[1]:
         return None
     return float(value[0]) / float(value[1])

@@ -1,8 +1,10 @@
 // The picture's light, encoded for the screen. Where the room shows through (SEE_THROUGH), with its
-// opacity, which its light is times already.
+// opacity, which its light is times already. For a moment after a jump there is a share of the picture before it.
 precision highp float;
 
 uniform sampler2D uLight;  // linear
+uniform sampler2D uBefore;  // linear
+uniform float uShareBefore;  // 0..1
 
 out vec4 oColor;
 
@@ -10,11 +12,13 @@ out vec4 oColor;
 #include <chunks/within_gamut>
 
 void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  vec4 light = texelFetch(uLight, at, 0);
+  if (uShareBefore > 0.0) light = mix(light, texelFetch(uBefore, at, 0), uShareBefore);
 #ifdef SEE_THROUGH
-  vec4 light = texelFetch(uLight, ivec2(gl_FragCoord.xy), 0);
   vec3 bare = light.rgb / max(light.a, 1e-4);
   oColor = vec4(light.a * encoded(withinGamut(bare)), light.a);
 #else
-  oColor = vec4(encoded(withinGamut(texelFetch(uLight, ivec2(gl_FragCoord.xy), 0).rgb)), 1.0);
+  oColor = vec4(encoded(withinGamut(light.rgb)), 1.0);
 #endif
 }

@@ -17,10 +17,12 @@ import {
 import { captioned, LABEL, one, region, toneOf, unlessRefused } from "./parts";
 
 /** Largest cell, px: a map of few tiles need not fill the panel. */
-const LARGEST_CELL = 96;
-const MAP_HEIGHT = 7 * ROW;
-/** Smallest cell, px: 1.25 degrees at 1.2 m; no gaze could choose a smaller one. */
-const SMALLEST_CELL = 42;
+const LARGEST_CELL = 160;
+const MAP_HEIGHT = 5 * ROW;
+/** Smallest cell, px: 4.5 degrees at 1.2 m, so that a gaze finds it. */
+const SMALLEST_CELL = 78;
+/** Targets that a map counts for on a page: two switches have room beside it. */
+const MAP_TARGETS = 4;
 
 /** Options side by side. */
 export function chips(choice: Choice, width: number): Block {
@@ -38,7 +40,21 @@ export function chips(choice: Choice, width: number): Block {
   return captioned(choice.label, width, one(marks, unlessRefused(choice, regions)));
 }
 
-/** Many options, or long ones: the one before and the one after. */
+/** A few options with long names: a row for each. */
+export function optionRows(choice: Choice, width: number): readonly Block[] {
+  return choice.options.map(({ value, label }) => {
+    const row: Rect = { x: 0, y: 0, width, height: ROW };
+    const isChosen = value === choice.value;
+    const marks = [
+      box(row, isChosen ? "accent" : "raised"),
+      text(row, label, { tone: toneOf(choice, isChosen) }),
+    ];
+    const place = region(`${choice.id}=${value}`, label, row, () => choice.to(value));
+    return one(marks, unlessRefused(choice, [place]));
+  });
+}
+
+/** Many options: the one before and the one after. */
 export function stepper(choice: Choice, row: Rect): Block {
   const { options, value, id } = choice;
   const at = options.findIndex((each) => each.value === value);
@@ -53,10 +69,10 @@ export function stepper(choice: Choice, row: Rect): Block {
   const middle: Rect = { ...row, x: before.x + ROW, width: after.x - before.x - ROW };
   const tone = toneOf(choice);
   const marks = [
-    text(label, choice.label, { tone, size: SMALL }),
+    text(label, choice.label, { tone, size: SMALL, lines: 2 }),
     box(before, "raised"),
     text(before, "‹", { align: "center", tone }),
-    text(middle, options[at]?.label ?? value, { align: "center", tone, size: SMALL + 2 }),
+    text(middle, options[at]?.label ?? value, { align: "center", tone, lines: 2 }),
     box(after, "raised"),
     text(after, "›", { align: "center", tone }),
   ];
@@ -72,34 +88,46 @@ export function stepper(choice: Choice, row: Rect): Block {
   );
 }
 
-/** Any colour: the palettes' next one. */
-export function nextSwatch(colour: Colour, rect: Rect): Block {
-  const { shows = [] } = colour;
+/** A colour, or the colours that show in its place. */
+export function swatchMarks({ value, shows = [] }: Colour, rect: Rect): readonly Mark[] {
   const width = rect.width / shows.length;
   const stripes = shows.map((hex, i): Mark => {
     const stripe = { ...rect, x: rect.x + i * width, width };
     return { kind: "box", rect: stripe, fill: toneOfHex(hex), stroke: null, radius: 0 };
   });
-  return one(
-    [box(rect, toneOfHex(colour.value), "line"), ...stripes],
-    unlessRefused(colour, [
-      region(colour.id, colour.name ?? colour.label, rect, () =>
-        colour.to(nextColour(colour.value)),
-      ),
-    ]),
+  return [box(rect, toneOfHex(value), "line"), ...stripes];
+}
+
+/** Any colour: the palettes' next one. */
+export function nextSwatch(colour: Colour, rect: Rect): Block {
+  const to = () => colour.to(nextColour(colour.value));
+  const place = region(colour.id, colour.name ?? colour.label, rect, to);
+  return one(swatchMarks(colour, rect), unlessRefused(colour, [place]));
+}
+
+/** Colours side by side. */
+export function swatches(colour: Colour, hexes: readonly string[], row: Rect): Block {
+  const rects = split(row, hexes.length);
+  const marks = hexes.map((hex, i) =>
+    box(rects[i], toneOfHex(hex), hex === colour.value ? "text" : "line"),
   );
+  const regions = hexes.map((hex, i) =>
+    region(`${colour.id}=${hex}`, hex, rects[i], () => colour.to(hex)),
+  );
+  return one(marks, unlessRefused(colour, regions));
 }
 
 export function palettes(colour: Colour, width: number): readonly Block[] {
   return colour.palettes.map(({ name, colors }) => {
-    const rects = split({ x: 0, y: 0, width, height: ROW }, colors.length);
-    const marks = colors.map(({ hex }, i) =>
-      box(rects[i], toneOfHex(hex), hex === colour.value ? "text" : null),
-    );
-    const regions = colors.map(({ name: label, hex }, i) =>
-      region(`${colour.id}=${name}=${hex}`, label, rects[i], () => colour.to(hex)),
-    );
-    return captioned(name, width, one(marks, unlessRefused(colour, regions)));
+    const row = { x: 0, y: 0, width, height: ROW };
+    const hexes = colors.map(({ hex }) => hex);
+    const { marks, regions } = swatches(colour, hexes, row);
+    const named = regions.map((each, i) => ({
+      ...each,
+      id: `${colour.id}=${name}=${hexes[i]}`,
+      label: colors[i].name,
+    }));
+    return { ...captioned(name, width, one(marks, named)), targets: 1 };
   });
 }
 
@@ -123,14 +151,13 @@ export function mapBlock(map: TileMap, width: number): Block {
     const rect = rectOf(tile.row, tile.column);
     const isChosen = tile.isSelected || tile.isIsolated;
     marks.push(box(rect, isChosen ? "accent" : "raised", tile.isFocus ? "text" : "line"));
-    if (cell >= ROW) {
-      const label = tile.isIsolated ? "only" : shortTileName(tile.id);
-      const tone = isChosen ? "ink" : "dim";
-      marks.push(text(rect, label, { align: "center", size: SMALL, tone }));
-    }
+    const label = tile.isIsolated ? "only" : shortTileName(tile.id);
+    const tone = isChosen ? "ink" : "dim";
+    marks.push(text(rect, label, { align: "center", size: SMALL, tone }));
     regions.push(region(`${map.id}=${tile.id}`, tileName(tile.id), rect, () => map.to(tile.id)));
   }
-  const block = one(marks, unlessRefused(map, regions), Math.ceil(cell * map.rows) + GAP);
+  const height = Math.ceil(cell * map.rows) + GAP;
+  const block = { ...one(marks, unlessRefused(map, regions), height), targets: MAP_TARGETS };
   return captioned(map.label, width, block);
 }
 

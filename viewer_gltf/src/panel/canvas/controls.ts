@@ -1,15 +1,25 @@
 /**
  * The controls of a layout as rows of the panel on a canvas, each tall enough to be gazed at. Pure.
  */
-import type { Button, Choice, Control, Group, Search, Slider, Toggle } from "../controls";
-import { chips, mapBlock, nextSwatch, palettes, stepper } from "./choices";
+import type { Button, Choice, Colour, Control, Group, Search, Toggle } from "../controls";
+import {
+  chips,
+  mapBlock,
+  nextSwatch,
+  optionRows,
+  palettes,
+  stepper,
+  swatches,
+  swatchMarks,
+} from "./choices";
 import {
   type Block,
   box,
+  type CanvasChange,
   GAP,
+  inset,
   type Mark,
   type Rect,
-  type Region,
   ROW,
   SMALL,
   split,
@@ -34,12 +44,19 @@ export const ELSEWHERE: ReadonlySet<string> = new Set([
   ...["picture-size", "save-picture", "save-video", "keep-view", "next-view", "forget-views"],
   "help",
 ]);
-/** Widths in a channel's row. */
-const CHIP = 150;
-const SWATCH = 80;
+/** Width of a swatch in a channel's row: 6 degrees at 1.2 m. */
+const SWATCH = 110;
+/** Options with a name of more letters than fit between two arrows are listed, if there are so few. */
+const LONG = 16;
+const MAX_LISTED = 6;
 
-export function blocksOf(item: Control | Group, width: number): readonly Block[] {
-  if (item.kind === "group") return groupBlocks(item, width);
+/** @param fanned the group whose colours lie over its name; null: none */
+export function blocksOf(
+  item: Control | Group,
+  width: number,
+  fanned: string | null = null,
+): readonly Block[] {
+  if (item.kind === "group") return [groupRow(item, width, item.id === fanned)];
   if (ELSEWHERE.has(item.id)) return [];
   const row: Rect = { x: 0, y: 0, width, height: ROW };
   switch (item.kind) {
@@ -48,11 +65,12 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
     case "button":
       return [buttonIn(item, row)];
     case "slider":
-      return [sliderRow(item, row), ...aboutOf(item, width)];
+      return [sliderRow(item, row)];
     case "window":
       return [windowRow(item, 0, row), windowRow(item, 1, row)];
     case "choice":
-      return [item.isInline ? chips(item, width) : stepper(item, row)];
+      if (item.isInline) return [chips(item, width)];
+      return isWordy(item) ? optionRows(item, width) : [stepper(item, row)];
     case "colour":
       return item.palettes.length === 0 ? [nextSwatch(item, row)] : palettes(item, width);
     case "map":
@@ -70,9 +88,9 @@ export function blocksOf(item: Control | Group, width: number): readonly Block[]
   }
 }
 
-/** What a slider does, in a sentence; those of light, whose list is long as it is, say it on the page alone. */
-function aboutOf({ id, about }: Slider, width: number): readonly Block[] {
-  return about && !id.startsWith("trace/") ? [textBlock("", about, width)] : [];
+/** Whether its options are few, and too long for the space between two arrows. */
+function isWordy({ options }: Choice): boolean {
+  return options.length <= MAX_LISTED && options.some(({ label }) => label.length > LONG);
 }
 
 /** Nobody types by gaze: one hint after the other. */
@@ -82,18 +100,20 @@ function asChoice({ id, value, to }: Search, hints: readonly string[]): Choice {
 }
 
 /** The blocks of a section; buttons that go on while they are held share a row with their opposite. */
-export function blocksOfAll(items: readonly (Control | Group)[], width: number): readonly Block[] {
+export function blocksOfAll(
+  items: readonly (Control | Group)[],
+  width: number,
+  fanned: string | null = null,
+): readonly Block[] {
   const blocks: Block[] = [];
   for (let i = 0; i < items.length; i++) {
     const [item, next] = [items[i], items[i + 1]];
     if (isRepeating(item) && next !== undefined && isRepeating(next)) {
       const rects = split({ x: 0, y: 0, width, height: ROW }, 2);
       const [left, right] = [buttonIn(item, rects[0]), buttonIn(next, rects[1])];
-      blocks.push(
-        one([...left.marks, ...right.marks], [...left.regions, ...right.regions], ROW + GAP),
-      );
+      blocks.push(one([...left.marks, ...right.marks], [...left.regions, ...right.regions]));
       i++;
-    } else blocks.push(...blocksOf(item, width));
+    } else blocks.push(...blocksOf(item, width, fanned));
   }
   return blocks;
 }
@@ -114,12 +134,12 @@ function buttonIn(item: Button, rect: Rect): Block {
   );
 }
 
-function toggleRow(toggle: Toggle, row: Rect): Block {
+function toggleRow(toggle: Toggle, row: Rect, isDimmed = false): Block {
   const mark: Rect = { ...row, width: ROW };
   const label: Rect = { ...row, x: row.x + ROW, width: row.width - ROW };
   const marks = [
     box(inner(mark), toggle.value ? "accent" : "raised", toggle.value ? null : "line"),
-    text(label, toggle.label, { tone: toneOf(toggle) }),
+    text(label, toggle.label, { tone: isDimmed ? "dim" : toneOf(toggle), lines: 2 }),
   ];
   if (toggle.value) marks.push({ kind: "tick", rect: inner(mark), tone: "ink" });
   const label_ = toggle.name ?? toggle.label;
@@ -129,22 +149,8 @@ function toggleRow(toggle: Toggle, row: Rect): Block {
   );
 }
 
-function inner({ x, y, width, height }: Rect): Rect {
-  return { x: x + 8, y: y + 8, width: width - 16, height: height - 16 };
-}
-
-/** A toggle among others in a row: lit while it is on. */
-function chip(toggle: Toggle, rect: Rect): Block {
-  const isOn = toggle.value && !toggle.refusal;
-  return one(
-    [
-      box(rect, isOn ? "accent" : "raised", isOn ? null : "line"),
-      text(rect, toggle.label, { align: "center", tone: toneOf(toggle, isOn) }),
-    ],
-    unlessRefused(toggle, [
-      region(toggle.id, toggle.name ?? toggle.label, rect, () => toggle.to(!toggle.value)),
-    ]),
-  );
+function inner(rect: Rect): Rect {
+  return inset(rect, GAP);
 }
 
 function textBlock(label: string, value: string, width: number): Block {
@@ -161,35 +167,83 @@ function textBlock(label: string, value: string, width: number): Block {
   );
 }
 
-/** A channel: colour, name and what is switched in one row; the rest while it is open. */
-function groupBlocks(group: Group, width: number): readonly Block[] {
-  const inRow = group.controls.filter(({ kind }) => kind === "colour" || kind === "toggle");
-  const below = [...group.controls.filter((each) => !inRow.includes(each)), ...group.more];
-  const marks: Mark[] = [];
-  const regions: Region[] = [];
-  const add = ({ marks: more, regions: places }: Block) => {
-    marks.push(...more);
-    regions.push(...places);
-  };
-  let [left, right] = [0, width];
-  for (const control of inRow) {
-    if (control.kind !== "colour") continue;
-    add(nextSwatch(control, { x: left, y: 0, width: SWATCH, height: ROW }));
-    left += SWATCH;
+/** The group's colour, which knows the colours that no other channel has; null: it has none, or knows none. */
+function offered({ controls, more }: Group): Colour | null {
+  const colours = [...controls, ...more].filter((each): each is Colour => each.kind === "colour");
+  return colours.find(({ free }) => free !== undefined) ?? null;
+}
+
+function shownToggle({ controls }: Group): Toggle | null {
+  return controls.find((each): each is Toggle => each.kind === "toggle") ?? null;
+}
+
+/**
+ * A channel or a lamp: its name, which shows and hides it, and its swatch: a look at it lays the colours that the
+ * channel can have over the name, and the way to all that is set of it.
+ */
+function groupRow(group: Group, width: number, isFanned: boolean): Block {
+  const { id, label, isDimmed, tags, controls, more } = group;
+  const swatch: Rect = { x: 0, y: 0, width: SWATCH, height: ROW };
+  const rest: Rect = { x: SWATCH, y: 0, width: width - SWATCH, height: ROW };
+  const colour = [...controls, ...more].find((each): each is Colour => each.kind === "colour");
+  const marks: readonly Mark[] =
+    colour === undefined ? [text(swatch, "›", { align: "center" })] : swatchMarks(colour, swatch);
+  const fan = offered(group);
+  const beside =
+    fan !== null && isFanned ? fanned(group, fan, rest) : nameRow(group, rest, isDimmed, tags);
+  const wish = fan === null ? ({ canvas: "group", group: id } as const) : fanOf(id);
+  const place = region(`${id}/open`, `${label}: colour and more`, swatch, () => wish);
+  const look = { ...place, isGlance: fan !== null };
+  return { ...one([...marks, ...beside.marks], [look, ...beside.regions]), targets: 1 };
+}
+
+function fanOf(group: string): CanvasChange {
+  return { canvas: "fan", group };
+}
+
+/** The colours, and the way to the page of the group. */
+function fanned({ id, label }: Group, colour: Colour, row: Rect): Block {
+  const more: Rect = { ...row, x: row.x + row.width - SWATCH, width: SWATCH };
+  const colours = swatches(colour, colour.free ?? [], { ...row, width: row.width - SWATCH });
+  const open = region(`${id}/more`, `More of ${label}`, more, () => ({
+    canvas: "group",
+    group: id,
+  }));
+  const marks = [
+    ...colours.marks,
+    box(more, "raised"),
+    text(more, "More", { align: "center", size: SMALL }),
+  ];
+  return one(marks, [...colours.regions, open]);
+}
+
+function nameRow(group: Group, row: Rect, isDimmed: boolean, tags: readonly string[]): Block {
+  const { id, label } = group;
+  const toggle = shownToggle(group);
+  if (toggle === null) {
+    const open = region(id, label, row, () => ({ canvas: "group", group: id }));
+    return one([text(row, label)], [open]);
   }
-  for (const control of inRow) {
-    if (control.kind !== "toggle") continue;
-    right -= CHIP;
-    add(chip(control, { x: right, y: 0, width: CHIP, height: ROW }));
-  }
-  const name: Rect = { x: left, y: 0, width: right - left, height: ROW };
-  const canOpen = group.controls.length > 1 || group.more.length > 0;
-  const sign = canOpen ? (group.isOpen ? "▾ " : "▸ ") : "";
-  const tags = group.tags.length === 0 ? "" : ` (${group.tags.join(", ")})`;
-  const tone = group.isDimmed ? "dim" : "text";
-  marks.push(text(name, `${sign}${group.label}${tags}`, { tone }));
-  if (canOpen) regions.push(region(`${group.id}/open`, group.label, name, () => group.opener));
-  const head = one(marks, regions);
-  if (!group.isOpen) return [head];
-  return [head, ...below.flatMap((control) => blocksOf(control, width))];
+  return toggleRow({ ...toggle, label: [label, ...tags].join(" · ") }, row, isDimmed);
+}
+
+/** The page of a channel or a lamp: its colours first, then all that is set of it. */
+export function blocksOfGroup(group: Group, width: number): readonly Block[] {
+  const colour = offered(group);
+  const fan = colour === null ? [] : [freeColours(colour, width)];
+  const others = [...group.controls, ...group.more].filter(
+    (each) => each.kind !== "colour" || (colour === null && each.palettes.length > 0),
+  );
+  return [...fan, ...others.flatMap((control) => blocksOf(control, width))];
+}
+
+/** Two rows of four. */
+function freeColours(colour: Colour, width: number): Block {
+  const free = colour.free ?? [];
+  const half = Math.ceil(free.length / 2);
+  const [upper, lower] = [free.slice(0, half), free.slice(half)].map((colours, i) =>
+    swatches(colour, colours, { x: 0, y: i * ROW, width, height: ROW }),
+  );
+  const regions = [...upper.regions, ...lower.regions];
+  return { ...one([...upper.marks, ...lower.marks], regions, 2 * ROW), targets: 1 };
 }

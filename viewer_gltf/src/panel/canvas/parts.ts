@@ -5,7 +5,7 @@ import { type Block, type Mark, type Rect, type Region, ROW, SMALL, text } from 
 /** A control's label, as a share of the row that it shares with the control. */
 export const LABEL = 0.27;
 /** Height of a caption over a row, px. */
-const CAPTION = 34;
+const CAPTION = 52;
 
 export function one(marks: readonly Mark[], regions: readonly Region[], height = ROW): Block {
   return { height, marks, regions };
@@ -40,6 +40,7 @@ export function captioned(caption: string, width: number, below: Block): Block {
   const over: Rect = { x: 0, y: 0, width, height: CAPTION };
   const down = (rect: Rect): Rect => ({ ...rect, y: rect.y + CAPTION });
   return {
+    ...below,
     height: CAPTION + below.height,
     marks: [
       text(over, caption, { tone: "dim", size: SMALL }),

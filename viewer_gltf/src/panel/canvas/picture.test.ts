@@ -19,7 +19,7 @@ describe("a picture on the panel's plane", () => {
   it("is as high as its share of the width, but no higher than a page", () => {
     const rectOf = (height: number) => pictureBlock({ ...PICTURE, height }, 832).marks[1].rect;
     expect(rectOf(0.25)).toMatchObject({ x: 16, width: 800, height: 200 });
-    expect(rectOf(3).height).toBe(400);
+    expect(rectOf(3).height).toBe(480);
   });
 
   it("is pressed where a ray meets it, and dragged if it can be", () => {

@@ -4,7 +4,7 @@ import type { Block, Rect } from "./draw_list";
 import { captioned, one, region, unlessRefused } from "./parts";
 
 /** Highest, px: a page has room for it. */
-const TALLEST = 400;
+const TALLEST = 480;
 /** Space at its sides, px. */
 const PAD = 16;
 

@@ -1,10 +1,12 @@
 /** Sliders of the panel on a canvas. Pure. */
 import type { Slider, Window, Wish } from "../controls";
-import { type Block, type Mark, type Rect, ROW, SMALL, text } from "./draw_list";
-import { LABEL, one, region, toneOf, unlessRefused } from "./parts";
+import { type Block, GAP, type Mark, type Rect, ROW, SMALL, type Tone, text } from "./draw_list";
+import { one, region, toneOf, unlessRefused } from "./parts";
 
-/** A slider's value, as a share of the row. */
-const VALUE = 0.21;
+/** Height of the words above a track, px. */
+const WORDS = 50;
+const KNOB = 44;
+const LINE = 16;
 
 type Track = Readonly<{
   id: string;
@@ -16,40 +18,31 @@ type Track = Readonly<{
   to: (value: number) => Wish;
 }>;
 
+/** The words in the upper half, the track in the lower one; all of the row takes hold of it. */
 function track(slider: Track, row: Rect): Block {
-  const [left, right] = [row.width * LABEL, row.width * VALUE];
-  const label: Rect = { ...row, width: left };
-  const value: Rect = { ...row, x: row.x + row.width - right, width: right };
-  const whole: Rect = { ...row, x: row.x + left, width: row.width - left - right };
+  const words: Rect = { ...row, height: WORDS };
   const end = ROW / 2; // a knob at either end stays in the region
-  const length = whole.width - 2 * end;
-  const at = whole.x + end + slider.value * length;
-  const line = (x: number, width: number): Rect => ({
-    x,
-    y: row.y + ROW / 2 - 7,
-    width,
-    height: 14,
-  });
-  const tone = slider.refusal ? "line" : "accent";
-  const knob: Rect = { x: at - 18, y: row.y + ROW / 2 - 18, width: 36, height: 36 };
+  const length = row.width - 2 * end;
+  const at = row.x + end + slider.value * length;
+  const middle = row.y + (WORDS + ROW - GAP) / 2;
+  const bar = (x: number, width: number, height: number, fill: Tone): Mark => {
+    const rect = { x, y: middle - height / 2, width, height };
+    return { kind: "box", rect, fill, stroke: null, radius: height / 2 };
+  };
+  const left = row.x + end;
+  const tone = toneOf(slider);
   const marks: Mark[] = [
-    text(label, slider.label, { tone: toneOf(slider), size: SMALL + 2 }),
-    { kind: "box", rect: line(whole.x + end, length), fill: "line", stroke: null, radius: 7 },
-    {
-      kind: "box",
-      rect: line(whole.x + end, at - whole.x - end),
-      fill: tone,
-      stroke: null,
-      radius: 7,
-    },
-    { kind: "box", rect: knob, fill: slider.refusal ? "dim" : "text", stroke: null, radius: 18 },
-    text(value, slider.text, { align: "right", size: SMALL + 2, tone: toneOf(slider) }),
+    text(words, slider.label, { tone, size: SMALL }),
+    text(words, slider.text, { align: "right", size: SMALL, tone }),
+    bar(left, length, LINE, "line"),
+    bar(left, at - left, LINE, slider.refusal ? "line" : "accent"),
+    bar(at - KNOB / 2, KNOB, KNOB, slider.refusal ? "dim" : "text"),
   ];
   const to = (across: number) => {
-    const share = Math.min(1, Math.max(0, (across * whole.width - end) / length));
+    const share = Math.min(1, Math.max(0, (across * row.width - end) / length));
     return slider.to(Math.round(share * slider.steps) / slider.steps);
   };
-  return one(marks, unlessRefused(slider, [region(slider.id, slider.label, whole, to, true)]));
+  return one(marks, unlessRefused(slider, [region(slider.id, slider.label, row, to, true)]));
 }
 
 export function sliderRow(slider: Slider, row: Rect): Block {

@@ -8,12 +8,12 @@ import { type Block, type Mark, type Rect, SMALL, text } from "./draw_list";
 import { captioned, one, region, unlessRefused } from "./parts";
 
 /** Height of the plane on the panel, px. */
-const HEIGHT = 300;
+const HEIGHT = 440;
 /** Space for the axes' texts, px. */
-const AXIS = 30;
+const AXIS = 52;
 /** Reach of a corner, px: a ray trembles. */
-const REACH = 26;
-const HANDLE = 22;
+const REACH = 36;
+const HANDLE = 32;
 
 /** The corners that are drawn to be taken hold of. */
 function handlesOf(shape: Shape): readonly HistogramPoint[] {
@@ -72,12 +72,12 @@ export function histogramBlock(editor: HistogramEditor, width: number): Block {
   const rect: Rect = { x: REACH, y: 0, width: width - 2 * REACH, height: HEIGHT };
   const below: Rect = { ...rect, y: HEIGHT, height: AXIS };
   const [low, high, steepest] = editor.texts;
-  const look = { size: SMALL - 2, tone: "dim" } as const;
+  const look = { size: SMALL, tone: "dim" } as const;
   const marks = [
     ...histogramMarks(editor, rect, HANDLE),
     text(below, low, look),
     text(below, high, { ...look, align: "right" }),
-    text({ ...rect, height: AXIS + 8 }, steepest, look),
+    text({ ...rect, height: AXIS }, steepest, look),
   ];
   const pointAt = (across: number, down = 0): HistogramPoint => ({
     value: across,

@@ -123,8 +123,31 @@ export class Panel {
   private readonly status = element("p", { className: "status" }, { status: "" });
   private readonly fold: HTMLButtonElement;
   private readonly sections = new Map<string, Widget<Section>>();
+  /** The list of the deeper sections, and what opens it. */
+  private readonly more = element("div", { className: "deeper", id: "panel-more" });
+  private readonly moreOpener: HTMLButtonElement;
+  private readonly moreRoot: HTMLElement;
+  private layout: Layout | null = null;
 
   constructor(private readonly send: Send) {
+    this.moreOpener = element(
+      "button",
+      {
+        type: "button",
+        className: "opener",
+        textContent: "More",
+        onclick: () => this.layout && send(this.layout.more.opener),
+      },
+      { opener: "more" },
+    );
+    this.moreOpener.setAttribute("aria-controls", this.more.id);
+    this.moreRoot = element(
+      "section",
+      { ariaLabel: "More" },
+      { section: "more" },
+      element("h2", {}, {}, this.moreOpener),
+      this.more,
+    );
     this.fold = element("button", {
       type: "button",
       className: "fold",
@@ -154,18 +177,29 @@ export class Panel {
     setText(this.status, layout.status);
     this.root.classList.toggle("folded", layout.isHidden);
     this.fold.ariaExpanded = String(!layout.isHidden);
-    const roots = layout.sections.map((section) => {
-      let widget = this.sections.get(section.id);
-      if (widget === undefined) {
-        widget = makeSection(section, this.send);
-        this.sections.set(section.id, widget);
-      }
-      widget.update(section);
-      return widget.root;
-    });
-    arrange(this.body, roots);
+    this.layout = layout;
+    const { isOpen } = layout.more;
+    this.moreOpener.ariaExpanded = String(isOpen);
+    this.more.hidden = !isOpen;
+    const first = layout.sections.filter(({ isDeeper }) => !isDeeper);
+    const deeper = layout.sections.filter(({ isDeeper }) => isDeeper && isOpen);
+    arrange(
+      this.more,
+      deeper.map((section) => this.rootOf(section)),
+    );
+    arrange(this.body, [...first.map((section) => this.rootOf(section)), this.moreRoot]);
     // A channel that comes or goes moves in the list: the focus goes with it.
     if (focused !== undefined && document.activeElement !== activeElement) this.focus(focused);
+  }
+
+  private rootOf(section: Section): HTMLElement {
+    let widget = this.sections.get(section.id);
+    if (widget === undefined) {
+      widget = makeSection(section, this.send);
+      this.sections.set(section.id, widget);
+    }
+    widget.update(section);
+    return widget.root;
   }
 
   /** Bring the keyboard to a control, by its id; whether there is one. */

@@ -4,8 +4,8 @@ import { CHANNEL, COLOR, VOLUME } from "../../state/parameters/channel";
 import { setTo } from "../../state/parameters/kinds";
 import type { ChannelState } from "../../state/viewer_state";
 import type { Wish } from "../controls";
-import { type Key, key, keysOfChannel, neighbour, no, ofChannel } from "../key";
-import { nextColour } from "../palettes";
+import { type Key, key, keysOfChannel, neighbour, no, ofChannel, withChannel } from "../key";
+import { nextFreeColour } from "../palettes";
 import { pagesOf } from "./channels";
 
 const WINDOW_STEP = 1 / 64;
@@ -51,8 +51,12 @@ export const CHANNEL_KEYS: readonly Key[] = [
       ? no("It has no transfer function.")
       : { type: "choose-transfer-function", channel: id, name };
   }),
-  ofChannel("k", "Next colour of the palettes", ({ id, color }) =>
-    setTo(COLOR, fromHex(nextColour(toHex(color))), id),
+  key("k", "Next colour that no other channel has", (context) =>
+    withChannel(context, ({ id, color }) => {
+      const others = context.state.channels.filter((each) => each.id !== id);
+      const hexes = others.map((each) => toHex(each.color));
+      return setTo(COLOR, fromHex(nextFreeColour(toHex(color), hexes)), id);
+    }),
   ),
   ...CHANNEL.filter((row) => row !== VOLUME).flatMap(keysOfChannel),
   ofChannel("w", "Window: lower end down", shift(-WINDOW_STEP, 0)),

@@ -6,15 +6,17 @@
  */
 
 import { valueText } from "../../annotations/measure";
+import { toHex } from "../../math/color";
 import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel";
 import { isTwoD } from "../../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 import { colourOf, controlOf, paletteOf } from "../control_templates";
-import type { Control, Group, PanelView, Section } from "../controls";
+import type { Colour, Control, Group, PanelView, Section } from "../controls";
+import { freeColours } from "../palettes";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
-/** Largest number of channels that all have a card: so many rows fit a page of the panel in stereo. */
+/** Largest number of channels that all have a card. */
 export const FEW = 9;
 /** Channels of a page of the list; fewer need no search. */
 export const PAGE = 6;
@@ -66,8 +68,15 @@ export function windowTexts(
   return [intensityText(low, range), `${intensityText(high, range)} ${unit}`.trim()];
 }
 
+/** The channel's colour, with those that no other channel has. */
+function ownColour(channel: ChannelState, channels: readonly ChannelState[]): Colour {
+  const others = channels.filter(({ id }) => id !== channel.id).map(({ color }) => toHex(color));
+  return { ...colourOf(COLOR, channel, channel.id), free: freeColours(others) };
+}
+
 function cardOf(
   channel: ChannelState,
+  { channels }: ViewerState,
   { ranges, histogram = null, objects = [] }: ChannelFacts,
   view: PanelView,
 ): Group {
@@ -94,9 +103,8 @@ function cardOf(
   }
   return {
     ...head,
-    controls: [
-      controlOf(COLOR, channel, id),
-      shownToggle(channel),
+    controls: [ownColour(channel, channels), shownToggle(channel)],
+    more: [
       controlOf(VOLUME, channel, id),
       {
         kind: "choice",
@@ -112,8 +120,6 @@ function cardOf(
         refusal: channel.volume ? "" : "Only volumes have one.",
         to: (each) => ({ type: "choose-transfer-function", channel: id, name: each }),
       },
-    ],
-    more: [
       ...CHANNEL.filter((row) => row !== COLOR && row !== VOLUME).map((row) =>
         controlOf(row, channel, id),
       ),
@@ -191,7 +197,7 @@ function addingOf(
     });
   }
   for (const channel of found.slice(page * PAGE, (page + 1) * PAGE)) {
-    items.push(rowOf(cardOf(channel, facts, view)));
+    items.push(rowOf(cardOf(channel, state, facts, view)));
   }
   if (isLong && found.length === 0) {
     const value = `No channel of the list is called "${view.search.trim()}".`;
@@ -209,17 +215,10 @@ function addingOf(
   return items;
 }
 
-/** A card as a row of the list. Only the switch is there until the channel is shown and opened. */
+/** A card as a row of the list: swatch and switch, and the rest once the channel is shown and opened. */
 function rowOf(card: Group): Group {
-  const isSwitch = ({ id }: Control) => id === `${card.id}/shown`;
   const canOpen = !card.isDimmed || card.isOpen;
-  const rest = [...card.controls.filter((each) => !isSwitch(each)), ...card.more];
-  return {
-    ...card,
-    isCompact: true,
-    controls: card.controls.filter(isSwitch),
-    more: canOpen ? rest : [],
-  };
+  return { ...card, isCompact: true, more: canOpen ? card.more : [] };
 }
 
 export function channelItems(
@@ -227,7 +226,7 @@ export function channelItems(
   facts: ChannelFacts,
   view: PanelView,
 ): Section["items"] {
-  const cards = withCards(state, view).map((channel) => cardOf(channel, facts, view));
+  const cards = withCards(state, view).map((channel) => cardOf(channel, state, facts, view));
   return [...cards, ...addingOf(state, facts, view)];
 }
 

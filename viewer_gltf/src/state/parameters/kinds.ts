@@ -56,6 +56,8 @@ export type ChoiceParameter<On, T extends string = string> = Row<On, T> & {
   readonly names: Readonly<Record<T, string>>;
   /** Those that can be chosen now; absent: all. */
   readonly options?: (on: On) => readonly T[];
+  /** Long names: a list to open, where others stand side by side. */
+  readonly isListed?: boolean;
   /** The key for the next one. */
   readonly key?: KeyWords;
   /** A value that stays with the user: no link has it, no key leads to it. */

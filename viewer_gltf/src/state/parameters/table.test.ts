@@ -29,7 +29,7 @@ describe("the parameters", () => {
   it("say what they do, where their names can't", () => {
     // what these do, anyone sees: of another the row has to say it
     const plain =
-      /^(color|opacity|volume|tool|measure-kind|dwell|quality|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|sharpness|lamp|post).*|lamp-.*)$/;
+      /^(color|opacity|volume|mode|tool|measure-kind|dwell|quality|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|sharpness|lamp|post).*|lamp-.*)$/;
     const silent = [...PARAMETERS, ...CHANNEL].filter(({ about }) => !about).map(({ id }) => id);
     expect(silent.filter((id) => !plain.test(id))).toEqual([]);
     for (const { about } of PARAMETERS) expect(about ?? "").toMatch(/^$|^[A-Z0-9].*\.$/);

@@ -5,6 +5,7 @@ import {
   followHeading,
   headPose,
   predictTurn,
+  REST_MS,
   type Reading,
   toQuaternion,
 } from "./orientation";
@@ -71,27 +72,52 @@ describe("the phone's turn", () => {
 
 describe("the way ahead", () => {
   const turned = (yaw_deg: number) => toQuaternion(reading(90 + yaw_deg, 0, -90), 90);
+  /** After a phone has rested so, for a second. */
+  const rested = (head: Quaternion, isAcross = true, heading = FREE_HEADING) => {
+    const first = followHeading(heading, head, isAcross, 0);
+    return followHeading(first, head, isAcross, 1000);
+  };
 
-  it("is where the phone looks when it is level and across, and stays there", () => {
-    const heading = followHeading(FREE_HEADING, turned(70), true);
+  it("is where the phone has rested for half a second, level and across, and stays there", () => {
+    let heading = followHeading(FREE_HEADING, turned(70), true, 0);
+    heading = followHeading(heading, turned(70.5), true, REST_MS - 10); // heads tremble
+    expect(heading.isHeld).toBe(false);
+    heading = followHeading(heading, turned(70), true, REST_MS);
     expect(heading.isHeld).toBe(true);
     expectVector(headPose(turned(70), heading).toArray(), [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
-    expect(followHeading(heading, turned(120), true)).toBe(heading);
+    expect(followHeading(heading, turned(120), true, 9000)).toBe(heading);
     const left = new Vector3(0, 0, -1).transformDirection(headPose(turned(160), heading));
     expectVector(left.toArray(), [-1, 0, 0]);
   });
 
+  it("goes along while hands lift the phone to the eyes, though it is level on the way", () => {
+    let heading = FREE_HEADING;
+    for (let time_ms = 0; time_ms <= 1500; time_ms += 20) {
+      heading = followHeading(heading, turned(time_ms / 20), true, time_ms);
+      expect(heading.isHeld).toBe(false);
+      const ahead = new Vector3(0, 0, -1).transformDirection(
+        headPose(turned(time_ms / 20), heading),
+      );
+      expectVector(ahead.toArray(), [0, 0, -1]);
+    }
+    for (let time_ms = 1520; time_ms <= 2100; time_ms += 20) {
+      heading = followHeading(heading, turned(75), true, time_ms);
+    }
+    expect(heading.isHeld).toBe(true);
+    expect((heading.yaw_rad * 180) / Math.PI).toBeCloseTo(75, 9);
+  });
+
   it("goes along as long as the phone is in a hand", () => {
-    expect(followHeading(FREE_HEADING, turned(10), false).isHeld).toBe(false);
+    expect(rested(turned(10), false).isHeld).toBe(false);
     const flat = toQuaternion(reading(30, 0, 0), 0);
-    const heading = followHeading(FREE_HEADING, flat, true);
+    const heading = rested(flat);
     expect(heading.isHeld).toBe(false);
     expect((heading.yaw_rad * 180) / Math.PI).toBeCloseTo(30, 9);
   });
 
   it("keeps the horizon: only the heading is taken out", () => {
     const tilted = toQuaternion(reading(270 + 50, 180, 60), 90); // 30 degrees up
-    const heading = followHeading(FREE_HEADING, tilted, true);
+    const heading = rested(tilted);
     const pose = new Euler().setFromRotationMatrix(headPose(tilted, heading), "YXZ");
     expect((pose.x * 180) / Math.PI).toBeCloseTo(30, 9);
     expect(pose.y).toBeCloseTo(0, 9);
@@ -99,7 +125,7 @@ describe("the way ahead", () => {
   });
 
   it("turns about the neck: the eyes go where the nose goes", () => {
-    const heading = followHeading(FREE_HEADING, turned(0), true);
+    const heading = rested(turned(0));
     const eyes = new Vector3().setFromMatrixPosition(headPose(turned(90), heading));
     expectVector(eyes.toArray(), [-0.08, 0, 0.08]); // from before the neck to left of it
   });

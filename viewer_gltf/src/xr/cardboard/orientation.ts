@@ -13,8 +13,19 @@ import { Matrix4, Quaternion, Vector3 } from "three";
 export type Reading = Readonly<{ alpha_deg: number; beta_deg: number; gamma_deg: number }>;
 
 /** Which way of the earth is ahead in the room, as a turn about the vertical. */
-export type Heading = Readonly<{ yaw_rad: number; isHeld: boolean }>;
-export const FREE_HEADING: Heading = { yaw_rad: 0, isHeld: false };
+export type Heading = Readonly<{
+  yaw_rad: number;
+  /** Whether it stays; else it goes along with the phone. */
+  isHeld: boolean;
+  /** The turn from which the phone has hardly moved, level and across, and since when; null: it moves. */
+  rest: Readonly<{ head: Quaternion; since_ms: number }> | null;
+}>;
+export const FREE_HEADING: Heading = { yaw_rad: 0, isHeld: false, rest: null };
+
+/** Time for which a phone rests that has come to its place before the eyes, ms. */
+export const REST_MS = 500;
+/** Largest turn of a phone that rests, radians: a head trembles by a quarter of it. */
+const REST_RAD = (2 * Math.PI) / 180;
 
 const X = new Vector3(1, 0, 0);
 const Y = new Vector3(0, 1, 0);
@@ -43,16 +54,27 @@ export function toQuaternion(
 }
 
 /**
- * Ahead is where the phone looks when it first looks about level and is held across: then it is in
- * the viewer. Until then ahead goes along, since the button is tapped with the phone in a hand.
+ * Ahead is where the phone looks when it has rested for half a second, about level and across: then it is in the
+ * viewer, before the eyes. Until then ahead goes along, since the button is tapped with the phone in a hand, and the
+ * hand then lifts phone and viewer to the eyes.
  */
-export function followHeading(heading: Heading, head: Quaternion, isAcross: boolean): Heading {
+export function followHeading(
+  heading: Heading,
+  head: Quaternion,
+  isAcross: boolean,
+  time_ms: number,
+): Heading {
   if (heading.isHeld) return heading;
   const ahead = vector.set(0, 0, -1).applyQuaternion(head);
   const isLevel = Math.abs(ahead.y) < STEEP;
   // On a table, the screen up, the way ahead is that of the screen's upper edge.
   if (!isLevel) ahead.set(0, ahead.y < 0 ? 1 : -1, 0).applyQuaternion(head);
-  return { yaw_rad: Math.atan2(-ahead.x, -ahead.z), isHeld: isLevel && isAcross };
+  const yaw_rad = Math.atan2(-ahead.x, -ahead.z);
+  if (!isLevel || !isAcross) return { yaw_rad, isHeld: false, rest: null };
+  const { rest } = heading;
+  const isAtRest = rest !== null && rest.head.angleTo(head) < REST_RAD;
+  const next = isAtRest ? rest : { head: head.clone(), since_ms: time_ms };
+  return { yaw_rad, isHeld: time_ms - next.since_ms >= REST_MS, rest: next };
 }
 
 /** The head's pose in the room, metres: the origin is where the eyes are looking ahead, -z. */
@@ -121,9 +143,10 @@ export class HeadSensor {
     );
   }
 
-  /** Ahead is where the phone looks now, or as soon as it is level. */
+  /** Ahead is where the phone looks now; if it isn't level and across, where it looks once it has rested so. */
   recentre(): void {
-    this.heading = FREE_HEADING;
+    const rest = { head: this.head.clone(), since_ms: Number.NEGATIVE_INFINITY };
+    this.heading = { ...FREE_HEADING, rest };
   }
 
   /**
@@ -139,7 +162,7 @@ export class HeadSensor {
     }
     if (this.last === null) return out.identity();
     predictTurn(this.before, this.last, at_ms - this.last.time_ms, this.head);
-    this.heading = followHeading(this.heading, this.head, innerWidth > innerHeight);
+    this.heading = followHeading(this.heading, this.head, innerWidth > innerHeight, at_ms);
     return headPose(this.head, this.heading, out);
   }
 

@@ -18,7 +18,6 @@ type OldDocument = { webkitFullscreenElement?: Element | null; webkitExitFullscr
 const NO_FULL_SCREEN =
   "This browser gives no full screen to a page: on an iPhone, add the page to the home screen, " +
   "and open it from there.";
-const NO_LOCK = "This browser can't keep the picture across: lock the phone's own rotation.";
 const NO_WAKE_LOCK = "This browser can't keep the screen on: the phone may dim after a while.";
 
 /**
@@ -61,8 +60,7 @@ export async function holdScreen(
   }
 
   // Android locks in full screen only.
-  const isLocked = await succeeds(orientation?.lock?.call(orientation, "landscape"));
-  if (!isLocked && !matches("(orientation: landscape)")) problems.push(NO_LOCK);
+  await succeeds(orientation?.lock?.call(orientation, "landscape")); // else the turn sign asks for it
 
   if (!(await awake)) problems.push(NO_WAKE_LOCK);
   // A page that was hidden has lost its lock.

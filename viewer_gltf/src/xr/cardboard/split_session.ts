@@ -26,6 +26,7 @@ import { type Gesture, listenForFingers } from "./fingers";
 import { cssPixelsPerInch, screenOf } from "./lens";
 import { HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientation";
 import type { ScreenHold } from "./screen";
+import { TurnSign } from "./turn_sign";
 import type { Asked } from "./user_gesture";
 import { CARDBOARD_V2, type Profile } from "./viewer_profile";
 
@@ -107,6 +108,8 @@ export class SplitSession {
       throw new BundleError(ORIENTATION_REFUSED);
     }
     running.problems = found === "absent" ? [...problems, ORIENTATION_ABSENT] : problems;
+    await running.sign.turned();
+    if (this.running !== running) return; // left while the phone was upright
     this.update();
     running.hasStarted = true;
     this.onStart();
@@ -163,8 +166,9 @@ export class SplitSession {
 /** Changes that last as long as one session, and are undone with it. */
 class Running {
   readonly sensor = new HeadSensor();
+  readonly sign: TurnSign;
   problems: readonly string[] = [];
-  /** False while the browser asks the user for the orientation. */
+  /** False while the browser asks the user for the orientation, and while the phone is upright. */
   hasStarted = false;
   private readonly stage: HTMLElement;
   private readonly hold: Promise<ScreenHold>;
@@ -191,6 +195,7 @@ class Running {
       borderInlineWidth: notch,
       zIndex,
     });
+    this.sign = new TurnSign(stage, end);
     listenForFingers(stage, onGesture, signal);
     const onKey = (event: KeyboardEvent) => {
       if (event.key !== "Escape") return;
@@ -207,6 +212,7 @@ class Running {
     if (this.stopped.signal.aborted) return;
     this.stopped.abort();
     this.sensor.dispose();
+    this.sign.dispose();
     this.stage.style.cssText = this.style;
     void this.hold.then(({ release }) => release());
     // Not if the user went back, nor if the page has written another address over the step.

@@ -8,7 +8,7 @@ import {
   MeshBasicMaterial,
   PlaneGeometry,
   SRGBColorSpace,
-  type Vector3,
+  Vector3,
 } from "three";
 import { leaveUncut } from "../../gpu/unclipped_material";
 import type { RoomRay } from "../../interaction/ray_pointer";
@@ -17,7 +17,8 @@ import { PX_PER_M } from "../../panel/canvas/page";
 import { paint } from "../../panel/canvas/paint";
 
 const LIT = 0xffffff;
-const LIT_OPACITY = 0.14;
+/** In linear light, in which 0.04 looks like a fifth of white. */
+const LIT_OPACITY = 0.04;
 /** Distance before the quad, m. */
 const LIT_M = 0.001;
 /** Anisotropy of the texture, samples: the user may see the text aslant. */
@@ -35,15 +36,16 @@ export class CanvasQuad {
   private painted = "";
   private readonly toQuad = new Matrix4();
 
-  /** @param context of the canvas that is painted; null: nothing is painted, as in a test without a browser */
+  /** @param context of the canvas that is painted; null or `undefined`: none, as in a test, or a new one */
   constructor(
     readonly width: number,
     readonly height: number,
     private readonly context: CanvasRenderingContext2D | null = newContext(width, height),
+    private readonly pxPerM = PX_PER_M,
   ) {
     this.texture = context === null ? null : textureOf(context.canvas);
     this.mesh = new Mesh(
-      new PlaneGeometry(width / PX_PER_M, height / PX_PER_M),
+      new PlaneGeometry(width / pxPerM, height / pxPerM),
       new MeshBasicMaterial({ map: this.texture, toneMapped: false }),
     );
     this.mesh.visible = false;
@@ -69,6 +71,17 @@ export class CanvasQuad {
       mesh.material.depthTest = mesh.material.depthWrite = false;
       mesh.renderOrder = renderOrder + i;
     }
+  }
+
+  /** Where a part of it is in the room. @param across, down shares of the rect, from its upper left corner */
+  pointOf({ x, y, width, height }: Rect, across = 0.5, down = 0.5): Vector3 {
+    return this.mesh.localToWorld(
+      new Vector3(
+        (x + across * width - this.width / 2) / this.pxPerM,
+        (this.height / 2 - y - down * height) / this.pxPerM,
+        0,
+      ),
+    );
   }
 
   /** True if the picture differs from what was painted before. */
@@ -99,8 +112,8 @@ export class CanvasQuad {
     const to = direction.clone().transformDirection(this.toQuad);
     if (from.z <= 0 || to.z >= 0) return null;
     const distance_m = -from.z / to.z; // the quad is not scaled
-    const x = (from.x + distance_m * to.x) * PX_PER_M + this.width / 2;
-    const y = this.height / 2 - (from.y + distance_m * to.y) * PX_PER_M;
+    const x = (from.x + distance_m * to.x) * this.pxPerM + this.width / 2;
+    const y = this.height / 2 - (from.y + distance_m * to.y) * this.pxPerM;
     const whole: Rect = { x: 0, y: 0, width: this.width, height: this.height };
     return holds(whole, { x, y }) ? { x, y, distance_m } : null;
   }
@@ -111,11 +124,11 @@ export class CanvasQuad {
     if (rect === null) return;
     const { x, y, width, height } = rect;
     this.lit.position.set(
-      (x + width / 2 - this.width / 2) / PX_PER_M,
-      (this.height / 2 - y - height / 2) / PX_PER_M,
+      (x + width / 2 - this.width / 2) / this.pxPerM,
+      (this.height / 2 - y - height / 2) / this.pxPerM,
       LIT_M,
     );
-    this.lit.scale.set(width / PX_PER_M, height / PX_PER_M, 1);
+    this.lit.scale.set(width / this.pxPerM, height / this.pxPerM, 1);
   }
 
   dispose(): void {

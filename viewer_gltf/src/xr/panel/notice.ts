@@ -10,6 +10,7 @@ import {
   announce,
   NO_ANNOUNCEMENTS,
   NOTICE_HEIGHT,
+  NOTICE_PX_PER_M,
   NOTICE_WIDTH,
   noticeMarks,
 } from "./notice_queue";
@@ -28,7 +29,8 @@ export class RoomNotice {
 
   /** @param isPainted false: nothing is painted, as in a test without a browser */
   constructor(isPainted = true) {
-    this.quad = new CanvasQuad(NOTICE_WIDTH, NOTICE_HEIGHT, isPainted ? undefined : null);
+    const context = isPainted ? undefined : null;
+    this.quad = new CanvasQuad(NOTICE_WIDTH, NOTICE_HEIGHT, context, NOTICE_PX_PER_M);
     this.quad.drawOver(RENDER_ORDER);
     this.quad.mesh.name = "notice";
   }

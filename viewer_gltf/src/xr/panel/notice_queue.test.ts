@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { Rect } from "../../panel/canvas/draw_list";
-import { HOW_IT_WORKS } from "../stereo";
+import { howItWorks } from "../stereo";
 import {
   ANNOUNCED_S,
   type Announcements,
@@ -45,9 +45,9 @@ describe("notices in stereo", () => {
     const sizesOf = (...texts: readonly string[]) =>
       noticeMarks(texts).flatMap((mark) => (mark.kind === "text" ? [mark.size] : []));
     // over 2 degrees, of which a phone of 280 pixels an eye makes 6 pixels
-    expect(Math.min(...sizesOf(HOW_IT_WORKS))).toBeGreaterThan(60);
+    expect(Math.min(...sizesOf(howItWorks("before-eyes")))).toBeGreaterThan(60);
     expect(sizesOf("Quality: low", "Choosing by gaze: off")).toEqual([80, 80]);
-    expect(sizesOf("a word ".repeat(60))).toEqual([28]);
+    expect(sizesOf("a word ".repeat(60))).toEqual([48]);
   });
 
   it("fits the plane, however long", () => {

@@ -2,7 +2,7 @@
  * Notices before the eyes in stereo, where nobody sees the page: a few texts under each other,
  * the newest last. One after the other goes by itself. Pure.
  */
-import { type Mark, type Rect, TEXT, text } from "../../panel/canvas/draw_list";
+import { type Mark, type Rect, text } from "../../panel/canvas/draw_list";
 
 /** Time for the oldest notice, s: then it goes, and the next one has as long. */
 export const ANNOUNCED_S = 5;
@@ -34,9 +34,11 @@ export function advanceAnnouncements(announcements: Announcements, dt_s: number)
 export const NOTICE_WIDTH = 1040;
 const PAD = 16;
 /** Letters as large as all texts have room for, px: on a phone's half of a screen small ones can't be read. */
-const SIZES = [80, 56, 40, TEXT] as const;
+const SIZES = [80, 60, 48] as const;
+const SMALLEST = SIZES[SIZES.length - 1];
 const MAX_LINES = 4;
-export const NOTICE_HEIGHT = MAX_NOTICES * (MAX_LINES * pitchOf(TEXT) + 3 * PAD);
+export const NOTICE_HEIGHT = MAX_NOTICES * (MAX_LINES * pitchOf(SMALLEST) + 3 * PAD);
+export const NOTICE_PX_PER_M = 1600;
 
 function pitchOf(size: number): number {
   return Math.ceil(1.15 * size);
@@ -54,7 +56,7 @@ function sizeFor(texts: readonly string[]): number {
     const height = lines.reduce((sum, each) => sum + each * pitchOf(size) + 3 * PAD, 0);
     return height <= NOTICE_HEIGHT && Math.max(...lines) <= MAX_LINES;
   };
-  return SIZES.find(fits) ?? TEXT;
+  return SIZES.find(fits) ?? SMALLEST;
 }
 
 /** From the top of the plane; what is not covered stays clear. */

@@ -1,15 +1,15 @@
 /**
- * The panel in the room: a quad with one section of the layout at a time, and a button under all
- * that is looked at, which opens and closes it. It opens in that button's place, straight below the gaze.
+ * The panel in the room: one page of the layout at a time on a quad, and the bar below the specimen, which is
+ * always there and opens it.
  */
 import { Group, type Matrix4, Vector3 } from "three";
 import type { Hit, RoomRay, Target } from "../../interaction/ray_pointer";
-import { type CanvasWish, holds, type Rect, type Region, text } from "../../panel/canvas/draw_list";
+import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../../panel/canvas/bar";
+import { type CanvasWish, holds, type Mark, type Region } from "../../panel/canvas/draw_list";
 import {
   type CanvasView,
   HEIGHT,
   type Page,
-  PX_PER_M,
   pageOf,
   START_CANVAS,
   WIDTH,
@@ -24,27 +24,29 @@ import {
 import { keepPlaces } from "../../panel/sections/channels";
 import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
+import { START_VOLUMES } from "../../state/parameters/volumes";
 import type { ViewerState } from "../../state/viewer_state";
 import { CanvasQuad, type Spot } from "./canvas_quad";
 import {
   type Bearing,
+  barPitch,
+  bearingOf,
   followHead,
   headBearing,
-  openerPitch,
   panelBearing,
+  panelDistance_m,
   pointAt,
+  type Setting,
 } from "./placement";
 
-const DISTANCE_M = 1.2;
 /** Over a specimen that is brought nearer than the panel, by which it is brought; under a notice. */
 const RENDER_ORDER = 1800;
-const OPENER_M = 0.7;
-const OPENER: Rect = { x: 0, y: 0, width: 208, height: 80 };
 /** Time between readings of values outside the state (frame time, gazed tile), s. */
 const REFRESH_S = 0.5;
+/** Time, s, after which colours lie beside a swatch that is looked at. */
+const FAN_S = 0.4;
 
 export const PANEL = "panel:";
-const OPENER_KEY = "opener";
 
 export type RoomPanelOptions = Readonly<{
   layOut: (view: PanelView) => Layout;
@@ -54,66 +56,140 @@ export type RoomPanelOptions = Readonly<{
   onLenses: (lenses: Lenses) => void;
   /** Reports why a request can't be granted. */
   onAnnounce: (text: string) => void;
+  /** The last choice is undone. */
+  onUndo: () => void;
+  /** The specimen is taken hold of by the gaze along a ray; then it is carried along others. */
+  onCarry: (ray: RoomRay, isStart: boolean) => void;
   /** Absent: true. False: nothing is painted, as in a test without a browser. */
   isPainted?: boolean;
 }>;
+
+type Shown = Readonly<{ marks: readonly Mark[]; regions: readonly Region[] }>;
 
 function placeOf({ rect: { x, y, width, height } }: Region): string {
   return `${x} ${y} ${width} ${height}`;
 }
 
-export class RoomPanel {
-  readonly group = new Group();
-  readonly quad: CanvasQuad;
-  private readonly opener: CanvasQuad;
-  /** In the order in which rays meet them. */
-  readonly targets: readonly Target[];
-  private page: Page = { marks: [], regions: [] };
-  /** The places of the page's controls, and the number of times that they have changed. */
+/** A quad with targets: the page, or the bar. */
+class Surface implements Target {
+  readonly isOnTop = true;
+  shown: Shown = { marks: [], regions: [] };
+  /** The places of the targets, and the number of times that they have changed. */
   private arrangement = "";
   private changes = 0;
+
+  constructor(
+    private readonly name: string,
+    readonly quad: CanvasQuad,
+    private readonly onChoose: (region: Region, spot: Spot, ray: RoomRay, isPress: boolean) => void,
+    /** Lays the targets out again, if a choice has changed them. */
+    private readonly freshen: () => void,
+  ) {
+    quad.drawOver(RENDER_ORDER);
+  }
+
+  /** Changes whenever a target appears, disappears or moves. */
+  get layout(): string {
+    return `${this.name} ${this.quad.mesh.visible} ${this.changes}`;
+  }
+
+  /** Whether it looks otherwise than before. */
+  show(shown: Shown): boolean {
+    this.shown = shown;
+    const arrangement = shown.regions.map((each) => `${each.id} ${placeOf(each)}`).join("\n");
+    if (arrangement !== this.arrangement) this.changes++;
+    this.arrangement = arrangement;
+    return this.quad.show(shown.marks);
+  }
+
+  /** Light up what is pointed at. */
+  light(id: string | null): void {
+    this.quad.light(this.shown.regions.find((region) => region.id === id)?.rect ?? null);
+  }
+
+  meet(ray: RoomRay): Hit | null {
+    const spot = this.quad.meet(ray);
+    if (spot === null) return null;
+    const region = this.shown.regions.find(({ rect }) => holds(rect, spot));
+    const { distance_m } = spot;
+    if (region === undefined) return { key: null, distance_m };
+    const { id, repeats, isStep, isCarry, isGlance } = region;
+    const hit: Hit = { key: PANEL + id, distance_m, place: placeOf(region), isStep, isGlance };
+    if (repeats !== undefined) return { ...hit, repeats, isStep: true };
+    if (isCarry) return { ...hit, hold: "carry" };
+    if (!region.isSlide) return hit;
+    // what is first taken hold of can be carried by the gaze alone
+    return { ...hit, hold: region.press === undefined ? "slide" : "carry" };
+  }
+
+  choose({ key }: Hit, ray: RoomRay): void {
+    if (key !== null) this.grant(key, ray, true);
+  }
+
+  drag(key: string, ray: RoomRay): void {
+    this.freshen(); // what was taken hold of is part of it by now
+    this.grant(key, ray, false);
+  }
+
+  private grant(key: string, ray: RoomRay, isPress: boolean): void {
+    const region = this.shown.regions.find(({ id }) => PANEL + id === key);
+    const spot = this.quad.meet(ray);
+    if (region === undefined || (spot === null && !region.isCarry)) return;
+    this.onChoose(region, spot ?? { x: 0, y: 0, distance_m: 0 }, ray, isPress);
+  }
+}
+
+export class RoomPanel {
+  readonly group = new Group();
+  private readonly menu: Surface;
+  private readonly bar: Surface;
+  private page: Page | null = null;
   private view: PanelView = START_VIEW;
   private section: CanvasView = START_CANVAS;
   private state: ViewerState | null = null;
   private isStale = true;
   private rested_s = 0;
   /** null until the first frame gives the head's direction. */
-  private openerYaw: number | null = null;
-  /** It opens with the next frame, which knows where the eye is. */
-  private wantsPlace = false;
+  private barYaw: number | null = null;
+  /** It opens with the next frame, which knows where the eye is: over the bar, or where the head faces. */
+  private wantsPlace: "bar" | "head" | null = null;
   /** The last request: a button that is held still asks for nothing more. */
   private dragged = "";
+  /** The target that is pointed at, and for how long. */
+  private lit: string | null = null;
+  private lit_s = 0;
+  private lastMode = START_VOLUMES.mode;
+  /** The page of the section from which a group was opened. */
+  private sectionPage = 0;
+  /** Whether the last choice can be undone by the bar. */
+  canUndo = false;
+  /** The specimen is carried: the bar would be in the way. */
+  isCarrying = false;
 
   constructor(private readonly options: RoomPanelOptions) {
     const context = options.isPainted === false ? null : undefined;
-    this.quad = new CanvasQuad(WIDTH, HEIGHT, context);
-    this.opener = new CanvasQuad(OPENER.width, OPENER.height, context);
+    const choose = (region: Region, spot: Spot, ray: RoomRay, isPress: boolean) =>
+      this.choose(region, spot, ray, isPress);
+    const freshen = () => {
+      if (this.isStale && this.state !== null) this.refresh(this.state);
+    };
+    this.menu = new Surface("menu", new CanvasQuad(WIDTH, HEIGHT, context), choose, freshen);
+    this.bar = new Surface("bar", new CanvasQuad(BAR_WIDTH, BAR_HEIGHT, context), choose, freshen);
     this.group.name = "panel";
     this.group.visible = false;
-    this.group.add(this.quad.mesh, this.opener.mesh);
-    this.opener.mesh.visible = true;
-    for (const quad of [this.quad, this.opener]) quad.drawOver(RENDER_ORDER);
-    const layout = () => this.layout;
-    this.targets = [
-      {
-        isOnTop: true,
-        get layout() {
-          return layout();
-        },
-        meet: (ray) => this.meet(ray),
-        choose: (hit, ray) => this.choose(hit, ray),
-        drag: (key, ray) => this.drag(key, ray),
-      },
-      {
-        isOnTop: true,
-        meet: (ray) => this.meetOpener(ray),
-        choose: () => this.toggle(),
-      },
-    ];
-    this.paintOpener();
+    this.group.add(this.menu.quad.mesh, this.bar.quad.mesh);
   }
 
-  /** What the page's own panel has chosen, and this one shows. */
+  /** In the order in which rays meet them. */
+  get targets(): readonly Target[] {
+    return [this.menu, this.bar];
+  }
+
+  get quad(): CanvasQuad {
+    return this.menu.quad;
+  }
+
+  /** The page's own panel has chosen it, and this one shows it. */
   take(view: Partial<PanelView>): void {
     this.view = { ...this.view, ...view };
     this.isStale = true;
@@ -123,79 +199,76 @@ export class RoomPanel {
     return this.quad.mesh.visible;
   }
 
-  /** Changes whenever a control appears, disappears or moves. */
-  private get layout(): string {
-    return `panel ${this.isOpen} ${this.changes}`;
-  }
-
-  /** The regions to point at now, for tests and for a program that reads them aloud. */
+  /** The regions of the menu to point at now, for tests and for a program that reads them aloud. */
   get regions(): readonly Region[] {
-    return this.isOpen ? this.page.regions : [];
+    return this.isOpen ? [...this.menu.shown.regions, ...this.bar.shown.regions] : [];
   }
 
-  /** The specimen stands on a table: where the button hangs else it would be before it. */
-  isTableBelow = false;
-  /** And the panel, too. A screen in a hand shows the table alone: there it has to be before it. */
-  isOverTable = false;
+  /** What the specimen stands before. */
+  setting: Setting = "before-eyes";
 
   /** Stereo has begun, or has ended. */
   setShown(isShown: boolean): void {
     this.group.visible = isShown;
-    this.openerYaw = null;
+    this.barYaw = null;
+    this.canUndo = this.isCarrying = false;
     if (!isShown) this.close();
   }
 
   close(): void {
     this.quad.mesh.visible = false;
-    this.paintOpener();
+    this.isStale = true;
   }
 
   toggle(): void {
     if (this.isOpen) this.close();
-    else this.wantsPlace = true;
+    else this.wantsPlace = "head";
   }
 
   /** Whether it looks otherwise than before. */
   update(dt_s: number, head: Matrix4, state: ViewerState): boolean {
     const eye = new Vector3().setFromMatrixPosition(head);
     const bearing = headBearing(head);
-    this.openerYaw = followHead(this.openerYaw ?? bearing.yaw, bearing, dt_s);
-    const at = pointAt(
-      { yaw: this.openerYaw, pitch: openerPitch(this.isOpen || this.isTableBelow) },
-      eye,
-      OPENER_M,
-    );
-    this.opener.place(at, eye);
+    const { setting } = this;
+    this.barYaw = followHead(this.barYaw ?? bearing.yaw, bearing, dt_s, setting);
     let isChanged = false;
-    if (this.wantsPlace) {
-      this.wantsPlace = false;
-      this.open(eye, panelBearing(bearing, this.openerYaw, this.isOverTable));
+    if (this.wantsPlace !== null) {
+      const { pitch, yaw } = panelBearing(bearing, this.barYaw, setting);
+      this.open(eye, { pitch, yaw: this.wantsPlace === "bar" ? this.barYaw : yaw });
+      this.wantsPlace = null;
       isChanged = true;
     }
-    if (!this.isOpen) return isChanged;
+    // the bar hangs under the panel while that is open
+    if (this.isOpen) this.barYaw = bearingOf(this.quad.mesh.position.clone().sub(eye)).yaw;
+    const under: Bearing = { yaw: this.barYaw, pitch: barPitch(setting, this.isOpen) };
+    this.bar.quad.place(pointAt(under, eye, panelDistance_m(setting)), eye);
+    this.bar.quad.mesh.visible = !this.isCarrying;
     this.rested_s += dt_s;
+    this.fan(dt_s);
     if (state !== this.state || this.rested_s >= REFRESH_S) this.isStale = true;
-    this.view = keepPlaces(this.view, state);
+    if (this.isOpen) this.view = keepPlaces(this.view, state);
     this.state = state;
-    if (!this.isStale) return isChanged;
-    return this.refresh() || isChanged;
+    if (state.mode !== "off") this.lastMode = state.mode;
+    const isMenuNew = this.isStale && this.refresh(state);
+    const isBarNew = this.bar.show(
+      barOf({ state, page: this.page, canUndo: this.canUndo, lastMode: this.lastMode }),
+    );
+    return isMenuNew || isBarNew || isChanged;
   }
 
   /** Light up what is pointed at. */
   light(key: string | null): void {
     const id = key?.startsWith(PANEL) ? key.slice(PANEL.length) : null;
-    this.quad.light(this.page.regions.find((region) => region.id === id)?.rect ?? null);
-    this.opener.light(key === OPENER_KEY ? OPENER : null);
+    if (id !== this.lit) this.lit_s = 0;
+    this.lit = id;
+    for (const surface of [this.menu, this.bar]) surface.light(id);
   }
 
-  /**
-   * The button and what the panel has now, each with a point of it in the room: of a slider at 0.3 of it;
-   * none on a flat screen.
-   */
+  /** The bar and what the panel has now, each with a point of it in the room: of a slider at 0.3 of it. */
   get places(): readonly Readonly<{ id: string; label: string; at: Vector3 }>[] {
-    if (!this.group.visible) return [];
-    const opener = { id: OPENER_KEY, label: this.openerLabel, isSlide: false };
-    return [opener, ...this.regions].flatMap(({ id, label, isSlide }) => {
+    if (!this.group.visible) return []; // a flat screen
+    const all = [...(this.isOpen ? this.menu.shown.regions : []), ...this.bar.shown.regions];
+    return all.flatMap(({ id, label, isSlide }) => {
       const at = this.pointOf(id, isSlide ? 0.3 : 0.5);
       return at === null ? [] : [{ id, label, at }];
     });
@@ -203,7 +276,7 @@ export class RoomPanel {
 
   /** What was ahead is another way of the room now: the panel stays where it is to the head. */
   comeAlong(from: Matrix4, to: Matrix4): void {
-    this.openerYaw = null;
+    this.barYaw = null;
     const { position } = this.quad.mesh;
     position.applyMatrix4(from.clone().invert()).applyMatrix4(to);
     this.quad.place(position, new Vector3().setFromMatrixPosition(to));
@@ -211,121 +284,121 @@ export class RoomPanel {
 
   /** Where the middle of a region is in the room; for tests. */
   pointOf(id: string, across = 0.5, down = 0.5): Vector3 | null {
-    const region = this.regions.find((each) => each.id === id);
-    if (id === OPENER_KEY) return this.opener.mesh.getWorldPosition(new Vector3());
-    if (region === undefined) return null;
-    const { x, y, width, height } = region.rect;
-    return this.quad.mesh.localToWorld(
-      new Vector3(
-        (x + across * width - WIDTH / 2) / PX_PER_M,
-        (HEIGHT / 2 - y - down * height) / PX_PER_M,
-        0,
-      ),
-    );
+    for (const { quad, shown } of [this.menu, this.bar]) {
+      const region = shown.regions.find((each) => each.id === id);
+      if (region !== undefined && quad.mesh.visible) return quad.pointOf(region.rect, across, down);
+    }
+    return null;
   }
 
   dispose(): void {
-    this.quad.dispose();
-    this.opener.dispose();
+    this.menu.quad.dispose();
+    this.bar.quad.dispose();
   }
 
   private open(eye: Vector3, bearing: Bearing): void {
-    this.quad.place(pointAt(bearing, eye, DISTANCE_M), eye);
+    this.quad.place(pointAt(bearing, eye, panelDistance_m(this.setting)), eye);
     this.quad.mesh.visible = true;
-    this.layOutAgain();
-    this.paintOpener();
+    this.go(START_CANVAS);
   }
 
-  /** Lay the page out again, with cards for the channels that are shown now. */
-  private layOutAgain(): void {
+  /** To another page, with cards for the channels that are shown now. */
+  private go(section: CanvasView): void {
+    this.section = section;
     this.view = { ...this.view, channelsWithCard: null };
     this.isStale = true;
   }
 
-  private refresh(): boolean {
+  /**
+   * The colours of the swatch that is looked at lie over the channel's name until the gaze has left the row for
+   * as long: a head that trembles is still there.
+   */
+  private fan(dt_s: number): void {
+    this.lit_s += dt_s;
+    if (this.lit_s < FAN_S) return;
+    const { fanned } = this.section;
+    const swatch = this.lit?.endsWith("/open") ? this.lit.slice(0, -"/open".length) : null;
+    const isInRow = fanned !== null && this.lit?.startsWith(`${fanned}/`) === true;
+    const next = swatch ?? (isInRow ? fanned : null);
+    if (next === fanned) return;
+    this.section = { ...this.section, fanned: next };
+    this.isStale = true;
+  }
+
+  private refresh(state: ViewerState): boolean {
     this.isStale = false;
     this.rested_s = 0;
+    if (!this.isOpen) {
+      this.page = null;
+      return false;
+    }
+    this.view = keepPlaces(this.view, state);
     this.page = pageOf(this.options.layOut(this.view), this.section);
-    const arrangement = this.page.regions.map((each) => `${each.id} ${placeOf(each)}`).join("\n");
-    if (arrangement !== this.arrangement) this.changes++;
-    this.arrangement = arrangement;
-    return this.quad.show(this.page.marks);
-  }
-
-  private get openerLabel(): string {
-    return this.isOpen ? "Close" : "Menu";
-  }
-
-  private paintOpener(): void {
-    this.opener.show([
-      { kind: "box", rect: OPENER, fill: "back", stroke: "accent", radius: 0 },
-      text(OPENER, this.openerLabel, { align: "center", size: 38 }),
-    ]);
-  }
-
-  private regionAt(spot: Spot): Region | null {
-    return this.page.regions.find(({ rect }) => holds(rect, spot)) ?? null;
-  }
-
-  private meet(ray: RoomRay): Hit | null {
-    const spot = this.quad.meet(ray);
-    if (spot === null) return null;
-    const region = this.regionAt(spot);
-    const { distance_m } = spot;
-    if (region === null) return { key: null, distance_m };
-    const { id, repeats, isStep } = region;
-    const hit: Hit = { key: PANEL + id, distance_m, place: placeOf(region), isStep };
-    if (repeats !== undefined) return { ...hit, repeats, isStep: true };
-    if (!region.isSlide) return hit;
-    // what is first taken hold of can be carried by the gaze alone
-    return { ...hit, hold: region.press === undefined ? "slide" : "carry" };
-  }
-
-  private meetOpener(ray: RoomRay): Hit | null {
-    const spot = this.opener.meet(ray);
-    return spot && { key: OPENER_KEY, distance_m: spot.distance_m, place: OPENER_KEY };
-  }
-
-  private choose({ key }: Hit, ray: RoomRay): void {
-    const wish = key === null ? null : this.wishAt(key, ray, true);
-    if (wish === null) return;
-    this.dragged = JSON.stringify(wish);
-    this.grant(wish);
-  }
-
-  private drag(key: string, ray: RoomRay): void {
-    if (this.isStale) this.refresh(); // what was taken hold of is part of it by now
-    const wish = this.wishAt(key, ray, false);
-    const text = JSON.stringify(wish);
-    if (wish === null || text === this.dragged) return;
-    this.dragged = text;
-    this.grant(wish);
+    return this.menu.show(this.page);
   }
 
   /** Beyond a region's ends is at its ends: a slider is dragged past them. */
-  private wishAt(key: string, ray: RoomRay, isPress: boolean): CanvasWish | null {
-    const region = this.page.regions.find(({ id }) => PANEL + id === key);
-    const spot = this.quad.meet(ray);
-    if (region === undefined || spot === null) return null;
+  private choose(region: Region, spot: Spot, ray: RoomRay, isPress: boolean): void {
+    if (region.isCarry) {
+      this.options.onCarry(ray, isPress);
+      return;
+    }
     const { x, y, width, height } = region.rect;
     const inside = (share: number) => Math.min(1, Math.max(0, share));
     const at = [inside((spot.x - x) / width), inside((spot.y - y) / height)] as const;
-    return isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
+    const wish = isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
+    const words = JSON.stringify(wish);
+    if (wish === null || (!isPress && words === this.dragged)) return;
+    this.dragged = words;
+    this.isStale = true;
+    this.grant(wish);
   }
 
   private grant(wish: CanvasWish): void {
-    this.isStale = true;
-    if (typeof wish === "string") this.options.onWish(wish);
+    const { options, section } = this;
+    if (typeof wish === "string") options.onWish(wish);
     else if ("panel" in wish) {
       this.view = changePanel(this.view, wish);
-      if (wish.panel === "lenses") this.options.onLenses(wish.lenses);
-    } else if ("type" in wish) this.options.onWish(wish);
-    else if (wish.canvas === "tab") {
-      this.section = { tab: wish.section, page: 0 };
-      this.layOutAgain();
-    } else if (wish.canvas === "page") this.section = { ...this.section, page: wish.page };
-    else if (wish.canvas === "announce") this.options.onAnnounce(wish.text);
-    else if (wish.canvas === "close") this.close();
-    else this.options.onLeave();
+      if (wish.panel === "lenses") options.onLenses(wish.lenses);
+    } else if ("type" in wish) options.onWish(wish);
+    else {
+      switch (wish.canvas) {
+        case "open":
+          this.wantsPlace = "bar";
+          break;
+        case "tab":
+          this.go({ ...START_CANVAS, tab: wish.section });
+          break;
+        case "fan":
+          this.section = { ...section, fanned: wish.group };
+          break;
+        case "group":
+          this.take({ picked: wish.group });
+          this.sectionPage = section.page;
+          this.go({ ...section, group: wish.group, page: 0, fanned: null });
+          break;
+        case "page":
+          this.section = { ...section, page: wish.page, fanned: null };
+          break;
+        case "back":
+          if (section.group === null) this.go({ ...START_CANVAS, tab: null });
+          else this.go({ ...section, group: null, page: this.sectionPage });
+          break;
+        case "announce":
+          options.onAnnounce(wish.text);
+          break;
+        case "undo":
+          options.onUndo();
+          break;
+        case "close":
+          this.close();
+          break;
+        case "leave":
+          options.onLeave();
+          break;
+        case "carry":
+          break; // see choose
+      }
+    }
   }
 }

@@ -1,33 +1,43 @@
 import { Vector3 } from "three";
 import { describe, expect, it } from "vitest";
+import { BAR_HEIGHT, BAR_WIDTH } from "../../panel/canvas/bar";
+import { HEIGHT, PX_PER_M, WIDTH } from "../../panel/canvas/page";
+import { LONGEST_EDGE_M, ROOM_DISTANCE_M, ROOM_SIZE, UNDER_EYES_M } from "../../render/placement";
 import {
+  barPitch,
   bearingOf,
   followHead,
   noticeBearing,
-  openerPitch,
   panelBearing,
+  panelDistance_m,
   pointAt,
+  type Setting,
 } from "./placement";
 
 const DEG = Math.PI / 180;
 const EYE = new Vector3(0.3, 1.6, -0.2);
-/** From the panel's middle to its edge. */
-const HALF_PITCH = 9.5 * DEG;
+const LEVEL = { yaw: 0, pitch: 0 };
+/** Half the angle of so many px of a texture, radians. */
+const half = (px: number, setting: Setting) =>
+  Math.atan(px / PX_PER_M / 2 / panelDistance_m(setting));
+/** Lower and upper edge, radians. */
+const edges = (pitch: number, height_px: number, setting: Setting) =>
+  [pitch - half(height_px, setting), pitch + half(height_px, setting)] as const;
+const panelEdges = (setting: Setting) =>
+  edges(panelBearing(LEVEL, 0, setting).pitch, HEIGHT, setting);
+const barEdges = (setting: Setting, isOpen: boolean) =>
+  edges(barPitch(setting, isOpen), BAR_HEIGHT, setting);
 
 describe("the panel's place", () => {
   it("is straight below the gaze, also of one who has turned round", () => {
     for (const yaw of [0, 0.7, 3, -2.5]) {
       for (const pitch of [0.2, 0, -0.5]) {
-        expect(panelBearing({ yaw, pitch }, 0)).toEqual({ yaw, pitch: expect.closeTo(-30 * DEG) });
+        expect(panelBearing({ yaw, pitch }, 0)).toEqual({
+          yaw,
+          pitch: expect.closeTo(-27.5 * DEG),
+        });
       }
     }
-  });
-
-  it("is over a specimen on a table, between its upper edge and a level gaze", () => {
-    const { pitch } = panelBearing({ yaw: 0, pitch: -0.7 }, 0, true);
-    const upper = Math.atan2(0.24 - 0.5, 0.9); // of 48 cm, their middle half a metre under the eyes
-    expect(pitch - HALF_PITCH).toBeGreaterThan(upper);
-    expect(pitch).toBeLessThan(0);
   });
 
   it("is where the button was for one who looks straight down, with no heading", () => {
@@ -53,13 +63,20 @@ describe("a notice", () => {
   });
 });
 
-describe("the panel's button", () => {
-  it("hangs where a level gaze finds it, and out of the panel's way while that is open", () => {
-    expect(openerPitch(false)).toBeCloseTo(-30 * DEG, 12);
-    const button = 2 * DEG; // half of its height, 0.7 m away
-    const lowest = -30 * DEG - HALF_PITCH;
-    expect(openerPitch(true) + button).toBeLessThan(lowest);
+describe("the bar", () => {
+  it("hangs where a level gaze finds it", () => {
+    expect(barPitch("before-eyes", false)).toBeCloseTo(-30 * DEG, 12);
   });
+
+  it.each(["before-eyes", "over-table", "in-hand"] as const)(
+    "is out of the open panel's way, and close under it: %s",
+    (setting) => {
+      const [, upper] = barEdges(setting, true);
+      const [lower] = panelEdges(setting);
+      expect(upper).toBeLessThan(lower);
+      expect(upper).toBeGreaterThan(lower - 2 * DEG);
+    },
+  );
 
   it("stays while the head turns a little, or looks down", () => {
     expect(followHead(0, { yaw: 0.25, pitch: 0 }, 1)).toBe(0);
@@ -71,5 +88,47 @@ describe("the panel's button", () => {
     for (let i = 0; i < 200; i++) yaw = followHead(yaw, { yaw: -2.5, pitch: 0 }, 0.05);
     expect(Math.abs(yaw)).toBeGreaterThan(2.5);
     expect(Math.abs(yaw + 2.5)).toBeLessThan(16 * DEG);
+  });
+
+  it("goes with a head that walks round a table, which looks down at the specimen", () => {
+    for (const setting of ["over-table", "in-hand"] as const) {
+      const yaw = followHead(0, { yaw: 1.5, pitch: -36 * DEG }, 1, setting);
+      expect(yaw, setting).toBeGreaterThan(1);
+      const looked = { yaw: 1.5, pitch: barPitch(setting, false) };
+      expect(followHead(0, looked, 1, setting), setting).toBe(0);
+    }
+  });
+});
+
+/** A cube on the table, as large as the specimen may be: its near lower edge, and the upper one of its middle, radians. */
+function cubeOnTable(): readonly [lower: number, upper: number] {
+  const halfEdge_m = (LONGEST_EDGE_M * ROOM_SIZE) / 2;
+  const at = (up_m: number, away_m: number) =>
+    Math.atan2(up_m - UNDER_EYES_M, ROOM_DISTANCE_M + away_m);
+  return [at(-halfEdge_m, -halfEdge_m), at(halfEdge_m, 0)];
+}
+
+describe("a specimen on a table", () => {
+  const [lower, upper] = cubeOnTable();
+
+  it("is hidden neither by panel nor by bar before a head, which reaches both", () => {
+    for (const isOpen of [false, true]) {
+      expect(barEdges("over-table", isOpen)[0]).toBeGreaterThan(upper);
+    }
+    expect(panelEdges("over-table")[0]).toBeGreaterThan(upper);
+    expect(panelEdges("over-table")[1]).toBeLessThan(37 * DEG);
+  });
+
+  it("is not hidden by the bar on a phone's screen, whose picture holds bar and panel", () => {
+    for (const isOpen of [false, true]) {
+      expect(barEdges("in-hand", isOpen)[1]).toBeLessThan(lower);
+    }
+    const middle = Math.atan2(-UNDER_EYES_M, ROOM_DISTANCE_M);
+    // an upright phone's camera shows about 65 x 35 degrees
+    expect(barEdges("in-hand", true)[0]).toBeGreaterThan(middle - 32.5 * DEG);
+    expect(panelEdges("in-hand")[1]).toBeLessThan(middle + 32.5 * DEG);
+    for (const width of [WIDTH, BAR_WIDTH]) {
+      expect(half(width, "in-hand")).toBeLessThan(17.5 * DEG);
+    }
   });
 });

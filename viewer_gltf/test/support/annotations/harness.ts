@@ -103,6 +103,8 @@ type View = Readonly<{
   target: Vec3;
   isStereo?: boolean;
   isPanelOpen?: boolean;
+  /** In the user's own room the bar does not hang below the specimen. */
+  isInUsersRoom?: boolean;
   dt_s?: number;
 }>;
 
@@ -208,6 +210,7 @@ class Bench {
       gaze: rayAhead(camera.matrixWorld, specimen.group),
       disc: null,
       isPanelOpen: view.isPanelOpen ?? false,
+      isBarBelow: view.isStereo === true && view.isInUsersRoom !== true,
       dt_s: view.dt_s ?? 0,
     });
     this.renderer.render(this.scene, camera);
@@ -286,10 +289,12 @@ class Bench {
     this.marks.target.drag(key, gazeOf(this.camera.matrixWorld));
   }
 
-  ruler(): { length_um: number; isVisible: boolean; hasAxes: boolean } {
+  /** `up_um`: height of the ruler's middle. */
+  ruler(): { length_um: number; up_um: number; isVisible: boolean; hasAxes: boolean } {
     const { ruler, axes } = this.marks;
     const { length_um, group } = ruler;
-    return { length_um, isVisible: group.visible, hasAxes: axes.group.visible };
+    const up_um = group.children[0].position.y;
+    return { length_um, up_um, isVisible: group.visible, hasAxes: axes.group.visible };
   }
 
   name(): string {

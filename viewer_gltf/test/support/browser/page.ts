@@ -31,6 +31,7 @@ export class ViewerPage {
   /** Open a section of the panel, such as `measure`. */
   async unfold(section: string): Promise<void> {
     const opener = this.page.locator(`h2 [data-opener="${section}"]`);
+    if ((await opener.count()) === 0) await this.page.locator('h2 [data-opener="more"]').click();
     if ((await opener.getAttribute("aria-expanded")) === "false") await opener.click();
   }
 
@@ -66,8 +67,8 @@ export class ViewerPage {
   }
 
   async drawVolume(channel: string, isVolume: boolean): Promise<void> {
-    // The checkbox lies invisible under its label's text, which is what a person clicks.
-    await this.part(channel, "volume").setChecked(isVolume, { force: true });
+    await this.openCard(channel);
+    await this.part(channel, "volume").setChecked(isVolume);
     await this.settled();
   }
 
@@ -84,6 +85,7 @@ export class ViewerPage {
   }
 
   async chooseTransferFunction(channel: string, name: string): Promise<void> {
+    await this.openCard(channel);
     await this.part(channel, "transfer-function").selectOption(name);
     await this.settled();
   }
@@ -99,7 +101,7 @@ export class ViewerPage {
   }
 
   async chooseMode(mode: Mode): Promise<void> {
-    await this.page.locator(`[data-mode="${mode}"]`).setChecked(true, { force: true });
+    await this.page.locator("select[data-mode]").selectOption(mode);
     await this.settled();
   }
 

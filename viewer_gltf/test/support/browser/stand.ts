@@ -47,6 +47,8 @@ export type StandOptions = Readonly<{
   hasTouch?: boolean;
   /** Nothing is drawn. */
   isBlind?: boolean;
+  /** The panel is as somebody finds it who has never been there. */
+  isFirstVisit?: boolean;
   /** Between frames thrice the time passes that the last one took. */
   hasRests?: boolean;
   /** The page stays open from test to test of the `describe`, none of which disturbs another. */
@@ -54,6 +56,20 @@ export type StandOptions = Readonly<{
   /** Served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
   mounts?: (bundle: string) => Readonly<Record<string, string>>;
 }>;
+
+/** The sections of the panel that a reader has opened, whose controls most tests use. */
+const OPEN = "channels objects volumes tiles stereo slices save more view volume-settings light";
+
+/** As on a visit after another. Runs in the page before its own scripts. */
+function openSections(open: string): void {
+  try {
+    if (localStorage.getItem("stereocell-open") === null) {
+      localStorage.setItem("stereocell-open", open);
+    }
+  } catch {
+    // about:blank has no storage
+  }
+}
 
 /** Set up and cleared away around the tests of one `describe`; to be used inside them. */
 export function prepareStand(options: StandOptions): Stand {
@@ -100,6 +116,7 @@ export function prepareStand(options: StandOptions): Stand {
       return addInitScript(...given);
     };
     isAltered = false;
+    if (!options.isFirstVisit) await addInitScript(openSections, OPEN);
     viewer = new ViewerPage(page);
   };
 

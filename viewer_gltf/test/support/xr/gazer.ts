@@ -11,10 +11,14 @@ const CORRECTIONS = 4;
 /** Age of a report, ms, from which nothing is predicted: the head's turn is then the same in every run. */
 const OLD_MS = 1000;
 
+/** Time after which where the head rests is ahead, ms of the phone's own clock. */
+const SETTLED_MS = 600;
+
 /** The page's clock must be held: see `addClock`. */
 export class Gazer {
   private yaw_deg = 0;
   private pitch_deg = 0;
+  private hasLooked = false;
   private readonly offsets = tremble(FRAME_MS / 1000);
 
   constructor(private readonly viewer: ViewerPage) {}
@@ -33,10 +37,15 @@ export class Gazer {
     }
   }
 
-  /** To the right of where the head first looked, and up. */
+  /** To the right of where the head first looked, and up. There it rests, so that this is ahead. */
   async turnTo(yaw_deg: number, pitch_deg: number): Promise<void> {
+    const isFirst = !this.hasLooked;
+    this.hasLooked = true;
     [this.yaw_deg, this.pitch_deg] = [yaw_deg, pitch_deg];
     await this.report(0, 0);
+    await tick(this.page, 10);
+    if (!isFirst) return;
+    await this.page.waitForTimeout(SETTLED_MS);
     await tick(this.page, 10);
   }
 

@@ -271,6 +271,7 @@ class Stand {
       position: position.toArray(),
       scale,
       regions: panel.regions.map(({ id }) => id),
+      labels: panel.regions.map(({ label }) => label),
       drags: this.drags.length,
       told: this.hands.notice.mesh.visible ? this.hands.notice.texts : [],
       textures: this.renderer.info.memory.textures,

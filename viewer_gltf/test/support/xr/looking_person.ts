@@ -1,5 +1,15 @@
 /** A person in stereo who looks, rests and presses, without a browser: the hands as they are, nothing painted. */
 import { Euler, Matrix4, Quaternion, Scene, Vector3 } from "three";
+import {
+  dragHandle,
+  type HandleId,
+  handlesOf,
+  TOLERANCE_RAD,
+} from "../../../src/annotations/clip_handles";
+import { HandleTarget } from "../../../src/annotations/handle_target";
+import { dragLamp, isLampHandle, lampHandles } from "../../../src/annotations/lamp_handles";
+import type { Box } from "../../../src/math/box";
+import type { Ray } from "../../../src/math/vec3";
 import type { Region } from "../../../src/panel/canvas/draw_list";
 import { type PanelView, START_VIEW } from "../../../src/panel/controls";
 import { chosenTile, type Facts, layOut } from "../../../src/panel/layout";
@@ -10,7 +20,7 @@ import { reduce } from "../../../src/state/reduce";
 import type { ViewerState } from "../../../src/state/viewer_state";
 import { Hands } from "../../../src/xr/interaction";
 import { STEREO_FACTS } from "../fixture/facts";
-import { sampleManifest } from "../fixture/manifest";
+import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
 import { tremble } from "./tremble";
 
 /** Longest time that a frame counts, s. */
@@ -19,6 +29,7 @@ const FRAME_S = 0.1;
 const TURN_MS = 500;
 const EYE = new Vector3();
 const RAD = Math.PI / 180;
+const SPECIMEN: Box = { min: [...SPECIMEN_BOX.min], max: [...SPECIMEN_BOX.max] };
 
 /** Stereo is offered in both ways, and a step can be undone and redone, so that every control can be operated. */
 const FACTS: Facts = {
@@ -49,11 +60,19 @@ export class LookingPerson {
   /** How often anything has changed, the panel's own pages too; what follows in the next frame is the same change. */
   changes = 0;
   readonly hands: Hands;
+  /** The handles of the cut and of the lamps. */
+  readonly handles = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
+  /** Rays by which a point was measured, um. */
+  readonly measured: Ray[] = [];
   /** Time on the clock of the frames, in milliseconds. */
   now_ms = 1000;
+  private readonly specimen: Specimen;
+  private readonly pose: Specimen["pose"];
+  private readonly tiles: ReturnType<typeof sampleManifest>["tiles"];
   private view: Partial<PanelView> = {};
   private session: ButtonSession | null = null;
   private facing = new Quaternion();
+  private readonly earlier = new Quaternion();
   private before: readonly unknown[] = [];
   private hasJustChanged = false;
   private readonly offsets = tremble(FRAME_S);
@@ -63,11 +82,15 @@ export class LookingPerson {
     this.state = change(initialState(manifest));
     const specimen = new Specimen(manifest.specimen.bounds_um);
     specimen.anchorAt(new Vector3(0, 0, -XR_DISTANCE_M));
+    this.specimen = specimen;
+    this.pose = specimen.pose;
+    this.tiles = manifest.tiles;
     this.hands = new Hands({
       xr: { getFrame: () => null as unknown as XRFrame, getReferenceSpace: () => null },
       scene: new Scene(),
       specimen,
       tiles: manifest.tiles,
+      handles: [this.handles],
       isPainted: false,
       now_ms: () => this.now_ms,
       layOut: (view) => layOut(this.state, FACTS, view),
@@ -75,8 +98,15 @@ export class LookingPerson {
         this.wishes.push(action);
         this.state = reduce(this.state, action);
       },
-      onCommand: (command) => this.wishes.push(command),
-      onChoose: (_, tile) => {
+      onCommand: (command) => {
+        this.wishes.push(command);
+        this.hands.run(command, this.state);
+      },
+      onChoose: (ray, tile) => {
+        if (this.state.tool === "measure") {
+          this.measured.push(ray);
+          return;
+        }
         this.wishes.push(tile);
         this.state = reduce(this.state, chosenTile(this.state, tile));
       },
@@ -99,6 +129,17 @@ export class LookingPerson {
       .flatMap(({ kind, id }) => (kind === "toggle" ? [id] : []));
   }
 
+  /** The sections of the menu. */
+  get tabs(): readonly string[] {
+    while (this.has("up")) this.pressOn("up");
+    const found = new Set<string>();
+    for (let before = -1; found.size > before; this.pressOn("more")) {
+      before = found.size;
+      for (const { id } of this.regions) if (id.startsWith("tab=")) found.add(id.slice(4));
+    }
+    return [...found];
+  }
+
   region(id: string): Region {
     const found = this.regions.find((each) => each.id === id);
     if (found === undefined) throw new Error(`no ${id} in ${this.regions.map((each) => each.id)}`);
@@ -109,13 +150,74 @@ export class LookingPerson {
   lookAt(id: string, across?: number, down?: number): void {
     const at = this.hands.panel.pointOf(id, across, down);
     if (at === null) throw new Error(`no ${id} in ${this.regions.map((each) => each.id)}`);
-    this.facing.setFromRotationMatrix(new Matrix4().lookAt(EYE, at, new Vector3(0, 1, 0)));
+    this.faceTo(at);
+  }
+
+  lookUp(): void {
+    this.earlier.copy(this.facing);
+    this.turnTo(0, 60);
+  }
+
+  /** From where it was to the right, at the same height. */
+  lookAside(): void {
+    this.turnBy(20);
+  }
+
+  /** Look at the middle of a tile's front. */
+  lookAtTile(name: string): void {
+    const tile = this.tiles.find(({ id }) => `tile:${id}` === name);
+    if (tile === undefined) throw new Error(`no ${name}`);
+    const { min, max } = tile.bounds_um;
+    const front = new Vector3((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]);
+    this.faceTo(front.applyMatrix4(this.specimen.group.matrixWorld));
+  }
+
+  /** Look at the middle of a handle. */
+  lookAtHandle(id: HandleId): void {
+    const handle = this.handles.handles.find((each) => each.id === id);
+    if (handle === undefined) throw new Error(`no ${id}`);
+    this.faceTo(new Vector3(...handle.position).applyMatrix4(this.specimen.group.matrixWorld));
+  }
+
+  /** Look where it looked before it looked up. */
+  lookBack(): void {
+    this.facing.copy(this.earlier);
     this.now_ms += TURN_MS;
     this.frame(0);
   }
 
-  lookUp(): void {
-    this.facing.setFromEuler(new Euler(60 * RAD, 0, 0));
+  /** Where the specimen is and how it is turned. */
+  get place(): string {
+    const { position, orientation, scale } = this.specimen.pose;
+    return JSON.stringify([position.toArray(), orientation.toArray(), scale]);
+  }
+
+  /** Whether the gaze carries something. */
+  get isCarrying(): boolean {
+    return this.hands.isCarrying;
+  }
+
+  /** Turn from where it looks to the right, degrees. */
+  turnBy(yaw_deg: number): void {
+    const { x, y } = new Euler().setFromQuaternion(this.facing, "YXZ");
+    this.turnTo(y / RAD - yaw_deg, x / RAD);
+  }
+
+  private drag(id: HandleId, ray: Ray): void {
+    const drag = isLampHandle(id)
+      ? (dragLamp(id, ray, this.state, SPECIMEN, false)?.action ?? null)
+      : dragHandle(id, ray, this.state.clip, SPECIMEN);
+    if (drag !== null) this.state = reduce(this.state, drag);
+  }
+
+  private turnTo(yaw_deg: number, pitch_deg: number): void {
+    this.facing.setFromEuler(new Euler(pitch_deg * RAD, yaw_deg * RAD, 0, "YXZ"));
+    this.now_ms += TURN_MS;
+    this.frame(0);
+  }
+
+  private faceTo(at: Vector3): void {
+    this.facing.setFromRotationMatrix(new Matrix4().lookAt(EYE, at, new Vector3(0, 1, 0)));
     this.now_ms += TURN_MS;
     this.frame(0);
   }
@@ -140,21 +242,52 @@ export class LookingPerson {
     this.frame(0);
   }
 
-  /** Open the panel's page of a tab, and go on by so many pages. */
-  open(tab: string, page = 0, view: Partial<PanelView> = {}): void {
+  /** Open the panel's page of a tab, or of a group of it (`channels/c2`), and go on by so many pages. */
+  open(where: string, page = 0, view: Partial<PanelView> = {}): void {
+    const [tab, group] = where.split("/");
     this.view = view;
     this.hands.panel.take(view);
     if (!this.hands.panel.isOpen) this.hands.panel.toggle();
     this.frame(0);
-    this.lookAt(`tab=${tab}`);
-    this.press();
-    this.frame(0);
-    if (page > 0) this.lookAt("more");
-    for (let k = 0; k < page; k++) this.press();
+    while (this.has("up")) this.pressOn("up");
+    while (!this.has(`tab=${tab}`)) this.pressOn("more");
+    this.pressOn(`tab=${tab}`);
+    if (group !== undefined) this.openGroup(group);
+    for (let k = 0; k < page; k++) this.pressOn("more");
     this.lookUp();
     this.frame(FRAME_S);
     this.wishes.length = 0;
     this.changes = 0;
+  }
+
+  /** Whether there is such a target of the menu or of the bar. */
+  has(id: string): boolean {
+    return this.hands.panel.places.some((each) => each.id === id);
+  }
+
+  /** The first target of the menu or of the bar whose name begins so. */
+  find(start: string): string {
+    const found = this.hands.panel.places.find(({ id }) => id.startsWith(start));
+    if (found === undefined) throw new Error(`no ${start}`);
+    return found.id;
+  }
+
+  /** Whether the specimen is elsewhere, or turned otherwise, than at the start. */
+  get hasMoved(): boolean {
+    const [{ position, orientation }, then] = [this.specimen.pose, this.pose];
+    return !position.equals(then.position) || !orientation.equals(then.orientation);
+  }
+
+  private openGroup(group: string): void {
+    while (!this.has(`${group}/open`)) this.pressOn("more");
+    this.pressOn(`${group}/open`);
+    this.pressOn(`${group}/more`);
+  }
+
+  private pressOn(id: string): void {
+    this.lookAt(id);
+    this.press();
+    this.frame(0);
   }
 
   dispose(): void {
@@ -163,6 +296,9 @@ export class LookingPerson {
 
   private frame(dt_s: number): void {
     this.now_ms += 1000 * dt_s;
+    const { clip } = this.state;
+    this.handles.handles = [...handlesOf(clip, SPECIMEN), ...lampHandles(this.state, SPECIMEN)];
+    this.handles.specimen = this.specimen.group.matrixWorld;
     const [right_deg, up_deg] = this.offsets.next().value as readonly [number, number];
     const offset = new Quaternion().setFromEuler(new Euler(up_deg * RAD, -right_deg * RAD, 0));
     const head = new Matrix4().makeRotationFromQuaternion(this.facing.clone().multiply(offset));
@@ -187,9 +323,9 @@ export function pagesOf(
 ): readonly (readonly [tab: string, page: number, ids: readonly string[]])[] {
   const person = new LookingPerson(12, change);
   person.open("channels", 0, view);
-  const tabs = person.regions.flatMap(({ id }) => (id.startsWith("tab=") ? [id.slice(4)] : []));
-  const pages = tabs.flatMap((tab) => {
-    person.open(tab);
+  const tabs = person.tabs;
+  const pages = [...tabs, "channels/c2"].flatMap((tab) => {
+    person.open(tab, 0, view);
     const found: (readonly [string, number, readonly string[]])[] = [];
     const seen = new Set<string>();
     for (let page = 0; ; page++) {
@@ -207,5 +343,5 @@ export function pagesOf(
   return pages;
 }
 
-/** Tabs, and the two buttons above, are the same on every page. */
-const isOfThePage = (id: string) => !id.startsWith("tab=") && !["leave", "close"].includes(id);
+/** The bar's buttons are the same on every page. */
+const isOfThePage = (id: string) => !["leave", "close", "up"].includes(id);

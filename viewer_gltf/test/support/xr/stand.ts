@@ -12,6 +12,10 @@ const PAGE = `<!doctype html><style>
   [data-webxr_runtime] canvas { width: 100% !important; height: 100% !important }
 </style><body><div id="stage"></div>`;
 
+const MOST_PAGES = 12;
+/** Time, ms, after which a press is no second one of a double press, which does nothing. */
+const PRESS_APART_MS = 450;
+
 export type At = readonly [number, number, number];
 export type Side = "left" | "right";
 
@@ -53,8 +57,39 @@ export class HandsStand {
   }
 
   async openPanel(): Promise<void> {
-    await this.lookAt(await this.controlAt("opener"));
+    await this.tapOn("opener");
+  }
+
+  /** Look at a control of the panel or of the bar, and press the button. */
+  async tapOn(id: string): Promise<void> {
+    await this.lookAt(await this.controlAt(id));
     await this.tap();
+  }
+
+  /** Go from any page of the open panel to a section, by the bar and the list of sections. */
+  async openSection(section: string): Promise<void> {
+    const regions = async () => (await this.status()).regions;
+    while ((await regions()).includes("up")) {
+      await this.tapOn("up");
+      await this.page.waitForTimeout(PRESS_APART_MS);
+    }
+    await this.reach(`tab=${section}`);
+    await this.tapOn(`tab=${section}`);
+  }
+
+  /** Go on to the page of the list or section that has a control. */
+  async reach(id: string): Promise<void> {
+    for (let page = 0; page < MOST_PAGES; page++) {
+      if ((await this.status()).regions.includes(id)) return;
+      await this.tapOn("more");
+    }
+    throw new Error(`no page has ${id}`);
+  }
+
+  /** Go from the list of channels to the page of one of them, by its swatch. */
+  async openChannel(channel: string): Promise<void> {
+    await this.tapOn(`${channel}/open`);
+    await this.tapOn(`${channel}/more`);
   }
 }
 

@@ -1,0 +1,48 @@
+import { describe, expect, it } from "vitest";
+import { embedOrigin, faultOfState } from "./frame_port";
+
+const CHANNELS = ["dna", "cd8"];
+
+describe("a state that a page sends to the viewer in its frame", () => {
+  it("is taken with any part of what the notebook has", () => {
+    const states = [
+      {},
+      { link: "#mode=off" },
+      { channels: { dna: { visible: false, color: "#ff0000", opacity: 0.5, window: [0, 900] } } },
+      { view: { eye_um: [0, 0, 900] } },
+      { picked: null },
+      { picked: { point_um: [1, 2, 3], tile: "r0_c0", channel: null, object: "7" } },
+    ];
+    for (const state of states) expect(faultOfState(state, CHANNELS)).toBeNull();
+  });
+
+  it.each([
+    [null, "state: expected an object, found null"],
+    [{ zoom: 3 }, "zoom: expected link, channels, view or picked"],
+    [{ link: 3 }, "link: expected a text, found 3"],
+    [{ channels: { cd3: {} } }, "channels.cd3: expected one of dna, cd8"],
+    [{ channels: { dna: { color: "red" } } }, 'channels.dna.color: expected #rrggbb, found "red"'],
+    [{ channels: { dna: { opacity: 2 } } }, "channels.dna.opacity: expected 0 to 1, found 2"],
+    [
+      { channels: { dna: { gamma: 1 } } },
+      "channels.dna.gamma: expected one of visible, color, opacity, window, found gamma",
+    ],
+    [
+      { view: { eye_um: [0, Number.NaN, 1] } },
+      "view.eye_um: expected three numbers, found [0,null,1]",
+    ],
+    [{ picked: 3 }, "picked: expected an object, found 3"],
+  ])("is refused with the field and what was expected: %j", (state, fault) => {
+    expect(faultOfState(state, CHANNELS)).toBe(fault);
+  });
+});
+
+describe("the page that may drive the viewer", () => {
+  it("is the one whose origin the address names", () => {
+    expect(embedOrigin("?embed=https://lab.example")).toBe("https://lab.example");
+    expect(embedOrigin("?embed=https://lab.example:8443/page")).toBe("https://lab.example:8443");
+    for (const search of ["", "?embed=", "?embed=lab", "?embed=javascript:1", "?embed=*"]) {
+      expect(embedOrigin(search)).toBeNull();
+    }
+  });
+});

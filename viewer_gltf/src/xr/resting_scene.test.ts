@@ -1,0 +1,199 @@
+/** A gaze that rests in the scene: on handles, lamps, objects, points to measure, and on the bar's buttons. */
+import { describe, expect, it } from "vitest";
+import { LookingPerson } from "../../test/support/xr/looking_person";
+import { reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
+
+const DWELL_S = 1.7;
+const LONG_S = 7.5;
+
+/** The specimen in a box to cut by. */
+function boxed(state: ViewerState): ViewerState {
+  const box = { min: [5, -15, 2], max: [45, -5, 6] } as const;
+  return { ...state, clip: { ...state.clip, box: { min: [...box.min], max: [...box.max] } } };
+}
+const traced = (state: ViewerState): ViewerState => {
+  const lit = reduce(state, { type: "set", id: "mode", value: "traced" });
+  const lamps = lit.trace.lamps.map((lamp) => ({ ...lamp, isOn: true }));
+  return { ...lit, areLampsShown: true, trace: { ...lit.trace, lamps } };
+};
+const measuring = (state: ViewerState) =>
+  reduce(state, { type: "set", id: "tool", value: "measure" });
+
+const HANDLES = [
+  ["a face of the box", "x-max", boxed],
+  ["a lamp", "lamp-0", traced],
+] as const;
+
+describe("a handle under a gaze that rests", () => {
+  it.each(HANDLES)("is taken, stays where it is, and is put down once: %s", (_, id, change) => {
+    const person = new LookingPerson(4, change);
+    person.lookUp();
+    person.lookAtHandle(id);
+    const at = () => person.handles.handles.find((each) => each.id === id)?.position ?? [];
+    const before = at();
+    person.rest(DWELL_S);
+    expect(person.isCarrying).toBe(true);
+    person.rest(LONG_S);
+    at().forEach((v, i) => {
+      expect(Math.abs(v - before[i])).toBeLessThan(1.5); // um, of 50: a head trembles
+    });
+    person.turnBy(6);
+    person.rest(DWELL_S);
+    expect(person.isCarrying).toBe(false);
+    const put = at();
+    expect(put).not.toEqual(before);
+    person.rest(LONG_S);
+    expect(person.isCarrying).toBe(false);
+    expect(at()).toEqual(put);
+  });
+
+  it.each(HANDLES)("is not taken when it comes under the gaze: %s", (_, id, change) => {
+    const person = new LookingPerson(4, change);
+    const { state } = person;
+    person.lookAtHandle(id);
+    person.state = change === boxed ? { ...state, clip: { ...state.clip, box: null } } : state;
+    if (change === traced) person.state = { ...state, areLampsShown: false };
+    person.lookUp();
+    person.rest(0.5);
+    person.lookBack();
+    person.rest(0.2);
+    person.state = state;
+    person.rest(LONG_S);
+    expect(person.hands.pointed).toBe(`handle:${id}`);
+    expect(person.isCarrying).toBe(false);
+  });
+});
+
+describe("a handle of a cut that was there when stereo began", () => {
+  it("is not taken by a gaze that rests ahead, but by the button", () => {
+    const person = new LookingPerson(4, boxed);
+    person.handles.isCutAsleep = true;
+    person.lookUp();
+    person.lookAtHandle("x-max");
+    person.rest(LONG_S);
+    expect(person.hands.pointed).toBe("handle:x-max");
+    expect(person.isCarrying).toBe(false);
+    person.press();
+    expect(person.isCarrying).toBe(true);
+  });
+});
+
+describe("a point to measure under a gaze that rests", () => {
+  it("is set once, and the next one where the gaze rests then, in the same tile, too", () => {
+    const person = new LookingPerson(4, measuring);
+    person.lookUp();
+    person.lookAtTile("tile:r0_c1");
+    person.rest(LONG_S);
+    expect(person.measured).toHaveLength(1);
+    person.turnBy(3);
+    expect(person.hands.pointed).toBe("tile:r0_c1");
+    person.rest(LONG_S);
+    expect(person.measured).toHaveLength(2);
+  });
+});
+
+describe("an object under a gaze that rests", () => {
+  const showing = (person: LookingPerson, object: string | null) => {
+    person.hands.tiles.objectAlong = () => (object === null ? null : { id: object, distance: 0.9 });
+    const { objects } = person.state;
+    person.state = { ...person.state, objects: { ...objects } };
+  };
+
+  it("is not chosen when it has come under the gaze because another was hidden", () => {
+    const person = new LookingPerson(4);
+    showing(person, "c0/7");
+    person.lookUp();
+    person.lookAtTile("tile:r0_c1");
+    person.rest(1);
+    showing(person, "c0/8");
+    person.rest(LONG_S);
+    expect(person.hands.pointed).toBe("tile:r0_c1/c0/8");
+    expect(person.wishes).toEqual([]);
+  });
+
+  it("is chosen once", () => {
+    const person = new LookingPerson(4);
+    showing(person, "c0/7");
+    person.lookUp();
+    person.lookAtTile("tile:r0_c1");
+    person.rest(LONG_S);
+    expect(person.wishes).toHaveLength(1);
+  });
+});
+
+describe("the bar under a gaze that rests", () => {
+  const ids = new LookingPerson(4).hands.panel.places.map(({ id }) => id);
+  const repeating = ids.filter((id) => /nearer|farther|roll/.test(id));
+
+  it("has the buttons of these tests", () => {
+    expect(repeating).toHaveLength(4);
+    expect(ids).toEqual(expect.arrayContaining(["bar-volumes", "bar-move", "opener"]));
+  });
+
+  it.each(["bar-volumes", "opener"])("changes one thing: %s", (id) => {
+    const person = new LookingPerson(4);
+    person.lookAt(id);
+    person.changes = 0;
+    person.rest(LONG_S);
+    expect(person.changes).toBe(1);
+  });
+
+  it.each(repeating)("moves on while the gaze stays, and stops when it leaves: %s", (id) => {
+    const person = new LookingPerson(4);
+    const { state } = person;
+    person.lookUp();
+    person.lookAt(id);
+    person.rest(1.3);
+    expect(person.hasMoved).toBe(false);
+    person.rest(1);
+    const first = person.place;
+    person.rest(1);
+    const second = person.place;
+    expect(second).not.toEqual(first);
+    person.lookUp();
+    const left = person.place;
+    person.rest(LONG_S);
+    expect(person.place).toEqual(left);
+    expect(person.state).toBe(state);
+  });
+
+  it("takes the specimen once, and leaves it where it was put down", () => {
+    const person = new LookingPerson(4);
+    person.lookUp();
+    person.lookAt("bar-move");
+    person.rest(DWELL_S);
+    expect(person.isCarrying).toBe(true);
+    person.lookAside();
+    person.rest(DWELL_S);
+    expect(person.isCarrying).toBe(false);
+    const put = person.place;
+    person.rest(LONG_S);
+    expect(person.place).toEqual(put);
+  });
+
+  it("undoes one choice, and no earlier one, under Undo", () => {
+    const person = new LookingPerson(4);
+    person.lookAt("bar-volumes");
+    person.rest(DWELL_S);
+    person.lookUp();
+    person.lookAt("undo-choice");
+    person.changes = 0;
+    person.rest(LONG_S);
+    expect(person.changes).toBeLessThanOrEqual(2); // undone, and Undo is gone from the bar
+    expect(person.wishes.filter((wish) => JSON.stringify(wish).includes("restore"))).toHaveLength(
+      1,
+    );
+  });
+
+  it.each(["leave", "close", "up"])("changes one thing while the menu is open: %s", (id) => {
+    const person = new LookingPerson(4);
+    person.open("channels");
+    person.lookAt(id);
+    person.changes = 0;
+    person.wishes.length = 0;
+    person.rest(LONG_S);
+    expect(person.changes).toBe(1);
+    expect(person.wishes.length).toBeLessThanOrEqual(1);
+  });
+});

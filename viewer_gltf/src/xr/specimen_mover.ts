@@ -1,0 +1,64 @@
+/** How the specimen is moved in stereo: by commands, fingers, sticks and hands, and along with gaze or head. */
+import type { Vector3 } from "three";
+import type { RoomRay } from "../interaction/ray_pointer";
+import { type SpecimenPose, zoomAbout } from "../math/grab";
+import { type BoxedTile, shownTiles } from "../math/pick";
+import type { Specimen } from "../render/specimen_pose";
+import type { Command } from "../state/commands";
+import type { ViewerState } from "../state/viewer_state";
+import { type HeadHold, isFacing, moveByCommand, moveByFingers } from "./hold_specimen";
+import { hullOf, middleOf } from "./shown_hull";
+
+/** A gesture that moves something. */
+type Move = Parameters<typeof moveByFingers>[1];
+
+export class SpecimenMover {
+  constructor(
+    private readonly specimen: Specimen,
+    private readonly tiles: readonly BoxedTile[],
+  ) {}
+
+  get pose(): SpecimenPose {
+    return this.specimen.pose;
+  }
+
+  /** Middle of what is shown, room. */
+  middle({ isolated }: ViewerState): Vector3 {
+    return middleOf(hullOf(shownTiles(this.tiles, isolated), this.specimen.group.matrixWorld));
+  }
+
+  /** To a pose, as an eye sees it; whether that is another one. */
+  to(pose: SpecimenPose, eye: Vector3): boolean {
+    if (pose === this.pose) return false;
+    this.specimen.moveTo(pose, eye);
+    return true;
+  }
+
+  /** To an earlier pose, at once. */
+  backTo(pose: SpecimenPose, eye: Vector3): void {
+    this.specimen.jumpTo(pose, eye);
+  }
+
+  /** By a share of a command's step; false: the command moves nothing. */
+  run(command: Command, state: ViewerState, eye: Vector3, share: number): boolean {
+    const pose = moveByCommand(this.pose, command, this.middle(state), eye, share);
+    if (pose === null) return false;
+    if (isFacing(command)) this.specimen.jumpTo(pose, eye);
+    else this.specimen.moveTo(pose, eye);
+    return true;
+  }
+
+  /** So much larger about its middle. */
+  resize(factor: number, state: ViewerState, eye: Vector3): void {
+    this.specimen.moveTo(zoomAbout(this.pose, this.middle(state), factor), eye);
+  }
+
+  byFingers(gesture: Move, state: ViewerState, eye: Vector3): void {
+    this.specimen.moveTo(moveByFingers(this.pose, gesture, this.middle(state), eye), eye);
+  }
+
+  /** How a gaze holds it that takes it now. */
+  holdBy(gaze: RoomRay, state: ViewerState): HeadHold {
+    return { pose: this.pose, pivot: this.middle(state), gaze };
+  }
+}

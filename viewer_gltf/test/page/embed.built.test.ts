@@ -1,0 +1,97 @@
+/** The viewer in a frame of another origin, by the example of docs/embed.md. */
+import { readFile } from "node:fs/promises";
+import { createServer, type Server } from "node:http";
+import type { AddressInfo } from "node:net";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+const DOCS = new URL("../../../docs/embed.md", import.meta.url);
+
+describeInChromium("the viewer in another page", () => {
+  const stand = prepareStand({ viewport: { width: 800, height: 600 }, isBlind: true });
+  let server: Server;
+  let holder: string;
+  let example: string;
+
+  beforeAll(async () => {
+    const [, found] = /```html\n([\s\S]*?)```/.exec(await readFile(DOCS, "utf8")) ?? [];
+    if (found === undefined) throw new Error("no example in docs/embed.md");
+    expect(found.split("\n").length).toBeLessThanOrEqual(32);
+    // the bundle's address is the only thing that a reader puts in
+    example = found
+      .replace("https://host.example/specimen/", `${stand.host.address}/app/`)
+      .replace("?panel=off", "?bundle=/bundle/&panel=off");
+    server = createServer((_, response) => {
+      response.setHeader("Content-Type", "text/html");
+      response.end(example);
+    }).listen(0, "127.0.0.1");
+    await new Promise((resolve) => server.once("listening", resolve));
+    holder = `http://127.0.0.1:${(server.address() as AddressInfo).port}`;
+  });
+
+  afterAll(() => {
+    server?.close();
+  });
+
+  async function open() {
+    const { page } = stand.viewer;
+    await page.goto(holder);
+    const told = page.locator("#told");
+    await expect.poll(() => told.textContent()).toMatch(/^Shown: F_x20_body/);
+    return { page, told, frame: page.frameLocator("#viewer") };
+  }
+
+  it("hears of what changes and changes what it is asked to, with no panel", async () => {
+    const { page, told, frame } = await open();
+    expect(await frame.locator(".panel").isVisible()).toBe(false);
+    expect(await frame.locator(".stage canvas").isVisible()).toBe(true);
+    await page.locator("#toggle").click();
+    await expect.poll(() => told.textContent()).not.toMatch(/F_x20_body/);
+    await page.locator("#toggle").click();
+    await expect.poll(() => told.textContent()).toMatch(/F_x20_body/);
+  });
+
+  it("refuses what does not fit, and hears no other page", async () => {
+    const { page, told } = await open();
+    const send = (state: unknown) =>
+      page.evaluate((asked) => {
+        const frame = document.querySelector<HTMLIFrameElement>("#viewer");
+        frame?.contentWindow?.postMessage({ target: "stereocell", state: asked }, "*");
+      }, state);
+    await send({ channels: { Balls: { opacity: 7 } } });
+    await expect
+      .poll(() => told.textContent())
+      .toBe("channels.Balls.opacity: expected 0 to 1, found 7");
+    // the frame itself is of another origin than the one that may send
+    const inner = page.frames().find((each) => each.url().includes("embed="));
+    await inner?.evaluate(() =>
+      postMessage(
+        { target: "stereocell", state: { channels: { Balls: { visible: false } } } },
+        "*",
+      ),
+    );
+    await page.waitForTimeout(500);
+    const shown = await inner?.evaluate(
+      () => window.stereocell?.snapshot().state.channels.find(({ id }) => id === "Balls")?.shown,
+    );
+    expect(shown).toBe(true);
+  });
+
+  it("leaves the wheel to the page until somebody has clicked into it", async () => {
+    const { page } = await open();
+    const inner = page.frames().find((each) => each.url().includes("embed="));
+    const distance = () =>
+      inner?.evaluate(() => Math.hypot(...(window.stereocell?.snapshot().look.position ?? [])));
+    await page.locator("#toggle").click(); // the keyboard is the page's
+    const before = await distance();
+    await page.mouse.move(300, 300);
+    await page.mouse.wheel(0, -300);
+    await page.waitForTimeout(400);
+    expect(await distance()).toBe(before);
+    await page.mouse.click(20, 400); // a corner of the frame, beside the specimen
+    await page.mouse.move(300, 300);
+    await page.mouse.wheel(0, -300);
+    await expect.poll(distance).not.toBe(before);
+  });
+});
