@@ -180,6 +180,20 @@ describeInChromium("the path tracer", () => {
     }
   });
 
+  it("lights even matter at the face of a cut as a matt wall of its colour", async () => {
+    const color = [0.6, 0.6, 0.6] as const;
+    const { sums } = await gather({
+      ...BASE,
+      color,
+      texels: new Array<number>(SIZE[0] * SIZE[1] * SIZE[2]).fill(255),
+      opacities: new Array<number>(256).fill(250),
+      camera: { eye: [16, -16, 64_000], target: [16, -16, 16], fov_deg: 0.02 },
+    });
+    const coverage = mean(sums.filter((_, i) => i % 4 === 3));
+    const light = mean(sums.filter((_, i) => i % 4 === 0)) / coverage;
+    expect(Math.abs(light - 0.6)).toBeLessThan(0.02);
+  });
+
   it("covers as much whatever the bricks' size", async () => {
     const found: Estimate[] = [];
     for (const brick of BRICKS) found.push(coverage(await gather({ ...BASE, brick })));
