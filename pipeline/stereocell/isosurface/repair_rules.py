@@ -121,7 +121,7 @@ def _added(
     touches = np.zeros(count + 1, bool)
     touches[labels[before & main]] = True
     hangs = touches[labels]
-    around = ndimage.binary_dilation(before, np.ones((3, 3, 3)), REACH)
+    around = ndimage.binary_dilation(before, np.ones((3, 3, 3), bool), REACH)
     return int((hangs & ~around).sum()), int((main & ~hangs).sum())
 
 
