@@ -45,7 +45,7 @@ describeInChromium("the objects of a label map", () => {
     const box = await stand.viewer.page.locator(".stage").boundingBox();
     if (box === null) throw new Error("no stage");
     const { x, y } = project(point, stand.manifest.specimen.bounds_um, box.width, box.height);
-    await stand.viewer.page.mouse.click(box.x + x, box.y + y);
+    await stand.viewer.clickOnce(box.x + x, box.y + y);
     await stand.viewer.settled();
   };
   const choose = async (part: string, value: string) => {

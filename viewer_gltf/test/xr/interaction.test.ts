@@ -72,7 +72,7 @@ describeInChromium("hands on the picture", () => {
     const { min, max } = bounds_um;
     const front = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]] as const;
     const { x, y } = project(front, stand.manifest.specimen.bounds_um, box.width, box.height);
-    const click = () => stand.viewer.page.mouse.click(box.x + x, box.y + y);
+    const click = () => stand.viewer.clickOnce(box.x + x, box.y + y);
     const whole = await takePicture(stand.viewer.page);
     await click();
     await click();

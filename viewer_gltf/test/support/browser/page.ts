@@ -3,7 +3,12 @@ import type { Page } from "playwright-core";
 import type { Snapshot } from "../../../src/app/automation_api";
 import type { Mode } from "../../../src/state/parameters/volumes";
 
+/** Time after which a click is no second one of a double click. */
+const APART_MS = 500;
+
 export class ViewerPage {
+  private clicked_ms = 0;
+
   constructor(readonly page: Page) {}
 
   /** Open an address and wait until the overview is on screen. */
@@ -11,6 +16,13 @@ export class ViewerPage {
     await this.page.goto(address);
     await this.page.waitForFunction(() => window.stereocell !== undefined);
     await this.page.evaluate(() => window.stereocell?.ready);
+  }
+
+  /** A click that is no second one of a double click. */
+  async clickOnce(x: number, y: number): Promise<void> {
+    await this.page.waitForTimeout(Math.max(0, this.clicked_ms + APART_MS - Date.now()));
+    await this.page.mouse.click(x, y);
+    this.clicked_ms = Date.now();
   }
 
   /** Wait until nothing loads and the picture shows all of it. */
