@@ -185,7 +185,7 @@ describeInChromium("in a Cardboard, by gaze alone", () => {
         "reset",
         "nearer",
       ],
-      ...["lenses=before", "stereo-strength", "tool=measure", "clip-box", "slice-x", "quality=low"],
+      ...["lenses=v1", "stereo-strength", "tool=measure", "clip-box", "slice-x", "quality=low"],
     ]) {
       expect(found.walked).toContain(id);
     }

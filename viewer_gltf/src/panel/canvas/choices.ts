@@ -49,7 +49,8 @@ export function optionRows(choice: Choice, width: number): readonly Block[] {
       box(row, isChosen ? "accent" : "raised"),
       text(row, label, { tone: toneOf(choice, isChosen) }),
     ];
-    const place = region(`${choice.id}=${value}`, label, row, () => choice.to(value));
+    const name = isChosen ? `${label}, chosen` : label;
+    const place = region(`${choice.id}=${value}`, name, row, () => choice.to(value));
     return one(marks, unlessRefused(choice, [place]));
   });
 }
