@@ -335,8 +335,9 @@ def code(text: str) -> str:
 
 def test_only_libraries_that_can_change_a_byte_are_in_a_unit_s_key() -> None:
     _, libraries = cache_key._reach(unit.__name__, cache_key.NEUTRAL)
+    _, of_window = cache_key._reach(window.__name__, cache_key.NEUTRAL)
     _, of_reader = cache_key._reach(ZARR, cache_key.NEUTRAL)
-    named = {name for name, _ in libraries} | {name for name, _ in of_reader}
+    named = {name for name, _ in (*libraries, *of_window, *of_reader)}
     assert {"numpy", "vtk", "edt", "zarr"} <= named
     others = {"alktx2", "pymeshlab", "xatlas"}  # of extras: in the keys of the builds that use them
     others |= {"aiohttp", "botocore", "psutil", "jsonschema", "distributed", "rich", "pydicom"}
@@ -397,7 +398,7 @@ def test_modules_that_are_left_out_exist() -> None:
 
 
 def test_versions_of_libraries_count_those_of_lone_extension_modules_too() -> None:
-    assert {"numpy", "vtk", "edt", "zarr"} <= cache_key.libraries_of(unit, ZARR).keys()
+    assert {"numpy", "vtk", "edt", "zarr"} <= cache_key.libraries_of(unit, window, ZARR).keys()
     assert {"usd-core", "OpenEXR"} <= cache_key.libraries_of(stage_tasks).keys()
 
 

@@ -10,6 +10,8 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Grid
 
 Color = tuple[float, float, float]
+RGB_NAMES = ("Red", "Green", "Blue")  # channels of colour pixels
+RGB_COLORS: tuple[Color, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # linear
 MAX_CHANNELS = 10_000  # most channels of a source; a source with more is refused
 
 

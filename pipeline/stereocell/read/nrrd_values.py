@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from stereocell.read.diffusion import diffusion_note, order_of
-from stereocell.read.image import Color
-from stereocell.read.tiff.arrays import RGB_COLORS, RGB_NAMES
+from stereocell.read.image import RGB_COLORS, RGB_NAMES, Color
 
 _PARTS: dict[str, tuple[str, ...]] = {
     "complex": ("real part", "imaginary part"),

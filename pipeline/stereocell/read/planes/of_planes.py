@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
-from stereocell.read.image import Color, Image
+from stereocell.read.image import RGB_COLORS, RGB_NAMES, Color, Image
 from stereocell.read.planes.agreement import (
     drift_notes_of_planes,
     dtype_of_planes,
@@ -23,7 +23,6 @@ from stereocell.read.planes.files import read_head, read_plane
 from stereocell.read.planes.head import Head
 from stereocell.read.planes.scan_log import find_log, with_log
 from stereocell.read.planes.volume_files import Key, VolumeFiles
-from stereocell.read.tiff.arrays import RGB_COLORS, RGB_NAMES
 from stereocell.read.value_scale import values_of
 
 Channels = tuple[tuple[str | None, ...], tuple[Color | None, ...]]

@@ -11,11 +11,9 @@ from stereocell.model.errors import SourceError
 from stereocell.read import zarr_ending  # noqa: F401  (it registers a function for Python's end)
 from stereocell.read.array_axes import given_axes
 from stereocell.read.dataset import StoredArray, VoxelArray
-from stereocell.read.image import Color
+from stereocell.read.image import RGB_COLORS, RGB_NAMES, Color
 
 _RGB, _PALETTE, WHITE_IS_ZERO = 2, 3, 0  # TIFF tag PhotometricInterpretation
-RGB_NAMES = ("Red", "Green", "Blue")
-RGB_COLORS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # linear
 
 
 def array_of(series: TiffPageSeries, level: int) -> VoxelArray:
