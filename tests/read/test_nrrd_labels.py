@@ -63,3 +63,12 @@ def test_labels_that_contradict_a_patient_s_directions_are_noted(tmp_path: Path)
     )
     (note,) = [note for note in dataset.notes if note.startswith("axes of space")]
     assert "space directions states x, y, z, labels states z, y, x" in note
+
+
+def test_a_negative_spacing_is_noted_and_its_size_taken(tmp_path: Path) -> None:
+    steps = [SPACING["x"], -SPACING["y"], SPACING["z"]]
+    dataset = read.open(write(tmp_path / "a.nrrd", "xyz", ["x", "y", "z"], spacings=steps))
+    np.testing.assert_array_equal(whole(dataset), f_phantom())
+    assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
+    (note,) = dataset.notes
+    assert note.startswith("spacings: found 0.25 -0.2 0.5, of which one is negative")

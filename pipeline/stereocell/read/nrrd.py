@@ -273,9 +273,15 @@ def _spacing(spatial: NDArray[np.float64]) -> PartialTriple:
 def _turned(fields: Mapping[str, Any], spatial: NDArray[np.float64]) -> tuple[str, ...]:
     """Note directions that are not along x, y, z: outside a patient they are not followed."""
     notes = []
-    is_stated = fields.get("space directions") is not None
-    if is_stated and not np.array_equal(spatial, np.diag(np.abs(np.diag(spatial)))):
+    is_along_axes = np.array_equal(spatial, np.diag(np.abs(np.diag(spatial))))
+    if fields.get("space directions") is not None and not is_along_axes:
         notes.append("axes turned or mirrored by `space directions`: as stored")
+    if any(step < 0 for step in np.atleast_1d(fields.get("spacings", ()))):
+        stated = " ".join(f"{step:g}" for step in fields["spacings"])
+        notes.append(
+            f"spacings: found {stated}, of which one is negative: its size is taken and the voxels "
+            "stay as stored, so the volume may be mirrored"
+        )
     if "left-handed" in str(fields.get("space", "")).lower():
         notes.append("space: its axes are left-handed: as stored, so the volume may be mirrored")
     return tuple(notes)
