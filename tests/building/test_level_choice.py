@@ -28,7 +28,7 @@ def _rung(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> Rung:
 TISSUE = _rung((1000, 1000, 1), (900, 890, 4))
 CELLS = _rung((100, 10, 40), (90, 9, 50))
 TOUCHING = _rung((100, 60, 40), (90, 20, 50))  # the largest hold .42
-# of a whole mouse brain at 25 um: the level of its brightest cortex
+# this level shows the brightest cortex of a whole mouse brain at 25 um
 BRIGHT_PARTS = _rung((249778, 89062, 159), (98724, 94128, 32), kept_share=0.05)
 SPECKS = _rung((4, 2, 2), (5, 2, 3))
 

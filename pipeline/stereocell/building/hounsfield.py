@@ -29,7 +29,7 @@ _PRESETS = ("ct", "ct-bone")  # presets with levels and windows in Hounsfield un
 
 @dataclass(frozen=True, slots=True)
 class Modality:
-    """What took a volume.
+    """The kind of scanner or microscope that took a volume.
 
     code           DICOM's; empty: it is not known
     is_hounsfield  whether values may be compared with Hounsfield units, if it is a CT

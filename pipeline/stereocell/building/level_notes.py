@@ -10,7 +10,7 @@ from stereocell.isosurface.near_levels import ABOVE_BACKGROUND, MARK, find_near_
 from stereocell.isosurface.options import APART, CONNECTED, NO_SURFACE
 from stereocell.model.channel import LOW_CONFIDENCE
 
-# Of a confidence by blocks: an estimate below the bound by less is not called unsure
+# A confidence that blocks estimate may lie below the bound by this much and is not called unsure
 MARGIN = 0.1
 _CHOICES = {
     APART: "the one with the most separate pieces",

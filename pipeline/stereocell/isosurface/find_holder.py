@@ -41,8 +41,8 @@ _DEPTH_UM, _DEPTH_SHARE = 12_000.0, 0.1  # depth of a core; at most this share o
 _CORE_SHARE = 0.02  # least share of the largest core's voxels: arms and legs have own cores
 _SLACK = 1.5  # coarsest spacings that the body reaches beyond a core's depth
 _LENGTH = 8.0  # depths: diagonal of the box of a piece that is apart, at least
-# By the kind of a piece: with a larger share of the body's voxels it belongs to the body (a dry
-# skull round something soft is larger than it), and so it does with a larger share of its surface
+# A piece with a larger share of the body's voxels than its kind allows belongs to the body (a dry
+# skull round something soft is larger than it), and so does one with a larger share of its surface
 # joined to the body or to the volume's end.
 _LIMITS: dict[str, tuple[float, float]] = {
     "plain": (0.5, 0.18),

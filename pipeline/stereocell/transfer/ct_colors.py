@@ -24,7 +24,7 @@ _FAT_FROM_HU = -150.0  # blurred skin has values of the thinnest fat
 # one between tissues
 MAX_UNEVEN = 3.0
 _FOOT_HU = 36.0  # Hounsfield units below the surface at which opacity starts
-# What one finest voxel spacing absorbs: skin hides the fat beneath it
+# Share of the light that a path of one finest voxel spacing absorbs: skin hides the fat beneath it
 _OPACITY, _SKIN_OPACITY, _BONE_OPACITY = 0.45, 0.95, 0.6
 
 

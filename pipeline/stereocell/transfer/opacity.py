@@ -24,9 +24,9 @@ BRIGHT = 0.3  # share of the window above the level over which a body becomes br
 # The same two numbers for magnitudes, as MR has them. A cut through such a volume shows tissues by
 # their opacity, so the opacity has to rise over all of their values.
 AT_SURFACE_OF_MAGNITUDES, BRIGHT_OF_MAGNITUDES = 0.12, 0.5
-# Share of the window between the start of a body's opacity and its surface: 36 HU by the presets
-# of CT. At an edge the values rise by more than that within a voxel. A step of the opacity would
-# look jagged.
+# Share of the window between the start of a body's opacity and its surface. The presets for CT
+# make it 36 HU. The values at an edge rise by more than that within a voxel. A step of the opacity
+# would look jagged.
 BELOW_BODY = 0.012
 SOLID_BODY = 0.06  # share of the window above the surface in which a body becomes opaque: 180 HU
 NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them

@@ -224,7 +224,7 @@ export class Marks {
     return this.reading.probe(ray);
   }
 
-  /** From the first time that somebody points: see `markedClip`. */
+  /** Shows the handles of the opening cut from the first time that somebody points: see `markedClip`. */
   private showHandles(): void {
     if (this.isPointedAt) return;
     this.isPointedAt = true;

@@ -57,7 +57,7 @@ export type Sight = Readonly<{
   /** Factor to the angles of labels: in stereo a phone's few pixels need large letters. */
   textZoom: number;
 }>;
-/** Of labels in stereo: letters of 32 mm at 1 m, as on the panel. */
+/** Factor to the angles of labels in stereo: their letters are 32 mm high at 1 m, as on the panel. */
 export const STEREO_TEXT = 2.25;
 
 /** Of a flat screen: how much larger angles are, at so many CSS pixels to a radian. */

@@ -107,7 +107,7 @@ export function portToHolder(search: string, { channels }: Manifest): FramePort 
 
 type Message = Readonly<{ type: string }>;
 
-/** As a port of messages has it, for the part that shares the view. */
+/** This way to the page around has the methods of a MessagePort, which the part that shares the view expects. */
 export class FramePort {
   constructor(
     private readonly origin: string,

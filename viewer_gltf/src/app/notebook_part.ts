@@ -1,6 +1,6 @@
 /**
- * The view, shared with the notebook or the page that holds this one: what changes here is sent through a port,
- * what changes there is shown. Numbers are the specimen's: micrometres, values of the source.
+ * This part shares the view with the notebook or the page that holds this one. It sends each change through a
+ * port, and shows the changes that come back. Lengths are micrometres of the specimen, windows are values of the source.
  */
 import { Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";

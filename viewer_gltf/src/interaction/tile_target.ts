@@ -19,7 +19,7 @@ export class TileTarget implements Target {
   private names = "";
   private shown: readonly BoxedTile[] = [];
   private clip: Clip = WHOLE;
-  /** What shows within the tiles, and how often that has changed. */
+  /** The state that decides which objects show in the tiles, and how often it has changed. */
   private content: readonly unknown[] = [];
   private changes = 0;
   /** Points are measured, so that each point of a tile is another choice. */
@@ -41,7 +41,7 @@ export class TileTarget implements Target {
     this.names = tiles.map(({ id }) => id).join();
   }
 
-  /** Other objects may show now, or another part of the specimen. */
+  /** Takes over which objects show, and which part of the specimen is cut away. */
   follow({ objects, clip, channels, tool }: ViewerState): void {
     const content = [objects, clip, channels];
     if (content.some((each, i) => each !== this.content[i])) this.changes++;

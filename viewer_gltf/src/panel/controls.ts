@@ -273,7 +273,7 @@ export type Layout = Readonly<{
   sections: readonly Section[];
   /** Opens and closes the list of the deeper sections. */
   more: Readonly<{ isOpen: boolean; opener: PanelChange }>;
-  /** What is shown and whether it is complete: one line that is always in view. */
+  /** This line names the forms that are shown, and whether they are complete. It is always in view. */
   status: string;
   isHidden: boolean;
 }>;

@@ -182,7 +182,7 @@ function deeperSections(
   ];
 }
 
-/** For people who speak to their computer, or whose hands come upon keys. */
+/** Some people speak to their computer or press keys by accident: they switch the keys of one character off. */
 function lettersToggle({ hasLetters: value }: PanelView): Control {
   return {
     kind: "toggle",
@@ -313,7 +313,7 @@ function volumesText(level: number): string {
   return level === 0 ? "in full detail" : `at 1/${2 ** level} detail`;
 }
 
-/** What is shown, and whether that is all of it. */
+/** Names the forms that are shown, and whether they are complete. */
 function statusOf({ channels, mode, isolated }: ViewerState, facts: Facts): string {
   const { samples, isLoading } = facts;
   if (channels.every(({ shown }) => !shown)) return "All channels are hidden: switch one on.";

@@ -87,7 +87,7 @@ export class Picture {
   /** The same where edges aren't smoothed. */
   private readonly draft: WebGLRenderTarget;
   private readonly encode = new EncodePass();
-  /** From the picture before a jump to the one after it. */
+  /** Fades from the picture before a jump to the one after it. */
   readonly fade: CrossFade;
   /** The target of the last picture. */
   private last: WebGLRenderTarget | null = null;

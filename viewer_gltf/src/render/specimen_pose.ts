@@ -25,7 +25,7 @@ export class Specimen {
   readonly anchor = new Vector3();
   /** As a factor to how large it opens. */
   size = 1;
-  /** In stereo it does not glide to another place, which makes sick: it is there at once, and the picture fades. */
+  /** Gliding makes people sick in stereo, so there the specimen jumps to another place, and the picture fades. */
   isJumping = false;
   private hasJumped = false;
   private readonly facing = new Quaternion();

@@ -6,7 +6,7 @@ import { BufferAttribute, BufferGeometry, Color, LineBasicMaterial, LineSegments
 
 /** Height under the eyes as stereo begins, m: about that of a standing user. */
 const UNDER_EYES_M = 1.45;
-/** Between two lines, m, and from the middle to the farthest, m. */
+/** Distance between two lines, and from the middle to the farthest line, m. */
 const STEP_M = 0.75;
 const REACH_M = 9;
 const COLOR = new Color(0x5a6f96);

@@ -21,7 +21,7 @@ import { type Screen, toScreen } from "./cardboard/lens";
 import { BUILT_IN, type Profile } from "./cardboard/viewer_profile";
 import { PANEL_DISTANCE_M } from "./panel/placement";
 
-/** Of a letter's size: the least of the fonts that phones have (Roboto 0.53, San Francisco 0.53, Segoe UI 0.50). */
+/** Height of an x as a share of a letter's size: the least of the fonts that phones have (Roboto 0.53, San Francisco 0.53, Segoe UI 0.50). */
 const X_HEIGHT = 0.5;
 const INCH_M = 0.0254;
 const EDGE_M = 0.003;

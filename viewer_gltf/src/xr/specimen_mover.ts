@@ -39,7 +39,7 @@ export class SpecimenMover {
     this.specimen.jumpTo(pose, eye);
   }
 
-  /** By a share of a command's step; false: the command moves nothing. */
+  /** Moves the specimen by a share of a command's step. Returns false if the command moves nothing. */
   run(command: Command, state: ViewerState, eye: Vector3, share: number): boolean {
     const pose = moveByCommand(this.pose, command, this.middle(state), eye, share);
     if (pose === null) return false;

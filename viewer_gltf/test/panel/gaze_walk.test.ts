@@ -21,7 +21,7 @@ describeInChromium("by gaze alone", () => {
             hands.gazeFor(null, 6); // away: the same may be chosen again, and what was told has gone
             return after;
           };
-          /** What there is to be seen of an answer. */
+          /** Everything that a person can see of an answer. */
           const seen = () => {
             const { told, position, scale, ...status } = hands.status();
             // Undo goes by itself; the button for the next page counts the pages

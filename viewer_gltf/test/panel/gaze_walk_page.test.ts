@@ -45,7 +45,7 @@ async function walk(stand: Stand, only = "") {
       turn(alpha, 150);
       pass(0.1);
     };
-    /** What there is to be seen of an answer. *Undo* goes by itself, so it is none. */
+    /** Everything that a person can see of an answer. *Undo* goes by itself, so it is none. */
     const seen = () => {
       const { state, told, specimenAt, specimenTurn, isStereo } = api.snapshot();
       const onPage = [...document.querySelectorAll("input")].map((each) => each.checked);

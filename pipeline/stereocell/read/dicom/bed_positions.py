@@ -105,7 +105,7 @@ def _is_deepest(height: float, bed: _Bed, beds: Sequence[_Bed], near_mm: float) 
         depth = min(height - other.low, other.high - height)
         if other is bed or depth < -near_mm:
             continue
-        # of two beds that lie equally deep the lower one is taken
+        # the lower bed is taken where two lie equally deep
         if depth > own + near_mm or (abs(depth - own) <= near_mm and other.low < bed.low):
             return False
     return True

@@ -1,5 +1,5 @@
 // Unit normal of the face by which a ray comes into what is drawn: of the box round all tiles, or of a cut;
-// 0: it begins within. What is cut through is lit as the face: along it the gradient of the matter has no
+// 0: it begins within. Matter that is cut through is lit as a face: along it the gradient of the matter has no
 // side that faces the eye, so that light by it would be a matter of chance.
 vec3 cutFace(vec3 start) {
   float near = 0.05 * uVoxel;

@@ -17,7 +17,7 @@ import { PX_PER_M } from "../../panel/canvas/page";
 import { paint } from "../../panel/canvas/paint";
 
 const LIT = 0xffffff;
-/** In linear light, in which 0.04 looks like a fifth of white. */
+/** Opacity of the light on a target. Light is mixed linearly, so that 0.04 looks like a fifth of white. */
 const LIT_OPACITY = 0.04;
 /** Distance before the quad, m. */
 const LIT_M = 0.001;

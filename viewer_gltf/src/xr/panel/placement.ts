@@ -8,7 +8,7 @@ const DEG = Math.PI / 180;
 /** Distance of the panel and of the bar from the eye, m: what they measure in legibility.test.ts is seen from there. */
 export const PANEL_DISTANCE_M = 1.2;
 
-/** What the specimen stands before: eyes, in the dark; or a table in the user's own room, seen by eyes or on a screen. */
+/** The specimen stands before the eyes in the dark, or over a table in the user's own room, seen by eyes or on a screen. */
 export type Setting = "before-eyes" | "over-table" | "in-hand";
 
 type Places = Readonly<{

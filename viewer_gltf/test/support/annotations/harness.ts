@@ -103,7 +103,7 @@ type View = Readonly<{
   target: Vec3;
   isStereo?: boolean;
   isPanelOpen?: boolean;
-  /** In the user's own room the bar does not hang below the specimen. */
+  /** The bar does not hang below the specimen in the user's own room. */
   isInUsersRoom?: boolean;
   dt_s?: number;
 }>;

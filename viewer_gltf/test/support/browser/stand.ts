@@ -60,7 +60,7 @@ export type StandOptions = Readonly<{
 /** The sections of the panel that a reader has opened, whose controls most tests use. */
 const OPEN = "channels objects volumes tiles stereo slices save more view volume-settings light";
 
-/** As on a visit after another. Runs in the page before its own scripts. */
+/** Opens the sections as on a later visit. It runs in the page before the page's own scripts. */
 function openSections(open: string): void {
   try {
     if (localStorage.getItem("stereocell-open") === null) {

@@ -158,7 +158,7 @@ export class LookingPerson {
     this.turnTo(0, 60);
   }
 
-  /** From where it was to the right, at the same height. */
+  /** Turns the gaze to the right, at the same height. */
   lookAside(): void {
     this.turnBy(20);
   }
