@@ -40,9 +40,8 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def port(bundle: Path) -> Iterator[int]:
-    server = BundleServer(bundle.parent, 0, lan=False)
+def running(server: BundleServer) -> Iterator[int]:
+    """Run a server in a thread, and give its port until it is not needed any more."""
     thread = Thread(target=server.run)
     thread.start()
     while not server.has_started:
@@ -50,6 +49,11 @@ def port(bundle: Path) -> Iterator[int]:
     yield server.port
     server.stop()
     thread.join()
+
+
+@pytest.fixture(scope="module")
+def port(bundle: Path) -> Iterator[int]:
+    yield from running(BundleServer(bundle.parent, 0, lan=False))
 
 
 def test_a_range_is_answered_with_its_bytes(port: int) -> None:
@@ -295,13 +299,7 @@ def test_pages_of_other_sites_may_lead_here_and_no_more(
 @pytest.fixture(scope="module")
 def framed(bundle: Path) -> Iterator[int]:
     server = BundleServer(bundle.parent, 0, lan=False, frames=("https://lab.example",))
-    thread = Thread(target=server.run)
-    thread.start()
-    while not server.has_started:
-        time.sleep(0.01)
-    yield server.port
-    server.stop()
-    thread.join()
+    yield from running(server)
 
 
 def test_a_page_that_is_allowed_may_hold_the_viewer_in_a_frame(framed: int) -> None:
