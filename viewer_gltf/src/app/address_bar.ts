@@ -16,7 +16,13 @@ import type { Viewer } from "./viewer";
 
 const LOOK_MS = 500;
 
+/** `camera`: null where the specimen is seen as the page opens without a link. */
 type Seen = Readonly<{ state: ViewerState; camera: CameraView | null }>;
+/** The view that the address has opened, before anybody changed it. */
+export type Opened = Seen;
+
+/** A link that looks from somewhere. */
+const HAS_CAMERA = /[#&]eye=/;
 
 /** Whether the address of a page follows its view: not that of a mere picture in another page. Pure. */
 export function follows(search: string, isFramed: boolean): boolean {
@@ -38,14 +44,13 @@ export class AddressBar {
   /** The link to the view that the page has opened with, and what stood in the address then. */
   private readonly opening: Readonly<{ link: string; hash: string }>;
 
-  /** @param opened the state in which the page has opened */
   constructor(
     private readonly viewer: Viewer,
-    opened: ViewerState,
+    { state, camera }: Opened,
   ) {
     const { hash } = location;
     this.seen = this.now;
-    this.written = { state: opened, camera: hash === "" ? null : this.seen.camera };
+    this.written = { state, camera: HAS_CAMERA.test(hash) ? camera : null };
     this.opening = { link: this.linkTo(this.written), hash };
   }
 

@@ -1,7 +1,6 @@
 /** Parts of the page that nobody needs before the first picture. */
 import { pixelShare } from "../render/pixel_share";
-import type { ViewerState } from "../state/viewer_state";
-import { AddressBar, follows } from "./address_bar";
+import { AddressBar, follows, type Opened } from "./address_bar";
 import { OfflinePart } from "./offline_part";
 import type { Viewer } from "./viewer";
 
@@ -13,12 +12,12 @@ export type Later = Readonly<{
 }>;
 
 /**
- * @param opened the state in which the page has opened
+ * @param opened the view that the address has opened
  * @param keptToo addresses of files that are kept for a visit without a network, though the page does not fetch them
  */
 export function startLater(
   viewer: Viewer,
-  opened: ViewerState,
+  opened: Opened,
   say: (text: string) => void,
   keptToo: readonly string[],
 ): Later {

@@ -19,10 +19,10 @@ import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/
 import { opensAr, WaysIn } from "../panel/html/ways_in";
 import { flightAsked } from "../share/bench_parameter";
 import { panelOf } from "../share/page_parameters";
-import type { ViewerState } from "../state/viewer_state";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
 import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
+import type { Opened } from "./address_bar";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
 import type { Later } from "./later_parts";
@@ -44,8 +44,8 @@ function describeSize({ specimen, tiles }: Manifest): string {
 }
 
 const said = new Said();
-/** The state that the address has opened. */
-let openedAs: ViewerState | null = null;
+/** The view that the address has opened. */
+let openedAs: Opened | null = null;
 
 /** On the page that stands until there is a picture: see boot/. */
 function sayAtStart(text: string): void {
@@ -128,7 +128,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
   controller.followAddress(search, hash);
-  openedAs = viewer.state;
+  openedAs = { state: viewer.state, camera: viewer.cameraView };
   viewer.renderer.domElement.addEventListener("webglcontextlost", (event) => {
     const canvas = event.target as HTMLCanvasElement;
     void import("./lost_context").then(({ offerReload }) =>

@@ -67,7 +67,7 @@ describeInChromium("the graphics driver", () => {
     await prepareLoss();
     await stand.open("&mode=traced");
     const gathered = async () => {
-      await expect.poll(async () => (await stand.viewer.snapshot()).traced.samples > 24).toBe(true);
+      await expect.poll(async () => (await stand.viewer.snapshot()).traced.samples > 64).toBe(true);
       return takePicture(stand.viewer.page);
     };
     const before = await gathered();

@@ -37,7 +37,7 @@ describeInChromium("the address", () => {
     expect(page().url()).toBe(opened);
     await page().keyboard.press("ArrowRight");
     await expect.poll(hash).toContain("&eye=");
-    await page().keyboard.press("f"); // the front, with which the page has opened
+    await page().keyboard.press("z"); // the front, with which the page has opened
     await expect.poll(() => page().url()).toBe(opened);
   });
 
