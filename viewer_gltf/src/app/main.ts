@@ -14,7 +14,6 @@ import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
-import { keepOffline } from "../offline/register";
 import { isKept } from "../offline/request_plan";
 import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
 import { opensAr, WaysIn } from "../panel/html/ways_in";
@@ -23,8 +22,10 @@ import { panelOf } from "../share/page_parameters";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
 import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
+import type { Opened } from "./address_bar";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
+import type { Later } from "./later_parts";
 import type { NotebookPart } from "./notebook_part";
 import { Viewer } from "./viewer";
 
@@ -46,6 +47,8 @@ function describeSize({ specimen, tiles }: Manifest): string {
 }
 
 const said = new Said();
+/** The view that the address has opened. */
+let openedAs: Opened | null = null;
 
 /** On the page that stands until there is a picture: see boot/. */
 function sayAtStart(text: string): void {
@@ -128,6 +131,13 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
   controller.followAddress(search, hash);
+  openedAs = { state: viewer.state, camera: viewer.cameraView };
+  viewer.renderer.domElement.addEventListener("webglcontextlost", (event) => {
+    const canvas = event.target as HTMLCanvasElement;
+    void import("./lost_context").then(({ offerReload }) =>
+      offerReload(canvas, () => later?.addressBar?.write()),
+    );
+  });
   hint.update(viewer.state);
   whenTouched(() => {
     viewer.stopTurning();
@@ -220,23 +230,21 @@ opened.catch((error: unknown) => {
   showFatal(app, "This bundle can't be shown", error.message);
 });
 let viewer: Viewer | null = null;
+let later: Later | null = null;
 void opened.then(
   (made) => {
     viewer = made;
   },
   () => undefined, // reported above
 );
-const sayReady = () => said.say("Ready offline: what has been shown opens without a network, too.");
-void ready.then(
-  () => keepOffline(sayReady, viewer === null ? [] : alsoKept(viewer)),
-  () => undefined,
-);
-const WAITING = "The host does not answer: trying again. What has come stays on screen.";
-watchWaiting((isWaiting) =>
-  viewer?.dispatch(
-    isWaiting ? { type: "notify", text: WAITING } : { type: "dismiss", texts: [WAITING] },
-  ),
-);
+void ready
+  .then(async () => {
+    const { startLater } = await import("./later_parts");
+    if (viewer === null || openedAs === null) return;
+    later = startLater(viewer, openedAs, (text) => said.say(text), alsoKept(viewer));
+  })
+  .catch(() => undefined); // without these parts the page shows all the same
+watchWaiting((jobs) => viewer?.noteWaiting(jobs));
 ready.catch(() => undefined); // reported above; a caller that awaits `ready` still sees it
 
 /** Bugs: the console has the details, the page reports that something is amiss. */
