@@ -20,10 +20,10 @@ const DEMO_TILES = 10;
 /**
  * Fetched where they are wanted: textures, bricks from a server, paths of light, what shades volumes, pictures
  * and videos, the split screen, the benchmark, the slices, the objects of label maps, dialogs about the screen
- * and the phone viewer, what a notebook asks of the page.
+ * and the phone viewer, what a notebook asks of the page, the background of the flat picture.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|card_measure|qr_scanner|notebook_part/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|card_measure|qr_scanner|notebook_part|backdrop/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {
