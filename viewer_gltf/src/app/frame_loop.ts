@@ -282,7 +282,10 @@ export class FrameLoop {
   private poseMono(dt_s: number): Camera {
     const { navigation, contents, state } = this.options.shown();
     const outline = contents.outline(state);
-    if (outline !== null) navigation.surround(outline);
+    if (outline !== null) {
+      navigation.surround(outline);
+      this.options.room.standUnder(navigation.occupied);
+    }
     navigation.update(dt_s);
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     return navigation.camera;

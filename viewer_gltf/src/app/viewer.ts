@@ -14,6 +14,7 @@ import { pickTile, shownBox, shownTiles } from "../math/pick";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
+import type { Backdrop } from "../render/backdrop";
 import { StageSize } from "../render/canvas_size";
 import { Hybrid } from "../render/gaze_focus";
 import { pixelShare } from "../render/pixel_share";
@@ -26,6 +27,7 @@ import {
   XR_DISTANCE_M,
 } from "../render/placement";
 import { Room } from "../render/scene";
+import type { Theme } from "../render/theme";
 import type { CameraView } from "../share/camera_link";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
@@ -110,6 +112,8 @@ export class Viewer {
   private readonly size: StageSize;
   private readonly steps: Steps;
   private nextView = 0;
+  /** Resolves when the background of the flat picture has come. */
+  private dressed: Promise<void> = Promise.resolve();
   private readonly disposed = new AbortController();
 
   /**
@@ -473,6 +477,24 @@ export class Viewer {
     this.follow();
   }
 
+  /**
+   * The background of the flat picture; the specimen has the same colours before all of them.
+   *
+   * @param isPlain one colour and no shadow: for cutting out, and for readers who ask for more contrast
+   */
+  dress(theme: Theme, isPlain: boolean): void {
+    const dressIn = (backdrop: Backdrop | null) => {
+      this.room.dress(theme, backdrop);
+      this.loop.change();
+    };
+    dressIn(null);
+    if (isPlain) return;
+    this.dressed = import("../render/backdrop").then(
+      ({ Backdrop }) => dressIn(new Backdrop()),
+      () => undefined, // a picture without it is as true
+    );
+  }
+
   /** Someone has touched the page. */
   stopTurning(): void {
     this.navigation.stopTurning();
@@ -515,7 +537,8 @@ export class Viewer {
   }
 
   /** Resolves when nothing loads any more and the picture shows all of it. */
-  settled(): Promise<void> {
+  async settled(): Promise<void> {
+    await this.dressed;
     return this.loop.settled();
   }
 
