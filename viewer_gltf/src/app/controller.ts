@@ -5,7 +5,7 @@
  */
 
 import { unitOf } from "../annotations/measure";
-import { pageAddress } from "../bundle/address";
+import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
@@ -337,7 +337,7 @@ export class Controller {
 
   private splitScreen(): void {
     const { lenses, code } = this.view;
-    this.viewer.stereo.hands.panel.take({ lenses, code });
+    this.viewer.stereo.showInPanel({ lenses, code });
     this.withProfile((profile) => this.options.onSplit(profile));
   }
 
@@ -471,11 +471,10 @@ export class Controller {
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
-    // a notebook's frame has no address
-    if (globalThis.stereocellHost === undefined) history.replaceState(history.state, "", address);
+    if (hasAddress()) history.replaceState(history.state, "", address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
-    viewer.stereo.hands.panel.take({ link: address.href });
+    viewer.stereo.showInPanel({ link: address.href });
     const without = viewer.leftOutOfLink;
     const but =
       without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;

@@ -19,12 +19,12 @@ const FIRST_PICTURE_BYTES = 300_000;
 const DEMO_TILES = 10;
 /**
  * Fetched where they are wanted: textures, bricks from a server, paths of light, what shades volumes, pictures
- * and videos, the split screen, the benchmark, the slices, the objects of label maps, dialogs about the screen
- * and the phone viewer, what a notebook or a page around this one asks of it, the card beside a tapped place, and why a
+ * and videos, stereo, the benchmark, the slices, the objects of label maps, dialogs about the screen
+ * and the phone viewer, what a notebook or a page around asks of the page, the card beside a tapped place, and why a
  * picture is empty.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|card_measure|qr_scanner|notebook_part|frame_port|tap_part|view_message_part/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|interaction|split_session|unclipped|bench|slices|objects|card_measure|qr_scanner|notebook_part|frame_port|tap_part|view_message_part/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {
