@@ -41,6 +41,7 @@ import { ENVIRONMENT } from "../state/parameters/light";
 import { START_TOOLS } from "../state/parameters/tools";
 import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
 import { newNotice, reduce } from "../state/reduce";
+import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import type { Profile } from "../xr/cardboard/viewer_profile";
@@ -72,7 +73,6 @@ const ASIDE = [1, 0, -1].flatMap((z) =>
 const BEHIND_OTHERS = "Others lie before it on all sides: from its card it is shown alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
-const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
 const NEXT_KEPT = "` goes to the next.";
 
 const NO_LAYOUT: Layout = {
@@ -104,6 +104,10 @@ export class Viewer {
   onCard: (control: string) => void = () => undefined;
   /** Where someone has tapped, um; for what stands round the page. */
   onTap: (ray: Ray) => void = () => undefined;
+  /** Someone has tapped the flat picture with the tool *Select* (ray in um), or pressed the key for it. */
+  onSelect: (ray: Ray, isByKey: boolean) => void = () => undefined;
+  /** Two quick taps are one request, to fly there: the first was no selection. */
+  onDouble: () => void = () => undefined;
   readonly contents: Contents;
   private readonly room: Room;
   private readonly hybrid: Hybrid;
@@ -218,6 +222,7 @@ export class Viewer {
       },
       (point) => {
         if (this.stereo.kind !== null) return;
+        this.onDouble();
         if (this.state.tool === "measure") this.tap(rayAt(point));
         else void this.flyAlong(rayAt(point));
       },
@@ -299,8 +304,8 @@ export class Viewer {
         break;
       case "press":
         if (this.stereo.kind !== null) return this.stereo.run(command, this.state);
-        if (!this.tap(rayAhead(this.loop.head, this.room.specimen.group))) {
-          this.onAnnounce(this.state.isolated === null ? NOTHING_AHEAD : NO_OTHER_TILE);
+        if (!this.tap(rayAhead(this.loop.head, this.room.specimen.group), true)) {
+          this.onAnnounce(NOTHING_AHEAD);
         }
         break;
       default: {
@@ -391,7 +396,7 @@ export class Viewer {
   private step(command: "undo" | "redo"): boolean {
     const found = command === "undo" ? this.steps.undo() : this.steps.redo();
     if (found === null) {
-      this.onAnnounce(`Nothing to ${command}.`);
+      this.onAnnounce(REFUSED[command]);
       return true;
     }
     const { state, camera, isInRoom } = found.moment;
@@ -751,24 +756,35 @@ export class Viewer {
     this.onState(this.state);
   }
 
-  /** Whether there was anything to measure or to choose. */
-  private tap(ray: Ray): boolean {
+  /** A tap on the flat picture: measure, or select what lies there. Returns whether it met anything. */
+  private tap(ray: Ray, isByKey = false): boolean {
     this.onTap(ray);
-    const tiles = shownTiles(this.bundle.manifest.tiles, this.state.isolated);
-    return this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
+    if (this.measures(ray)) return true;
+    const { isolated, clip } = this.state;
+    const { tiles } = this.bundle.manifest;
+    const hasObject = this.contents.objects.choose(ray, false);
+    const tile = pickTile(ray, shownTiles(tiles, isolated), clip)?.id ?? null;
+    // a single tile has no others to be told apart from
+    if (!hasObject && tiles.length > 1 && tile !== null) this.dispatch({ type: "select", tile });
+    this.onSelect(ray, isByKey);
+    return hasObject || tile !== null;
   }
 
   /**
-   * Measure, or choose the tile; of one that is alone nothing is left to choose. A gaze that rested there
+   * In stereo: measure, or choose the tile; of one that is alone nothing is left to choose. A gaze that rested there
    * has chosen without being asked: undoing is for what a person sets.
    */
-  private choose(ray: Ray, tile: string | null, isByGaze = false): boolean {
+  private choose(ray: Ray, tile: string | null, isByGaze: boolean): void {
     const { state } = this;
-    if (state.tool === "measure") void this.contents.marks.measure(ray);
-    else if (this.contents.objects.choose(ray, isByGaze)) return true;
-    else if (state.isolated === null && tile !== null) {
+    if (this.measures(ray) || this.contents.objects.choose(ray, isByGaze)) return;
+    if (state.isolated === null && tile !== null) {
       this.dispatch(chosenTile(state, tile), !isByGaze);
-    } else return false;
+    }
+  }
+
+  private measures(ray: Ray): boolean {
+    if (this.state.tool !== "measure") return false;
+    void this.contents.marks.measure(ray);
     return true;
   }
 

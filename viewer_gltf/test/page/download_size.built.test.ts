@@ -41,7 +41,9 @@ const OPTIONAL = new RegExp(
     "shading",
     "slices",
     "split_session",
+    "tap_part",
     "unclipped",
+    "view_message_part",
   ].join("|"),
 );
 const CODE = /\.(js|css|wasm|html)$/;

@@ -8,6 +8,8 @@ import type { Progress } from "../../surfaces/overview_progress";
 
 /** Time for which an announcement stays, ms; a screen reader reads it at once. */
 const SAID_MS = 4000;
+/** The same with a button, which a person has to find first. */
+const OFFERED_MS = 8000;
 
 /** A thin bar at the top with its count in words; hidden once complete. */
 export class ProgressBar {
@@ -104,13 +106,37 @@ export class FirstHint {
 
 /** What a key or a button has just done, where nothing else shows it; it goes by itself. */
 export class Said {
-  readonly root = element("p", { className: "said", role: "status" }, { said: "" });
+  private readonly words = element("p", { role: "status" }, { said: "" });
+  private readonly button = element(
+    "button",
+    { type: "button", hidden: true },
+    { action: "offer" },
+  );
+  readonly root = element("div", { className: "said" }, {}, this.words, this.button);
   private timer = 0;
 
   say(text: string): void {
-    setText(this.root, text);
+    this.write(text, SAID_MS);
+  }
+
+  /** A button beside the words, if they still stand. */
+  offer(text: string, label: string, act: () => void): void {
+    if (this.words.textContent !== text) return;
+    this.write(text, OFFERED_MS);
+    setText(this.button, label);
+    this.button.hidden = false;
+    this.button.onclick = () => {
+      this.write("", 0);
+      act();
+    };
+  }
+
+  private write(text: string, for_ms: number): void {
+    setText(this.words, text);
+    this.button.hidden = true;
     clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => setText(this.root, ""), SAID_MS);
+    this.timer = window.setTimeout(() => this.write("", 0), for_ms);
+    if (text === "") clearTimeout(this.timer);
   }
 }
 
