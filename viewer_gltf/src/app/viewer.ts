@@ -17,6 +17,7 @@ import { chosenTile } from "../panel/sections/tiles";
 import type { Backdrop } from "../render/backdrop";
 import { StageSize } from "../render/canvas_size";
 import { Hybrid } from "../render/gaze_focus";
+import { pixelShare } from "../render/pixel_share";
 import {
   OVER_FLOOR_M,
   place,
@@ -78,6 +79,11 @@ const NO_LAYOUT: Layout = {
   ...{ title: "", subtitle: "", sections: [], status: "", isHidden: true },
   more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
 };
+
+const WAITING = "The host does not answer: trying again. What has come stays on screen.";
+const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
+/** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
+const FINER = /^\S+\.(glb|ktx2):/;
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -179,13 +185,13 @@ export class Viewer {
       },
       onLenses: (lenses) => this.onLenses(lenses),
       onChoose: (ray, tile, isByGaze) => this.choose(ray, tile, isByGaze),
+      objectAlong: (ray) => {
+        const met = this.contents.objects.meet(ray);
+        return met && { id: `${met.channel}/${met.row}`, distance: met.distance };
+      },
       onStart: () => this.enterStereo(),
       onEnd: () => this.leaveStereo(),
     });
-    this.stereo.hands.tiles.objectAlong = (ray) => {
-      const met = this.contents.objects.meet(ray);
-      return met && { id: `${met.channel}/${met.row}`, distance: met.distance };
-    };
     this.steps = new Steps(
       () => ({ state: this.state, camera: this.cameraView, isInRoom: this.stereo.kind !== null }),
       this.disposed.signal,
@@ -525,7 +531,7 @@ export class Viewer {
       isStereo: this.stereo.kind !== null,
       specimenAt: this.room.specimen.middle,
       specimenTurn: this.room.specimen.pose.orientation.toArray(),
-      told: this.stereo.hands.notice.texts,
+      told: this.stereo.hands?.notice.texts ?? [],
       menu: this.stereo.menu,
     };
   }
@@ -554,11 +560,38 @@ export class Viewer {
 
   report(error: unknown): void {
     if (!(error instanceof BundleError)) throw error;
-    const isMendable = error instanceof TemporaryError;
-    const text = isMendable ? error.notice : error.message;
+    const isOffline = navigator.onLine === false;
+    if (isOffline && FINER.test(error.message) && !this.isIncomplete) return;
+    const isMendable = isOffline || error instanceof TemporaryError;
+    const text = isOffline
+      ? OFFLINE
+      : error instanceof TemporaryError
+        ? error.notice
+        : error.message;
     // it would be reported again for each of a host's files
     if (isMendable && this.state.mendable.includes(text)) return;
     this.dispatch({ type: "notify", text, isMendable });
+  }
+
+  /**
+   * Files are awaited. A device without a network shows what it has, and mentions it if that is not all.
+   *
+   * @param files so many; one more than before, or none any more
+   */
+  noteWaiting(files: number): void {
+    const text = navigator.onLine ? WAITING : OFFLINE;
+    if (files === 0) this.dispatch({ type: "dismiss", texts: [WAITING, OFFLINE] });
+    else if (this.state.notices.includes(text)) return;
+    else if (navigator.onLine ? files === 1 : this.isIncomplete) {
+      this.dispatch({ type: "notify", text });
+    }
+  }
+
+  /** Whether a part of the picture is missing, not merely coarse. */
+  private get isIncomplete(): boolean {
+    const { surfaces, volumes } = this.contents;
+    const isNone = ({ level }: { level: number | null }) => level === null;
+    return !surfaces.overview.isComplete || volumes.status().some(isNone);
   }
 
   /** Light the traced picture by a file of the user's. Throws BundleError. */
@@ -632,7 +665,7 @@ export class Viewer {
     if (this.renderer.xr.isPresenting) return;
     const { clientWidth, clientHeight } = this.stage;
     if (clientWidth === 0 || clientHeight === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO) * pixelShare());
     this.renderer.setSize(clientWidth, clientHeight);
     const style = getComputedStyle(this.stage);
     const share = (name: string) => Number.parseFloat(style.getPropertyValue(name)) / clientHeight;

@@ -156,6 +156,11 @@ export class Navigation {
     return this.stand === "opening" && !this.isTurning ? null : this.lookNow;
   }
 
+  /** The named view that still holds; null: someone has moved. */
+  get standing(): Stand | null {
+    return this.stand;
+  }
+
   /** Whether the specimen is seen as a room has it that nobody has turned. */
   get isStraight(): boolean {
     return this.stand === "front";
