@@ -5,7 +5,7 @@
  */
 
 import { unitOf } from "../annotations/measure";
-import { pageAddress } from "../bundle/address";
+import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
@@ -282,7 +282,7 @@ export class Controller {
 
   private splitScreen(): void {
     const { lenses, code } = this.view;
-    this.viewer.stereo.hands.panel.take({ lenses, code });
+    this.viewer.stereo.showInPanel({ lenses, code });
     this.withProfile((profile) => this.options.onSplit(profile));
   }
 
@@ -381,13 +381,13 @@ export class Controller {
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
-    // A notebook's frame has no address. The step that the split screen has made in the history goes when it is left,
+    // The step that the split screen has made in the history goes when it is left,
     // and its address with it; the address follows the view then.
     const isSplit = viewer.stereo.kind === "split";
-    if (globalThis.stereocellHost === undefined && !isSplit) writeAddress(address);
+    if (hasAddress() && !isSplit) writeAddress(address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
-    viewer.stereo.hands.panel.take({ link: address.href });
+    viewer.stereo.showInPanel({ link: address.href });
     const without = viewer.leftOutOfLink;
     const but =
       without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;

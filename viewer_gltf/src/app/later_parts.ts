@@ -1,4 +1,5 @@
 /** Parts of the page that nobody needs before the first picture. */
+import { hasAddress } from "../bundle/address";
 import { pixelShare } from "../render/pixel_share";
 import { AddressBar, follows, type Opened } from "./address_bar";
 import { OfflinePart } from "./offline_part";
@@ -23,7 +24,6 @@ export function startLater(
 ): Later {
   if (pixelShare() < 1) say(FEWER_PIXELS);
   void OfflinePart.start(viewer, say, keptToo);
-  const isNotebook = globalThis.stereocellHost !== undefined; // its frame has no address
-  const isFollowed = !isNotebook && follows(location.search, window.parent !== window);
+  const isFollowed = hasAddress() && follows(location.search, window.parent !== window);
   return { addressBar: isFollowed ? new AddressBar(viewer, opened) : null };
 }

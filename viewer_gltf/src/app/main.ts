@@ -29,6 +29,9 @@ import type { Later } from "./later_parts";
 import type { NotebookPart } from "./notebook_part";
 import { Viewer } from "./viewer";
 
+/** Time after the first picture until stereo is prepared, where the browser does not report idle time, ms. */
+const AFTER_PICTURE_MS = 2000;
+
 function checkWebGl2(): void {
   if (document.createElement("canvas").getContext("webgl2") !== null) return;
   throw new BundleError(
@@ -145,12 +148,14 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   controller.setStereo(support, hasRoom);
   const way = wayToStereo(support, isTouch);
   waysIn.offerStereo(way, () => way && controller.perform(way));
+  if (way !== null || hasRoom) void prepareStereo(viewer);
   if (hasRoom) waysIn.offerRoom(() => controller.perform("room"));
   const usdz = usdzFor(bundle);
   if (usdz !== null) waysIn.offerLink(usdz);
-  if (globalThis.stereocellHost !== undefined) {
+  const port = globalThis.stereocellHost?.port;
+  if (port !== undefined) {
     const part = await import("./notebook_part");
-    notebook = new part.NotebookPart(viewer, globalThis.stereocellHost.port);
+    notebook = new part.NotebookPart(viewer, port);
   } else if (isFramed && new URLSearchParams(search).has("embed")) {
     const [part, way] = await Promise.all([import("./notebook_part"), import("./frame_port")]);
     const port = way.portToHolder(search, manifest);
@@ -177,7 +182,7 @@ async function offerBench(
     stereo: hasHeadset ? ["headset", "split"] : ["split"],
     startStereo: async (kind) => {
       if (kind === "split") await viewer.startSplit(CARDBOARD_V2);
-      else if (navigator.xr !== undefined) await viewer.stereo.headset.start(navigator.xr);
+      else if (navigator.xr !== undefined) await viewer.stereo.startHeadset(navigator.xr);
     },
     onReport: (report) => {
       api.bench = report;
@@ -189,11 +194,19 @@ async function offerBench(
 async function enterStereo(viewer: Viewer, mode: ImmersiveMode): Promise<void> {
   if (navigator.xr === undefined) return;
   try {
-    await viewer.stereo.headset.start(navigator.xr, mode);
+    await viewer.stereo.startHeadset(navigator.xr, mode);
   } catch (error) {
-    if (!(error instanceof DOMException)) throw error;
+    if (!(error instanceof DOMException || error instanceof BundleError)) throw error;
     viewer.dispatch({ type: "notify", text: `Stereo could not start: ${error.message}` });
   }
+}
+
+/** Load the part of the page that shows stereo, once there is a picture and the page has nothing else to do. */
+async function prepareStereo(viewer: Viewer): Promise<void> {
+  await overviewShown(viewer);
+  const prepare = () => void viewer.stereo.prepare().catch(() => undefined); // a start reports it
+  if (typeof requestIdleCallback === "function") requestIdleCallback(prepare);
+  else setTimeout(prepare, AFTER_PICTURE_MS);
 }
 
 /** Resolves once every shown channel's overview is on screen. */

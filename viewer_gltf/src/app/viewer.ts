@@ -181,13 +181,13 @@ export class Viewer {
       },
       onLenses: (lenses) => this.onLenses(lenses),
       onChoose: (ray, tile, isByGaze) => this.choose(ray, tile, isByGaze),
+      objectAlong: (ray) => {
+        const met = this.contents.objects.meet(ray);
+        return met && { id: `${met.channel}/${met.row}`, distance: met.distance };
+      },
       onStart: () => this.enterStereo(),
       onEnd: () => this.leaveStereo(),
     });
-    this.stereo.hands.tiles.objectAlong = (ray) => {
-      const met = this.contents.objects.meet(ray);
-      return met && { id: `${met.channel}/${met.row}`, distance: met.distance };
-    };
     this.steps = new Steps(
       () => ({ state: this.state, camera: this.cameraView, isInRoom: this.stereo.kind !== null }),
       this.disposed.signal,
@@ -509,7 +509,7 @@ export class Viewer {
       isStereo: this.stereo.kind !== null,
       specimenAt: this.room.specimen.middle,
       specimenTurn: this.room.specimen.pose.orientation.toArray(),
-      told: this.stereo.hands.notice.texts,
+      told: this.stereo.hands?.notice.texts ?? [],
       menu: this.stereo.menu,
     };
   }

@@ -19,11 +19,12 @@ const FIRST_PICTURE_BYTES = 300_000;
 const DEMO_TILES = 10;
 /**
  * Fetched where they are wanted: textures, bricks from a server, paths of light, what shades volumes, pictures
- * and videos, the split screen, the benchmark, the slices, the objects of label maps, dialogs about the screen
- * and the phone viewer, what a notebook asks of the page, what follows the first picture, a lost graphics context.
+ * and videos, stereo, the benchmark, the slices, the objects of label maps, dialogs about the screen
+ * and the phone viewer, what a notebook or a page around asks of the page, what
+ * follows the first picture, a lost graphics context.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|card_measure|qr_scanner|notebook_part|later_parts|lost_context/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|interaction|split_session|unclipped|bench|slices|objects|card_measure|qr_scanner|notebook_part|frame_port|later_parts|lost_context/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {
