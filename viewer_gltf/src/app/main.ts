@@ -231,7 +231,8 @@ void ready.then(
   () => keepOffline(sayReady, viewer === null ? [] : alsoKept(viewer)),
   () => undefined,
 );
-const WAITING = "The host does not answer: trying again. What has come stays on screen.";
+const WAITING =
+  "The host does not answer. The page tries again, and what has loaded stays on screen.";
 watchWaiting((isWaiting) =>
   viewer?.dispatch(
     isWaiting ? { type: "notify", text: WAITING } : { type: "dismiss", texts: [WAITING] },

@@ -20,11 +20,11 @@ const DEMO_TILES = 10;
 /**
  * Fetched where they are wanted: textures, bricks from a server, paths of light, what shades volumes, pictures
  * and videos, stereo, the benchmark, the slices, the objects of label maps, dialogs about the screen
- * and the phone viewer, what a notebook or a page around asks of the page, the card beside a tapped place, and why a
- * picture is empty.
+ * and the phone viewer, what a notebook or a page around asks of the page, the card beside a tapped place, why a picture
+ * is empty, and explanations of the settings.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|interaction|split_session|unclipped|bench|slices|objects|card_measure|qr_scanner|notebook_part|frame_port|tap_part|view_message_part/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|interaction|split_session|unclipped|bench|slices|objects|card_measure|qr_scanner|notebook_part|frame_port|tap_part|view_message_part|explanations/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {
