@@ -6,7 +6,7 @@ import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
-import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
+import { isSameLook, type Look, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";
@@ -69,13 +69,20 @@ const ASIDE = [1, 0, -1].flatMap((z) =>
 const BEHIND_OTHERS = "Others lie before it on all sides: from its card it is shown alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
-const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
-const NEXT_KEPT = "` goes to the next.";
+const NO_OTHER_TILE = "This tile is shown alone: go back to all tiles first.";
+const NEXT_KEPT = "“Next kept view” goes through them.";
 
 const NO_LAYOUT: Layout = {
   ...{ title: "", subtitle: "", sections: [], status: "", isHidden: true },
   more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
 };
+
+export type Mark = Readonly<{
+  state: ViewerState;
+  camera: CameraView | null;
+  look: Look;
+  newest: object | null;
+}>;
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -401,6 +408,33 @@ export class Viewer {
 
   get redoes(): string | null {
     return this.steps.redoes;
+  }
+
+  /** A moment that `takeBack` can return to. */
+  get mark(): Mark {
+    const { state, cameraView: camera } = this;
+    return { state, camera, look: this.navigation.lookNow, newest: this.steps.newest };
+  }
+
+  /** Whether the user would see a difference since then. */
+  hasChangedSince({ state, look }: Mark): boolean {
+    return !isSameView(state, this.state) || !isSameLook(look, this.navigation);
+  }
+
+  /** The newest step of the history. */
+  get newestStep(): object | null {
+    return this.steps.newest;
+  }
+
+  /** Return to the state of a moment and to where the specimen was seen from. */
+  takeBack({ state, camera, newest }: Mark): void {
+    if (!isSameView(state, this.state)) {
+      // a change that was joined with the step before it made no step of its own
+      for (let left = Math.max(1, this.steps.since(newest)); left > 0; left--) this.step("undo");
+    }
+    if (this.stereo.kind === null) this.transition.restore(camera);
+    this.loop.change();
+    this.onState(this.state);
   }
 
   /** From here on: what came before was no user's. */

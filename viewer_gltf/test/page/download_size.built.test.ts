@@ -19,11 +19,11 @@ const FIRST_PICTURE_BYTES = 300_000;
 const DEMO_TILES = 10;
 /**
  * Fetched where they are wanted: textures, bricks from a server, paths of light, what shades volumes, pictures
- * and videos, the split screen, the benchmark, the slices, the objects of label maps, dialogs about the screen
+ * and videos, the split screen, the benchmark, the slices, the objects of label maps, the list of keys, dialogs about the screen
  * and the phone viewer, what a notebook asks of the page.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|card_measure|qr_scanner|notebook_part/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|split_session|bench|slices|objects|card_measure|qr_scanner|key_list|notebook_part/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {

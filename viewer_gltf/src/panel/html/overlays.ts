@@ -8,6 +8,8 @@ import type { Progress } from "../../surfaces/overview_progress";
 
 /** Time for which an announcement stays, ms; a screen reader reads it at once. */
 const SAID_MS = 4000;
+/** The same where the reader may want to undo something, ms. */
+const UNDO_MS = 8000;
 
 /** A thin bar at the top with its count in words; hidden once complete. */
 export class ProgressBar {
@@ -102,15 +104,64 @@ export class FirstHint {
   }
 }
 
-/** What a key or a button has just done, where nothing else shows it; it goes by itself. */
+/** Says in a line what a key or a button has just done. The line goes by itself, unless someone is about to undo it. */
 export class Said {
-  readonly root = element("p", { className: "said", role: "status" }, { said: "" });
+  private readonly text = element("p", { role: "status" }, { said: "" });
+  private readonly undo = element(
+    "button",
+    { type: "button", textContent: "Undo", hidden: true },
+    { overlay: "undo" },
+  );
+  readonly root = element("div", { className: "said" }, {}, this.text, this.undo);
   private timer = 0;
 
-  say(text: string): void {
-    setText(this.root, text);
+  /** @param onUndo takes back what the text announces; null: nothing can be taken back */
+  say(text: string, onUndo: (() => void) | null = null): void {
+    setText(this.text, text);
+    this.offer(onUndo);
+    this.leaveLater(onUndo === null ? SAID_MS : UNDO_MS);
+  }
+
+  /** Leave the text and take the offer away: something else has changed since. */
+  withdraw(): void {
+    this.offer(null);
+  }
+
+  private offer(onUndo: (() => void) | null): void {
+    this.undo.hidden = onUndo === null;
+    this.undo.onclick = onUndo;
+  }
+
+  private leaveLater(after_ms: number): void {
     clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => setText(this.root, ""), SAID_MS);
+    this.timer = window.setTimeout(() => {
+      if (this.undo.matches(":hover, :focus")) {
+        this.leaveLater(SAID_MS);
+        return;
+      }
+      setText(this.text, "");
+      this.offer(null);
+    }, after_ms);
+  }
+}
+
+/** The way back from a tile that is shown alone, for thumbs: see overlays.css. */
+export class WayBack {
+  readonly root: HTMLButtonElement;
+
+  constructor(onBack: () => void) {
+    this.root = element(
+      "button",
+      {
+        ...{ type: "button", className: "way way-back", textContent: "Back to all tiles" },
+        ...{ hidden: true, onclick: onBack },
+      },
+      { overlay: "back" },
+    );
+  }
+
+  update({ isolated }: Pick<ViewerState, "isolated">): void {
+    this.root.hidden = isolated === null;
   }
 }
 
@@ -119,10 +170,15 @@ export function showFatal(parent: HTMLElement, title: string, text: string): voi
   parent.replaceChildren(
     element(
       "main",
-      { className: "fatal", role: "alert" },
+      { className: "fatal" },
       { fatal: "" },
-      element("h1", { textContent: title }),
-      element("p", { textContent: text }),
+      element(
+        "div",
+        { role: "alert" },
+        {},
+        element("h1", { textContent: title }),
+        element("p", { textContent: text }),
+      ),
       element("button", { textContent: "Try again", onclick: () => location.reload() }),
     ),
   );

@@ -8,7 +8,7 @@ import { type Key, key, keysOf, neighbour, no } from "../key";
 import { middleBox, middlePlane } from "../layout";
 import { clearMeasured } from "./measure";
 
-const NOT_CUT = no("Nothing is cut: b cuts by a box, n by a plane.");
+const NOT_CUT = no("Nothing is cut: cut by a box or a plane first.");
 const NOT_MEASURED = no("Nothing is measured.");
 
 function nextClipPart(by: number): Key["to"] {

@@ -12,7 +12,7 @@ import { refusalOf, setShapes } from "./transfer_function_2d";
 /** One step of a shape's number, 0..1: five cells of its table. */
 const SHAPE_STEP = 5 / 255;
 
-const NO_SHAPE = no("There is no shape: Q adds a rectangle, Y a triangle.");
+const NO_SHAPE = no("There is no shape: add a rectangle or a triangle first.");
 
 function addShapeOf(kind: Shape["kind"]) {
   return (channel: ChannelState): Wish | Refusal => {
