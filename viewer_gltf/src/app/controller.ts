@@ -5,12 +5,14 @@
  */
 
 import { unitOf } from "../annotations/measure";
-import { pageAddress } from "../bundle/address";
+import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
+import { store, stored } from "../dom/stored";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import { handleOf } from "../panel/clip_by_key";
 import {
   changePanel,
@@ -18,6 +20,7 @@ import {
   type Lenses,
   type PanelChange,
   type PanelView,
+  type Refusal,
   START_VIEW,
   type Wish,
 } from "../panel/controls";
@@ -27,10 +30,11 @@ import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
 import { isRefusal, type KeyContext } from "../panel/key";
 import { isWritten, listenForKeys } from "../panel/key_events";
-import { type KeyChanges, labelOf, standsFor, wishOf } from "../panel/keys";
+import { type KeyChanges, labelOf, standsFor, wishOf, withKeys } from "../panel/keys";
 import { type Facts, layOut, MORE } from "../panel/layout";
 import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
+import { withTyped, writeAddress } from "../share/address";
 import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
 import type { Action } from "../state/actions";
@@ -41,7 +45,9 @@ import { allOf, measurementsCsv } from "../state/measurements";
 import { setTo } from "../state/parameters/kinds";
 import { EYE_DISTANCE, START_TOOLS, STEREO_STRENGTH } from "../state/parameters/tools";
 import { SWITCH_DISTANCE } from "../state/parameters/volumes";
+import { REFUSED } from "../state/refusals";
 import { PER_INCH, type XrSupport } from "../state/stereo";
+import type { ViewerState } from "../state/viewer_state";
 import { cssPixelsPerInch } from "../xr/cardboard/lens";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
@@ -51,6 +57,8 @@ import {
   ProfileError,
   parseProfile,
 } from "../xr/cardboard/viewer_profile";
+import type { TapPart } from "./tap_part";
+import type { ViewMessagePart } from "./view_message_part";
 import type { Mark, Viewer } from "./viewer";
 
 /** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
@@ -71,11 +79,11 @@ const EYE_ROWS = [EYE_DISTANCE, STEREO_STRENGTH] as const;
 /** The user's phone viewer, from the visit before. */
 function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
   try {
-    const { lenses, code } = JSON.parse(localStorage.getItem(LENS_KEY) ?? "{}");
+    const { lenses, code } = JSON.parse(stored(LENS_KEY) ?? "{}");
     const isKnown = lenses === "own" || lenses in BUILT_IN;
     return isKnown && typeof code === "string" ? { lenses, code } : {};
   } catch {
-    return {}; // no storage here, or another's words in it: then as at first
+    return {}; // another program has written other words there
   }
 }
 
@@ -86,7 +94,7 @@ const KEYS_KEY = "stereocell-keys";
 /** The keys that the reader has changed on a visit before. */
 function rememberedKeys(): KeyChanges {
   try {
-    const found: unknown = JSON.parse(remembered(KEYS_KEY) ?? "{}");
+    const found: unknown = JSON.parse(stored(KEYS_KEY) ?? "{}");
     const pairs = Object.entries(found ?? {}).filter((pair) => typeof pair[1] === "string");
     return Object.fromEntries(pairs);
   } catch {
@@ -96,7 +104,7 @@ function rememberedKeys(): KeyChanges {
 
 /** The sections of the panel that the reader had open on the visit before. */
 function rememberedOpen(): readonly string[] {
-  const text = remembered(OPEN_KEY);
+  const text = stored(OPEN_KEY);
   return text === null ? START_VIEW.open : text.split(" ");
 }
 
@@ -106,42 +114,26 @@ const EYES_KEY = "stereocell-eyes";
 /** CSS pixels in an inch of this screen, as it was measured; null: it was not. */
 function rememberedScreen(): number | null {
   const [least, most] = PER_INCH;
-  const perInch = Number(remembered(SCREEN_KEY));
+  const perInch = Number(stored(SCREEN_KEY));
   return perInch >= least && perInch <= most ? perInch : null;
 }
 
 /** What the user has set for the eyes, on a visit before. */
 function rememberedEyes(): readonly Action[] {
-  const texts = (remembered(EYES_KEY) ?? "").split(",");
+  const texts = (stored(EYES_KEY) ?? "").split(",");
   return EYE_ROWS.flatMap((row, i) => {
     const value = Number(texts[i] || Number.NaN);
     return Number.isFinite(value) ? [setTo(row, value)] : [];
   });
 }
 
-function remembered(key: string): string | null {
-  try {
-    return localStorage.getItem(key);
-  } catch {
-    return null; // no storage here
-  }
-}
+/** Parts of the state that can leave the picture empty. */
+const EMPTYING = ["channels", "clip", "isolated", "selected", "objects"] as const;
 
-function remember(key: string, text: string): void {
-  try {
-    localStorage.setItem(key, text);
-  } catch {
-    // no storage here: it has to be set anew next time
-  }
-}
-
-function rememberLens(lens: Pick<PanelView, "lenses" | "code">): void {
-  try {
-    localStorage.setItem(LENS_KEY, JSON.stringify(lens));
-  } catch {
-    // no storage here: it has to be chosen anew next time
-  }
-}
+/** Whether the picture may be empty by what was set: then the part of the page that says why is loaded. */
+const mayBeEmpty = (state: ViewerState, opening: ViewerState) =>
+  EMPTYING.some((key) => state[key] !== opening[key]) ||
+  (state.mode === "off" && !state.channels.some(({ shown, hasSurface }) => shown && hasSurface));
 
 /** What was there before a key was pressed. */
 type Before = Readonly<{ mark: Mark; view: PanelView }>;
@@ -166,13 +158,21 @@ export class Controller {
     ...START_VIEW,
     ...rememberedLens(),
     open: rememberedOpen(),
-    hasLetters: remembered(LETTERS_KEY) !== "off",
+    hasLetters: stored(LETTERS_KEY) !== "off",
     keyChanges: rememberedKeys(),
   };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
   /** Once it was asked for, as is the next one. */
   private help: Help | null = null;
   private card: CardMeasure | null = null;
+  /** The card beside a tapped place, once something was tapped. */
+  private tapped: TapPart | null = null;
+  /** Counts the taps and double taps: the code may come after the second one. */
+  private taps = 0;
+  /** What the picture says about itself, once it may have something to say. */
+  private message: ViewMessagePart | null = null;
+  /** The state in which the bundle opened. */
+  private readonly opening: ViewerState;
   private readonly ranges: Ranges;
   private readonly disposed = new AbortController();
   private timer = 0;
@@ -193,6 +193,7 @@ export class Controller {
   ) {
     const { manifest } = viewer.bundle;
     const unit = unitOf(manifest);
+    this.opening = viewer.state;
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
@@ -200,6 +201,11 @@ export class Controller {
     for (const action of rememberedEyes()) viewer.dispatch(action);
     viewer.onAnnounce = (text) => this.say(text);
     viewer.onCard = (control) => this.panel.reveal(control);
+    viewer.onSelect = (ray, isByKey) => void this.openTapCard(ray, isByKey);
+    viewer.onDouble = () => {
+      this.taps++;
+      this.tapped?.close();
+    };
     viewer.onCommand = (command) => {
       if (command === "share") void this.share();
       return command === "share";
@@ -234,7 +240,7 @@ export class Controller {
     this.view = keepPlaces(this.view, this.viewer.state);
     this.panel.update(this.layOut());
     const eyes = EYE_ROWS.map((row) => row.get(this.viewer.state)).join();
-    if (eyes !== this.eyes) remember(EYES_KEY, eyes);
+    if (eyes !== this.eyes) store(EYES_KEY, eyes);
     this.eyes = eyes;
     this.help?.update(this.view.isHelpOpen, this.view.keyChanges);
     if (this.view.isHelpOpen && this.help === null) void this.loadHelp();
@@ -242,22 +248,27 @@ export class Controller {
       this.accident = null;
       this.said.withdraw();
     }
+    this.tapped?.update();
+    if (mayBeEmpty(this.viewer.state, this.opening)) void this.loadMessage();
+    this.message?.update();
   }
 
-  /** Bring the figures to the frame that was just drawn, now and then. */
+  /** Bring the card beside a place to the frame that was just drawn, and the figures now and then. */
   refreshSoon(): void {
+    this.tapped?.follow();
     if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
   }
 
-  perform(wish: Wish): void {
+  perform(wish: Wish | Refusal): void {
     if (typeof wish === "string") this.run(wish);
+    else if ("refusal" in wish) void this.explain(wish);
     else if ("panel" in wish) {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
       if (laysOutCards(wish)) this.view = { ...this.view, channelsWithCard: null };
-      if (wish.panel === "unfold") remember(OPEN_KEY, this.view.open.join(" "));
-      if (wish.panel === "letters") remember(LETTERS_KEY, wish.areOn ? "on" : "off");
-      if (wish.panel === "keys") remember(KEYS_KEY, JSON.stringify(wish.changes));
+      if (wish.panel === "unfold") store(OPEN_KEY, this.view.open.join(" "));
+      if (wish.panel === "letters") store(LETTERS_KEY, wish.areOn ? "on" : "off");
+      if (wish.panel === "keys") store(KEYS_KEY, JSON.stringify(wish.changes));
       this.refresh();
     } else this.viewer.dispatch(wish);
   }
@@ -266,7 +277,7 @@ export class Controller {
   followAddress(search: string, hash: string): void {
     const { viewer } = this;
     const { bounds_um } = viewer.bundle.manifest.specimen;
-    const { actions, camera } = readLink(hash, viewer.state, bounds_um);
+    const { actions, camera } = readLink(withTyped(hash), viewer.state, bounds_um);
     const asked = [...settingsOf(search), ...actions];
     for (const action of asked) viewer.dispatch(action);
     const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
@@ -331,7 +342,7 @@ export class Controller {
 
   private splitScreen(): void {
     const { lenses, code } = this.view;
-    this.viewer.stereo.hands.panel.take({ lenses, code });
+    this.viewer.stereo.showInPanel({ lenses, code });
     this.withProfile((profile) => this.options.onSplit(profile));
   }
 
@@ -345,7 +356,7 @@ export class Controller {
     const { lenses, code } = this.view;
     try {
       use(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
-      rememberLens({ lenses, code });
+      store(LENS_KEY, JSON.stringify({ lenses, code }));
     } catch (error) {
       if (!(error instanceof ProfileError)) throw error;
       this.say(error.message);
@@ -360,12 +371,48 @@ export class Controller {
       return;
     }
     this.card ??= new part.CardMeasure(parent, (perInch) => {
-      remember(SCREEN_KEY, String(perInch));
+      store(SCREEN_KEY, String(perInch));
       viewer.setScreen(perInch);
       this.say(`The screen has ${perInch} pixels an inch: split it to see.`);
     });
     const { userAgent } = navigator;
     this.card.open(viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
+  }
+
+  private get pictureArea(): HTMLElement {
+    return this.parent.querySelector<HTMLElement>(".view") ?? this.parent;
+  }
+
+  /** Say why a request does nothing now, with a button where something leads on. */
+  private async explain({ refusal }: Refusal): Promise<void> {
+    const words = withKeys(refusal, this.view.keyChanges);
+    this.say(words);
+    if (this.viewer.stereo.kind !== null) return;
+    const button = (await this.loadMessage())?.buttonFor(refusal, this.shown) ?? null;
+    if (button !== null) this.said.offer(words, button.label, button.act);
+  }
+
+  private async loadMessage(): Promise<ViewMessagePart | null> {
+    if (this.message !== null) return this.message;
+    const part = await import("./view_message_part").catch(() => null);
+    if (part === null || this.message !== null) return this.message;
+    const refresh = () => this.message?.update();
+    this.message = new part.ViewMessagePart(this.viewer, this.pictureArea, this.opening, refresh);
+    refresh();
+    return this.message;
+  }
+
+  private async openTapCard(ray: Ray, isByKey: boolean): Promise<void> {
+    const time_ms = performance.now();
+    const number = ++this.taps;
+    const part = await import("./tap_part").catch(() => null);
+    if (number !== this.taps) return;
+    if (part === null) {
+      this.say(NOT_COME);
+      return;
+    }
+    this.tapped ??= new part.TapPart(this.viewer, this.pictureArea, (wish) => this.perform(wish));
+    await this.tapped.open({ ray, isByKey, time_ms });
   }
 
   private async scan(): Promise<void> {
@@ -409,7 +456,7 @@ export class Controller {
     };
     const wish = name === null ? null : wishOf(name, context);
     if (name === null || wish === null || isRefusal(wish)) {
-      if (wish !== null && isRefusal(wish)) this.say(wish.refusal);
+      if (wish !== null && isRefusal(wish)) void this.explain(wish);
       else if (isWritten(pressed)) this.say(`No key ${pressed}: ? lists the keys.`);
       return false;
     }
@@ -434,7 +481,8 @@ export class Controller {
     if (isOwnAnswer || !(viewer.hasChangedSince(mark) || view !== this.view)) return false;
     const words = view.isHidden === this.view.isHidden ? text : HIDDEN[String(this.view.isHidden)];
     const accident = { mark, view, after: viewer.newestStep };
-    this.said.say(words, () => this.takeBack(accident));
+    this.say(words);
+    this.said.offer(words, "Undo", () => this.takeBack(accident));
     this.accident = accident;
     return true;
   }
@@ -471,11 +519,13 @@ export class Controller {
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
-    // a notebook's frame has no address
-    if (globalThis.stereocellHost === undefined) history.replaceState(history.state, "", address);
+    // A notebook's frame has no address. The step that the split screen has made in the history goes when it is left,
+    // and its address with it; the address follows the view then.
+    const isSplit = viewer.stereo.kind === "split";
+    if (hasAddress() && !isSplit) writeAddress(address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
-    viewer.stereo.hands.panel.take({ link: address.href });
+    viewer.stereo.showInPanel({ link: address.href });
     const without = viewer.leftOutOfLink;
     const but =
       without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;
@@ -554,7 +604,7 @@ export class Controller {
     const { state } = this.viewer;
     const list = allOf(state);
     if (list.length === 0) {
-      this.say("Nothing is measured.");
+      this.say(REFUSED.measured);
       return;
     }
     this.save("measurements", "csv", new Blob([measurementsCsv(list)], { type: "text/csv" }));
@@ -631,5 +681,7 @@ export class Controller {
     this.panel.root.remove();
     this.help?.dispose();
     this.card?.dispose();
+    this.tapped?.dispose();
+    this.message?.dispose();
   }
 }

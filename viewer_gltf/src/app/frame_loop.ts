@@ -171,7 +171,7 @@ export class FrameLoop {
     this.picture.isSeeThrough = stereo.isInUsersRoom;
     const isStereo = inRoom !== null;
     const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
-    if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state, fade_s);
+    if (isStereo) stereo.hands?.update(dt_s, this.head, this.options.shown().state, fade_s);
     const { isChanging, isFading } = this.advance(dt_s, fade_s);
     const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
     const isDue = this.resting.isDue(time_ms) && this.hasCome;
@@ -282,7 +282,10 @@ export class FrameLoop {
   private poseMono(dt_s: number): Camera {
     const { navigation, contents, state } = this.options.shown();
     const outline = contents.outline(state);
-    if (outline !== null) navigation.surround(outline);
+    if (outline !== null) {
+      navigation.surround(outline);
+      this.options.room.standUnder(navigation.occupied);
+    }
     navigation.update(dt_s);
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     return navigation.camera;
@@ -314,7 +317,7 @@ export class FrameLoop {
       screen: stereo.kind === null ? screen : null,
       gaze: rayAhead(head, group),
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
-      isPanelOpen: stereo.hands.panel.isOpen,
+      isPanelOpen: stereo.isPanelOpen,
       isBarBelow: !stereo.isInUsersRoom,
       dt_s,
     };

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { changeKey, keyNow } from "./key_changes";
-import { KEYS, type KeyChanges, standsFor } from "./keys";
+import { KEYS, type KeyChanges, standsFor, withKeys } from "./keys";
 
 const changed = (changes: KeyChanges, name: string, pressed: string): KeyChanges => {
   const answer = changeKey(changes, name, pressed);
@@ -42,6 +42,12 @@ describe("a key that a reader changes", () => {
     changes = changed(changes, "a", "b");
     const done = names.map((name) => standsFor(keyNow(name, changes), changes));
     expect(done).toEqual(names);
+  });
+
+  it("is named in sentences by its new key", () => {
+    const text = "Nothing is cut open yet: cut by a box (b) or by a plane (n).";
+    expect(withKeys(text, { b: "é" })).toBe(text.replace("(b)", "(é)"));
+    expect(withKeys("two tiles (row 1)", { r: "é" })).toBe("two tiles (row 1)");
   });
 
   it("does nothing by a name that every object has", () => {

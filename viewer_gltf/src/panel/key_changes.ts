@@ -1,5 +1,6 @@
 /** Changing the keys: which key may do what. Pure; it comes with the list of keys. */
-import { no, type Refusal } from "./key";
+import type { Refusal } from "./controls";
+import { no } from "./key";
 import { type KeyChanges, labelOf, standsFor } from "./keys";
 
 /** The key of this list stays, so that everybody finds the way back. */

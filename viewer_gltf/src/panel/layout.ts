@@ -24,6 +24,8 @@ import { tileItems } from "./sections/tiles";
 
 export { chosenTile } from "./sections/tiles";
 
+import { REFUSED } from "../state/refusals";
+
 /** Facts outside the state. */
 export type Facts = StereoSupport &
   Readonly<{
@@ -200,13 +202,13 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
       ...command("undo", "Undo"),
       isStep: true,
       name: `Undo ${undo ?? ""}`.trim(),
-      refusal: undo === null ? "Nothing to undo." : "",
+      refusal: undo === null ? REFUSED.undo : "",
     },
     {
       ...command("redo", "Redo"),
       isStep: true,
       name: `Redo ${redo ?? ""}`.trim(),
-      refusal: redo === null ? "Nothing to redo." : "",
+      refusal: redo === null ? REFUSED.redo : "",
     },
   ];
 }

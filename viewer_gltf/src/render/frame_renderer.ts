@@ -142,6 +142,7 @@ export class Picture {
     const specimen = room.specimen.group.matrixWorld;
     renderer.info.reset();
     room.light(head);
+    room.isFlat = this.eyes.all.length === 1;
     this.both.takeIn(room.scene);
     this.cuts.follow(clip, specimen);
     this.aim(bounds, resolution);

@@ -8,8 +8,8 @@ import type { Progress } from "../../surfaces/overview_progress";
 
 /** Time for which an announcement stays, ms; a screen reader reads it at once. */
 const SAID_MS = 4000;
-/** The same where the reader may want to undo something, ms. */
-const UNDO_MS = 8000;
+/** The same with a button, which a person has to find first. */
+const OFFERED_MS = 8000;
 
 /** A thin bar at the top with its count in words; hidden once complete. */
 export class ProgressBar {
@@ -106,41 +106,47 @@ export class FirstHint {
 
 /** Says in a line what a key or a button has just done. The line goes by itself, unless someone is about to undo it. */
 export class Said {
-  private readonly text = element("p", { role: "status" }, { said: "" });
-  private readonly undo = element(
+  private readonly words = element("p", { role: "status" }, { said: "" });
+  private readonly button = element(
     "button",
-    { type: "button", textContent: "Undo", hidden: true },
-    { overlay: "undo" },
+    { type: "button", hidden: true },
+    { action: "offer" },
   );
-  readonly root = element("div", { className: "said" }, {}, this.text, this.undo);
+  readonly root = element("div", { className: "said" }, {}, this.words, this.button);
   private timer = 0;
 
-  /** @param onUndo takes back what the text announces; null: nothing can be taken back */
-  say(text: string, onUndo: (() => void) | null = null): void {
-    setText(this.text, text);
-    this.offer(onUndo);
-    this.leaveLater(onUndo === null ? SAID_MS : UNDO_MS);
+  say(text: string): void {
+    this.write(text, SAID_MS);
   }
 
-  /** Leave the text and take the offer away: something else has changed since. */
+  /** A button beside the words, if they still stand. */
+  offer(text: string, label: string, act: () => void): void {
+    if (this.words.textContent !== text) return;
+    this.write(text, OFFERED_MS);
+    setText(this.button, label);
+    this.button.hidden = false;
+    this.button.onclick = () => {
+      this.write("", 0);
+      act();
+    };
+  }
+
+  /** Take the button away: its offer holds no longer. */
   withdraw(): void {
-    this.offer(null);
+    this.button.hidden = true;
   }
 
-  private offer(onUndo: (() => void) | null): void {
-    this.undo.hidden = onUndo === null;
-    this.undo.onclick = onUndo;
+  private write(text: string, for_ms: number): void {
+    setText(this.words, text);
+    this.withdraw();
+    clearTimeout(this.timer);
+    if (text !== "") this.leaveLater(for_ms);
   }
 
   private leaveLater(after_ms: number): void {
-    clearTimeout(this.timer);
     this.timer = window.setTimeout(() => {
-      if (this.undo.matches(":hover, :focus")) {
-        this.leaveLater(SAID_MS);
-        return;
-      }
-      setText(this.text, "");
-      this.offer(null);
+      if (this.button.matches(":hover, :focus")) this.leaveLater(SAID_MS);
+      else this.write("", 0);
     }, after_ms);
   }
 }

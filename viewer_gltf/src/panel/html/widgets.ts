@@ -10,7 +10,7 @@ import { makePicture } from "./picture";
 import { makeWindow } from "./range";
 import { makeMap } from "./tile_map";
 import { makeHistogram } from "./transfer_function_2d";
-import { hooks, type Send, type Widget } from "./widget";
+import { askedBy, hooks, type Send, type Widget } from "./widget";
 
 type Maker<C> = (first: C, send: Send) => Widget<C>;
 
@@ -52,7 +52,7 @@ function makeToggle(first: Toggle, send: Send): Widget<Toggle> {
       onchange: () => {
         const wanted = input.checked;
         input.checked = now.value; // the state holds its value
-        if (!now.refusal) send(now.to(wanted));
+        send(askedBy(now, () => now.to(wanted)));
       },
     },
     hooks(first.id),
@@ -76,6 +76,14 @@ function refuse(target: HTMLElement, refusal = ""): void {
   if ((target.ariaDisabled === "true") === isRefused) return;
   target.ariaDisabled = isRefused ? "true" : null;
   target.title = refusal;
+}
+
+/** A press on a disabled slider or list says why it is disabled: a finger sees no tooltip. */
+function explainRefusal(root: HTMLElement, now: () => Control, send: Send): void {
+  root.addEventListener("click", () => {
+    const { refusal } = now();
+    if (refusal) send({ refusal });
+  });
 }
 
 /** What a control does, in a sentence, where its name can't say it. */
@@ -105,8 +113,10 @@ function makeSlider(first: Slider, send: Send): Widget<Slider> {
     element("span", {}, {}, first.label),
     text,
   );
+  const root = element("label", { className: "slider" }, {}, head, input, ...aboutOf(first));
+  explainRefusal(root, () => now, send);
   return {
-    root: element("label", { className: "slider" }, {}, head, input, ...aboutOf(first)),
+    root,
     update(control) {
       now = control;
       input.value = String(Math.round(control.value * control.steps));
@@ -159,9 +169,11 @@ function makeSelect(first: Choice, send: Send): Widget<Choice> {
     { ...hooks(first.id), ...(first.id.includes("/") ? {} : { [camel(first.id)]: "" }) },
   );
   const label = element("span", { className: "label", textContent: first.label });
+  const root = element("label", { className: "field" }, {}, label, select);
+  explainRefusal(root, () => now, send);
   let listed = "";
   return {
-    root: element("label", { className: "field" }, {}, label, select),
+    root,
     update(control) {
       now = control;
       const options = control.options.map((each) => `${each.value}\n${each.label}`).join("\n");
@@ -187,9 +199,7 @@ function makeButton(first: Button, send: Send): Widget<Button> {
     {
       type: "button",
       className: first.isPrimary ? "primary" : "",
-      onclick: () => {
-        if (!now.refusal) send(now.to());
-      },
+      onclick: () => send(askedBy(now, () => now.to())),
     },
     { ...hooks(first.id), action: first.id, ...(first.isStep ? { step: "" } : {}) },
   );

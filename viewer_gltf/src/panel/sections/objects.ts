@@ -29,6 +29,7 @@ import {
   type PaletteName,
   START_OBJECTS,
 } from "../../state/objects";
+import { REFUSED } from "../../state/refusals";
 import type { ViewerState } from "../../state/viewer_state";
 import type { Control, Picture, Wish } from "../controls";
 
@@ -396,7 +397,7 @@ class Layout {
   private choiceOfMany(): readonly Control[] {
     const { view, objects } = this;
     const { selected } = view;
-    const none = selected.length === 0 ? "Nothing is selected." : "";
+    const none = selected.length === 0 ? REFUSED.objects : "";
     const isWhole = view.hidden.length === 0 && view.only === null && filtered(view).length === 0;
     return [
       this.text(

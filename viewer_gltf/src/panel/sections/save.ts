@@ -1,5 +1,6 @@
 /** The panel's section of pictures and videos, and its keys. Pure. */
 import { PICTURE_PARAMETERS } from "../../state/parameters/tools";
+import { REFUSED } from "../../state/refusals";
 import type { ViewerState } from "../../state/viewer_state";
 import { command, controlsOf } from "../control_templates";
 import type { Control } from "../controls";
@@ -8,7 +9,7 @@ import { type Key, key, keysOf, no } from "../key";
 export function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
   const { length } = state.keptViews;
   const path = length > 1 ? `through ${length} views` : "once round";
-  const none = length === 0 ? "No view is kept." : "";
+  const none = length === 0 ? REFUSED.views : "";
   return [
     ...controlsOf(PICTURE_PARAMETERS, state),
     command("save-picture", isFilming ? "Leave it" : "Save the picture"),
@@ -19,7 +20,7 @@ export function saveItems(state: ViewerState, isFilming: boolean): readonly Cont
   ];
 }
 
-const NO_VIEW = no("No view is kept: ' keeps this one.");
+const NO_VIEW = no(REFUSED.views);
 
 export const SAVE_KEYS: readonly Key[] = [
   ...PICTURE_PARAMETERS.flatMap(keysOf),

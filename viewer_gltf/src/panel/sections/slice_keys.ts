@@ -2,11 +2,11 @@
 import { setTo, shareOf, valueAtShare } from "../../state/parameters/kinds";
 import {
   isSliced,
-  NO_SLICES,
   SLICE_NUMBERS,
   SLICE_PICTURES,
   SLICE_PLANES,
 } from "../../state/parameters/slices";
+import { REFUSED } from "../../state/refusals";
 import { type Key, key, keysOf, neighbour, no, refusalOf } from "../key";
 import { STRAIGHT } from "./slices";
 
@@ -34,6 +34,6 @@ export const SLICE_KEYS: readonly Key[] = [
   key("{", "Less of it", turn(-STEPS)),
   key("}", "More of it", turn(STEPS)),
   key("~", "Slices to the middle, straight", ({ state }) =>
-    isSliced(state) ? STRAIGHT : no(NO_SLICES),
+    isSliced(state) ? STRAIGHT : no(REFUSED.slices),
   ),
 ];

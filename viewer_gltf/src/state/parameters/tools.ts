@@ -1,5 +1,6 @@
 /** The parameters of what a tap and a gaze do, and of how finely is drawn. Pure. */
 import { QUALITY_LEVELS, type QualityLevel } from "../quality_controller";
+import { REFUSED } from "../refusals";
 import {
   type ChoiceParameter,
   lensesOf,
@@ -62,7 +63,7 @@ export const MEASURE_KIND: ChoiceParameter<ToolSettings, MeasureKind> = {
   ...lens("measureKind"),
   values: MEASURES,
   names: { distance: "Distance", angle: "Angle", line: "Line" },
-  refusal: ({ tool }) => (tool === "measure" ? "" : "A tap does not measure now."),
+  refusal: ({ tool }) => (tool === "measure" ? "" : REFUSED.measuring),
   key: ["&", "Next: distance, angle, line through points"],
   spoken: ({ measureKind }) => `Measure: ${measureKind}`,
 };

@@ -1,4 +1,6 @@
 /** The parameters of where volumes show. Pure. */
+
+import { REFUSED } from "../refusals";
 import { type ChoiceParameter, lensesOf, type NumberParameter, type Parameter } from "./kinds";
 
 /**
@@ -22,7 +24,7 @@ export const START_VOLUMES = {
   /** Metres of the room: nearer than a headset's specimen is at the start. */
   switchDistance_m: 1.25,
   /** Angle between the gaze and the disc's rim. */
-  discRadius_deg: 12,
+  discRadius_deg: 16,
   compositing: "over" as Compositing,
   /** By how much volumes shade one another, 0..1. */
   depthShading: 0.5,
@@ -83,8 +85,7 @@ export const SWITCH_DISTANCE: NumberParameter<Volumes> = {
   isLogarithmic: true,
   rounded: (value) => Number(value.toPrecision(3)),
   text: metres,
-  refusal: ({ mode }) =>
-    mode === "disc" || mode === "tile" ? "" : "Only the modes Disc and Tile have one.",
+  refusal: ({ mode }) => (mode === "disc" || mode === "tile" ? "" : REFUSED.near),
   keys: {
     less: ["s", "Smaller switch distance"],
     more: ["S", "Larger switch distance"],
@@ -106,7 +107,7 @@ export const DISC_RADIUS: NumberParameter<Volumes> = {
   steps: 76,
   rounded: (value) => Number(value.toFixed(2)),
   text: degrees,
-  refusal: ({ mode }) => (mode === "disc" ? "" : "Only the mode Disc has one."),
+  refusal: ({ mode }) => (mode === "disc" ? "" : REFUSED.disc),
   keys: {
     less: ["d", "Smaller disc"],
     more: ["D", "Larger disc"],
@@ -125,8 +126,7 @@ export const COMPOSITING: ChoiceParameter<Volumes, Compositing> = {
   ...lens("compositing"),
   values: COMPOSITINGS,
   names: { over: "Opacity", maximum: "Maximum", sum: "Sum" },
-  refusal: ({ mode }) =>
-    mode === "traced" || mode === "off" ? "Only volumes that are marched have one." : "",
+  refusal: ({ mode }) => (mode === "traced" || mode === "off" ? REFUSED.marched : ""),
   key: ["%", "Next: opacity, maximum or sum along a ray"],
   spoken: ({ compositing }) => `Along a ray: ${compositing}`,
 };
@@ -145,9 +145,9 @@ export const DEPTH_SHADING: NumberParameter<Volumes> = {
   rounded: (value) => Number(value.toFixed(2)),
   text: percent,
   refusal: ({ mode, compositing }) => {
-    if (mode === "traced" || mode === "off") return "Only volumes that are marched have one.";
-    if (mode !== "all") return "Beside surfaces volumes are lit as those are: choose All.";
-    return compositing === "over" ? "" : "Only opacity along a ray has one.";
+    if (mode === "traced" || mode === "off") return REFUSED.marched;
+    if (mode !== "all") return REFUSED.shaded;
+    return compositing === "over" ? "" : REFUSED.opacity;
   },
   keys: {
     less: ["PageDown", "Less depth shading"],
