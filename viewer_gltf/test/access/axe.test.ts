@@ -92,6 +92,29 @@ describeInChromium("axe-core", () => {
     });
   });
 
+  it("finds nothing in the card of a tapped place, and in an empty picture", async () => {
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    await page().keyboard.press("Enter"); // a tap in the middle of the view
+    await page().locator(".tap-card").waitFor();
+    expect(await findings()).toEqual([]);
+    await page().keyboard.press("Escape");
+    for (const key of ["1", "2", "3"]) await page().keyboard.press(key);
+    await page().locator(".view-message").waitFor();
+    expect(await findings()).toEqual([]);
+  });
+
+  it("finds nothing in the ways into stereo of an upright phone", async () => {
+    await page().setViewportSize(PHONE);
+    await stand.open("&mode=off");
+    await stand.viewer.unfold("stereo");
+    await page().locator('[data-control="lenses"]').selectOption("own");
+    expect(await findings()).toEqual([]);
+    await page().keyboard.press("P");
+    await page().getByText("Turn the phone on its side").waitFor();
+    expect(await findings()).toEqual([]);
+  });
+
   it("finds nothing on the page of a bundle that is not there", async () => {
     stand.host.overrides.set("/bundle/manifest.json", { status: 404, body: "gone" });
     await page().goto(`${stand.host.address}/app/?bundle=../bundle/`);
