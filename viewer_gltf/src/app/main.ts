@@ -4,6 +4,7 @@ import "../panel/html/panel.css";
 import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
+import "../panel/html/forced_colors.css";
 import "../annotations/annotations.css";
 import { sizeText } from "../annotations/measure";
 import { bundleAddress, pageAddress } from "../bundle/address";
@@ -15,7 +16,7 @@ import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
 import { isKept } from "../offline/request_plan";
-import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
+import { FirstHint, Notices, ProgressBar, Said, showFatal, WayBack } from "../panel/html/overlays";
 import { opensAr, WaysIn } from "../panel/html/ways_in";
 import type { Theme } from "../render/theme";
 import { flightAsked } from "../share/bench_parameter";
@@ -117,8 +118,9 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const waysIn = new WaysIn();
   const isTouch = matchMedia("(pointer: coarse)").matches;
   const hint = new FirstHint(isTouch);
-  const over = [hint.root, progress.root, said.root, notices.root, waysIn.root];
-  parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
+  const wayBack = new WayBack(() => viewer.run("back"));
+  const over = [hint.root, progress.root, said.root, notices.root, waysIn.root, wayBack.root];
+  parent.replaceChildren(element("main", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
   let notebook: NotebookPart | null = null;
   const isFramed = window.parent !== window;
@@ -132,6 +134,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
       controller?.refresh();
       notices.update(state);
       hint.update(state);
+      wayBack.update(state);
       notebook?.note();
     },
     () => {

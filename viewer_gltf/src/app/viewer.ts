@@ -6,7 +6,7 @@ import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
-import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
+import { isSameLook, type Look, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";
@@ -73,13 +73,19 @@ const ASIDE = [1, 0, -1].flatMap((z) =>
 const BEHIND_OTHERS = "Other objects hide it from all sides: its card shows it alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
-const NEXT_KEPT = "` goes to the next one.";
+const NEXT_KEPT = "“Next kept view” goes through them.";
 
 const NO_LAYOUT: Layout = {
   ...{ title: "", subtitle: "", sections: [], status: "", isHidden: true },
   more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
 };
 
+export type Mark = Readonly<{
+  state: ViewerState;
+  camera: CameraView | null;
+  look: Look;
+  newest: object | null;
+}>;
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
 /** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
@@ -421,6 +427,33 @@ export class Viewer {
 
   get redoes(): string | null {
     return this.steps.redoes;
+  }
+
+  /** A moment that `takeBack` can return to. */
+  get mark(): Mark {
+    const { state, cameraView: camera } = this;
+    return { state, camera, look: this.navigation.lookNow, newest: this.steps.newest };
+  }
+
+  /** Whether the user would see a difference since then. */
+  hasChangedSince({ state, look }: Mark): boolean {
+    return !isSameView(state, this.state) || !isSameLook(look, this.navigation);
+  }
+
+  /** The newest step of the history. */
+  get newestStep(): object | null {
+    return this.steps.newest;
+  }
+
+  /** Return to the state of a moment and to where the specimen was seen from. */
+  takeBack({ state, camera, newest }: Mark): void {
+    if (!isSameView(state, this.state)) {
+      // a change that was joined with the step before it made no step of its own
+      for (let left = Math.max(1, this.steps.since(newest)); left > 0; left--) this.step("undo");
+    }
+    if (this.stereo.kind === null) this.transition.restore(camera);
+    this.loop.change();
+    this.onState(this.state);
   }
 
   /** From here on: what came before was no user's. */

@@ -33,6 +33,7 @@ const OPTIONAL = new RegExp(
     "frame_port",
     "HDRLoader",
     "interaction",
+    "key_list",
     "later_parts",
     "lost_context",
     "notebook_part",
