@@ -78,6 +78,8 @@ const NO_LAYOUT: Layout = {
   more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
 };
 
+/** While the graphics driver has its time to give the picture back. */
+export const DROPPED = "The graphics driver has dropped the picture: it is drawn again.";
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
 /** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
@@ -218,9 +220,8 @@ export class Viewer {
         else void this.flyAlong(rayAt(point));
       },
     );
-    const lost = "The graphics driver has dropped the picture: it is drawn anew.";
     canvas.addEventListener("webglcontextlost", () => {
-      this.dispatch({ type: "notify", text: lost });
+      this.dispatch({ type: "notify", text: DROPPED });
       volumes.forget(); // their texels went with the context
       this.contents.traced.forget();
       this.loop.forget();
@@ -230,7 +231,7 @@ export class Viewer {
       this.contents.traced.forget();
       this.loop.renew(); // the times that were asked for went, too
       this.follow();
-      this.dispatch({ type: "dismiss", texts: [lost] });
+      this.dispatch({ type: "dismiss", texts: [DROPPED] });
     });
     addEventListener("online", () => this.retry(), { signal });
     this.size = new StageSize(stage, () => this.fit());
