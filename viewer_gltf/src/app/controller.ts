@@ -12,6 +12,7 @@ import { fileName, saveFile } from "../dom/save_file";
 import { store, stored } from "../dom/stored";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import { handleOf } from "../panel/clip_by_key";
 import {
   changePanel,
@@ -19,6 +20,7 @@ import {
   type Lenses,
   type PanelChange,
   type PanelView,
+  type Refusal,
   START_VIEW,
   type Wish,
 } from "../panel/controls";
@@ -43,7 +45,9 @@ import { allOf, measurementsCsv } from "../state/measurements";
 import { setTo } from "../state/parameters/kinds";
 import { EYE_DISTANCE, START_TOOLS, STEREO_STRENGTH } from "../state/parameters/tools";
 import { SWITCH_DISTANCE } from "../state/parameters/volumes";
+import { REFUSED } from "../state/refusals";
 import { PER_INCH, type XrSupport } from "../state/stereo";
+import type { ViewerState } from "../state/viewer_state";
 import { cssPixelsPerInch } from "../xr/cardboard/lens";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
@@ -53,6 +57,8 @@ import {
   ProfileError,
   parseProfile,
 } from "../xr/cardboard/viewer_profile";
+import type { TapPart } from "./tap_part";
+import type { ViewMessagePart } from "./view_message_part";
 import type { Viewer } from "./viewer";
 
 /** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
@@ -60,9 +66,9 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
 
-const NOT_COME = "This part of the page has not come: check the connection and try again.";
+const NOT_COME = "This part of the page could not be loaded: check the connection and try again.";
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
-const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
+const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 
 const LENS_KEY = "stereocell-lens";
 /** Whether a change gives the cards to the channels that are shown by then. */
@@ -109,6 +115,14 @@ function rememberedEyes(): readonly Action[] {
   });
 }
 
+/** Parts of the state that can leave the picture empty. */
+const EMPTYING = ["channels", "clip", "isolated", "selected", "objects"] as const;
+
+/** Whether the picture may be empty by what was set: then the part of the page that says why is loaded. */
+const mayBeEmpty = (state: ViewerState, opening: ViewerState) =>
+  EMPTYING.some((key) => state[key] !== opening[key]) ||
+  (state.mode === "off" && !state.channels.some(({ shown, hasSurface }) => shown && hasSurface));
+
 export type ControllerOptions = Readonly<{
   subtitle: string;
   /** Enter stereo; called from within a click or a key, as is the other. */
@@ -131,6 +145,14 @@ export class Controller {
   private readonly help: Help;
   /** Once it was asked for. */
   private card: CardMeasure | null = null;
+  /** The card beside a tapped place, once something was tapped. */
+  private tapped: TapPart | null = null;
+  /** Counts the taps and double taps: the code may come after the second one. */
+  private taps = 0;
+  /** What the picture says about itself, once it may have something to say. */
+  private message: ViewMessagePart | null = null;
+  /** The state in which the bundle opened. */
+  private readonly opening: ViewerState;
   private readonly ranges: Ranges;
   private readonly disposed = new AbortController();
   private timer = 0;
@@ -149,6 +171,7 @@ export class Controller {
   ) {
     const { manifest } = viewer.bundle;
     const unit = unitOf(manifest);
+    this.opening = viewer.state;
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
@@ -159,6 +182,11 @@ export class Controller {
     for (const action of rememberedEyes()) viewer.dispatch(action);
     viewer.onAnnounce = (text) => this.say(text);
     viewer.onCard = (control) => this.panel.reveal(control);
+    viewer.onSelect = (ray, isByKey) => void this.openTapCard(ray, isByKey);
+    viewer.onDouble = () => {
+      this.taps++;
+      this.tapped?.close();
+    };
     viewer.onCommand = (command) => {
       if (command === "share") void this.share();
       return command === "share";
@@ -196,15 +224,20 @@ export class Controller {
     if (eyes !== this.eyes) store(EYES_KEY, eyes);
     this.eyes = eyes;
     this.help.update(this.view.isHelpOpen);
+    this.tapped?.update();
+    if (mayBeEmpty(this.viewer.state, this.opening)) void this.loadMessage();
+    this.message?.update();
   }
 
-  /** Bring the figures to the frame that was just drawn, now and then. */
+  /** Bring the card beside a place to the frame that was just drawn, and the figures now and then. */
   refreshSoon(): void {
+    this.tapped?.follow();
     if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
   }
 
-  perform(wish: Wish): void {
+  perform(wish: Wish | Refusal): void {
     if (typeof wish === "string") this.run(wish);
+    else if ("refusal" in wish) void this.explain(wish);
     else if ("panel" in wish) {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
@@ -313,10 +346,47 @@ export class Controller {
     this.card ??= new part.CardMeasure(parent, (perInch) => {
       store(SCREEN_KEY, String(perInch));
       viewer.setScreen(perInch);
-      this.say(`The screen has ${perInch} pixels an inch: split it to see.`);
+      this.say(
+        `The screen has ${perInch} pixels an inch: split the screen to see it in true size.`,
+      );
     });
     const { userAgent } = navigator;
     this.card.open(viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
+  }
+
+  private get pictureArea(): HTMLElement {
+    return this.parent.querySelector<HTMLElement>(".view") ?? this.parent;
+  }
+
+  /** Say why a request does nothing now, with a button where something leads on. */
+  private async explain({ refusal }: Refusal): Promise<void> {
+    this.say(refusal);
+    if (this.viewer.stereo.kind !== null) return;
+    const button = (await this.loadMessage())?.buttonFor(refusal, this.shown) ?? null;
+    if (button !== null) this.said.offer(refusal, button.label, button.act);
+  }
+
+  private async loadMessage(): Promise<ViewMessagePart | null> {
+    if (this.message !== null) return this.message;
+    const part = await import("./view_message_part").catch(() => null);
+    if (part === null || this.message !== null) return this.message;
+    const refresh = () => this.message?.update();
+    this.message = new part.ViewMessagePart(this.viewer, this.pictureArea, this.opening, refresh);
+    refresh();
+    return this.message;
+  }
+
+  private async openTapCard(ray: Ray, isByKey: boolean): Promise<void> {
+    const time_ms = performance.now();
+    const number = ++this.taps;
+    const part = await import("./tap_part").catch(() => null);
+    if (number !== this.taps) return;
+    if (part === null) {
+      this.say(NOT_COME);
+      return;
+    }
+    this.tapped ??= new part.TapPart(this.viewer, this.pictureArea, (wish) => this.perform(wish));
+    await this.tapped.open({ ray, isByKey, time_ms });
   }
 
   private async scan(): Promise<void> {
@@ -358,7 +428,7 @@ export class Controller {
     };
     const wish = wishOf(name, context);
     if (wish === null || isRefusal(wish)) {
-      if (wish !== null) this.say(wish.refusal);
+      if (wish !== null) void this.explain(wish);
       else if (isWritten(name)) this.say(`No key ${name}: ? lists the keys.`);
       return false;
     }
@@ -381,7 +451,7 @@ export class Controller {
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
-    // The step that the split screen has made in the history goes when it is left,
+    // A notebook's frame has no address. The step that the split screen has made in the history goes when it is left,
     // and its address with it; the address follows the view then.
     const isSplit = viewer.stereo.kind === "split";
     if (hasAddress() && !isSplit) writeAddress(address);
@@ -390,7 +460,9 @@ export class Controller {
     viewer.stereo.showInPanel({ link: address.href });
     const without = viewer.leftOutOfLink;
     const but =
-      without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;
+      without === 0
+        ? ""
+        : ` It leaves out lists of ${without} objects, which are too long: save them as CSV.`;
     if (viewer.stereo.kind !== null) {
       this.say(`The link is in the page's address, for when you leave.${but}`);
     } else if (await copyText(address.href)) this.say(`The link is in the clipboard.${but}`);
@@ -416,7 +488,7 @@ export class Controller {
     try {
       const size = Number(viewer.state.pictureSize);
       const png = await viewer.picture(size, (words) => this.say(`Picture: ${words}`), signal);
-      if (png === null) this.say("The picture was left.");
+      if (png === null) this.say("Saving the picture was cancelled.");
       else this.save("picture", "png", png);
     } catch (error) {
       this.refuse("The picture can't be saved", error);
@@ -441,7 +513,7 @@ export class Controller {
     this.refresh();
     try {
       const file = await viewer.film((done, of) => this.say(`Video: ${done} of ${of}`), signal);
-      if (file === null) this.say("The video was left.");
+      if (file === null) this.say("Making the video was cancelled.");
       else this.save("video", file.suffix, file.content);
     } catch (error) {
       this.refuse("The video can't be made", error);
@@ -466,7 +538,7 @@ export class Controller {
     const { state } = this.viewer;
     const list = allOf(state);
     if (list.length === 0) {
-      this.say("Nothing is measured.");
+      this.say(REFUSED.measured);
       return;
     }
     this.save("measurements", "csv", new Blob([measurementsCsv(list)], { type: "text/csv" }));
@@ -475,12 +547,13 @@ export class Controller {
   private saveObjects(): void {
     const { objects } = this.viewer;
     if (objects.length === 0) {
-      this.say("No objects of a label map are shown.");
+      this.say("No label map is shown, so there are no objects to save.");
       return;
     }
     for (const { id, text } of this.viewer.objectsCsv()) {
       const name = objects.length === 1 ? "objects" : `objects-${id}`;
-      if (text === null) this.say("Their values are on their way: once more, please.");
+      if (text === null)
+        this.say("The values of the objects are still loading: save them again in a moment.");
       else this.save(name, "csv", new Blob([text], { type: "text/csv" }));
     }
   }
@@ -543,5 +616,7 @@ export class Controller {
     this.panel.root.remove();
     this.help.dispose();
     this.card?.dispose();
+    this.tapped?.dispose();
+    this.message?.dispose();
   }
 }

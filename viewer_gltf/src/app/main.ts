@@ -17,8 +17,9 @@ import { leaveWheelToHolder } from "../interaction/frame_wheel";
 import { isKept } from "../offline/request_plan";
 import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
 import { opensAr, WaysIn } from "../panel/html/ways_in";
+import type { Theme } from "../render/theme";
 import { flightAsked } from "../share/bench_parameter";
-import { panelOf } from "../share/page_parameters";
+import { isLight, isPlain, panelOf } from "../share/page_parameters";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
 import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
@@ -79,7 +80,25 @@ function alsoKept({ bundle }: Viewer): readonly string[] {
   return usdz !== null && isKept(bundle.manifest.usdz ?? null) ? [usdz] : [];
 }
 
+const LIGHT = matchMedia("(prefers-color-scheme: light)");
+const CONTRAST = matchMedia("(prefers-contrast: more)");
+
+/** The page's colours, as the address or the system has them. */
+function dressPage(): Theme {
+  const theme = isLight(new URL(pageAddress()).search, LIGHT.matches) ? "light" : "dark";
+  document.documentElement.dataset.theme = theme;
+  return theme;
+}
+
+/** The background of the picture, too; a system's colours may change by night. */
+function followSystem(viewer: Viewer, search: string): void {
+  const dress = () => viewer.dress(dressPage(), isPlain(search, CONTRAST.matches));
+  for (const query of [LIGHT, CONTRAST]) query.addEventListener("change", dress);
+  dress();
+}
+
 async function open(parent: HTMLElement): Promise<Viewer> {
+  dressPage();
   checkWebGl2();
   sayAtStart("Reading the bundle");
   const page = pageAddress();
@@ -121,6 +140,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
       notebook?.note();
     },
   );
+  followSystem(viewer, search);
   controller = new Controller(viewer, parent, said, {
     subtitle: describeSize(manifest),
     onStereo: () => void enterStereo(viewer, "immersive-vr"),
