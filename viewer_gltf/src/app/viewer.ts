@@ -85,7 +85,7 @@ export const DROPPED = "The graphics driver has dropped the picture: it is drawn
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
 /** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
-const FINER = /^\S+\.(glb|ktx2):/;
+const FINER = /^(channels|volumes)\/\S+\.(glb|ktx2):/;
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -601,8 +601,7 @@ export class Viewer {
   /** Whether a part of the picture is missing, not merely coarse. */
   private get isIncomplete(): boolean {
     const { surfaces, volumes } = this.contents;
-    const isNone = ({ level }: { level: number | null }) => level === null;
-    return !surfaces.overview.isComplete || volumes.status().some(isNone);
+    return !surfaces.overview.isComplete || volumes.isIncomplete;
   }
 
   /** Light the traced picture by a file of the user's. Throws BundleError. */
