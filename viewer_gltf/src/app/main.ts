@@ -155,10 +155,9 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   notices.update(viewer.state);
   controller.followAddress(search, hash);
   openedAs = { state: viewer.state, camera: viewer.cameraView };
-  viewer.renderer.domElement.addEventListener("webglcontextlost", (event) => {
-    const canvas = event.target as HTMLCanvasElement;
+  viewer.renderer.domElement.addEventListener("webglcontextlost", () => {
     void import("./lost_context").then(({ offerReload }) =>
-      offerReload(canvas, () => later?.addressBar?.write()),
+      offerReload(viewer, () => later?.addressBar?.write()),
     );
   });
   hint.update(viewer.state);

@@ -86,10 +86,13 @@ export type Mark = Readonly<{
   look: Look;
   newest: object | null;
 }>;
+
+/** While the graphics driver has its time to give the picture back. */
+export const DROPPED = "The graphics driver has dropped the picture: it is drawn again.";
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
 /** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
-const FINER = /^\S+\.(glb|ktx2):/;
+const FINER = /^(channels|volumes)\/\S+\.(glb|ktx2):/;
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -233,9 +236,8 @@ export class Viewer {
         else void this.flyAlong(rayAt(point));
       },
     );
-    const lost = "The graphics driver has dropped the picture: it is drawn anew.";
     canvas.addEventListener("webglcontextlost", () => {
-      this.dispatch({ type: "notify", text: lost });
+      this.dispatch({ type: "notify", text: DROPPED });
       volumes.forget(); // their texels went with the context
       this.contents.traced.forget();
       this.loop.forget();
@@ -245,7 +247,7 @@ export class Viewer {
       this.contents.traced.forget();
       this.loop.renew(); // the times that were asked for went, too
       this.follow();
-      this.dispatch({ type: "dismiss", texts: [lost] });
+      this.dispatch({ type: "dismiss", texts: [DROPPED] });
     });
     addEventListener("online", () => this.retry(), { signal });
     this.size = new StageSize(stage, () => this.fit());
@@ -633,8 +635,7 @@ export class Viewer {
   /** Whether a part of the picture is missing, not merely coarse. */
   private get isIncomplete(): boolean {
     const { surfaces, volumes } = this.contents;
-    const isNone = ({ level }: { level: number | null }) => level === null;
-    return !surfaces.overview.isComplete || volumes.status().some(isNone);
+    return !surfaces.overview.isComplete || volumes.isIncomplete;
   }
 
   /** Light the traced picture by a file of the user's. Throws BundleError. */
