@@ -88,10 +88,14 @@ function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
 const OPEN_KEY = "stereocell-open";
 const LETTERS_KEY = "stereocell-letters";
 
-/** The sections of the panel that the reader had open on the visit before. */
+/**
+ * The sections of the panel that the reader had open on the visit before, but for those of label maps: the rows below
+ * would move when a table has come.
+ */
 function rememberedOpen(): readonly string[] {
   const text = remembered(OPEN_KEY);
-  return text === null ? START_VIEW.open : text.split(" ");
+  const sections = text === null ? START_VIEW.open : text.split(" ");
+  return sections.filter((id) => !id.startsWith("objects"));
 }
 
 const SCREEN_KEY = "stereocell-screen";
@@ -267,6 +271,7 @@ export class Controller {
       if (wish.panel === "unfold") remember(OPEN_KEY, this.view.open.join(" "));
       if (wish.panel === "letters") remember(LETTERS_KEY, wish.areOn ? "on" : "off");
       this.refresh();
+      if (wish.panel === "reveal") this.panel.reveal(wish.control);
     } else this.viewer.dispatch(wish);
   }
 

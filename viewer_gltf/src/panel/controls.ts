@@ -38,6 +38,8 @@ export type PanelChange =
   | Readonly<{ panel: "code"; text: string }>
   /** Whether keys that write a character do anything (WCAG 2.1.4). */
   | Readonly<{ panel: "letters"; areOn: boolean }>
+  /** Open a section, and scroll to one of its controls. */
+  | Readonly<{ panel: "reveal"; section: string; control: string }>
   | Readonly<{ panel: "hide" }>
   | Readonly<{ panel: "help" }>;
 
@@ -87,7 +89,7 @@ export const START_VIEW: PanelView = {
   shape: null,
   grasp: null,
   shapeNumber: null,
-  open: ["channels", "objects", "volumes"],
+  open: ["channels", "volumes"],
   lenses: "v2",
   code: "",
   hasLetters: true,
@@ -311,6 +313,8 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
       const open = isOpen ? view.open.filter((id) => id !== section) : [...view.open, section];
       return { ...view, open };
     }
+    case "reveal":
+      return { ...view, isHidden: false, open: [...new Set([...view.open, change.section])] };
     case "lenses":
       return change.lenses === view.lenses ? view : { ...view, lenses: change.lenses };
     case "code":

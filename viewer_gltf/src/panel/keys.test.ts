@@ -186,6 +186,7 @@ describe("the keys", () => {
       lenses: true,
       hide: true,
       help: true,
+      reveal: false,
       find: false,
       code: false,
       letters: false, // a key could not switch it back on
