@@ -8,6 +8,7 @@ import { unitOf } from "../annotations/measure";
 import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
+import { toggleFullScreen } from "../dom/full_screen";
 import { fileName, saveFile } from "../dom/save_file";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
@@ -66,6 +67,7 @@ const REFRESH_MS = 250;
 
 const NOT_COME = "This part of the page could not be loaded: check the connection and try again.";
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
+const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
 const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 
 const LENS_KEY = "stereocell-lens";
@@ -300,6 +302,8 @@ export class Controller {
       if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
       else if (this.hasRoom) this.options.onRoom();
       else this.say(NO_ROOM);
+    } else if (command === "full-screen") {
+      void toggleFullScreen().then((isDone) => isDone || this.say(NO_FULL_SCREEN));
     } else if (command === "split") {
       this.splitScreen();
     } else if (command === "scan") {

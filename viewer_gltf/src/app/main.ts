@@ -13,6 +13,7 @@ import type { Manifest } from "../bundle/generated/bundle";
 import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
+import { hasFullScreen } from "../dom/full_screen";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
 import { keepOffline } from "../offline/register";
 import { isKept } from "../offline/request_plan";
@@ -139,6 +140,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const way = wayToStereo(support, isTouch);
   waysIn.offerStereo(way, () => way && controller.perform(way));
   if (way !== null || hasRoom) void prepareStereo(viewer);
+  if (hasFullScreen()) waysIn.offerFullScreen(() => controller.perform("full-screen"));
   if (hasRoom) waysIn.offerRoom(() => controller.perform("room"));
   const usdz = usdzFor(bundle);
   if (usdz !== null) waysIn.offerLink(usdz);

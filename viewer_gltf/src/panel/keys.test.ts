@@ -118,6 +118,7 @@ describe("the keys", () => {
       room: true,
       undo: true,
       redo: true,
+      "full-screen": true,
       split: true,
       scan: true,
       share: true,
