@@ -20,6 +20,7 @@ export const VIEW_KEYS: readonly Key[] = [
   key("r", "Reset the view", "reset"),
   key("Ctrl+z", "Undo the last change of the view", "undo"),
   key(["Ctrl+Z", "Ctrl+y"], "Redo what was undone", "redo"),
+  key("Shift+Enter", "Full screen, or back in the window", "full-screen"),
   key("V", "Enter stereo (VR), or leave it", "stereo"),
   key("Home", "The specimen in your room (AR), or leave it", "room"),
   key("L", "Next phone viewer", ({ view }) => {
