@@ -58,6 +58,7 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
     ...tableUniforms(),
     uMajorants: nothing(),
     uBrick: { value: new Vector3(SKIP_BRICK, SKIP_BRICK, SKIP_BRICK) },
+    uStride: { value: 0 },
     uClipLow: { value: new Vector3() },
     uClipHigh: { value: new Vector3() },
     uClipPlane: { value: new Vector4(0, 0, 0, 1) },
@@ -141,6 +142,8 @@ export function sceneInto(
   uniforms.uScatters.value = settings.isMultiple ? most : 1;
   const beyond = settings.isMultiple && isDraft ? settings.environmentLight : 0;
   uniforms.uBeyond.value.set(...roomLight).multiplyScalar(beyond);
+  const { steps } = settings;
+  uniforms.uStride.value = steps > 0 ? uniforms.uSize.value.length() / Math.max(1, steps) : 0;
   uniforms.uAnisotropy.value = settings.anisotropy;
   uniforms.uSurface.value = settings.surface;
   uniforms.uShine.value = settings.shine;

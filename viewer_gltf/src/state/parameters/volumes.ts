@@ -59,13 +59,13 @@ export const MODE: ChoiceParameter<Volumes, Mode> = {
     tile: "Surfaces; near, one tile as volume",
     all: "Volumes everywhere",
     stage: "As the stage has it",
-    traced: "Volumes in natural light (path-traced)",
+    traced: "Volumes in natural light (path tracing)",
     off: "Surfaces only",
   },
   options: modesOf,
   fault: ({ canTrace }, mode) => (mode === "traced" && !canTrace ? NO_FLOATS : null),
   key: ["m", "Next mode: where volumes show"],
-  spoken: ({ mode }) => `Volumes: ${mode}`,
+  spoken: ({ mode }) => `Volumes: ${mode === "traced" ? "path tracing" : mode}`,
 };
 
 const metres = (value: number) => `${value.toPrecision(2)} m`;
