@@ -13,7 +13,7 @@ import {
 } from "three";
 import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { Eyes } from "../gpu/eyes";
-import { drawWhole, floatTarget } from "../gpu/float_targets";
+import { floatTarget } from "../gpu/float_targets";
 import { drawEyes } from "../gpu/offscreen_target";
 import { GROUND, SKY } from "../gpu/room_light";
 import { ScreenPass } from "../gpu/screen_pass";
@@ -27,19 +27,19 @@ import { LightProbe } from "./light_probe";
 import { type Hemispheres, hemispheresOf, lightMarch } from "./march_light";
 import type { MediumTexels } from "./medium_loader";
 import { MediumTextures } from "./medium_textures";
-import { TRACE_FRAGMENT, TRACE_NOISE } from "./shaders/sources";
+import { TRACE_FRAGMENT } from "./shaders/sources";
+import { NOISE_TILE, TileNoise } from "./tile_noise";
 import {
+  keyOf,
   lowCorner,
+  matterOf,
   sceneInto,
-  sumUniforms,
   type TraceScene,
   type TraceUniforms,
   texelsInto,
   traceUniforms,
 } from "./uniforms";
 
-/** Pixels along the edge of a tile that rests or is sampled as a whole. */
-export const NOISE_TILE = 16;
 /** Samples between two looks at the noise of the tiles. */
 const NOISE_EVERY = 8;
 /** Noise at which a tile is as good as done. */
@@ -73,7 +73,7 @@ export class Tracer {
   /** Those of them with paths from the present view. */
   rested = 0;
   private readonly sums = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
-  private readonly noise = floatTarget(1, FloatType);
+  private readonly noise = new TileNoise();
   private readonly probe = new LightProbe();
   private readonly denoiseAndTone = new DenoiseAndTone(this.probe);
   private roomLight: readonly [number, number, number] = [0, 0, 0];
@@ -98,7 +98,6 @@ export class Tracer {
   isStoodIn = false;
   private readonly pathPass: ScreenPass<TraceUniforms>;
   private readonly textures: MediumTextures;
-  private readonly noisePass = new ScreenPass(TRACE_NOISE, sumUniforms(), { NOISE_TILE });
 
   /**
    * @param brick texels along an edge of a brick of majorants: SKIP_BRICK or a multiple
@@ -250,7 +249,7 @@ export class Tracer {
       this.rested += share;
       this.turn = (this.turn + share) % 1;
       const isDue = Math.floor(before / NOISE_EVERY) < Math.floor(this.samples / NOISE_EVERY);
-      if (isDue) this.judge(renderer, this.gathered);
+      if (isDue) this.noise.judge(renderer, this.gathered);
     }
     const { denoiseAndTone } = this;
     this.isStoodIn = standIn !== null && this.samples < STOOD_IN;
@@ -379,20 +378,6 @@ export class Tracer {
     });
   }
 
-  /** How noisy each tile is. */
-  private judge(renderer: WebGLRenderer, sums: WebGLRenderTarget): void {
-    const { uniforms, scene } = this.noisePass;
-    uniforms.uSums.value = sums.textures[0];
-    uniforms.uMoments.value = sums.textures[1];
-    drawWhole(
-      renderer,
-      scene,
-      this.noise,
-      Math.ceil(sums.width / NOISE_TILE),
-      Math.ceil(sums.height / NOISE_TILE),
-    );
-  }
-
   /** From um of the box to the room. */
   private boxMatrix(specimen: Matrix4): Matrix4 {
     if (this.texels === null) throw new Error("there is nothing to trace");
@@ -404,27 +389,12 @@ export class Tracer {
   }
 
   dispose(): void {
-    for (const target of [...this.sums, this.noise]) target.dispose();
+    for (const target of this.sums) target.dispose();
     this.textures.dispose();
     this.texels?.release();
     this.pathPass.dispose();
-    this.noisePass.dispose();
+    this.noise.dispose();
     this.probe.dispose();
     this.denoiseAndTone.dispose();
   }
-}
-
-/** What a picture can't be gathered on without: another one begins anew. */
-function keyOf(
-  { width_px, height_px }: Eyes,
-  scene: TraceScene,
-  scale: number,
-  isDraft: boolean,
-): string {
-  return `${width_px} ${height_px} ${scale} ${isDraft} ${matterOf(scene)}`;
-}
-
-/** What there is besides the medium: opaque things, and cuts. */
-function matterOf({ solids, clip }: TraceScene): string {
-  return `${solids} ${JSON.stringify(clip)}`;
 }

@@ -3,6 +3,7 @@ import { Matrix3, Matrix4, type Texture, Vector2, Vector3, Vector4 } from "three
 import type { Bounds } from "../bundle/generated/bundle";
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import { clipInto, type MarchClip, noCorner } from "../gpu/clip_uniforms";
+import type { Eyes } from "../gpu/eyes";
 import { nothing } from "../gpu/float_targets";
 import { LAMPS, type TraceSettings } from "../state/path_trace_settings";
 import { tableUniforms } from "../volumes/transfer_table_2d";
@@ -34,6 +35,21 @@ export type TraceScene = Readonly<{
   /** The specimen's box, um: lamps are placed by it. */
   bounds: Bounds;
 }>;
+
+/** What a picture can't be gathered on without: another one begins anew. */
+export function keyOf(
+  { width_px, height_px }: Eyes,
+  scene: TraceScene,
+  scale: number,
+  isDraft: boolean,
+): string {
+  return `${width_px} ${height_px} ${scale} ${isDraft} ${matterOf(scene)}`;
+}
+
+/** What there is besides the medium: opaque things, and cuts. */
+export function matterOf({ solids, clip }: TraceScene): string {
+  return `${solids} ${JSON.stringify(clip)}`;
+}
 
 export type TraceUniforms = ReturnType<typeof traceUniforms>;
 
