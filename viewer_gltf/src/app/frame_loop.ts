@@ -10,11 +10,12 @@ import { Pace } from "../render/pacing/frame_budget";
 import { RestPace } from "../render/pacing/redraw_at_rest";
 import { GatherPace } from "../render/pacing/samples_per_frame";
 import type { Room } from "../render/scene";
+import { isTraced } from "../state/parameters/volumes";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
 import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
-import { MAX_STEPS } from "../volumes/tile_raymarch";
+import { MAX_STEPS, REST_STEPS } from "../volumes/tile_raymarch";
 import type { Stereo } from "../xr/stereo";
 import { Pulse } from "./pulse";
 import type { Contents } from "./scene_contents";
@@ -190,7 +191,7 @@ export class FrameLoop {
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
     // too slow a device to turn the specimen by itself shows it at rest, as well as can be
     if (settings.resolution < MIN_TURNING) this.options.shown().navigation.stopTurning();
-    this.picture.marchFrame.uSteps.value = settings.steps;
+    this.picture.marchFrame.uSteps.value = stepsOf(this.options.shown().state) ?? settings.steps;
     hybrid.radiusShare = settings.discShare;
     const [eye] = this.picture.eyes.all; // a headset has none before its first pose
     if (eye !== undefined) {
@@ -365,4 +366,9 @@ export class FrameLoop {
     this.picture.dispose();
     this.pace.dispose();
   }
+}
+
+/** Steps of the march that stands in for paths of light; null: as many as the frame's budget allows. */
+function stepsOf({ mode, trace: { steps } }: ViewerState): number | null {
+  return isTraced({ mode }) && steps > 0 ? Math.min(REST_STEPS, Math.ceil(steps)) : null;
 }
