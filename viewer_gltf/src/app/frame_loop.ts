@@ -257,9 +257,9 @@ export class FrameLoop {
    * @param begun what it has returned for the same view, to go on with
    */
   drawStill(most_ms: number, begun: Still | null = null): Still {
-    const { contents, navigation, state } = this.options.shown();
+    const { contents, state } = this.options.shown();
     const { traced, surfaces } = contents;
-    this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
+    this.followScreen();
     surfaces.dressAll();
     const start_ms = performance.now();
     const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
@@ -284,8 +284,14 @@ export class FrameLoop {
     const outline = contents.outline(state);
     if (outline !== null) navigation.surround(outline);
     navigation.update(dt_s);
-    this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
+    this.followScreen();
     return navigation.camera;
+  }
+
+  private followScreen(): void {
+    const { stereo, navigation } = this.options.shown();
+    const { camera, controls } = navigation;
+    stereo.followScreen(this.picture.eyes, camera, controls.target);
   }
 
   /** Follow the gaze, and go on with what moves and with what fades; whether it goes on. */

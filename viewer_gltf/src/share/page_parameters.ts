@@ -1,6 +1,7 @@
 /**
  * What the page's address asks for: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
- * high), `switch` (metres of the room), `disc` (degrees), `view` (front, side, top), `panel` (off). Pure.
+ * high), `switch` (metres of the room), `disc` (degrees), `stereo` (off, anaglyph, side-by-side), `view` (front, side, top), `panel` (off).
+ * Pure.
  */
 import { STANDS, type Stand } from "../interaction/orbit_camera";
 import type { Action } from "../state/actions";

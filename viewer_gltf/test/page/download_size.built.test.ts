@@ -23,7 +23,7 @@ const DEMO_TILES = 10;
  * and the phone viewer, what a notebook or a page around asks of the page.
  */
 const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|interaction|split_session|unclipped|bench|slices|objects|card_measure|qr_scanner|notebook_part|frame_port/;
+  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|interaction|split_session|screen_stereo|unclipped|bench|slices|objects|card_measure|qr_scanner|notebook_part|frame_port/;
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {
