@@ -4,6 +4,7 @@ import { defineConfig } from "vitest/config";
 import { finishBuild } from "./scripts/finish_build.ts";
 import { oneChunk } from "./scripts/one_chunk.ts";
 import { OneLast } from "./scripts/one_last.ts";
+import { stripUnused } from "./scripts/strip_unused.ts";
 
 const SERVICE_WORKER = "sw.js";
 const PAGE = fileURLToPath(new URL("index.html", import.meta.url));
@@ -137,7 +138,7 @@ function ofBrowser(name: string, files: { include: string[]; exclude?: string[] 
 export default defineConfig({
   // Relative addresses: the page works from any folder of any static host.
   base: "./",
-  plugins: [stripShaders(), stripMaterials(), stripSchemas(), finishBuild()],
+  plugins: [stripShaders(), stripMaterials(), stripUnused(), stripSchemas(), finishBuild()],
   build: {
     target: "es2022",
     outDir: "dist",

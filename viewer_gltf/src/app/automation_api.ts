@@ -10,7 +10,7 @@ import type { QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
 import type { Progress } from "../surfaces/overview_progress";
 import type { VolumeStatus } from "../volumes/volume_set";
-import type { MenuEntry } from "../xr/stereo";
+import type { MenuEntry } from "../xr/panel/menu_entries";
 
 export type Snapshot = Readonly<{
   state: ViewerState;

@@ -12,6 +12,7 @@ import { GatherPace } from "../render/pacing/samples_per_frame";
 import type { Room } from "../render/scene";
 import { isTraced } from "../state/parameters/volumes";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
+import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
 import { MAX_STEPS, REST_STEPS } from "../volumes/tile_raymarch";
@@ -172,7 +173,7 @@ export class FrameLoop {
     this.picture.isSeeThrough = stereo.isInUsersRoom;
     const isStereo = inRoom !== null;
     const camera = inRoom ?? this.poseMono(Math.max(0, interval_ms) / 1000);
-    if (isStereo) stereo.hands.update(dt_s, this.head, this.options.shown().state, fade_s);
+    if (isStereo) stereo.hands?.update(dt_s, this.head, this.options.shown().state, fade_s);
     const { isChanging, isFading } = this.advance(dt_s, fade_s);
     const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
     const isDue = this.resting.isDue(time_ms) && this.hasCome;
@@ -283,7 +284,10 @@ export class FrameLoop {
   private poseMono(dt_s: number): Camera {
     const { navigation, contents, state } = this.options.shown();
     const outline = contents.outline(state);
-    if (outline !== null) navigation.surround(outline);
+    if (outline !== null) {
+      navigation.surround(outline);
+      this.options.room.standUnder(navigation.occupied);
+    }
     navigation.update(dt_s);
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     return navigation.camera;
@@ -315,7 +319,7 @@ export class FrameLoop {
       screen: stereo.kind === null ? screen : null,
       gaze: rayAhead(head, group),
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
-      isPanelOpen: stereo.hands.panel.isOpen,
+      isPanelOpen: stereo.isPanelOpen,
       isBarBelow: !stereo.isInUsersRoom,
       dt_s,
     };
@@ -336,10 +340,16 @@ export class FrameLoop {
       panes: surfaces.blended,
       overlays: [...marks.overlays, ...slices.overlays, ...stereo.overlays],
       bounds: this.options.bounds,
+      openTile: this.openTile(state),
       solids: surfaces.triangles + slices.solid,
     };
     const clip = { ...state.clip, corner: slices.cornerTowards(this.eyeOnSpecimen(head)) };
     stereo.present(() => picture.draw(head, drawn, clip, pace));
+  }
+
+  private openTile(state: ViewerState): Bounds | null {
+    const { room, hybrid } = this.options;
+    return room.boundsOf(marchedTile(state, hybrid.focusTiles));
   }
 
   /** um, world. */

@@ -1,15 +1,22 @@
 import { BundleError } from "./errors";
 
-/** What a notebook gives to the page that it holds in a frame, which has no address of its own. */
-export type NotebookHost = Readonly<{
-  /** Stands for the page's address: the bundle lies beside it, and the view is behind its `#`. */
-  page: string;
-  /** To the widget. */
-  port: MessagePort;
+/** What a document without a web host gives to the page in it: a notebook's frame, or a scene in one file. */
+export type PageHost = Readonly<{
+  /** Stands for the page's address, which a notebook's frame has none of: the view is behind its `#`. */
+  page?: string;
+  /** The bundle's folder, which the document itself answers for; absent: the bundle lies beside `page`. */
+  bundle?: string;
+  /** To the notebook's widget. */
+  port?: MessagePort;
 }>;
 
 declare global {
-  var stereocellHost: NotebookHost | undefined;
+  var stereocellHost: PageHost | undefined;
+}
+
+/** Whether the page has an address in which a view can be kept. */
+export function hasAddress(): boolean {
+  return globalThis.stereocellHost?.page === undefined;
 }
 
 /** The page's own address, or the one that a notebook gives it. */
@@ -19,10 +26,13 @@ export function pageAddress(): string {
 
 /**
  * The folder that holds the bundle, with a closing slash. `?bundle=` names the folder or its
- * manifest.json, relative to the page or absolute; without it the bundle lies beside the page.
+ * manifest.json, relative to the page or absolute; without it the bundle lies beside the page. A document that
+ * brings its bundle along opens no other.
  * Throws BundleError if it names no address of the web.
  */
 export function bundleAddress(page: string): string {
+  const brought = globalThis.stereocellHost?.bundle;
+  if (brought !== undefined) return brought;
   const named = new URL(page).searchParams.get("bundle");
   if (named === null || named === "") return new URL("./", page).href.split(/[?#]/)[0];
   const url = URL.canParse(named, page) ? new URL(named, page) : null;

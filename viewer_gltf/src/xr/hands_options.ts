@@ -20,6 +20,8 @@ export type HandsOptions = Readonly<{
   onCommand: (command: Command) => void;
   /** A tile was chosen by dwell (`isByGaze`) or button; the ray is in um of the specimen. */
   onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void;
+  /** The object along a ray in um of the specimen: its name, and where; null: none. Absent: there are none. */
+  objectAlong?: (ray: Ray) => Readonly<{ id: string; distance: number }> | null;
   /** The user asks to leave stereo. */
   onLeave: () => void;
   /** The user has chosen another lens profile. */

@@ -21,6 +21,7 @@ import type { ViewerState } from "../state/viewer_state";
 import type { Gesture } from "./cardboard/fingers";
 import { GazeCarry } from "./carry_handle";
 import { Controllers, type Hand, type HandEvent } from "./controllers";
+import { Ground } from "./ground";
 import type { HandsOptions } from "./hands_options";
 import {
   type HeadHold,
@@ -30,9 +31,12 @@ import {
   moveByStick,
   STEPS_PER_S,
 } from "./hold_specimen";
+import { howItWorks, isToBeTold } from "./how_it_works";
 import { LastChoice } from "./last_choice";
+import { type MenuEntry, menuEntries } from "./panel/menu_entries";
 import { RoomNotice } from "./panel/notice";
 import { PANEL, RoomPanel } from "./panel/panel";
+import type { Setting } from "./panel/placement";
 import { SpecimenMover } from "./specimen_mover";
 
 /** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
@@ -72,6 +76,7 @@ export class Hands {
   readonly panel: RoomPanel;
   readonly ring = new Ring();
   readonly notice: RoomNotice;
+  readonly ground = new Ground();
   private readonly mover: SpecimenMover;
   private readonly controllers = new Controllers();
   private readonly pointer = new Pointer();
@@ -116,13 +121,15 @@ export class Hands {
       },
     });
     this.tiles = new TileTarget(specimen.group, options.onChoose);
+    if (options.objectAlong !== undefined) this.tiles.objectAlong = options.objectAlong;
     this.targets = [...this.panel.targets, ...handles, this.tiles];
     scene.add(...this.overlays);
   }
 
   /** What is no opaque thing, which the pass for the depth has to leave out. */
   get overlays() {
-    return [this.controllers.group, this.panel.group, this.ring.group, this.notice.mesh];
+    const { controllers, panel, ring, notice, ground } = this;
+    return [controllers.group, panel.group, ring.group, notice.mesh, ground.lines];
   }
 
   /** The target met now, for tests and for names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
@@ -152,6 +159,19 @@ export class Hands {
   }
 
   /** @param session null: split screen, without any controllers */
+  enter(session: XRSession | null, setting: Setting): void {
+    this.panel.setting = setting;
+    this.start(session);
+    this.ground.show(setting === "before-eyes");
+    if (isToBeTold()) this.announce(howItWorks(setting));
+  }
+
+  /** The panel's controls as a head sees them. */
+  menuFrom(head: Matrix4): readonly MenuEntry[] {
+    return menuEntries(this.panel.places, head);
+  }
+
+  /** As `enter` does, without the card that says how it works. */
   start(session: XRSession | null): void {
     this.stop();
     this.isRunning = true;
@@ -175,6 +195,7 @@ export class Hands {
     this.panel.setShown(false);
     this.notice.clear();
     this.ring.hide();
+    this.ground.show(false);
   }
 
   /** Press the only button of the split screen, or a key in its place. @param time_ms on the clock of events */
@@ -249,6 +270,7 @@ export class Hands {
     this.notice.dispose();
     this.controllers.dispose();
     this.ring.dispose();
+    this.ground.dispose();
   }
 
   private now_ms(): number {

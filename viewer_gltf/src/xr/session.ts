@@ -50,8 +50,17 @@ export class XrSession {
     return this.session !== null && this.mode === "immersive-ar";
   }
 
-  /** Must be called from a click or a tap. Rejects if the browser or the user refuses. */
-  async start(xr: XRSystem, mode: ImmersiveMode = "immersive-vr"): Promise<void> {
+  /**
+   * Must be called from a click or a tap. Rejects if the browser or the user refuses, or as `prepared` does.
+   *
+   * @param prepared what has to be there before the first frame
+   */
+  async start(
+    xr: XRSystem,
+    mode: ImmersiveMode = "immersive-vr",
+    prepared: Promise<unknown> = Promise.resolve(),
+  ): Promise<void> {
+    prepared.catch(() => undefined); // it is awaited once the browser has answered
     if (this.session !== null) return;
     const session = await xr.requestSession(mode, { optionalFeatures: ["local-floor"] });
     this.session = session;
@@ -61,6 +70,7 @@ export class XrSession {
       this.onEnd();
     });
     try {
+      await prepared;
       // the origin is where the eyes are when it starts, whatever the body's height; a table has its own
       this.hasFloor = mode === "immersive-ar" && (await hasSpace(session, "local-floor"));
       this.renderer.xr.setReferenceSpaceType(this.hasFloor ? "local-floor" : "local");

@@ -1,30 +1,22 @@
 /** Stereo, whichever way: a headset's session, or a split screen in a phone's viewer. */
-import { type Camera, MathUtils, Matrix4, type Object3D, Vector3, type WebGLRenderer } from "three";
+import { type Camera, Matrix4, type Object3D, type WebGLRenderer } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Eyes } from "../gpu/eyes";
+import type { PanelView } from "../panel/controls";
 import type { Command } from "../state/commands";
 import type { ViewerState } from "../state/viewer_state";
 import type { SplitSession } from "./cardboard/split_session";
 import { askInTap } from "./cardboard/user_gesture";
 import type { Profile } from "./cardboard/viewer_profile";
-import { Ground } from "./ground";
 import type { HandsOptions } from "./hands_options";
 import { betweenEyes } from "./head_pose";
-import { Hands } from "./interaction";
-import { bearingOf, headBearing, type Setting } from "./panel/placement";
-import { XrSession } from "./session";
+import type { Hands } from "./interaction";
+import type { MenuEntry } from "./panel/menu_entries";
+import { type ImmersiveMode, XrSession } from "./session";
 import { spreadEyes } from "./stereo_strength";
 
 export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
   Readonly<{ onStart: () => void; onEnd: () => void }>;
-
-/** A control of the panel in the room: how far to the right of where the head faces, and above its level. */
-export type MenuEntry = Readonly<{
-  id: string;
-  label: string;
-  right_deg: number;
-  up_deg: number;
-}>;
 
 export type EyeSettings = Readonly<{
   distance_m: number;
@@ -34,33 +26,22 @@ export type EyeSettings = Readonly<{
   cssPixelsPerInch: number | null;
 }>;
 
-/** On a card before the eyes when stereo begins. Before a head that looks at a table the bar is higher than the gaze. */
-export function howItWorks(setting: Setting): string {
-  const way = setting === "over-table" ? "up" : "down";
-  return `Look ${way}: the bar.\nRest or press: choose.\nHold: it follows you.`;
-}
-/** Times that the card is shown on a device. */
-const TOLD_OFTEN = 3;
-const TOLD_KEY = "stereocell-told";
-
-function isToBeTold(): boolean {
-  try {
-    const times = Number(localStorage.getItem(TOLD_KEY) ?? 0);
-    localStorage.setItem(TOLD_KEY, String(times + 1));
-    return times < TOLD_OFTEN;
-  } catch {
-    return true; // nothing can be kept here
-  }
-}
-
 const NOT_LOADED =
-  "The part of the page that splits the screen could not be loaded. Check the connection, load " +
+  "The part of the page that shows stereo could not be loaded. Check the connection, load " +
   "the page again, and tap again.";
+
+/** The error for a part of the page that did not load. */
+function notLoaded(cause: unknown): never {
+  throw new BundleError(NOT_LOADED, { cause });
+}
 
 export class Stereo {
   readonly headset: XrSession;
-  readonly hands: Hands;
-  private readonly ground = new Ground();
+  /** Gaze, hands and the panel in the room; null until stereo is first wanted. */
+  hands: Hands | null = null;
+  private loading: Promise<Hands> | null = null;
+  /** The page's own choices, for the panel in the room as soon as it is loaded. */
+  private choices: Partial<PanelView> = {};
   private split: SplitSession | null = null;
   private eyes: EyeSettings = { distance_m: 0.063, strength: 1, cssPixelsPerInch: null };
   /** A split screen that is being asked for. */
@@ -73,8 +54,6 @@ export class Stereo {
     private readonly renderer: WebGLRenderer,
     private readonly options: StereoOptions,
   ) {
-    options.scene.add(this.ground.lines);
-    this.hands = new Hands({ ...options, xr: renderer.xr, onLeave: () => this.end() });
     this.headset = new XrSession(
       renderer,
       () => {
@@ -84,6 +63,34 @@ export class Stereo {
       },
       () => this.leave(),
     );
+  }
+
+  /** Load what stereo draws and listens with. Rejects with a BundleError, and may be asked again. */
+  prepare(): Promise<Hands> {
+    this.loading ??= import("./interaction")
+      .then(({ Hands }) => {
+        const { renderer, options } = this;
+        const hands = new Hands({ ...options, xr: renderer.xr, onLeave: () => this.end() });
+        hands.panel.take(this.choices);
+        this.hands = hands;
+        return hands;
+      })
+      .catch((error) => {
+        this.loading = null;
+        return notLoaded(error);
+      });
+    return this.loading;
+  }
+
+  /** What the user has chosen on the page, and the panel in the room shows as well. */
+  showInPanel(choices: Partial<PanelView>): void {
+    this.choices = { ...this.choices, ...choices };
+    this.hands?.panel.take(choices);
+  }
+
+  /** Must be called from a click or a tap. Rejects if the browser or the user refuses. */
+  startHeadset(xr: XRSystem, mode: ImmersiveMode = "immersive-vr"): Promise<void> {
+    return this.headset.start(xr, mode, this.prepare());
   }
 
   /** What the user has set for the eyes. */
@@ -122,7 +129,8 @@ export class Stereo {
   private async askAndSplit(profile: Profile): Promise<readonly string[]> {
     const asked = askInTap(this.renderer.domElement, () => this.end());
     try {
-      this.split ??= await this.loadSplit();
+      const [, split] = await Promise.all([this.prepare(), this.split ?? this.loadSplit()]);
+      this.split = split;
     } catch (error) {
       void asked.screen.then(({ release }) => release());
       throw error;
@@ -132,21 +140,19 @@ export class Stereo {
   }
 
   private async loadSplit(): Promise<SplitSession> {
-    const { SplitSession } = await import("./cardboard/split_session").catch((cause) => {
-      throw new BundleError(NOT_LOADED, { cause });
-    });
+    const { SplitSession } = await import("./cardboard/split_session").catch(notLoaded);
     return new SplitSession(
       this.renderer,
       () => this.begin(null),
       () => this.leave(),
-      (gesture) => this.hands.touch(gesture),
+      (gesture) => this.hands?.touch(gesture),
       this.splitOptions,
     );
   }
 
   /** Everything but what is opaque, which the pass for the depth has to leave out. */
   get overlays(): readonly Object3D[] {
-    return [this.ground.lines, ...this.hands.overlays];
+    return this.hands?.overlays ?? [];
   }
 
   /** Where the eyes are in this frame. Returns the camera to draw with; null: no stereo. */
@@ -191,7 +197,7 @@ export class Stereo {
       const before = this.split.head.clone();
       this.split.recentre();
       this.split.update();
-      this.hands.panel.comeAlong(before, this.split.head);
+      this.hands?.panel.comeAlong(before, this.split.head);
     }
     return this.head;
   }
@@ -216,13 +222,14 @@ export class Stereo {
 
   /** The specimen becomes so much larger where it is; on a flat screen nothing does. */
   resize(factor: number, state: ViewerState): void {
-    if (this.kind !== null) this.hands.resize(factor, state);
+    if (this.kind !== null) this.hands?.resize(factor, state);
   }
 
   /** Whether a command was one of those that move the specimen before the eyes. */
   run(command: Command, state: ViewerState): boolean {
-    if (command !== "press") return this.hands.run(command, state);
-    this.hands.tap();
+    const { hands } = this;
+    if (command !== "press") return hands?.run(command, state) ?? false;
+    hands?.tap();
     return true;
   }
 
@@ -233,53 +240,45 @@ export class Stereo {
 
   /** Say something before the eyes; nothing where there is no stereo. */
   announce(text: string): void {
-    this.hands.announce(text);
+    this.hands?.announce(text);
+  }
+
+  /** Whether the panel in the room is open. */
+  get isPanelOpen(): boolean {
+    return this.hands?.panel.isOpen ?? false;
   }
 
   /** What the panel in the room has now, and its button. */
   get menu(): readonly MenuEntry[] {
-    const { head } = this;
-    if (head === null) return [];
-    const eye = new Vector3().setFromMatrixPosition(head);
-    const { yaw } = headBearing(head);
-    return this.hands.panel.places.map(({ id, label, at }) => {
-      const bearing = bearingOf(at.sub(eye));
-      return {
-        id,
-        label,
-        right_deg: MathUtils.radToDeg(bearing.yaw - yaw),
-        up_deg: MathUtils.radToDeg(bearing.pitch),
-      };
-    });
+    const { head, hands } = this;
+    if (head === null || hands === null) return [];
+    return hands.menuFrom(head);
   }
 
   /** Open or close the panel in the room; false: no stereo. */
   togglePanel(): boolean {
     if (this.kind === null) return false;
-    this.hands.panel.toggle();
+    this.hands?.panel.toggle();
     return true;
   }
 
   private begin(session: XRSession | null): void {
+    const { hands } = this;
+    if (hands === null) throw new Error("stereo began before its part of the page was loaded");
     const isInHand = session?.interactionMode === "screen-space";
     const onTable = isInHand ? "in-hand" : "over-table";
-    this.hands.panel.setting = this.isInUsersRoom ? onTable : "before-eyes";
-    this.ground.show(!this.isInUsersRoom);
     this.options.onStart();
-    this.hands.start(session);
-    if (isToBeTold()) this.hands.announce(howItWorks(this.hands.panel.setting));
+    hands.enter(session, this.isInUsersRoom ? onTable : "before-eyes");
   }
 
   private leave(): void {
     this.isArriving = false;
-    this.ground.show(false);
-    this.hands.stop();
+    this.hands?.stop();
     this.options.onEnd();
   }
 
   dispose(): void {
-    this.ground.dispose();
-    this.hands.dispose();
+    this.hands?.dispose();
     this.split?.dispose();
   }
 }

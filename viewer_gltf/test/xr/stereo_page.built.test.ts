@@ -167,13 +167,25 @@ describeInChromium("the page in stereo", () => {
     await expect.poll(isFull).toBe(false);
   });
 
-  it("reports it where the rest of the page can't be had, and gives the screen back", async () => {
+  const PARTS = ["split_session", "interaction"];
+  it.each(PARTS)("reports that %s could not be loaded, and gives the screen back", async (part) => {
+    await stand.viewer.page.route(`**/${part}*`, (route) => route.abort());
     await addIphone("granted");
-    await stand.viewer.page.route("**/split_session*", (route) => route.abort());
     await tapSplit();
     await expect.poll(notices).toEqual([expect.stringMatching(/could not be loaded.*tap again/)]);
     expect(await isStereo()).toBe(false);
     await expect.poll(isFull).toBe(false);
+  });
+
+  it("ends a headset's session where its part of the page could not be loaded", async () => {
+    await stand.viewer.page.route("**/interaction*", (route) => route.abort());
+    await addHeadset(stand.viewer.page);
+    await stand.open("&mode=off");
+    await stand.viewer.page.locator('[data-action="stereo"]').dispatchEvent("click");
+    await expect.poll(notices).toEqual([expect.stringMatching(/could not be loaded.*tap again/)]);
+    expect(await isStereo()).toBe(false);
+    await stand.viewer.page.unroute("**/interaction*");
+    await stand.viewer.enterStereo();
   });
 
   it("splits the screen without WebXR, and goes back by Escape", async () => {

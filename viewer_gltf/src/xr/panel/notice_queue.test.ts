@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { Rect } from "../../panel/canvas/draw_list";
-import { howItWorks } from "../stereo";
+import { howItWorks } from "../how_it_works";
 import {
   ANNOUNCED_S,
   type Announcements,
