@@ -82,7 +82,7 @@ describeInChromium("every key", () => {
     await page.keyboard.press("}");
     expect(await said()).toBe(REFUSED.slices);
     await page.keyboard.press("]");
-    expect(await said()).toBe("Only paths of light have it: switch them on first.");
+    expect(await said()).toBe("Only path tracing has this setting: switch path tracing on first.");
     await page.keyboard.press("u");
     expect(await said()).toBe(REFUSED.measured);
     await page.keyboard.press("z");
