@@ -66,9 +66,9 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
 
-const NOT_COME = "This part of the page has not come: check the connection and try again.";
+const NOT_COME = "This part of the page could not be loaded: check the connection and try again.";
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
-const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
+const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 
 const LENS_KEY = "stereocell-lens";
 /** Whether a change gives the cards to the channels that are shown by then. */
@@ -373,7 +373,9 @@ export class Controller {
     this.card ??= new part.CardMeasure(parent, (perInch) => {
       store(SCREEN_KEY, String(perInch));
       viewer.setScreen(perInch);
-      this.say(`The screen has ${perInch} pixels an inch: split it to see.`);
+      this.say(
+        `The screen has ${perInch} pixels an inch: split the screen to see it in true size.`,
+      );
     });
     const { userAgent } = navigator;
     this.card.open(viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
@@ -528,7 +530,9 @@ export class Controller {
     viewer.stereo.showInPanel({ link: address.href });
     const without = viewer.leftOutOfLink;
     const but =
-      without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;
+      without === 0
+        ? ""
+        : ` It leaves out lists of ${without} objects, which are too long: save them as CSV.`;
     if (viewer.stereo.kind !== null) {
       this.say(`The link is in the page's address, for when you leave.${but}`);
     } else if (await copyText(address.href)) this.say(`The link is in the clipboard.${but}`);
@@ -554,7 +558,7 @@ export class Controller {
     try {
       const size = Number(viewer.state.pictureSize);
       const png = await viewer.picture(size, (words) => this.say(`Picture: ${words}`), signal);
-      if (png === null) this.say("The picture was left.");
+      if (png === null) this.say("Saving the picture was cancelled.");
       else this.save("picture", "png", png);
     } catch (error) {
       this.refuse("The picture can't be saved", error);
@@ -579,7 +583,7 @@ export class Controller {
     this.refresh();
     try {
       const file = await viewer.film((done, of) => this.say(`Video: ${done} of ${of}`), signal);
-      if (file === null) this.say("The video was left.");
+      if (file === null) this.say("Making the video was cancelled.");
       else this.save("video", file.suffix, file.content);
     } catch (error) {
       this.refuse("The video can't be made", error);
@@ -613,12 +617,13 @@ export class Controller {
   private saveObjects(): void {
     const { objects } = this.viewer;
     if (objects.length === 0) {
-      this.say("No objects of a label map are shown.");
+      this.say("No label map is shown, so there are no objects to save.");
       return;
     }
     for (const { id, text } of this.viewer.objectsCsv()) {
       const name = objects.length === 1 ? "objects" : `objects-${id}`;
-      if (text === null) this.say("Their values are on their way: once more, please.");
+      if (text === null)
+        this.say("The values of the objects are still loading: save them again in a moment.");
       else this.save(name, "csv", new Blob([text], { type: "text/csv" }));
     }
   }

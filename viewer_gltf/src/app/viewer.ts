@@ -62,7 +62,7 @@ const NEAR_AT_START = 1.1;
 /** Before these the place from which the specimen is seen is a step of its own. */
 const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset", "next-view"]);
 
-const NOTHING_AHEAD = "No tile is in the middle of the view.";
+const NOTHING_AHEAD = "Nothing is in the middle of the view.";
 /** Distance of the eye from an object that it flies to, in the object's lengths, and at least, m. */
 const NEAREST_OBJECT = 6;
 const NEAREST_OBJECT_M = 0.08;
@@ -70,7 +70,7 @@ const NEAREST_OBJECT_M = 0.08;
 const ASIDE = [1, 0, -1].flatMap((z) =>
   [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
 );
-const BEHIND_OTHERS = "Others lie before it on all sides: from its card it is shown alone.";
+const BEHIND_OTHERS = "Other objects hide it from all sides: its card shows it alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
 const NEXT_KEPT = "“Next kept view” goes through them.";
@@ -363,7 +363,10 @@ export class Viewer {
 
   private loadCapture() {
     return import("./capture").catch((cause) => {
-      throw new DOMException(`the code for it has not come (${cause})`, "NetworkError");
+      throw new DOMException(
+        `the part of the page for it could not be loaded (${cause})`,
+        "NetworkError",
+      );
     });
   }
 
@@ -395,7 +398,9 @@ export class Viewer {
     this.nextView = 0;
     this.dispatch({ type: "keep-views", views });
     const { length } = this.state.keptViews;
-    this.onAnnounce(length === 0 ? "No view is kept now." : `${length} kept: ${NEXT_KEPT}`);
+    this.onAnnounce(
+      length === 0 ? "No view is kept any more." : `${length} views are kept: ${NEXT_KEPT}`,
+    );
     return true;
   }
 

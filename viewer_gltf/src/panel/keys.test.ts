@@ -302,7 +302,7 @@ describe("the keys", () => {
       return spokenFeedback(wish, atEnd, atEnd, new Map());
     };
     expect(said("}")).toBe("Slices: x 100.0 %: it goes no further");
-    expect(said("D")).toBe("Disc 40°: it goes no further");
+    expect(said("D")).toBe("Focus disc 40°: it goes no further");
   });
 
   it("go to the next tile, also of those that are shown alone", () => {
@@ -334,7 +334,7 @@ describe("the keys", () => {
     expect(after("o")).toBe("Marker 0: opacity 95 %");
     expect(after("e")).toBe("Marker 0: window 100 – 1104");
     expect(after("1")).toBe("Marker 0: hidden");
-    expect(after("D")).toBe("Disc 17°");
+    expect(after("D")).toBe("Focus disc 17°");
     expect(after("b")).toBe("Not cut");
     expect(after("n")).toBe("Cut by a box and a plane");
     expect(after(".")).toBe("Box: x from 1.00 µm");

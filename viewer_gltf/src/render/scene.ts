@@ -10,7 +10,7 @@ import {
   type Object3D,
   Scene,
 } from "three";
-import type { Manifest } from "../bundle/generated/bundle";
+import type { Bounds, Manifest } from "../bundle/generated/bundle";
 import { FILL, FILL_AT, GROUND, KEY, KEY_AT, SHINES_AT, SKY } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
 import type { Vec3 } from "../math/vec3";
@@ -80,6 +80,11 @@ export class Room {
   light(eye: Matrix4): void {
     aim(this.key, eye, KEY_AT);
     aim(this.fill, eye, FILL_AT);
+  }
+
+  /** um, world; null: of no tile. */
+  boundsOf(tile: string | null): Bounds | null {
+    return this.manifest.tiles.find(({ id }) => id === tile)?.bounds_um ?? null;
   }
 
   /** Outline a tile among others, or none. */

@@ -27,6 +27,7 @@ const OPTIONAL = new RegExp(
     "capture",
     "card_measure",
     "client_worker",
+    "explanations",
     "EXRLoader",
     "fflate",
     "frame_port",

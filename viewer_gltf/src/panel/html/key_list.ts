@@ -60,7 +60,7 @@ export class Help {
     { type: "text", placeholder: "Find a key", ariaLabel: "Find a key", autocomplete: "off" },
     { control: "find-key" },
   );
-  private readonly none = element("p", { textContent: "No key is named so.", hidden: true });
+  private readonly none = element("p", { textContent: "No key fits these words.", hidden: true });
   private readonly line = element("p", { className: "hint", role: "status" }, { keyLine: "" });
   private readonly reset = element(
     "button",

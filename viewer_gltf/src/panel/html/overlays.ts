@@ -17,7 +17,7 @@ export class ProgressBar {
   private readonly label = element("span");
   readonly root = element(
     "div",
-    { className: "progress", role: "progressbar", ariaLabel: "The overview" },
+    { className: "progress", role: "progressbar", ariaLabel: "Loading of the overview" },
     { progress: "" },
     element("div", { className: "track" }, {}, this.fill),
     this.label,
@@ -107,12 +107,8 @@ export class FirstHint {
 /** Says in a line what a key or a button has just done. The line goes by itself, unless someone is about to undo it. */
 export class Said {
   private readonly words = element("p", { role: "status" }, { said: "" });
-  private readonly button = element(
-    "button",
-    { type: "button", hidden: true },
-    { action: "offer" },
-  );
-  readonly root = element("div", { className: "said" }, {}, this.words, this.button);
+  private readonly button = element("button", { type: "button" }, { action: "offer" });
+  readonly root = element("div", { className: "said" }, {}, this.words);
   private timer = 0;
 
   say(text: string): void {
@@ -124,7 +120,7 @@ export class Said {
     if (this.words.textContent !== text) return;
     this.write(text, OFFERED_MS);
     setText(this.button, label);
-    this.button.hidden = false;
+    this.root.append(this.button);
     this.button.onclick = () => {
       this.write("", 0);
       act();
@@ -133,7 +129,7 @@ export class Said {
 
   /** Take the button away: its offer holds no longer. */
   withdraw(): void {
-    this.button.hidden = true;
+    this.button.remove();
   }
 
   private write(text: string, for_ms: number): void {

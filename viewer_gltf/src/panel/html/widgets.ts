@@ -6,6 +6,7 @@
 import { element, setText } from "../../dom/element";
 import type { Button, Choice, Control, Link, Search, Slider, Text, Toggle } from "../controls";
 import { makeColour } from "./colour";
+import { explainerOf, explainOptions, withExplainer, withNote } from "./explain";
 import { makePicture } from "./picture";
 import { makeWindow } from "./range";
 import { makeMap } from "./tile_map";
@@ -60,7 +61,7 @@ function makeToggle(first: Toggle, send: Send): Widget<Toggle> {
   const label = element("span", { className: "label" });
   const root = element("label", { className: "toggle" }, {}, input, label);
   return {
-    root: first.about ? element("div", { className: "told" }, {}, root, ...aboutOf(first)) : root,
+    root: withExplainer(first, root),
     update(control) {
       now = control;
       input.checked = control.value;
@@ -86,13 +87,9 @@ function explainRefusal(root: HTMLElement, now: () => Control, send: Send): void
   });
 }
 
-/** What a control does, in a sentence, where its name can't say it. */
-function aboutOf({ about }: Control): readonly HTMLElement[] {
-  return about ? [element("small", { textContent: about })] : [];
-}
-
 function makeSlider(first: Slider, send: Send): Widget<Slider> {
   let now = first;
+  const explainer = explainerOf(first);
   const input = element(
     "input",
     {
@@ -110,13 +107,13 @@ function makeSlider(first: Slider, send: Send): Widget<Slider> {
     "span",
     { className: "head" },
     {},
-    element("span", {}, {}, first.label),
+    element("span", {}, {}, first.label, ...(explainer === null ? [] : [explainer.button])),
     text,
   );
-  const root = element("label", { className: "slider" }, {}, head, input, ...aboutOf(first));
+  const root = element("label", { className: "slider" }, {}, head, input);
   explainRefusal(root, () => now, send);
   return {
-    root,
+    root: withNote(root, explainer),
     update(control) {
       now = control;
       input.value = String(Math.round(control.value * control.steps));
@@ -150,12 +147,25 @@ function makeSegments(first: Choice, send: Send): Widget<Choice> {
     ),
   );
   return {
-    root: first.about ? element("div", { className: "told" }, {}, root, ...aboutOf(first)) : root,
+    root: named(first, root),
     update(control) {
       now = control;
       for (const input of inputs) input.checked = input.value === control.value;
     },
   };
+}
+
+/** Segments say what they are of where an explanation belongs to that. */
+function named(first: Choice, segments: HTMLElement): HTMLElement {
+  const explainer = explainerOf(first);
+  if (explainer === null) return segments;
+  const label = element("span", {
+    className: "label",
+    textContent: first.label,
+    ariaHidden: "true",
+  });
+  const { button, note } = explainer;
+  return element("div", { className: "explained" }, {}, label, button, segments, note);
 }
 
 function makeSelect(first: Choice, send: Send): Widget<Choice> {
@@ -171,9 +181,10 @@ function makeSelect(first: Choice, send: Send): Widget<Choice> {
   const label = element("span", { className: "label", textContent: first.label });
   const root = element("label", { className: "field" }, {}, label, select);
   explainRefusal(root, () => now, send);
+  explainOptions(select, first);
   let listed = "";
   return {
-    root,
+    root: withExplainer(first, root),
     update(control) {
       now = control;
       const options = control.options.map((each) => `${each.value}\n${each.label}`).join("\n");

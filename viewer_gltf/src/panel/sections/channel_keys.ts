@@ -40,7 +40,7 @@ export const CHANNEL_KEYS: readonly Key[] = [
     const pages = pagesOf(state, view);
     return pages === 1 ? no(REFUSED.page) : { panel: "page", page: (view.page + 1) % pages };
   }),
-  key("c", "Next channel: the keys below mean it", pick(1)),
+  key("c", "Next channel, which the keys below change", pick(1)),
   key("C", "Previous channel", pick(-1)),
   ofChannel("x", "Hide the channel", ({ id }) => ({ type: "show", channel: id, shown: false })),
   ...keysOfChannel(VOLUME),

@@ -17,7 +17,7 @@ export function measuredText({ tool, measured, measuredAs, measureKind }: Viewer
   if (measured.length > 0) {
     const more = missing(measuredAs, measured);
     if (more === 0) return measurementText(measuredAs, measured);
-    return more === 1 ? "Now the other point." : "Now the next point.";
+    return more === 1 ? "Now choose the other point." : "Now choose the next point.";
   }
   if (tool !== "measure") return "";
   if (measureKind === "angle") return "Choose three points: the angle is at the second.";
@@ -48,7 +48,7 @@ export function measureItems(
     {
       kind: "button",
       id: "finish-measuring",
-      label: "Done: keep it",
+      label: "Done: keep the measurement",
       refusal: isOpen ? REFUSED.points : "",
       to: () => ({ type: "finish-measuring" }),
     },

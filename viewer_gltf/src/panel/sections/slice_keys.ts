@@ -26,14 +26,14 @@ function turn(steps: number): Key["to"] {
 export const SLICE_KEYS: readonly Key[] = [
   ...keysOf(SLICE_PICTURES),
   ...keysOf(SLICE_PLANES),
-  key("^", "Next number of the slices: where they meet, how they are turned", ({ view }) => {
+  key("^", "Next setting of the slices: where they meet, how they are turned", ({ view }) => {
     const ids = SLICE_NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, 1);
     return parameter === null ? no("There is no number.") : { panel: "parameter", parameter };
   }),
-  key("{", "Less of it", turn(-STEPS)),
-  key("}", "More of it", turn(STEPS)),
-  key("~", "Slices to the middle, straight", ({ state }) =>
+  key("{", "Less of that setting", turn(-STEPS)),
+  key("}", "More of that setting", turn(STEPS)),
+  key("~", "Slices back to the middle, not turned", ({ state }) =>
     isSliced(state) ? STRAIGHT : no(REFUSED.slices),
   ),
 ];
