@@ -8,6 +8,7 @@ import { unitOf } from "../annotations/measure";
 import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
+import { toggleFullScreen } from "../dom/full_screen";
 import { fileName, saveFile } from "../dom/save_file";
 import { store, stored } from "../dom/stored";
 import type { Box } from "../math/box";
@@ -68,6 +69,7 @@ const REFRESH_MS = 250;
 
 const NOT_COME = "This part of the page could not be loaded: check the connection and try again.";
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
+const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
 const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 
 const LENS_KEY = "stereocell-lens";
@@ -102,10 +104,14 @@ function rememberedKeys(): KeyChanges {
   }
 }
 
-/** The sections of the panel that the reader had open on the visit before. */
+/**
+ * The sections of the panel that the reader had open on the visit before, but for those of label maps: the rows below
+ * would move when a table has come.
+ */
 function rememberedOpen(): readonly string[] {
   const text = stored(OPEN_KEY);
-  return text === null ? START_VIEW.open : text.split(" ");
+  const sections = text === null ? START_VIEW.open : text.split(" ");
+  return sections.filter((id) => !id.startsWith("objects"));
 }
 
 const SCREEN_KEY = "stereocell-screen";
@@ -270,6 +276,7 @@ export class Controller {
       if (wish.panel === "letters") store(LETTERS_KEY, wish.areOn ? "on" : "off");
       if (wish.panel === "keys") store(KEYS_KEY, JSON.stringify(wish.changes));
       this.refresh();
+      if (wish.panel === "reveal") this.panel.reveal(wish.control);
     } else this.viewer.dispatch(wish);
   }
 
@@ -299,6 +306,8 @@ export class Controller {
       if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
       else if (this.hasRoom) this.options.onRoom();
       else this.say(NO_ROOM);
+    } else if (command === "full-screen") {
+      void toggleFullScreen().then((isDone) => isDone || this.say(NO_FULL_SCREEN));
     } else if (command === "split") {
       this.splitScreen();
     } else if (command === "scan") {

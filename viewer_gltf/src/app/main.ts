@@ -14,6 +14,7 @@ import type { Manifest } from "../bundle/generated/bundle";
 import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
+import { hasFullScreen } from "../dom/full_screen";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
 import { isKept } from "../offline/request_plan";
 import { FirstHint, Notices, ProgressBar, Said, showFatal, WayBack } from "../panel/html/overlays";
@@ -155,10 +156,9 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   notices.update(viewer.state);
   controller.followAddress(search, hash);
   openedAs = { state: viewer.state, camera: viewer.cameraView };
-  viewer.renderer.domElement.addEventListener("webglcontextlost", (event) => {
-    const canvas = event.target as HTMLCanvasElement;
+  viewer.renderer.domElement.addEventListener("webglcontextlost", () => {
     void import("./lost_context").then(({ offerReload }) =>
-      offerReload(canvas, () => later?.addressBar?.write()),
+      offerReload(viewer, () => later?.addressBar?.write()),
     );
   });
   hint.update(viewer.state);
@@ -172,6 +172,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const way = wayToStereo(support, isTouch);
   waysIn.offerStereo(way, () => way && controller.perform(way));
   if (way !== null || hasRoom) void prepareStereo(viewer);
+  if (hasFullScreen()) waysIn.offerFullScreen(() => controller.perform("full-screen"));
   if (hasRoom) waysIn.offerRoom(() => controller.perform("room"));
   const usdz = usdzFor(bundle);
   if (usdz !== null) waysIn.offerLink(usdz);

@@ -83,8 +83,8 @@ export class Steps {
   /** How many steps were made since that one was the newest, moves of the camera included. */
   since(newest: object | null): number {
     this.note();
-    const { past } = this.history;
-    return past.length - 1 - past.findLastIndex((step) => step === newest);
+    const past: readonly (object | null)[] = this.history.past;
+    return past.length - 1 - past.lastIndexOf(newest);
   }
 
   forget(): void {

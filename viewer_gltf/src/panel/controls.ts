@@ -40,6 +40,8 @@ export type PanelChange =
   | Readonly<{ panel: "letters"; areOn: boolean }>
   /** The keys that differ from the tables: see keys.ts. */
   | Readonly<{ panel: "keys"; changes: Readonly<Record<string, string>> }>
+  /** Open a section, and scroll to one of its controls. */
+  | Readonly<{ panel: "reveal"; section: string; control: string }>
   | Readonly<{ panel: "hide" }>
   | Readonly<{ panel: "help" }>;
 
@@ -90,7 +92,7 @@ export const START_VIEW: PanelView = {
   shape: null,
   grasp: null,
   shapeNumber: null,
-  open: ["channels", "objects", "volumes"],
+  open: ["channels", "volumes"],
   lenses: "v2",
   code: "",
   hasLetters: true,
@@ -315,6 +317,8 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
       const open = isOpen ? view.open.filter((id) => id !== section) : [...view.open, section];
       return { ...view, open };
     }
+    case "reveal":
+      return { ...view, isHidden: false, open: [...new Set([...view.open, change.section])] };
     case "lenses":
       return change.lenses === view.lenses ? view : { ...view, lenses: change.lenses };
     case "code":

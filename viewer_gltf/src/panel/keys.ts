@@ -20,7 +20,7 @@ export const KEYS: readonly KeyGroup[] = [
   { name: "Value and gradient", keys: SHAPE_KEYS },
   { name: "Volumes", keys: VOLUME_KEYS },
   { name: "Slices", keys: SLICE_KEYS },
-  { name: "Light", keys: LIGHT_KEYS },
+  { name: "Path tracing", keys: LIGHT_KEYS },
   { name: "Tiles", keys: TILE_KEYS },
   { name: "Tools", keys: TOOL_KEYS },
   { name: "Pictures and video", keys: SAVE_KEYS },

@@ -40,6 +40,7 @@ const OPTIONAL = new RegExp(
     "objects",
     "path_tracer",
     "qr_scanner",
+    "screen_stereo",
     "shading",
     "slices",
     "split_session",
