@@ -46,7 +46,8 @@ describeInChromium("every key", () => {
         (each) => `${each.ariaExpanded}${each.ariaPressed}`,
       );
       const focused = (document.activeElement as HTMLElement | null)?.dataset.control;
-      const seen = JSON.stringify({ state, look, dialogs, isBodyShown, marks, focused });
+      const isFull = document.fullscreenElement !== null;
+      const seen = JSON.stringify({ state, look, dialogs, isBodyShown, marks, focused, isFull });
       return { seen, said: line?.textContent ?? "" };
     }, isBefore);
 
