@@ -9,8 +9,10 @@ import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { fileName, saveFile } from "../dom/save_file";
+import { store, stored } from "../dom/stored";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import { handleOf } from "../panel/clip_by_key";
 import {
   changePanel,
@@ -18,6 +20,7 @@ import {
   type Lenses,
   type PanelChange,
   type PanelView,
+  type Refusal,
   START_VIEW,
   type Wish,
 } from "../panel/controls";
@@ -31,6 +34,7 @@ import { wishOf } from "../panel/keys";
 import { type Facts, layOut, MORE } from "../panel/layout";
 import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
+import { withTyped, writeAddress } from "../share/address";
 import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
 import type { Action } from "../state/actions";
@@ -41,7 +45,9 @@ import { allOf, measurementsCsv } from "../state/measurements";
 import { setTo } from "../state/parameters/kinds";
 import { EYE_DISTANCE, START_TOOLS, STEREO_STRENGTH } from "../state/parameters/tools";
 import { SWITCH_DISTANCE } from "../state/parameters/volumes";
+import { REFUSED } from "../state/refusals";
 import { PER_INCH, type XrSupport } from "../state/stereo";
+import type { ViewerState } from "../state/viewer_state";
 import { cssPixelsPerInch } from "../xr/cardboard/lens";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
@@ -51,6 +57,8 @@ import {
   ProfileError,
   parseProfile,
 } from "../xr/cardboard/viewer_profile";
+import type { TapPart } from "./tap_part";
+import type { ViewMessagePart } from "./view_message_part";
 import type { Viewer } from "./viewer";
 
 /** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
@@ -58,9 +66,9 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
 
-const NOT_COME = "This part of the page has not come: check the connection and try again.";
+const NOT_COME = "This part of the page could not be loaded: check the connection and try again.";
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
-const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
+const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 
 const LENS_KEY = "stereocell-lens";
 /** Whether a change gives the cards to the channels that are shown by then. */
@@ -71,11 +79,11 @@ const EYE_ROWS = [EYE_DISTANCE, STEREO_STRENGTH] as const;
 /** The user's phone viewer, from the visit before. */
 function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
   try {
-    const { lenses, code } = JSON.parse(localStorage.getItem(LENS_KEY) ?? "{}");
+    const { lenses, code } = JSON.parse(stored(LENS_KEY) ?? "{}");
     const isKnown = lenses === "own" || lenses in BUILT_IN;
     return isKnown && typeof code === "string" ? { lenses, code } : {};
   } catch {
-    return {}; // no storage here, or another's words in it: then as at first
+    return {}; // another program has written other words there
   }
 }
 
@@ -84,7 +92,7 @@ const LETTERS_KEY = "stereocell-letters";
 
 /** The sections of the panel that the reader had open on the visit before. */
 function rememberedOpen(): readonly string[] {
-  const text = remembered(OPEN_KEY);
+  const text = stored(OPEN_KEY);
   return text === null ? START_VIEW.open : text.split(" ");
 }
 
@@ -94,42 +102,26 @@ const EYES_KEY = "stereocell-eyes";
 /** CSS pixels in an inch of this screen, as it was measured; null: it was not. */
 function rememberedScreen(): number | null {
   const [least, most] = PER_INCH;
-  const perInch = Number(remembered(SCREEN_KEY));
+  const perInch = Number(stored(SCREEN_KEY));
   return perInch >= least && perInch <= most ? perInch : null;
 }
 
 /** What the user has set for the eyes, on a visit before. */
 function rememberedEyes(): readonly Action[] {
-  const texts = (remembered(EYES_KEY) ?? "").split(",");
+  const texts = (stored(EYES_KEY) ?? "").split(",");
   return EYE_ROWS.flatMap((row, i) => {
     const value = Number(texts[i] || Number.NaN);
     return Number.isFinite(value) ? [setTo(row, value)] : [];
   });
 }
 
-function remembered(key: string): string | null {
-  try {
-    return localStorage.getItem(key);
-  } catch {
-    return null; // no storage here
-  }
-}
+/** Parts of the state that can leave the picture empty. */
+const EMPTYING = ["channels", "clip", "isolated", "selected", "objects"] as const;
 
-function remember(key: string, text: string): void {
-  try {
-    localStorage.setItem(key, text);
-  } catch {
-    // no storage here: it has to be set anew next time
-  }
-}
-
-function rememberLens(lens: Pick<PanelView, "lenses" | "code">): void {
-  try {
-    localStorage.setItem(LENS_KEY, JSON.stringify(lens));
-  } catch {
-    // no storage here: it has to be chosen anew next time
-  }
-}
+/** Whether the picture may be empty by what was set: then the part of the page that says why is loaded. */
+const mayBeEmpty = (state: ViewerState, opening: ViewerState) =>
+  EMPTYING.some((key) => state[key] !== opening[key]) ||
+  (state.mode === "off" && !state.channels.some(({ shown, hasSurface }) => shown && hasSurface));
 
 export type ControllerOptions = Readonly<{
   subtitle: string;
@@ -147,12 +139,20 @@ export class Controller {
     ...START_VIEW,
     ...rememberedLens(),
     open: rememberedOpen(),
-    hasLetters: remembered(LETTERS_KEY) !== "off",
+    hasLetters: stored(LETTERS_KEY) !== "off",
   };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
   private readonly help: Help;
   /** Once it was asked for. */
   private card: CardMeasure | null = null;
+  /** The card beside a tapped place, once something was tapped. */
+  private tapped: TapPart | null = null;
+  /** Counts the taps and double taps: the code may come after the second one. */
+  private taps = 0;
+  /** What the picture says about itself, once it may have something to say. */
+  private message: ViewMessagePart | null = null;
+  /** The state in which the bundle opened. */
+  private readonly opening: ViewerState;
   private readonly ranges: Ranges;
   private readonly disposed = new AbortController();
   private timer = 0;
@@ -171,6 +171,7 @@ export class Controller {
   ) {
     const { manifest } = viewer.bundle;
     const unit = unitOf(manifest);
+    this.opening = viewer.state;
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
@@ -181,6 +182,11 @@ export class Controller {
     for (const action of rememberedEyes()) viewer.dispatch(action);
     viewer.onAnnounce = (text) => this.say(text);
     viewer.onCard = (control) => this.panel.reveal(control);
+    viewer.onSelect = (ray, isByKey) => void this.openTapCard(ray, isByKey);
+    viewer.onDouble = () => {
+      this.taps++;
+      this.tapped?.close();
+    };
     viewer.onCommand = (command) => {
       if (command === "share") void this.share();
       return command === "share";
@@ -215,24 +221,29 @@ export class Controller {
     this.view = keepPlaces(this.view, this.viewer.state);
     this.panel.update(this.layOut());
     const eyes = EYE_ROWS.map((row) => row.get(this.viewer.state)).join();
-    if (eyes !== this.eyes) remember(EYES_KEY, eyes);
+    if (eyes !== this.eyes) store(EYES_KEY, eyes);
     this.eyes = eyes;
     this.help.update(this.view.isHelpOpen);
+    this.tapped?.update();
+    if (mayBeEmpty(this.viewer.state, this.opening)) void this.loadMessage();
+    this.message?.update();
   }
 
-  /** Bring the figures to the frame that was just drawn, now and then. */
+  /** Bring the card beside a place to the frame that was just drawn, and the figures now and then. */
   refreshSoon(): void {
+    this.tapped?.follow();
     if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
   }
 
-  perform(wish: Wish): void {
+  perform(wish: Wish | Refusal): void {
     if (typeof wish === "string") this.run(wish);
+    else if ("refusal" in wish) void this.explain(wish);
     else if ("panel" in wish) {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
       if (laysOutCards(wish)) this.view = { ...this.view, channelsWithCard: null };
-      if (wish.panel === "unfold") remember(OPEN_KEY, this.view.open.join(" "));
-      if (wish.panel === "letters") remember(LETTERS_KEY, wish.areOn ? "on" : "off");
+      if (wish.panel === "unfold") store(OPEN_KEY, this.view.open.join(" "));
+      if (wish.panel === "letters") store(LETTERS_KEY, wish.areOn ? "on" : "off");
       this.refresh();
     } else this.viewer.dispatch(wish);
   }
@@ -241,7 +252,7 @@ export class Controller {
   followAddress(search: string, hash: string): void {
     const { viewer } = this;
     const { bounds_um } = viewer.bundle.manifest.specimen;
-    const { actions, camera } = readLink(hash, viewer.state, bounds_um);
+    const { actions, camera } = readLink(withTyped(hash), viewer.state, bounds_um);
     const asked = [...settingsOf(search), ...actions];
     for (const action of asked) viewer.dispatch(action);
     const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
@@ -318,7 +329,7 @@ export class Controller {
     const { lenses, code } = this.view;
     try {
       use(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
-      rememberLens({ lenses, code });
+      store(LENS_KEY, JSON.stringify({ lenses, code }));
     } catch (error) {
       if (!(error instanceof ProfileError)) throw error;
       this.say(error.message);
@@ -333,12 +344,49 @@ export class Controller {
       return;
     }
     this.card ??= new part.CardMeasure(parent, (perInch) => {
-      remember(SCREEN_KEY, String(perInch));
+      store(SCREEN_KEY, String(perInch));
       viewer.setScreen(perInch);
-      this.say(`The screen has ${perInch} pixels an inch: split it to see.`);
+      this.say(
+        `The screen has ${perInch} pixels an inch: split the screen to see it in true size.`,
+      );
     });
     const { userAgent } = navigator;
     this.card.open(viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
+  }
+
+  private get pictureArea(): HTMLElement {
+    return this.parent.querySelector<HTMLElement>(".view") ?? this.parent;
+  }
+
+  /** Say why a request does nothing now, with a button where something leads on. */
+  private async explain({ refusal }: Refusal): Promise<void> {
+    this.say(refusal);
+    if (this.viewer.stereo.kind !== null) return;
+    const button = (await this.loadMessage())?.buttonFor(refusal, this.shown) ?? null;
+    if (button !== null) this.said.offer(refusal, button.label, button.act);
+  }
+
+  private async loadMessage(): Promise<ViewMessagePart | null> {
+    if (this.message !== null) return this.message;
+    const part = await import("./view_message_part").catch(() => null);
+    if (part === null || this.message !== null) return this.message;
+    const refresh = () => this.message?.update();
+    this.message = new part.ViewMessagePart(this.viewer, this.pictureArea, this.opening, refresh);
+    refresh();
+    return this.message;
+  }
+
+  private async openTapCard(ray: Ray, isByKey: boolean): Promise<void> {
+    const time_ms = performance.now();
+    const number = ++this.taps;
+    const part = await import("./tap_part").catch(() => null);
+    if (number !== this.taps) return;
+    if (part === null) {
+      this.say(NOT_COME);
+      return;
+    }
+    this.tapped ??= new part.TapPart(this.viewer, this.pictureArea, (wish) => this.perform(wish));
+    await this.tapped.open({ ray, isByKey, time_ms });
   }
 
   private async scan(): Promise<void> {
@@ -380,7 +428,7 @@ export class Controller {
     };
     const wish = wishOf(name, context);
     if (wish === null || isRefusal(wish)) {
-      if (wish !== null) this.say(wish.refusal);
+      if (wish !== null) void this.explain(wish);
       else if (isWritten(name)) this.say(`No key ${name}: ? lists the keys.`);
       return false;
     }
@@ -403,13 +451,18 @@ export class Controller {
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
-    if (hasAddress()) history.replaceState(history.state, "", address);
+    // A notebook's frame has no address. The step that the split screen has made in the history goes when it is left,
+    // and its address with it; the address follows the view then.
+    const isSplit = viewer.stereo.kind === "split";
+    if (hasAddress() && !isSplit) writeAddress(address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
     viewer.stereo.showInPanel({ link: address.href });
     const without = viewer.leftOutOfLink;
     const but =
-      without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;
+      without === 0
+        ? ""
+        : ` It leaves out lists of ${without} objects, which are too long: save them as CSV.`;
     if (viewer.stereo.kind !== null) {
       this.say(`The link is in the page's address, for when you leave.${but}`);
     } else if (await copyText(address.href)) this.say(`The link is in the clipboard.${but}`);
@@ -435,7 +488,7 @@ export class Controller {
     try {
       const size = Number(viewer.state.pictureSize);
       const png = await viewer.picture(size, (words) => this.say(`Picture: ${words}`), signal);
-      if (png === null) this.say("The picture was left.");
+      if (png === null) this.say("Saving the picture was cancelled.");
       else this.save("picture", "png", png);
     } catch (error) {
       this.refuse("The picture can't be saved", error);
@@ -460,7 +513,7 @@ export class Controller {
     this.refresh();
     try {
       const file = await viewer.film((done, of) => this.say(`Video: ${done} of ${of}`), signal);
-      if (file === null) this.say("The video was left.");
+      if (file === null) this.say("Making the video was cancelled.");
       else this.save("video", file.suffix, file.content);
     } catch (error) {
       this.refuse("The video can't be made", error);
@@ -485,7 +538,7 @@ export class Controller {
     const { state } = this.viewer;
     const list = allOf(state);
     if (list.length === 0) {
-      this.say("Nothing is measured.");
+      this.say(REFUSED.measured);
       return;
     }
     this.save("measurements", "csv", new Blob([measurementsCsv(list)], { type: "text/csv" }));
@@ -494,12 +547,13 @@ export class Controller {
   private saveObjects(): void {
     const { objects } = this.viewer;
     if (objects.length === 0) {
-      this.say("No objects of a label map are shown.");
+      this.say("No label map is shown, so there are no objects to save.");
       return;
     }
     for (const { id, text } of this.viewer.objectsCsv()) {
       const name = objects.length === 1 ? "objects" : `objects-${id}`;
-      if (text === null) this.say("Their values are on their way: once more, please.");
+      if (text === null)
+        this.say("The values of the objects are still loading: save them again in a moment.");
       else this.save(name, "csv", new Blob([text], { type: "text/csv" }));
     }
   }
@@ -562,5 +616,7 @@ export class Controller {
     this.panel.root.remove();
     this.help.dispose();
     this.card?.dispose();
+    this.tapped?.dispose();
+    this.message?.dispose();
   }
 }

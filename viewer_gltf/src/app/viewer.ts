@@ -14,8 +14,10 @@ import { pickTile, shownBox, shownTiles } from "../math/pick";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
+import type { Backdrop } from "../render/backdrop";
 import { StageSize } from "../render/canvas_size";
 import { Hybrid } from "../render/gaze_focus";
+import { pixelShare } from "../render/pixel_share";
 import {
   OVER_FLOOR_M,
   place,
@@ -25,6 +27,7 @@ import {
   XR_DISTANCE_M,
 } from "../render/placement";
 import { Room } from "../render/scene";
+import type { Theme } from "../render/theme";
 import type { CameraView } from "../share/camera_link";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
@@ -38,6 +41,7 @@ import { ENVIRONMENT } from "../state/parameters/light";
 import { SCREEN_STEREO, START_TOOLS } from "../state/parameters/tools";
 import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
 import { newNotice, reduce } from "../state/reduce";
+import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import type { Profile } from "../xr/cardboard/viewer_profile";
@@ -58,7 +62,7 @@ const NEAR_AT_START = 1.1;
 /** Before these the place from which the specimen is seen is a step of its own. */
 const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset", "next-view"]);
 
-const NOTHING_AHEAD = "No tile is in the middle of the view.";
+const NOTHING_AHEAD = "Nothing is in the middle of the view.";
 /** Distance of the eye from an object that it flies to, in the object's lengths, and at least, m. */
 const NEAREST_OBJECT = 6;
 const NEAREST_OBJECT_M = 0.08;
@@ -66,16 +70,20 @@ const NEAREST_OBJECT_M = 0.08;
 const ASIDE = [1, 0, -1].flatMap((z) =>
   [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
 );
-const BEHIND_OTHERS = "Others lie before it on all sides: from its card it is shown alone.";
+const BEHIND_OTHERS = "Other objects hide it from all sides: its card shows it alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
-const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
-const NEXT_KEPT = "` goes to the next.";
+const NEXT_KEPT = "` goes to the next one.";
 
 const NO_LAYOUT: Layout = {
   ...{ title: "", subtitle: "", sections: [], status: "", isHidden: true },
   more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
 };
+
+const WAITING = "The host does not answer: trying again. What has come stays on screen.";
+const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
+/** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
+const FINER = /^\S+\.(glb|ktx2):/;
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -96,6 +104,10 @@ export class Viewer {
   onCard: (control: string) => void = () => undefined;
   /** Where someone has tapped, um; for what stands round the page. */
   onTap: (ray: Ray) => void = () => undefined;
+  /** Someone has tapped the flat picture with the tool *Select* (ray in um), or pressed the key for it. */
+  onSelect: (ray: Ray, isByKey: boolean) => void = () => undefined;
+  /** Two quick taps are one request, to fly there: the first was no selection. */
+  onDouble: () => void = () => undefined;
   readonly contents: Contents;
   private readonly room: Room;
   private readonly hybrid: Hybrid;
@@ -104,6 +116,8 @@ export class Viewer {
   private readonly size: StageSize;
   private readonly steps: Steps;
   private nextView = 0;
+  /** Resolves when the background of the flat picture has come. */
+  private dressed: Promise<void> = Promise.resolve();
   private readonly disposed = new AbortController();
 
   /**
@@ -208,6 +222,7 @@ export class Viewer {
       },
       (point) => {
         if (this.stereo.kind !== null) return;
+        this.onDouble();
         if (this.state.tool === "measure") this.tap(rayAt(point));
         else void this.flyAlong(rayAt(point));
       },
@@ -289,8 +304,8 @@ export class Viewer {
         break;
       case "press":
         if (this.stereo.kind !== null) return this.stereo.run(command, this.state);
-        if (!this.tap(rayAhead(this.loop.head, this.room.specimen.group))) {
-          this.onAnnounce(this.state.isolated === null ? NOTHING_AHEAD : NO_OTHER_TILE);
+        if (!this.tap(rayAhead(this.loop.head, this.room.specimen.group), true)) {
+          this.onAnnounce(NOTHING_AHEAD);
         }
         break;
       default: {
@@ -342,7 +357,10 @@ export class Viewer {
 
   private loadCapture() {
     return import("./capture").catch((cause) => {
-      throw new DOMException(`the code for it has not come (${cause})`, "NetworkError");
+      throw new DOMException(
+        `the part of the page for it could not be loaded (${cause})`,
+        "NetworkError",
+      );
     });
   }
 
@@ -374,14 +392,16 @@ export class Viewer {
     this.nextView = 0;
     this.dispatch({ type: "keep-views", views });
     const { length } = this.state.keptViews;
-    this.onAnnounce(length === 0 ? "No view is kept now." : `${length} kept: ${NEXT_KEPT}`);
+    this.onAnnounce(
+      length === 0 ? "No view is kept any more." : `${length} views are kept: ${NEXT_KEPT}`,
+    );
     return true;
   }
 
   private step(command: "undo" | "redo"): boolean {
     const found = command === "undo" ? this.steps.undo() : this.steps.redo();
     if (found === null) {
-      this.onAnnounce(`Nothing to ${command}.`);
+      this.onAnnounce(REFUSED[command]);
       return true;
     }
     const { state, camera, isInRoom } = found.moment;
@@ -467,6 +487,24 @@ export class Viewer {
     this.follow();
   }
 
+  /**
+   * The background of the flat picture; the specimen has the same colours before all of them.
+   *
+   * @param isPlain one colour and no shadow: for cutting out, and for readers who ask for more contrast
+   */
+  dress(theme: Theme, isPlain: boolean): void {
+    const dressIn = (backdrop: Backdrop | null) => {
+      this.room.dress(theme, backdrop);
+      this.loop.change();
+    };
+    dressIn(null);
+    if (isPlain) return;
+    this.dressed = import("../render/backdrop").then(
+      ({ Backdrop }) => dressIn(new Backdrop()),
+      () => undefined, // a picture without it is as true
+    );
+  }
+
   /** Someone has touched the page. */
   stopTurning(): void {
     this.navigation.stopTurning();
@@ -509,7 +547,8 @@ export class Viewer {
   }
 
   /** Resolves when nothing loads any more and the picture shows all of it. */
-  settled(): Promise<void> {
+  async settled(): Promise<void> {
+    await this.dressed;
     return this.loop.settled();
   }
 
@@ -531,11 +570,38 @@ export class Viewer {
 
   report(error: unknown): void {
     if (!(error instanceof BundleError)) throw error;
-    const isMendable = error instanceof TemporaryError;
-    const text = isMendable ? error.notice : error.message;
+    const isOffline = navigator.onLine === false;
+    if (isOffline && FINER.test(error.message) && !this.isIncomplete) return;
+    const isMendable = isOffline || error instanceof TemporaryError;
+    const text = isOffline
+      ? OFFLINE
+      : error instanceof TemporaryError
+        ? error.notice
+        : error.message;
     // it would be reported again for each of a host's files
     if (isMendable && this.state.mendable.includes(text)) return;
     this.dispatch({ type: "notify", text, isMendable });
+  }
+
+  /**
+   * Files are awaited. A device without a network shows what it has, and mentions it if that is not all.
+   *
+   * @param files so many; one more than before, or none any more
+   */
+  noteWaiting(files: number): void {
+    const text = navigator.onLine ? WAITING : OFFLINE;
+    if (files === 0) this.dispatch({ type: "dismiss", texts: [WAITING, OFFLINE] });
+    else if (this.state.notices.includes(text)) return;
+    else if (navigator.onLine ? files === 1 : this.isIncomplete) {
+      this.dispatch({ type: "notify", text });
+    }
+  }
+
+  /** Whether a part of the picture is missing, not merely coarse. */
+  private get isIncomplete(): boolean {
+    const { surfaces, volumes } = this.contents;
+    const isNone = ({ level }: { level: number | null }) => level === null;
+    return !surfaces.overview.isComplete || volumes.status().some(isNone);
   }
 
   /** Light the traced picture by a file of the user's. Throws BundleError. */
@@ -631,7 +697,7 @@ export class Viewer {
     if (this.renderer.xr.isPresenting) return;
     const { clientWidth, clientHeight } = this.stage;
     if (clientWidth === 0 || clientHeight === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO) * pixelShare());
     this.renderer.setSize(clientWidth, clientHeight);
     const style = getComputedStyle(this.stage);
     const share = (name: string) => Number.parseFloat(style.getPropertyValue(name)) / clientHeight;
@@ -718,24 +784,35 @@ export class Viewer {
     this.onState(this.state);
   }
 
-  /** Whether there was anything to measure or to choose. */
-  private tap(ray: Ray): boolean {
+  /** A tap on the flat picture: measure, or select what lies there. Returns whether it met anything. */
+  private tap(ray: Ray, isByKey = false): boolean {
     this.onTap(ray);
-    const tiles = shownTiles(this.bundle.manifest.tiles, this.state.isolated);
-    return this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
+    if (this.measures(ray)) return true;
+    const { isolated, clip } = this.state;
+    const { tiles } = this.bundle.manifest;
+    const hasObject = this.contents.objects.choose(ray, false);
+    const tile = pickTile(ray, shownTiles(tiles, isolated), clip)?.id ?? null;
+    // a single tile has no others to be told apart from
+    if (!hasObject && tiles.length > 1 && tile !== null) this.dispatch({ type: "select", tile });
+    this.onSelect(ray, isByKey);
+    return hasObject || tile !== null;
   }
 
   /**
-   * Measure, or choose the tile; of one that is alone nothing is left to choose. A gaze that rested there
+   * In stereo: measure, or choose the tile; of one that is alone nothing is left to choose. A gaze that rested there
    * has chosen without being asked: undoing is for what a person sets.
    */
-  private choose(ray: Ray, tile: string | null, isByGaze = false): boolean {
+  private choose(ray: Ray, tile: string | null, isByGaze: boolean): void {
     const { state } = this;
-    if (state.tool === "measure") void this.contents.marks.measure(ray);
-    else if (this.contents.objects.choose(ray, isByGaze)) return true;
-    else if (state.isolated === null && tile !== null) {
+    if (this.measures(ray) || this.contents.objects.choose(ray, isByGaze)) return;
+    if (state.isolated === null && tile !== null) {
       this.dispatch(chosenTile(state, tile), !isByGaze);
-    } else return false;
+    }
+  }
+
+  private measures(ray: Ray): boolean {
+    if (this.state.tool !== "measure") return false;
+    void this.contents.marks.measure(ray);
     return true;
   }
 

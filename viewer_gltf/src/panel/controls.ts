@@ -44,6 +44,11 @@ export type PanelChange =
 /** The request of a control or a key. */
 export type Wish = Action | PanelChange | Command;
 
+/** Why a request does nothing now, in a sentence. */
+export type Refusal = Readonly<{ refusal: string }>;
+/** A button beside a refusal, or in an empty picture: one step that leads on. */
+export type Offer = Readonly<{ label: string; to: readonly (Action | Command)[] }>;
+
 export type PanelView = Readonly<{
   search: string;
   /** The page of the list of channels that is shown, from 0. */

@@ -1,8 +1,9 @@
 /** Every key: the sections' lists, in the order of the list that `?` opens. Pure. */
 
+import { REFUSED } from "../state/refusals";
 import { hasVolumes } from "../state/viewer_state";
-import type { Wish } from "./controls";
-import { type Key, type KeyContext, type KeyGroup, no, type Refusal } from "./key";
+import type { Refusal, Wish } from "./controls";
+import { type Key, type KeyContext, type KeyGroup, no } from "./key";
 import { CHANNEL_KEYS } from "./sections/channel_keys";
 import { LIGHT_KEYS } from "./sections/path_trace_keys";
 import { SAVE_KEYS } from "./sections/save";
@@ -32,7 +33,7 @@ const BY_KEY: ReadonlyMap<string, Key> = new Map(
 );
 
 const OF_VOLUMES: ReadonlySet<Key> = new Set([...VOLUME_KEYS, ...SLICE_KEYS, ...LIGHT_KEYS]);
-const NO_VOLUMES = no("There is no volume here, only objects.");
+const NO_VOLUMES = no(REFUSED.volumes);
 
 /** What a key asks for, or why it does nothing now; null: there is no such key. */
 export function wishOf(name: string, context: KeyContext): Wish | Refusal | null {

@@ -90,12 +90,12 @@ describe("the panel's layout", () => {
   it("reports what is shown, whether it is complete, and that nothing is", () => {
     const status = (state: ViewerState, facts: Partial<Facts> = {}) =>
       laid(state, START_VIEW, { ...FACTS, ...facts }).status;
-    expect(status(start())).toBe("Surfaces; volumes when near · complete");
-    expect(status(start(), { isLoading: true })).toBe("Surfaces; volumes when near · loading …");
+    expect(status(start())).toBe("Surfaces, volumes from near · complete");
+    expect(status(start(), { isLoading: true })).toBe("Surfaces, volumes from near · loading …");
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     expect(status(off)).toBe("Surfaces · complete");
     const none = { ...off, channels: off.channels.map((each) => ({ ...each, shown: false })) };
-    expect(status(none)).toBe("All channels are hidden: switch one on.");
+    expect(status(none)).toBe("All channels are hidden");
   });
 
   it("gives every control an id of its own, and a name", () => {
@@ -211,7 +211,7 @@ describe("the panel's layout", () => {
   it("tells where the limit of tiles ends the disc, and only there", () => {
     const now = (state: ViewerState, discLimit_deg: number | null) =>
       find(laid(state, START_VIEW, { ...FACTS, discLimit_deg }), "text", "disc-now").value;
-    expect(now(start(), 3.2)).toMatch(/^3°: at most 4 tiles/);
+    expect(now(start(), 3.2)).toMatch(/^3°, since it holds at most 4 tiles/);
     expect(now(start(), null)).toBe("");
     expect(now(reduce(start(), { type: "set", id: "mode", value: "all" }), 3.2)).toBe("");
   });

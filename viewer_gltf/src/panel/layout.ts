@@ -24,6 +24,8 @@ import { tileItems } from "./sections/tiles";
 
 export { chosenTile } from "./sections/tiles";
 
+import { REFUSED } from "../state/refusals";
+
 /** Facts outside the state. */
 export type Facts = StereoSupport &
   Readonly<{
@@ -178,7 +180,11 @@ function deeperSections(
       { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
       ...(facts.isStereo ? [] : [lettersToggle(view)]),
     ]),
-    section("quality", "Quality and speed", qualityItems(state, facts)),
+    section("quality", "Quality", [
+      ...controlsOf(QUALITY_PARAMETERS, state),
+      ...(facts.isStereo ? aboutItems(facts) : []), // there a page of texts alone would lead nowhere
+    ]),
+    section("about", "About this view", facts.isStereo ? [] : aboutItems(facts)),
   ];
 }
 
@@ -188,7 +194,6 @@ function lettersToggle({ hasLetters: value }: PanelView): Control {
     kind: "toggle",
     id: "letters",
     label: "Keys of one character",
-    about: "Off: only ?, arrows, Escape and keys with Ctrl work.",
     value,
     to: (areOn) => ({ panel: "letters", areOn }),
   };
@@ -200,13 +205,13 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
       ...command("undo", "Undo"),
       isStep: true,
       name: `Undo ${undo ?? ""}`.trim(),
-      refusal: undo === null ? "Nothing to undo." : "",
+      refusal: undo === null ? REFUSED.undo : "",
     },
     {
       ...command("redo", "Redo"),
       isStep: true,
       name: `Redo ${redo ?? ""}`.trim(),
-      refusal: redo === null ? "Nothing to redo." : "",
+      refusal: redo === null ? REFUSED.redo : "",
     },
   ];
 }
@@ -215,9 +220,9 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
 function discNow({ mode }: ViewerState, { discLimit_deg = null }: Facts): Control {
   const isCut = mode === "disc" && discLimit_deg !== null;
   const value = isCut
-    ? `${discLimit_deg.toFixed(0)}°: at most ${MAX_DISC_TILES} tiles are volumes in it. "All" draws every tile.`
+    ? `${discLimit_deg.toFixed(0)}°, since it holds at most ${MAX_DISC_TILES} tiles. “Volumes everywhere” has no limit.`
     : "";
-  return { kind: "text", id: "disc-now", label: "Disc now", value };
+  return { kind: "text", id: "disc-now", label: "Focus disc now", value };
 }
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */
@@ -263,10 +268,10 @@ function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
   ];
 }
 
-function qualityItems(state: ViewerState, facts: Facts): readonly Control[] {
+/** How finely and how fast this device draws. */
+function aboutItems(facts: Facts): readonly Control[] {
   const { settings, frame_ms, triangles, volumeLevel } = facts;
   const items: Control[] = [
-    ...controlsOf(QUALITY_PARAMETERS, state),
     {
       kind: "text",
       id: "frame-time",
@@ -285,7 +290,7 @@ function qualityItems(state: ViewerState, facts: Facts): readonly Control[] {
     const { steps, resolution, errorFactor } = settings;
     const parts = [`${steps} steps a ray`, `${Math.round(100 * resolution)} % resolution`];
     if (errorFactor !== 1) parts.push(`${errorFactor} x coarser surfaces`);
-    items.push({ kind: "text", id: "settings", label: "March", value: parts.join(", ") });
+    items.push({ kind: "text", id: "settings", label: "Rays", value: parts.join(", ") });
   }
   return items;
 }
@@ -297,7 +302,7 @@ function frameText(frame_ms: number | null): string {
 /** How far a path-traced picture is, in whole samples. */
 function samplesText(samples: number): string {
   const whole = Math.floor(samples);
-  if (whole < 1) return "first paths of light";
+  if (whole < 1) return "gathering light …";
   if (whole >= ENOUGH_SAMPLES) return `all ${ENOUGH_SAMPLES} samples of light`;
   return `${whole} of ${ENOUGH_SAMPLES} samples of light`;
 }
@@ -316,7 +321,7 @@ function volumesText(level: number): string {
 /** Names the forms that are shown, and whether they are complete. */
 function statusOf({ channels, mode, isolated }: ViewerState, facts: Facts): string {
   const { samples, isLoading } = facts;
-  if (channels.every(({ shown }) => !shown)) return "All channels are hidden: switch one on.";
+  if (channels.every(({ shown }) => !shown)) return "All channels are hidden";
   const alone = isolated === null ? "" : `${tileName(isolated)} alone`;
   const parts = [channels.some(({ hasObjects }) => !hasObjects) ? STATUS[mode] : "Objects", alone];
   if (isLoading) parts.push("loading …");
@@ -325,10 +330,10 @@ function statusOf({ channels, mode, isolated }: ViewerState, facts: Facts): stri
 }
 
 const STATUS: Readonly<Record<ViewerState["mode"], string>> = {
-  disc: "Surfaces; volumes when near",
-  tile: "Surfaces; one tile as volume when near",
+  disc: "Surfaces, volumes from near",
+  tile: "Surfaces, one tile as volume from near",
   all: "Volumes",
-  stage: "As the stage has it",
+  stage: "As set in the stage",
   traced: "Volumes, path-traced",
   off: "Surfaces",
 };

@@ -47,7 +47,7 @@ export class Help {
     { type: "text", placeholder: "Find a key", ariaLabel: "Find a key", autocomplete: "off" },
     { control: "find-key" },
   );
-  private readonly none = element("p", { textContent: "No key is named so.", hidden: true });
+  private readonly none = element("p", { textContent: "No key fits these words.", hidden: true });
 
   /** @param onClose called when the user wants it closed, at times once more than needed */
   constructor(parent: HTMLElement, onClose: () => void) {

@@ -8,6 +8,8 @@ import type { Progress } from "../../surfaces/overview_progress";
 
 /** Time for which an announcement stays, ms; a screen reader reads it at once. */
 const SAID_MS = 4000;
+/** The same with a button, which a person has to find first. */
+const OFFERED_MS = 8000;
 
 /** A thin bar at the top with its count in words; hidden once complete. */
 export class ProgressBar {
@@ -15,7 +17,7 @@ export class ProgressBar {
   private readonly label = element("span");
   readonly root = element(
     "div",
-    { className: "progress", role: "progressbar", ariaLabel: "The overview" },
+    { className: "progress", role: "progressbar", ariaLabel: "Loading of the overview" },
     { progress: "" },
     element("div", { className: "track" }, {}, this.fill),
     this.label,
@@ -104,13 +106,33 @@ export class FirstHint {
 
 /** What a key or a button has just done, where nothing else shows it; it goes by itself. */
 export class Said {
-  readonly root = element("p", { className: "said", role: "status" }, { said: "" });
+  private readonly words = element("p", { role: "status" }, { said: "" });
+  private readonly button = element("button", { type: "button" }, { action: "offer" });
+  readonly root = element("div", { className: "said" }, {}, this.words);
   private timer = 0;
 
   say(text: string): void {
-    setText(this.root, text);
+    this.write(text, SAID_MS);
+  }
+
+  /** A button beside the words, if they still stand. */
+  offer(text: string, label: string, act: () => void): void {
+    if (this.words.textContent !== text) return;
+    this.write(text, OFFERED_MS);
+    setText(this.button, label);
+    this.root.append(this.button);
+    this.button.onclick = () => {
+      this.write("", 0);
+      act();
+    };
+  }
+
+  private write(text: string, for_ms: number): void {
+    setText(this.words, text);
+    this.button.remove();
     clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => setText(this.root, ""), SAID_MS);
+    this.timer = window.setTimeout(() => this.write("", 0), for_ms);
+    if (text === "") clearTimeout(this.timer);
   }
 }
 

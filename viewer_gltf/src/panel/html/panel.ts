@@ -15,7 +15,8 @@ function shapeOf(item: Item): string {
   return `${item.id}, group of ${item.controls.length} ${opens}`;
 }
 
-class Items {
+/** The elements of a list of controls, each kept for as long as its control is listed. */
+export class Items {
   private readonly made = new Map<string, Widget<Item>>();
 
   constructor(

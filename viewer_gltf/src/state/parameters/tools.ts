@@ -1,5 +1,6 @@
 /** The parameters of what a tap and a gaze do, and of how finely is drawn. Pure. */
 import { QUALITY_LEVELS, type QualityLevel } from "../quality_controller";
+import { REFUSED } from "../refusals";
 import {
   type ChoiceParameter,
   lensesOf,
@@ -67,7 +68,7 @@ export const MEASURE_KIND: ChoiceParameter<ToolSettings, MeasureKind> = {
   ...lens("measureKind"),
   values: MEASURES,
   names: { distance: "Distance", angle: "Angle", line: "Line" },
-  refusal: ({ tool }) => (tool === "measure" ? "" : "A tap does not measure now."),
+  refusal: ({ tool }) => (tool === "measure" ? "" : REFUSED.measuring),
   key: ["&", "Next: distance, angle, line through points"],
   spoken: ({ measureKind }) => `Measure: ${measureKind}`,
 };
@@ -109,7 +110,6 @@ export const EYE_DISTANCE: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "eye-distance",
   label: "Eye distance",
-  about: "Between your pupils, on a split screen; a headset knows its own.",
   ...lens("eyeDistance_mm"),
   limits: [50, 76],
   steps: 52,
@@ -122,7 +122,6 @@ export const STEREO_STRENGTH: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "stereo-strength",
   label: "Strength of stereo",
-  about: "100 % is as your eyes see; at 0 % both see the same.",
   ...lens("stereoStrength"),
   limits: [0, 2],
   steps: 40,
@@ -138,7 +137,6 @@ export const SPECIMEN_SIZE: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "specimen-size",
   label: "Size in stereo",
-  about: "Of the specimen's longest edge.",
   ...lens("specimenSize_m"),
   limits: [0.2, 6],
   steps: 60,
