@@ -33,7 +33,7 @@ import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
 import { type Sight, STEREO_TEXT, screenZoom } from "./style";
 
 /** Why no point is set. */
-const NOTHING_MET = "Nothing there to measure: no surface, no volume and no slice.";
+const NOTHING_MET = "There is nothing to measure there: no surface, no volume and no slice.";
 /** Largest move of a head at rest, m. */
 const TREMBLE_M = 0.03;
 

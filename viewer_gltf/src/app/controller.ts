@@ -8,10 +8,12 @@ import { unitOf } from "../annotations/measure";
 import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
+import { toggleFullScreen } from "../dom/full_screen";
 import { fileName, saveFile } from "../dom/save_file";
 import { store, stored } from "../dom/stored";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
+import type { Ray } from "../math/vec3";
 import { handleOf } from "../panel/clip_by_key";
 import {
   changePanel,
@@ -19,16 +21,17 @@ import {
   type Lenses,
   type PanelChange,
   type PanelView,
+  type Refusal,
   START_VIEW,
   type Wish,
 } from "../panel/controls";
 import type { CardMeasure } from "../panel/html/card_measure";
-import { Help } from "../panel/html/key_list";
+import type { Help } from "../panel/html/key_list";
 import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
 import { isRefusal, type KeyContext } from "../panel/key";
 import { isWritten, listenForKeys } from "../panel/key_events";
-import { wishOf } from "../panel/keys";
+import { type KeyChanges, labelOf, standsFor, wishOf, withKeys } from "../panel/keys";
 import { type Facts, layOut, MORE } from "../panel/layout";
 import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
@@ -43,7 +46,9 @@ import { allOf, measurementsCsv } from "../state/measurements";
 import { setTo } from "../state/parameters/kinds";
 import { EYE_DISTANCE, START_TOOLS, STEREO_STRENGTH } from "../state/parameters/tools";
 import { SWITCH_DISTANCE } from "../state/parameters/volumes";
+import { REFUSED } from "../state/refusals";
 import { PER_INCH, type XrSupport } from "../state/stereo";
+import type { ViewerState } from "../state/viewer_state";
 import { cssPixelsPerInch } from "../xr/cardboard/lens";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import {
@@ -53,16 +58,19 @@ import {
   ProfileError,
   parseProfile,
 } from "../xr/cardboard/viewer_profile";
-import type { Viewer } from "./viewer";
+import type { TapPart } from "./tap_part";
+import type { ViewMessagePart } from "./view_message_part";
+import type { Mark, Viewer } from "./viewer";
 
 /** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
 
-const NOT_COME = "This part of the page has not come: check the connection and try again.";
+const NOT_COME = "This part of the page could not be loaded: check the connection and try again.";
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
-const ON_THE_SCREEN = "Pictures and videos are the screen's: leave stereo for them.";
+const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
+const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 
 const LENS_KEY = "stereocell-lens";
 /** Whether a change gives the cards to the channels that are shown by then. */
@@ -83,11 +91,27 @@ function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
 
 const OPEN_KEY = "stereocell-open";
 const LETTERS_KEY = "stereocell-letters";
+const KEYS_KEY = "stereocell-keys";
 
-/** The sections of the panel that the reader had open on the visit before. */
+/** The keys that the reader has changed on a visit before. */
+function rememberedKeys(): KeyChanges {
+  try {
+    const found: unknown = JSON.parse(stored(KEYS_KEY) ?? "{}");
+    const pairs = Object.entries(found ?? {}).filter((pair) => typeof pair[1] === "string");
+    return Object.fromEntries(pairs);
+  } catch {
+    return {}; // another program's words: then as at first
+  }
+}
+
+/**
+ * The sections of the panel that the reader had open on the visit before, but for those of label maps: the rows below
+ * would move when a table has come.
+ */
 function rememberedOpen(): readonly string[] {
   const text = stored(OPEN_KEY);
-  return text === null ? START_VIEW.open : text.split(" ");
+  const sections = text === null ? START_VIEW.open : text.split(" ");
+  return sections.filter((id) => !id.startsWith("objects"));
 }
 
 const SCREEN_KEY = "stereocell-screen";
@@ -109,6 +133,21 @@ function rememberedEyes(): readonly Action[] {
   });
 }
 
+/** Parts of the state that can leave the picture empty. */
+const EMPTYING = ["channels", "clip", "isolated", "selected", "objects"] as const;
+
+/** Whether the picture may be empty by what was set: then the part of the page that says why is loaded. */
+const mayBeEmpty = (state: ViewerState, opening: ViewerState) =>
+  EMPTYING.some((key) => state[key] !== opening[key]) ||
+  (state.mode === "off" && !state.channels.some(({ shown, hasSurface }) => shown && hasSurface));
+
+/** What was there before a key was pressed. */
+type Before = Readonly<{ mark: Mark; view: PanelView }>;
+const HIDDEN: Readonly<Record<string, string>> = {
+  true: "The panel is hidden.",
+  false: "The panel is shown.",
+};
+
 export type ControllerOptions = Readonly<{
   subtitle: string;
   /** Enter stereo; called from within a click or a key, as is the other. */
@@ -126,11 +165,20 @@ export class Controller {
     ...rememberedLens(),
     open: rememberedOpen(),
     hasLetters: stored(LETTERS_KEY) !== "off",
+    keyChanges: rememberedKeys(),
   };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
-  private readonly help: Help;
-  /** Once it was asked for. */
+  /** Once it was asked for, as is the next one. */
+  private help: Help | null = null;
   private card: CardMeasure | null = null;
+  /** The card beside a tapped place, once something was tapped. */
+  private tapped: TapPart | null = null;
+  /** Counts the taps and double taps: the code may come after the second one. */
+  private taps = 0;
+  /** What the picture says about itself, once it may have something to say. */
+  private message: ViewMessagePart | null = null;
+  /** The state in which the bundle opened. */
+  private readonly opening: ViewerState;
   private readonly ranges: Ranges;
   private readonly disposed = new AbortController();
   private timer = 0;
@@ -140,6 +188,8 @@ export class Controller {
   private hasRoom = false;
   /** While a picture or a video is made. */
   private filming: AbortController | null = null;
+  /** The change by a key that can still be taken back, with the newest step after it. */
+  private accident: (Before & Readonly<{ after: object | null }>) | null = null;
 
   constructor(
     private readonly viewer: Viewer,
@@ -149,16 +199,19 @@ export class Controller {
   ) {
     const { manifest } = viewer.bundle;
     const unit = unitOf(manifest);
+    this.opening = viewer.state;
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
-    this.help = new Help(parent, () => {
-      if (this.view.isHelpOpen) this.perform({ panel: "help" });
-    });
     viewer.setScreen(rememberedScreen());
     for (const action of rememberedEyes()) viewer.dispatch(action);
     viewer.onAnnounce = (text) => this.say(text);
     viewer.onCard = (control) => this.panel.reveal(control);
+    viewer.onSelect = (ray, isByKey) => void this.openTapCard(ray, isByKey);
+    viewer.onDouble = () => {
+      this.taps++;
+      this.tapped?.close();
+    };
     viewer.onCommand = (command) => {
       if (command === "share") void this.share();
       return command === "share";
@@ -195,23 +248,35 @@ export class Controller {
     const eyes = EYE_ROWS.map((row) => row.get(this.viewer.state)).join();
     if (eyes !== this.eyes) store(EYES_KEY, eyes);
     this.eyes = eyes;
-    this.help.update(this.view.isHelpOpen);
+    this.help?.update(this.view.isHelpOpen, this.view.keyChanges);
+    if (this.view.isHelpOpen && this.help === null) void this.loadHelp();
+    if (this.accident !== null && this.accident.after !== this.viewer.newestStep) {
+      this.accident = null;
+      this.said.withdraw();
+    }
+    this.tapped?.update();
+    if (mayBeEmpty(this.viewer.state, this.opening)) void this.loadMessage();
+    this.message?.update();
   }
 
-  /** Bring the figures to the frame that was just drawn, now and then. */
+  /** Bring the card beside a place to the frame that was just drawn, and the figures now and then. */
   refreshSoon(): void {
+    this.tapped?.follow();
     if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
   }
 
-  perform(wish: Wish): void {
+  perform(wish: Wish | Refusal): void {
     if (typeof wish === "string") this.run(wish);
+    else if ("refusal" in wish) void this.explain(wish);
     else if ("panel" in wish) {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
       if (laysOutCards(wish)) this.view = { ...this.view, channelsWithCard: null };
       if (wish.panel === "unfold") store(OPEN_KEY, this.view.open.join(" "));
       if (wish.panel === "letters") store(LETTERS_KEY, wish.areOn ? "on" : "off");
+      if (wish.panel === "keys") store(KEYS_KEY, JSON.stringify(wish.changes));
       this.refresh();
+      if (wish.panel === "reveal") this.panel.reveal(wish.control);
     } else this.viewer.dispatch(wish);
   }
 
@@ -231,7 +296,8 @@ export class Controller {
   }
 
   private run(command: Command): void {
-    if (command === "share") void this.share();
+    if (command === "undo" && this.accident !== null) this.takeBack(this.accident);
+    else if (command === "share") void this.share();
     else if (command === "stereo") {
       if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
       else if (this.stereo.isAvailable) this.options.onStereo();
@@ -240,6 +306,8 @@ export class Controller {
       if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
       else if (this.hasRoom) this.options.onRoom();
       else this.say(NO_ROOM);
+    } else if (command === "full-screen") {
+      void toggleFullScreen().then((isDone) => isDone || this.say(NO_FULL_SCREEN));
     } else if (command === "split") {
       this.splitScreen();
     } else if (command === "scan") {
@@ -264,6 +332,7 @@ export class Controller {
 
   /** On the page, and in stereo before the eyes, which don't see the page. */
   private say(text: string): void {
+    this.accident = null;
     this.said.say(text);
     this.viewer.stereo.announce(text);
   }
@@ -313,10 +382,48 @@ export class Controller {
     this.card ??= new part.CardMeasure(parent, (perInch) => {
       store(SCREEN_KEY, String(perInch));
       viewer.setScreen(perInch);
-      this.say(`The screen has ${perInch} pixels an inch: split it to see.`);
+      this.say(
+        `The screen has ${perInch} pixels an inch: split the screen to see it in true size.`,
+      );
     });
     const { userAgent } = navigator;
     this.card.open(viewer.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
+  }
+
+  private get pictureArea(): HTMLElement {
+    return this.parent.querySelector<HTMLElement>(".view") ?? this.parent;
+  }
+
+  /** Say why a request does nothing now, with a button where something leads on. */
+  private async explain({ refusal }: Refusal): Promise<void> {
+    const words = withKeys(refusal, this.view.keyChanges);
+    this.say(words);
+    if (this.viewer.stereo.kind !== null) return;
+    const button = (await this.loadMessage())?.buttonFor(refusal, this.shown) ?? null;
+    if (button !== null) this.said.offer(words, button.label, button.act);
+  }
+
+  private async loadMessage(): Promise<ViewMessagePart | null> {
+    if (this.message !== null) return this.message;
+    const part = await import("./view_message_part").catch(() => null);
+    if (part === null || this.message !== null) return this.message;
+    const refresh = () => this.message?.update();
+    this.message = new part.ViewMessagePart(this.viewer, this.pictureArea, this.opening, refresh);
+    refresh();
+    return this.message;
+  }
+
+  private async openTapCard(ray: Ray, isByKey: boolean): Promise<void> {
+    const time_ms = performance.now();
+    const number = ++this.taps;
+    const part = await import("./tap_part").catch(() => null);
+    if (number !== this.taps) return;
+    if (part === null) {
+      this.say(NOT_COME);
+      return;
+    }
+    this.tapped ??= new part.TapPart(this.viewer, this.pictureArea, (wish) => this.perform(wish));
+    await this.tapped.open({ ray, isByKey, time_ms });
   }
 
   private async scan(): Promise<void> {
@@ -347,19 +454,21 @@ export class Controller {
     }
   }
 
-  private press(name: string): boolean {
+  private press(pressed: string): boolean {
     const { viewer, view } = this;
-    if (!view.hasLetters && isWritten(name) && name !== "?") return false;
+    if (!view.hasLetters && isWritten(pressed) && pressed !== "?") return false;
+    const name = standsFor(pressed, view.keyChanges);
+    const mark = viewer.mark;
     const context: KeyContext = {
       state: viewer.state,
       view,
       shown: this.shown,
       focusTile: viewer.snapshot().gazed,
     };
-    const wish = wishOf(name, context);
-    if (wish === null || isRefusal(wish)) {
-      if (wish !== null) this.say(wish.refusal);
-      else if (isWritten(name)) this.say(`No key ${name}: ? lists the keys.`);
+    const wish = name === null ? null : wishOf(name, context);
+    if (name === null || wish === null || isRefusal(wish)) {
+      if (wish !== null && isRefusal(wish)) void this.explain(wish);
+      else if (isWritten(pressed)) this.say(`No key ${pressed}: ? lists the keys.`);
       return false;
     }
     this.perform(wish);
@@ -370,8 +479,48 @@ export class Controller {
     const text =
       announcementOf(context.state, viewer.state, tiles) ??
       spokenFeedback(wish, context.state, viewer.state, this.ranges);
-    if (text !== "") this.say(text);
+    if (!isWritten(pressed) || !this.offerBack(wish, text || labelOf(name), { mark, view })) {
+      if (text !== "") this.say(text);
+    }
     return true;
+  }
+
+  /** Announce what a key has changed, and offer to take it back: it may have been hit by accident. */
+  private offerBack(wish: Wish, text: string, { mark, view }: Before): boolean {
+    const { viewer } = this;
+    const isOwnAnswer = wish === "share" || this.view.isHelpOpen || viewer.stereo.kind !== null;
+    if (isOwnAnswer || !(viewer.hasChangedSince(mark) || view !== this.view)) return false;
+    const words = view.isHidden === this.view.isHidden ? text : HIDDEN[String(this.view.isHidden)];
+    const accident = { mark, view, after: viewer.newestStep };
+    this.say(words);
+    this.said.offer(words, "Undo", () => this.takeBack(accident));
+    this.accident = accident;
+    return true;
+  }
+
+  private takeBack({ mark, view }: Before): void {
+    this.accident = null;
+    this.viewer.takeBack(mark);
+    this.view = view;
+    this.refresh();
+    this.say("Undone.");
+  }
+
+  private async loadHelp(): Promise<void> {
+    const part = await import("../panel/html/key_list").catch(() => null);
+    if (part === null) {
+      this.view = { ...this.view, isHelpOpen: false };
+      this.say(NOT_COME);
+      return;
+    }
+    this.help ??= new part.Help(
+      this.parent,
+      () => {
+        if (this.view.isHelpOpen) this.perform({ panel: "help" });
+      },
+      (changes) => this.perform({ panel: "keys", changes }),
+    );
+    this.refresh();
   }
 
   /** The address of this view, in the clipboard, in the address bar and in the panel. */
@@ -390,7 +539,9 @@ export class Controller {
     viewer.stereo.showInPanel({ link: address.href });
     const without = viewer.leftOutOfLink;
     const but =
-      without === 0 ? "" : ` Lists of ${without} objects are too long for it: save a CSV.`;
+      without === 0
+        ? ""
+        : ` It leaves out lists of ${without} objects, which are too long: save them as CSV.`;
     if (viewer.stereo.kind !== null) {
       this.say(`The link is in the page's address, for when you leave.${but}`);
     } else if (await copyText(address.href)) this.say(`The link is in the clipboard.${but}`);
@@ -416,7 +567,7 @@ export class Controller {
     try {
       const size = Number(viewer.state.pictureSize);
       const png = await viewer.picture(size, (words) => this.say(`Picture: ${words}`), signal);
-      if (png === null) this.say("The picture was left.");
+      if (png === null) this.say("Saving the picture was cancelled.");
       else this.save("picture", "png", png);
     } catch (error) {
       this.refuse("The picture can't be saved", error);
@@ -441,7 +592,7 @@ export class Controller {
     this.refresh();
     try {
       const file = await viewer.film((done, of) => this.say(`Video: ${done} of ${of}`), signal);
-      if (file === null) this.say("The video was left.");
+      if (file === null) this.say("Making the video was cancelled.");
       else this.save("video", file.suffix, file.content);
     } catch (error) {
       this.refuse("The video can't be made", error);
@@ -466,7 +617,7 @@ export class Controller {
     const { state } = this.viewer;
     const list = allOf(state);
     if (list.length === 0) {
-      this.say("Nothing is measured.");
+      this.say(REFUSED.measured);
       return;
     }
     this.save("measurements", "csv", new Blob([measurementsCsv(list)], { type: "text/csv" }));
@@ -475,12 +626,13 @@ export class Controller {
   private saveObjects(): void {
     const { objects } = this.viewer;
     if (objects.length === 0) {
-      this.say("No objects of a label map are shown.");
+      this.say("No label map is shown, so there are no objects to save.");
       return;
     }
     for (const { id, text } of this.viewer.objectsCsv()) {
       const name = objects.length === 1 ? "objects" : `objects-${id}`;
-      if (text === null) this.say("Their values are on their way: once more, please.");
+      if (text === null)
+        this.say("The values of the objects are still loading: save them again in a moment.");
       else this.save(name, "csv", new Blob([text], { type: "text/csv" }));
     }
   }
@@ -541,7 +693,9 @@ export class Controller {
     clearTimeout(this.timer);
     this.disposed.abort();
     this.panel.root.remove();
-    this.help.dispose();
+    this.help?.dispose();
     this.card?.dispose();
+    this.tapped?.dispose();
+    this.message?.dispose();
   }
 }

@@ -148,6 +148,21 @@ export class ObjectsPart {
     return this.objects.get(channel)?.linked(view) ?? null;
   }
 
+  /** Rows of the objects that show, by channel that is shown. */
+  get rowsShown(): ReadonlyMap<string, readonly number[]> {
+    return new Map(this.shown.map(({ channel: { id }, objects }) => [id, objects.shown]));
+  }
+
+  /** How many objects of a channel show; null: their table has not come. */
+  left(channel: string): number | null {
+    return this.objects.get(channel)?.left ?? null;
+  }
+
+  /** The name of an object that a ray has met. */
+  titleOf({ channel, row }: Met): string {
+    return this.objects.get(channel)?.table.title(row) ?? "";
+  }
+
   /** The number of the object along a ray in its label map; null: there is none. */
   labelAlong(ray: Ray): Readonly<{ channel: string; label: string }> | null {
     const met = this.meet(ray);

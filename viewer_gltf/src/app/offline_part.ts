@@ -16,6 +16,8 @@ export class OfflinePart {
   /** Whether this visit, or one before, has announced how much is kept. */
   private hasSaid: boolean;
   private isReady: boolean;
+  /** Requests that the worker was asked to keep a second time. */
+  private readonly missed = new Set<string>();
 
   private constructor(
     private readonly viewer: Viewer,
@@ -28,8 +30,8 @@ export class OfflinePart {
   }
 
   /**
-   * For after the first picture. The page's root has `data-offline` then: "partly" once all that was shown is kept,
-   * "ready" once that is every place, "refused" where the browser keeps nothing, as on a full disk.
+   * For after the first picture. The page's root has `data-offline` then: "partly" once all that was shown and can be
+   * kept is kept, "ready" once that is every place, "refused" where the browser keeps nothing, as on a full disk.
    *
    * @param also addresses of files of the bundle that the page has not asked for
    */
@@ -57,13 +59,13 @@ export class OfflinePart {
     const looked = JSON.stringify([allCome().length, mode, shown]);
     if (looked === this.looked || viewer.contents.isLoading || !navigator.onLine) return;
     const coverage = await this.coverage();
-    if (coverage === null) return;
+    if (coverage === "later") return;
     this.looked = looked;
     this.report(coverage);
   }
 
-  /** null: some of it is not kept yet, which the worker now fetches. */
-  private async coverage(): Promise<Coverage | null> {
+  /** "later": the worker fetches what it has missed; null: some of what was shown can't be kept. */
+  private async coverage(): Promise<Coverage | "later" | null> {
     const { viewer, keeping } = this;
     const layers = await this.layers.now();
     const come = allCome();
@@ -72,10 +74,13 @@ export class OfflinePart {
     const areKept = await keeping.isKept(asked);
     const kept = new Set(asked.filter((_, i) => areKept[i]).map(keyOf));
     const missed = come.filter((each) => !kept.has(keyOf(each)));
-    if (missed.length > 0) {
-      await keeping.adopt(missed, []);
-      return null;
+    const news = missed.filter((each) => !this.missed.has(keyOf(each)));
+    if (news.length > 0) {
+      for (const each of news) this.missed.add(keyOf(each));
+      await keeping.adopt(news, []);
+      return "later";
     }
+    if (missed.length > 0) return null;
     const { manifest, bricks } = viewer.bundle;
     // a host that sends bricks by view is needed for each view
     const isStreamed = bricks !== undefined && showsVolumes(viewer.state);
@@ -83,13 +88,15 @@ export class OfflinePart {
     return coverageOf(tiles, layers, come, kept);
   }
 
-  private report(coverage: Coverage): void {
+  private report(coverage: Coverage | null): void {
     const { length } = this.viewer.bundle.manifest.tiles;
-    const isReady = coverage.tiles === length;
+    const isReady = coverage?.tiles === length;
     document.documentElement.dataset.offline = isReady ? "ready" : "partly";
     // each tile more would be news: the first words and the last are enough
-    if (!this.hasSaid || (isReady && !this.isReady)) this.say(coverageText(coverage, length));
-    this.hasSaid = true;
+    if (coverage !== null && (!this.hasSaid || (isReady && !this.isReady))) {
+      this.say(coverageText(coverage, length));
+      this.hasSaid = true;
+    }
     this.isReady = isReady;
   }
 }

@@ -6,7 +6,7 @@ import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
-import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
+import { isSameLook, type Look, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";
@@ -38,9 +38,10 @@ import { initialState } from "../state/initial_state";
 import type { ObjectView } from "../state/objects";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
-import { START_TOOLS } from "../state/parameters/tools";
+import { SCREEN_STEREO, START_TOOLS } from "../state/parameters/tools";
 import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
 import { newNotice, reduce } from "../state/reduce";
+import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import type { Profile } from "../xr/cardboard/viewer_profile";
@@ -61,7 +62,7 @@ const NEAR_AT_START = 1.1;
 /** Before these the place from which the specimen is seen is a step of its own. */
 const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset", "next-view"]);
 
-const NOTHING_AHEAD = "No tile is in the middle of the view.";
+const NOTHING_AHEAD = "Nothing is in the middle of the view.";
 /** Distance of the eye from an object that it flies to, in the object's lengths, and at least, m. */
 const NEAREST_OBJECT = 6;
 const NEAREST_OBJECT_M = 0.08;
@@ -69,21 +70,29 @@ const NEAREST_OBJECT_M = 0.08;
 const ASIDE = [1, 0, -1].flatMap((z) =>
   [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
 );
-const BEHIND_OTHERS = "Others lie before it on all sides: from its card it is shown alone.";
+const BEHIND_OTHERS = "Other objects hide it from all sides: its card shows it alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
-const NO_OTHER_TILE = "This tile is shown alone: i shows all.";
-const NEXT_KEPT = "` goes to the next.";
+const NEXT_KEPT = "“Next kept view” goes through them.";
 
 const NO_LAYOUT: Layout = {
   ...{ title: "", subtitle: "", sections: [], status: "", isHidden: true },
   more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
 };
 
+export type Mark = Readonly<{
+  state: ViewerState;
+  camera: CameraView | null;
+  look: Look;
+  newest: object | null;
+}>;
+
+/** While the graphics driver has its time to give the picture back. */
+export const DROPPED = "The graphics driver has dropped the picture: it is drawn again.";
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
 /** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
-const FINER = /^\S+\.(glb|ktx2):/;
+const FINER = /^(channels|volumes)\/\S+\.(glb|ktx2):/;
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -104,6 +113,10 @@ export class Viewer {
   onCard: (control: string) => void = () => undefined;
   /** Where someone has tapped, um; for what stands round the page. */
   onTap: (ray: Ray) => void = () => undefined;
+  /** Someone has tapped the flat picture with the tool *Select* (ray in um), or pressed the key for it. */
+  onSelect: (ray: Ray, isByKey: boolean) => void = () => undefined;
+  /** Two quick taps are one request, to fly there: the first was no selection. */
+  onDouble: () => void = () => undefined;
   readonly contents: Contents;
   private readonly room: Room;
   private readonly hybrid: Hybrid;
@@ -198,7 +211,7 @@ export class Viewer {
     );
     this.navigation.controls.addEventListener("start", () => this.steps.note());
     const rayAt = (point: Vector2) =>
-      rayUnder(point, this.navigation.camera, this.room.specimen.group);
+      rayUnder(this.withinEye(point), this.navigation.camera, this.room.specimen.group);
     const { signal } = this.disposed;
     listenForHandles(
       stage,
@@ -218,13 +231,13 @@ export class Viewer {
       },
       (point) => {
         if (this.stereo.kind !== null) return;
+        this.onDouble();
         if (this.state.tool === "measure") this.tap(rayAt(point));
         else void this.flyAlong(rayAt(point));
       },
     );
-    const lost = "The graphics driver has dropped the picture: it is drawn anew.";
     canvas.addEventListener("webglcontextlost", () => {
-      this.dispatch({ type: "notify", text: lost });
+      this.dispatch({ type: "notify", text: DROPPED });
       volumes.forget(); // their texels went with the context
       this.contents.traced.forget();
       this.loop.forget();
@@ -234,7 +247,7 @@ export class Viewer {
       this.contents.traced.forget();
       this.loop.renew(); // the times that were asked for went, too
       this.follow();
-      this.dispatch({ type: "dismiss", texts: [lost] });
+      this.dispatch({ type: "dismiss", texts: [DROPPED] });
     });
     addEventListener("online", () => this.retry(), { signal });
     this.size = new StageSize(stage, () => this.fit());
@@ -299,8 +312,8 @@ export class Viewer {
         break;
       case "press":
         if (this.stereo.kind !== null) return this.stereo.run(command, this.state);
-        if (!this.tap(rayAhead(this.loop.head, this.room.specimen.group))) {
-          this.onAnnounce(this.state.isolated === null ? NOTHING_AHEAD : NO_OTHER_TILE);
+        if (!this.tap(rayAhead(this.loop.head, this.room.specimen.group), true)) {
+          this.onAnnounce(NOTHING_AHEAD);
         }
         break;
       default: {
@@ -352,7 +365,10 @@ export class Viewer {
 
   private loadCapture() {
     return import("./capture").catch((cause) => {
-      throw new DOMException(`the code for it has not come (${cause})`, "NetworkError");
+      throw new DOMException(
+        `the part of the page for it could not be loaded (${cause})`,
+        "NetworkError",
+      );
     });
   }
 
@@ -384,14 +400,16 @@ export class Viewer {
     this.nextView = 0;
     this.dispatch({ type: "keep-views", views });
     const { length } = this.state.keptViews;
-    this.onAnnounce(length === 0 ? "No view is kept now." : `${length} kept: ${NEXT_KEPT}`);
+    this.onAnnounce(
+      length === 0 ? "No view is kept any more." : `${length} views are kept: ${NEXT_KEPT}`,
+    );
     return true;
   }
 
   private step(command: "undo" | "redo"): boolean {
     const found = command === "undo" ? this.steps.undo() : this.steps.redo();
     if (found === null) {
-      this.onAnnounce(`Nothing to ${command}.`);
+      this.onAnnounce(REFUSED[command]);
       return true;
     }
     const { state, camera, isInRoom } = found.moment;
@@ -411,6 +429,33 @@ export class Viewer {
 
   get redoes(): string | null {
     return this.steps.redoes;
+  }
+
+  /** A moment that `takeBack` can return to. */
+  get mark(): Mark {
+    const { state, cameraView: camera } = this;
+    return { state, camera, look: this.navigation.lookNow, newest: this.steps.newest };
+  }
+
+  /** Whether the user would see a difference since then. */
+  hasChangedSince({ state, look }: Mark): boolean {
+    return !isSameView(state, this.state) || !isSameLook(look, this.navigation);
+  }
+
+  /** The newest step of the history. */
+  get newestStep(): object | null {
+    return this.steps.newest;
+  }
+
+  /** Return to the state of a moment and to where the specimen was seen from. */
+  takeBack({ state, camera, newest }: Mark): void {
+    if (!isSameView(state, this.state)) {
+      // a change that was joined with the step before it made no step of its own
+      for (let left = Math.max(1, this.steps.since(newest)); left > 0; left--) this.step("undo");
+    }
+    if (this.stereo.kind === null) this.transition.restore(camera);
+    this.loop.change();
+    this.onState(this.state);
   }
 
   /** From here on: what came before was no user's. */
@@ -593,8 +638,7 @@ export class Viewer {
   /** Whether a part of the picture is missing, not merely coarse. */
   private get isIncomplete(): boolean {
     const { surfaces, volumes } = this.contents;
-    const isNone = ({ level }: { level: number | null }) => level === null;
-    return !surfaces.overview.isComplete || volumes.status().some(isNone);
+    return !surfaces.overview.isComplete || volumes.isIncomplete;
   }
 
   /** Light the traced picture by a file of the user's. Throws BundleError. */
@@ -658,10 +702,32 @@ export class Viewer {
     });
     const { manifest } = this.bundle;
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
+    this.followScreenStereo();
     this.contents.follow(this.state, this.hybrid);
     this.room.mark(isolated === null ? selected : null);
     this.loop.setLevel(quality);
     this.loop.change();
+  }
+
+  /** Bring the page's own screen to the stereo that is asked for. */
+  private followScreenStereo(): void {
+    const { screenStereo } = this.state;
+    if (this.stage.dataset.stereo === screenStereo) return;
+    this.stage.dataset.stereo = screenStereo;
+    this.stereo.showOnScreen(screenStereo).then(
+      () => this.loop.change(),
+      (error) => {
+        this.report(error);
+        this.dispatch(setTo(SCREEN_STEREO, "off"), false);
+      },
+    );
+    this.fit();
+  }
+
+  /** A point of the screen, -1..1, in the picture of the eye that shows there. */
+  private withinEye(point: Vector2): Vector2 {
+    if (this.state.screenStereo !== "side-by-side") return point;
+    return point.clone().setX(2 * point.x + (point.x < 0 ? 1 : -1));
   }
 
   private fit(): void {
@@ -673,7 +739,8 @@ export class Viewer {
     const style = getComputedStyle(this.stage);
     const share = (name: string) => Number.parseFloat(style.getPropertyValue(name)) / clientHeight;
     const covered = { top: share("--over-top") || 0, bottom: share("--over-bottom") || 0 };
-    this.navigation.fit(clientWidth / clientHeight, covered);
+    const pictures = this.state.screenStereo === "side-by-side" ? 2 : 1;
+    this.navigation.fit(clientWidth / pictures / clientHeight, covered);
     this.loop.change();
   }
 
@@ -754,24 +821,35 @@ export class Viewer {
     this.onState(this.state);
   }
 
-  /** Whether there was anything to measure or to choose. */
-  private tap(ray: Ray): boolean {
+  /** A tap on the flat picture: measure, or select what lies there. Returns whether it met anything. */
+  private tap(ray: Ray, isByKey = false): boolean {
     this.onTap(ray);
-    const tiles = shownTiles(this.bundle.manifest.tiles, this.state.isolated);
-    return this.choose(ray, pickTile(ray, tiles, this.state.clip)?.id ?? null);
+    if (this.measures(ray)) return true;
+    const { isolated, clip } = this.state;
+    const { tiles } = this.bundle.manifest;
+    const hasObject = this.contents.objects.choose(ray, false);
+    const tile = pickTile(ray, shownTiles(tiles, isolated), clip)?.id ?? null;
+    // a single tile has no others to be told apart from
+    if (!hasObject && tiles.length > 1 && tile !== null) this.dispatch({ type: "select", tile });
+    this.onSelect(ray, isByKey);
+    return hasObject || tile !== null;
   }
 
   /**
-   * Measure, or choose the tile; of one that is alone nothing is left to choose. A gaze that rested there
+   * In stereo: measure, or choose the tile; of one that is alone nothing is left to choose. A gaze that rested there
    * has chosen without being asked: undoing is for what a person sets.
    */
-  private choose(ray: Ray, tile: string | null, isByGaze = false): boolean {
+  private choose(ray: Ray, tile: string | null, isByGaze: boolean): void {
     const { state } = this;
-    if (state.tool === "measure") void this.contents.marks.measure(ray);
-    else if (this.contents.objects.choose(ray, isByGaze)) return true;
-    else if (state.isolated === null && tile !== null) {
+    if (this.measures(ray) || this.contents.objects.choose(ray, isByGaze)) return;
+    if (state.isolated === null && tile !== null) {
       this.dispatch(chosenTile(state, tile), !isByGaze);
-    } else return false;
+    }
+  }
+
+  private measures(ray: Ray): boolean {
+    if (this.state.tool !== "measure") return false;
+    void this.contents.marks.measure(ray);
     return true;
   }
 

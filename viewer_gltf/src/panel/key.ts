@@ -1,8 +1,9 @@
 /** A key: its names, the words for it, and its request. Pure. */
 import type { Box } from "../math/box";
 import { optionsOf, type Parameter, setTo, type Value } from "../state/parameters/kinds";
+import { REFUSED } from "../state/refusals";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
-import type { PanelView, Wish } from "./controls";
+import type { PanelView, Refusal, Wish } from "./controls";
 
 export type KeyContext = Readonly<{
   state: ViewerState;
@@ -11,9 +12,6 @@ export type KeyContext = Readonly<{
   shown: Box;
   focusTile: string | null;
 }>;
-
-/** Why a key does nothing now, in words for the status line. */
-export type Refusal = Readonly<{ refusal: string }>;
 
 export type Key = Readonly<{
   /** As `keyName` has them; several mean the same. */
@@ -32,8 +30,8 @@ export function isRefusal(answer: Wish | Refusal): answer is Refusal {
   return typeof answer !== "string" && "refusal" in answer;
 }
 
-const NO_CHANNEL = no("No channel is shown.");
-const NOTHING = no("There is nothing that it changes now.");
+const NO_CHANNEL = no(REFUSED.channel);
+const NOTHING = no(REFUSED.key);
 
 /** The item after (or before) the present one, round the end. */
 export function neighbour<T>(items: readonly T[], present: T | undefined, by: number): T | null {

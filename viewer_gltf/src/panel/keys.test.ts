@@ -9,6 +9,7 @@ import { SLICE_NUMBERS } from "../state/parameters/slices";
 import { PARAMETERS } from "../state/parameters/table";
 import { STEREO_NUMBERS } from "../state/parameters/tools";
 import { reduce } from "../state/reduce";
+import { REFUSED as REASONS } from "../state/refusals";
 import { makeShape } from "../state/transfer_shapes";
 import { type PanelChange, START_VIEW } from "./controls";
 import { isRefusal, type KeyContext } from "./key";
@@ -117,6 +118,7 @@ describe("the keys", () => {
       room: true,
       undo: true,
       redo: true,
+      "full-screen": true,
       split: true,
       scan: true,
       share: true,
@@ -185,9 +187,11 @@ describe("the keys", () => {
       lenses: true,
       hide: true,
       help: true,
+      reveal: false,
       find: false,
       code: false,
       letters: false, // a key could not switch it back on
+      keys: false, // the list of keys has it
       unfold: false,
     };
     for (const [panel, isWanted] of Object.entries(wanted)) {
@@ -293,14 +297,14 @@ describe("the keys", () => {
       }
     }
     expect(silent).toEqual([]);
-    expect(wishOf("}", contexts.bare)).toEqual({ refusal: "No slices are shown." });
+    expect(wishOf("}", contexts.bare)).toEqual({ refusal: REASONS.slices });
     const said = (name: string) => {
       const wish = wishOf(name, contexts.atEnd);
       if (wish === null || isRefusal(wish)) throw new Error(name);
       return spokenFeedback(wish, atEnd, atEnd, new Map());
     };
     expect(said("}")).toBe("Slices: x 100.0 %: it goes no further");
-    expect(said("D")).toBe("Disc 40°: it goes no further");
+    expect(said("D")).toBe("Focus disc 40°: it goes no further");
   });
 
   it("go to the next tile, also of those that are shown alone", () => {
@@ -332,7 +336,7 @@ describe("the keys", () => {
     expect(after("o")).toBe("Marker 0: opacity 95 %");
     expect(after("e")).toBe("Marker 0: window 100 – 1104");
     expect(after("1")).toBe("Marker 0: hidden");
-    expect(after("D")).toBe("Disc 13°");
+    expect(after("D")).toBe("Focus disc 17°");
     expect(after("b")).toBe("Not cut");
     expect(after("n")).toBe("Cut by a box and a plane");
     expect(after(".")).toBe("Box: x from 1.00 µm");
@@ -343,7 +347,7 @@ describe("the keys", () => {
     const objects = { ...MARCHED, state: { ...MARCHED.state, channels } };
     for (const name of ["m", "D", "%"]) {
       expect(wishOf(name, objects)).toEqual({
-        refusal: "There is no volume here, only objects.",
+        refusal: REASONS.volumes,
       });
       expect(wishOf(name, MARCHED)).not.toHaveProperty("refusal");
     }

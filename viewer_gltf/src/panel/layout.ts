@@ -24,6 +24,8 @@ import { tileItems } from "./sections/tiles";
 
 export { chosenTile } from "./sections/tiles";
 
+import { REFUSED } from "../state/refusals";
+
 /** Facts outside the state. */
 export type Facts = StereoSupport &
   Readonly<{
@@ -116,6 +118,19 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
   };
 }
 
+/** A label map that is shown has its section from the start, so that no row moves when its table has come. */
+const LOADING: Section["items"] = [
+  { kind: "text", id: "objects-loading", label: "Objects", value: "loading …" },
+];
+
+/** The ID of the section of a label map, where so many are shown. */
+export function objectsSection(channel: string, count: number): string {
+  return count === 1 ? "objects" : `objects/${channel}`;
+}
+
+export const labelMapsOf = ({ channels }: ViewerState) =>
+  channels.filter(({ shown, hasObjects }) => shown && hasObjects);
+
 type Make = (id: string, label: string, items: Section["items"]) => Section;
 
 function firstSections(
@@ -131,11 +146,11 @@ function firstSections(
     section("notices", "Notices", isStereo ? noticeItems(state) : []),
     ...(isPatient && !isStereo ? [slices] : []),
     section("channels", "Channels", channelItems(state, facts, view)),
-    ...(facts.objects ?? []).map(({ id, name, items }, _, { length }) =>
-      length === 1
-        ? section("objects", "Objects", items)
-        : section(`objects/${id}`, `Objects: ${name}`, items),
-    ),
+    ...labelMapsOf(state).map(({ id, name }, _, { length }) => {
+      const ofMap = facts.objects?.find((each) => each.id === id)?.items;
+      const label = length === 1 ? "Objects" : `Objects: ${name}`;
+      return section(objectsSection(id, length), label, ofMap ?? (isStereo ? [] : LOADING));
+    }),
     section("volumes", "Surfaces and volumes", hasAny ? [controlOf(MODE, state)] : []),
     section("tiles", "Tiles", tileItems(state, facts.focusTile)),
     section("cut", "Cut open", cutItems(state, facts.shown)),
@@ -169,7 +184,7 @@ function deeperSections(
       "Volume settings",
       ofVolumes([...controlsOf(settings, state), discNow(state, facts)]),
     ),
-    section("light", "Light", ofVolumes(lightItems(state, view, facts.isStereo))),
+    section("light", "Path tracing", ofVolumes(lightItems(state, view, facts.isStereo))),
     section("share", "Share and keys", [
       command("share", "Copy a link to this view"),
       ...(view.link === ""
@@ -178,7 +193,11 @@ function deeperSections(
       { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
       ...(facts.isStereo ? [] : [lettersToggle(view)]),
     ]),
-    section("quality", "Quality and speed", qualityItems(state, facts)),
+    section("quality", "Quality", [
+      ...controlsOf(QUALITY_PARAMETERS, state),
+      ...(facts.isStereo ? aboutItems(facts) : []), // there a page of texts alone would lead nowhere
+    ]),
+    section("about", "About this view", facts.isStereo ? [] : aboutItems(facts)),
   ];
 }
 
@@ -188,7 +207,6 @@ function lettersToggle({ hasLetters: value }: PanelView): Control {
     kind: "toggle",
     id: "letters",
     label: "Keys of one character",
-    about: "Off: only ?, arrows, Escape and keys with Ctrl work.",
     value,
     to: (areOn) => ({ panel: "letters", areOn }),
   };
@@ -200,13 +218,13 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
       ...command("undo", "Undo"),
       isStep: true,
       name: `Undo ${undo ?? ""}`.trim(),
-      refusal: undo === null ? "Nothing to undo." : "",
+      refusal: undo === null ? REFUSED.undo : "",
     },
     {
       ...command("redo", "Redo"),
       isStep: true,
       name: `Redo ${redo ?? ""}`.trim(),
-      refusal: redo === null ? "Nothing to redo." : "",
+      refusal: redo === null ? REFUSED.redo : "",
     },
   ];
 }
@@ -215,9 +233,9 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
 function discNow({ mode }: ViewerState, { discLimit_deg = null }: Facts): Control {
   const isCut = mode === "disc" && discLimit_deg !== null;
   const value = isCut
-    ? `${discLimit_deg.toFixed(0)}°: at most ${MAX_DISC_TILES} tiles are volumes in it. "All" draws every tile.`
+    ? `${discLimit_deg.toFixed(0)}°, since it holds at most ${MAX_DISC_TILES} tiles. “Volumes everywhere” has no limit.`
     : "";
-  return { kind: "text", id: "disc-now", label: "Disc now", value };
+  return { kind: "text", id: "disc-now", label: "Focus disc now", value };
 }
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */
@@ -263,10 +281,10 @@ function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
   ];
 }
 
-function qualityItems(state: ViewerState, facts: Facts): readonly Control[] {
+/** How finely and how fast this device draws. */
+function aboutItems(facts: Facts): readonly Control[] {
   const { settings, frame_ms, triangles, volumeLevel } = facts;
   const items: Control[] = [
-    ...controlsOf(QUALITY_PARAMETERS, state),
     {
       kind: "text",
       id: "frame-time",
@@ -278,14 +296,14 @@ function qualityItems(state: ViewerState, facts: Facts): readonly Control[] {
       kind: "text",
       id: "volume-detail",
       label: "Volumes",
-      value: volumeLevel === null ? "" : volumesText(volumeLevel),
+      value: volumeLevel === null ? "none" : volumesText(volumeLevel),
     },
   ];
   if (settings !== null) {
     const { steps, resolution, errorFactor } = settings;
     const parts = [`${steps} steps a ray`, `${Math.round(100 * resolution)} % resolution`];
     if (errorFactor !== 1) parts.push(`${errorFactor} x coarser surfaces`);
-    items.push({ kind: "text", id: "settings", label: "March", value: parts.join(", ") });
+    items.push({ kind: "text", id: "settings", label: "Rays", value: parts.join(", ") });
   }
   return items;
 }
@@ -297,13 +315,13 @@ function frameText(frame_ms: number | null): string {
 /** How far a path-traced picture is, in whole samples. */
 function samplesText(samples: number): string {
   const whole = Math.floor(samples);
-  if (whole < 1) return "first paths of light";
+  if (whole < 1) return "gathering light …";
   if (whole >= ENOUGH_SAMPLES) return `all ${ENOUGH_SAMPLES} samples of light`;
   return `${whole} of ${ENOUGH_SAMPLES} samples of light`;
 }
 
 function trianglesText(triangles: number): string {
-  if (triangles === 0) return "";
+  if (triangles === 0) return "none";
   if (triangles < 1000) return `${triangles} triangles`;
   return `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`;
 }
@@ -316,7 +334,7 @@ function volumesText(level: number): string {
 /** Names the forms that are shown, and whether they are complete. */
 function statusOf({ channels, mode, isolated }: ViewerState, facts: Facts): string {
   const { samples, isLoading } = facts;
-  if (channels.every(({ shown }) => !shown)) return "All channels are hidden: switch one on.";
+  if (channels.every(({ shown }) => !shown)) return "All channels are hidden";
   const alone = isolated === null ? "" : `${tileName(isolated)} alone`;
   const parts = [channels.some(({ hasObjects }) => !hasObjects) ? STATUS[mode] : "Objects", alone];
   if (isLoading) parts.push("loading …");
@@ -325,10 +343,10 @@ function statusOf({ channels, mode, isolated }: ViewerState, facts: Facts): stri
 }
 
 const STATUS: Readonly<Record<ViewerState["mode"], string>> = {
-  disc: "Surfaces; volumes when near",
-  tile: "Surfaces; one tile as volume when near",
+  disc: "Surfaces, volumes from near",
+  tile: "Surfaces, one tile as volume from near",
   all: "Volumes",
-  stage: "As the stage has it",
-  traced: "Volumes, path-traced",
+  stage: "As set in the stage",
+  traced: "Volumes, path tracing",
   off: "Surfaces",
 };

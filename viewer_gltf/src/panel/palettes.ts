@@ -37,6 +37,12 @@ export const PALETTES: readonly Palette[] = [
 
 const ALL = PALETTES.flatMap(({ colors }) => colors.map(({ hex }) => hex));
 
+/** The name of a palette's colour; of any other, its hexadecimal digits. */
+export function nameOfColour(hex: string): string {
+  const found = PALETTES.flatMap(({ colors }) => colors).find((each) => each.hex === hex);
+  return found?.name ?? hex;
+}
+
 /** The palettes' next colour; of any other, the first. */
 export function nextColour(hex: string): string {
   return ALL[(ALL.lastIndexOf(hex) + 1) % ALL.length];

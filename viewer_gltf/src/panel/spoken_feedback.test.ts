@@ -70,9 +70,9 @@ describe("announcements of the light", () => {
       after(
         channel === undefined ? { type: "set", id, value } : { type: "set", id, value, channel },
       );
-    expect(set("mode", "off")).toBe("Volumes: off");
+    expect(set("mode", "off")).toBe("Surfaces only");
     expect(set("switch-distance", 2.5)).toBe("Volumes within 2.5 m");
-    expect(set("disc-radius", 17.26)).toBe("Disc 17.3°");
+    expect(set("disc-radius", 17.26)).toBe("Focus disc 17.3°");
     expect(set("dwell", false)).toBe("Choosing by gaze: off");
     expect(set("quality", "low")).toBe("Quality: low");
     expect(set("tool", "select")).toBe("A tap selects");

@@ -38,7 +38,7 @@ function whyUnchanged(action: Action): string {
     case "choose-transfer-function":
     case "select":
     case "isolate":
-      return ": the only one";
+      return ": there is no other";
     default:
       return "";
   }
@@ -100,7 +100,7 @@ function spokenAction(action: Action, state: ViewerState, ranges: Ranges): strin
     case "set-measurements":
       return `${state.measurements.length} measurements`;
     case "move-slices":
-      return "Slices: in the middle, straight";
+      return "Slices: in the middle, not turned";
     case "move-lamp":
       return `Lamp ${action.lamp + 1}: moved`;
     default:

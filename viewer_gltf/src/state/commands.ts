@@ -5,6 +5,8 @@ export type Command =
   /** One step out: from an isolated tile to all, from a selected one to none. */
   | "back"
   | "stereo"
+  /** The page on the full screen, or back in its window. */
+  | "full-screen"
   /** Stereo, or one picture on a phone, with the user's own room behind the specimen. */
   | "room"
   /** One step of the history back, or on again. */
@@ -52,18 +54,18 @@ export type Command =
 
 /** Why a command of the flat view has left it as it was. */
 export const STAYS: Partial<Record<Command, string>> = {
-  front: "It is seen from the front.",
-  side: "It is seen from the side.",
-  top: "It is seen from the top.",
-  reset: "The view is as it opened.",
-  "zoom-in": "It comes no nearer.",
-  "zoom-out": "It goes no farther.",
-  "turn-up": "It is seen from the top: it turns no further.",
-  "turn-down": "It is seen from below: it turns no further.",
-  "pan-left": "It moves no further: the middle of the view stays in the specimen.",
-  "pan-right": "It moves no further: the middle of the view stays in the specimen.",
-  "pan-up": "It moves no further: the middle of the view stays in the specimen.",
-  "pan-down": "It moves no further: the middle of the view stays in the specimen.",
+  front: "The specimen is seen from the front already.",
+  side: "The specimen is seen from the side already.",
+  top: "The specimen is seen from the top already.",
+  reset: "The view is as it was at the opening already.",
+  "zoom-in": "This is as near as the view goes.",
+  "zoom-out": "This is as far as the view goes.",
+  "turn-up": "The specimen is seen from the top: it turns no further up.",
+  "turn-down": "The specimen is seen from below: it turns no further down.",
+  "pan-left": "The view moves no further: its middle stays in the specimen.",
+  "pan-right": "The view moves no further: its middle stays in the specimen.",
+  "pan-up": "The view moves no further: its middle stays in the specimen.",
+  "pan-down": "The view moves no further: its middle stays in the specimen.",
   "next-view": "That is the only kept view.",
 };
 

@@ -177,6 +177,6 @@ describeInChromium("a traced picture that the page saves", () => {
     await page().keyboard.press('"');
     await expect.poll(said).toContain("samples of light");
     await page().keyboard.press('"');
-    await expect.poll(said).toBe("The picture was left.");
+    await expect.poll(said).toBe("Saving the picture was cancelled.");
   });
 });

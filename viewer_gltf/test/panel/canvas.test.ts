@@ -1,6 +1,7 @@
 /** The panel on a canvas in the room: what it shows, what rays do to it, and when it is painted. */
 import { mkdir } from "node:fs/promises";
 import { expect, it } from "vitest";
+import { REFUSED } from "../../src/state/refusals";
 import { describeInChromium } from "../support/browser/skip";
 import { type At, prepareHands } from "../support/xr/stand";
 
@@ -197,7 +198,7 @@ describeInChromium("the panel in the room", () => {
     await hands().openSection("tiles");
     await hands().reach("back");
     await hands().tapOn("back");
-    const why = "No tile is chosen.";
+    const why = REFUSED.back;
     const commands = await hands().page.evaluate(() => window.hands.commands);
     expect([(await hands().status()).told, commands]).toEqual([[why], []]);
     const [aside, up] = await hands().page.evaluate(() => window.hands.noticeAt());

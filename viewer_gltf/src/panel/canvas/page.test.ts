@@ -3,6 +3,7 @@ import { STEREO_FACTS } from "../../../test/support/fixture/facts";
 import { sampleManifest } from "../../../test/support/fixture/manifest";
 import { initialState } from "../../state/initial_state";
 import { reduce } from "../../state/reduce";
+import { REFUSED } from "../../state/refusals";
 import type { ViewerState } from "../../state/viewer_state";
 import { type Layout, type PanelView, START_VIEW } from "../controls";
 import { layOut } from "../layout";
@@ -115,6 +116,7 @@ describe("the panel on a plane", () => {
       [
         "stereo",
         "split",
+        "screen-stereo",
         ...phone,
         ...files,
         "own-light",
@@ -142,7 +144,7 @@ describe("the panel on a plane", () => {
     const page = regionsOf(laidOut(off), "volumes");
     const radius = find(regionsOf(laidOut(off), "volume-settings"), "disc-radius");
     expect(radius.isSlide).toBe(false);
-    expect(radius.to(0.3)).toEqual({ canvas: "announce", text: "Only the mode Disc has one." });
+    expect(radius.to(0.3)).toEqual({ canvas: "announce", text: REFUSED.disc });
     expect(find(page, "mode=disc").to(0)).toEqual({ type: "set", id: "mode", value: "disc" });
   });
 });

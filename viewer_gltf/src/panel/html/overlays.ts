@@ -8,6 +8,8 @@ import type { Progress } from "../../surfaces/overview_progress";
 
 /** Time for which an announcement stays, ms; a screen reader reads it at once. */
 const SAID_MS = 4000;
+/** The same with a button, which a person has to find first. */
+const OFFERED_MS = 8000;
 
 /** A thin bar at the top with its count in words; hidden once complete. */
 export class ProgressBar {
@@ -15,7 +17,7 @@ export class ProgressBar {
   private readonly label = element("span");
   readonly root = element(
     "div",
-    { className: "progress", role: "progressbar", ariaLabel: "The overview" },
+    { className: "progress", role: "progressbar", ariaLabel: "Loading of the overview" },
     { progress: "" },
     element("div", { className: "track" }, {}, this.fill),
     this.label,
@@ -102,15 +104,66 @@ export class FirstHint {
   }
 }
 
-/** What a key or a button has just done, where nothing else shows it; it goes by itself. */
+/** Says in a line what a key or a button has just done. The line goes by itself, unless someone is about to undo it. */
 export class Said {
-  readonly root = element("p", { className: "said", role: "status" }, { said: "" });
+  private readonly words = element("p", { role: "status" }, { said: "" });
+  private readonly button = element("button", { type: "button" }, { action: "offer" });
+  readonly root = element("div", { className: "said" }, {}, this.words);
   private timer = 0;
 
   say(text: string): void {
-    setText(this.root, text);
+    this.write(text, SAID_MS);
+  }
+
+  /** A button beside the words, if they still stand. */
+  offer(text: string, label: string, act: () => void): void {
+    if (this.words.textContent !== text) return;
+    this.write(text, OFFERED_MS);
+    setText(this.button, label);
+    this.root.append(this.button);
+    this.button.onclick = () => {
+      this.write("", 0);
+      act();
+    };
+  }
+
+  /** Take the button away: its offer holds no longer. */
+  withdraw(): void {
+    this.button.remove();
+  }
+
+  private write(text: string, for_ms: number): void {
+    setText(this.words, text);
+    this.withdraw();
     clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => setText(this.root, ""), SAID_MS);
+    if (text !== "") this.leaveLater(for_ms);
+  }
+
+  private leaveLater(after_ms: number): void {
+    this.timer = window.setTimeout(() => {
+      if (this.button.matches(":hover, :focus")) this.leaveLater(SAID_MS);
+      else this.write("", 0);
+    }, after_ms);
+  }
+}
+
+/** The way back from a tile that is shown alone, for thumbs: see overlays.css. */
+export class WayBack {
+  readonly root: HTMLButtonElement;
+
+  constructor(onBack: () => void) {
+    this.root = element(
+      "button",
+      {
+        ...{ type: "button", className: "way way-back", textContent: "Back to all tiles" },
+        ...{ hidden: true, onclick: onBack },
+      },
+      { overlay: "back" },
+    );
+  }
+
+  update({ isolated }: Pick<ViewerState, "isolated">): void {
+    this.root.hidden = isolated === null;
   }
 }
 
@@ -119,10 +172,15 @@ export function showFatal(parent: HTMLElement, title: string, text: string): voi
   parent.replaceChildren(
     element(
       "main",
-      { className: "fatal", role: "alert" },
+      { className: "fatal" },
       { fatal: "" },
-      element("h1", { textContent: title }),
-      element("p", { textContent: text }),
+      element(
+        "div",
+        { role: "alert" },
+        {},
+        element("h1", { textContent: title }),
+        element("p", { textContent: text }),
+      ),
       element("button", { textContent: "Try again", onclick: () => location.reload() }),
     ),
   );

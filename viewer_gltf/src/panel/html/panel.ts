@@ -15,7 +15,8 @@ function shapeOf(item: Item): string {
   return `${item.id}, group of ${item.controls.length} ${opens}`;
 }
 
-class Items {
+/** The elements of a list of controls, each kept for as long as its control is listed. */
+export class Items {
   private readonly made = new Map<string, Widget<Item>>();
 
   constructor(
@@ -152,7 +153,7 @@ export class Panel {
       type: "button",
       className: "fold",
       ariaLabel: "Panel",
-      title: "Hide or show the panel (h)",
+      title: "Hide or show the panel",
       onclick: () => send({ panel: "hide" }),
     });
     this.fold.setAttribute("aria-controls", this.body.id);

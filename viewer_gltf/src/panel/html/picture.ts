@@ -1,6 +1,7 @@
 /** A picture that only its owner can draw, and takes hold of where it is pressed. */
 import { element, setText } from "../../dom/element";
 import type { Picture, Wish } from "../controls";
+import { withExplainer } from "./explain";
 import { hooks, type Send, type Widget } from "./widget";
 
 /** Width of the canvas, px; the page scales it. */
@@ -27,9 +28,9 @@ export function makePicture(first: Picture, send: Send): Widget<Picture> {
     if (now.drag && canvas.hasPointerCapture(event.pointerId)) at(event, now.drag);
   });
   const label = element("span", { className: "label" });
-  const about = element("small", { textContent: first.about ?? "" });
+  const root = element("div", { className: "plane picture" }, {}, label, canvas);
   return {
-    root: element("div", { className: "plane picture" }, {}, label, canvas, about),
+    root: first.about ? withExplainer(first, root) : root,
     update(control) {
       now = control;
       setText(label, control.label);

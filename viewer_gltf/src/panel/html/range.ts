@@ -2,11 +2,13 @@
 
 import { element, setText } from "../../dom/element";
 import type { Window } from "../controls";
+import { explainerOf, withNote } from "./explain";
 import { hooks, type Send, type Widget } from "./widget";
 
 export function makeWindow(first: Window, send: Send): Widget<Window> {
   let now = first;
   const name = first.name ?? first.label;
+  const explainer = explainerOf(first);
   const makeEnd = (end: 0 | 1) => {
     const input = element(
       "input",
@@ -34,13 +36,20 @@ export function makeWindow(first: Window, send: Send): Widget<Window> {
     "span",
     { className: "head" },
     {},
-    element("span", {}, {}, first.label),
+    element("span", {}, {}, first.label, ...(explainer === null ? [] : [explainer.button])),
     text,
   );
   const bar = element("div", { className: "bar" });
   const track = element("div", { className: "ends" }, {}, bar, ...ends);
+  const root = element(
+    "div",
+    { className: "window", role: "group", ariaLabel: name },
+    {},
+    head,
+    track,
+  );
   return {
-    root: element("div", { className: "window", role: "group", ariaLabel: name }, {}, head, track),
+    root: withNote(root, explainer),
     update(control) {
       now = control;
       const [low, high] = control.value;

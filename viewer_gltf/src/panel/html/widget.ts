@@ -1,7 +1,13 @@
 /** The interface of a control's element, and the attributes by which scripts find it. */
-import type { Wish } from "../controls";
+import type { Control, Refusal, Wish } from "../controls";
 
-export type Send = (wish: Wish) => void;
+export type Send = (wish: Wish | Refusal) => void;
+
+/** What a control asks for, or why it does nothing now. */
+export function askedBy({ refusal }: Control, wish: () => Wish): Wish | Refusal {
+  return refusal ? { refusal } : wish();
+}
+
 /** `update` is called with the control as it is now, whenever anything may have changed. */
 export type Widget<C> = Readonly<{ root: HTMLElement; update: (control: C) => void }>;
 

@@ -6,11 +6,12 @@
 import { element, setText } from "../../dom/element";
 import type { Button, Choice, Control, Link, Search, Slider, Text, Toggle } from "../controls";
 import { makeColour } from "./colour";
+import { explainerOf, explainOptions, withExplainer, withNote } from "./explain";
 import { makePicture } from "./picture";
 import { makeWindow } from "./range";
 import { makeMap } from "./tile_map";
 import { makeHistogram } from "./transfer_function_2d";
-import { hooks, type Send, type Widget } from "./widget";
+import { askedBy, hooks, type Send, type Widget } from "./widget";
 
 type Maker<C> = (first: C, send: Send) => Widget<C>;
 
@@ -52,7 +53,7 @@ function makeToggle(first: Toggle, send: Send): Widget<Toggle> {
       onchange: () => {
         const wanted = input.checked;
         input.checked = now.value; // the state holds its value
-        if (!now.refusal) send(now.to(wanted));
+        send(askedBy(now, () => now.to(wanted)));
       },
     },
     hooks(first.id),
@@ -60,7 +61,7 @@ function makeToggle(first: Toggle, send: Send): Widget<Toggle> {
   const label = element("span", { className: "label" });
   const root = element("label", { className: "toggle" }, {}, input, label);
   return {
-    root: first.about ? element("div", { className: "told" }, {}, root, ...aboutOf(first)) : root,
+    root: withExplainer(first, root),
     update(control) {
       now = control;
       input.checked = control.value;
@@ -78,13 +79,17 @@ function refuse(target: HTMLElement, refusal = ""): void {
   target.title = refusal;
 }
 
-/** What a control does, in a sentence, where its name can't say it. */
-function aboutOf({ about }: Control): readonly HTMLElement[] {
-  return about ? [element("small", { textContent: about })] : [];
+/** A press on a disabled slider or list says why it is disabled: a finger sees no tooltip. */
+function explainRefusal(root: HTMLElement, now: () => Control, send: Send): void {
+  root.addEventListener("click", () => {
+    const { refusal } = now();
+    if (refusal) send({ refusal });
+  });
 }
 
 function makeSlider(first: Slider, send: Send): Widget<Slider> {
   let now = first;
+  const explainer = explainerOf(first);
   const input = element(
     "input",
     {
@@ -102,11 +107,13 @@ function makeSlider(first: Slider, send: Send): Widget<Slider> {
     "span",
     { className: "head" },
     {},
-    element("span", {}, {}, first.label),
+    element("span", {}, {}, first.label, ...(explainer === null ? [] : [explainer.button])),
     text,
   );
+  const root = element("label", { className: "slider" }, {}, head, input);
+  explainRefusal(root, () => now, send);
   return {
-    root: element("label", { className: "slider" }, {}, head, input, ...aboutOf(first)),
+    root: withNote(root, explainer),
     update(control) {
       now = control;
       input.value = String(Math.round(control.value * control.steps));
@@ -140,12 +147,25 @@ function makeSegments(first: Choice, send: Send): Widget<Choice> {
     ),
   );
   return {
-    root: first.about ? element("div", { className: "told" }, {}, root, ...aboutOf(first)) : root,
+    root: named(first, root),
     update(control) {
       now = control;
       for (const input of inputs) input.checked = input.value === control.value;
     },
   };
+}
+
+/** Segments say what they are of where an explanation belongs to that. */
+function named(first: Choice, segments: HTMLElement): HTMLElement {
+  const explainer = explainerOf(first);
+  if (explainer === null) return segments;
+  const label = element("span", {
+    className: "label",
+    textContent: first.label,
+    ariaHidden: "true",
+  });
+  const { button, note } = explainer;
+  return element("div", { className: "explained" }, {}, label, button, segments, note);
 }
 
 function makeSelect(first: Choice, send: Send): Widget<Choice> {
@@ -159,9 +179,12 @@ function makeSelect(first: Choice, send: Send): Widget<Choice> {
     { ...hooks(first.id), ...(first.id.includes("/") ? {} : { [camel(first.id)]: "" }) },
   );
   const label = element("span", { className: "label", textContent: first.label });
+  const root = element("label", { className: "field" }, {}, label, select);
+  explainRefusal(root, () => now, send);
+  explainOptions(select, first);
   let listed = "";
   return {
-    root: element("label", { className: "field" }, {}, label, select),
+    root: withExplainer(first, root),
     update(control) {
       now = control;
       const options = control.options.map((each) => `${each.value}\n${each.label}`).join("\n");
@@ -187,9 +210,7 @@ function makeButton(first: Button, send: Send): Widget<Button> {
     {
       type: "button",
       className: first.isPrimary ? "primary" : "",
-      onclick: () => {
-        if (!now.refusal) send(now.to());
-      },
+      onclick: () => send(askedBy(now, () => now.to())),
     },
     { ...hooks(first.id), action: first.id, ...(first.isStep ? { step: "" } : {}) },
   );

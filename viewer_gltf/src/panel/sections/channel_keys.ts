@@ -2,6 +2,7 @@
 import { fromHex, toHex } from "../../math/color";
 import { CHANNEL, COLOR, VOLUME } from "../../state/parameters/channel";
 import { setTo } from "../../state/parameters/kinds";
+import { REFUSED } from "../../state/refusals";
 import type { ChannelState } from "../../state/viewer_state";
 import type { Wish } from "../controls";
 import { type Key, key, keysOfChannel, neighbour, no, ofChannel, withChannel } from "../key";
@@ -14,7 +15,7 @@ function pick(by: number): Key["to"] {
   return ({ state, view }) => {
     const shown = state.channels.filter((each) => each.shown).map(({ id }) => id);
     const channel = neighbour(shown, view.picked ?? undefined, by);
-    return channel === null ? no("No channel is shown.") : { panel: "pick", channel };
+    return channel === null ? no(REFUSED.channel) : { panel: "pick", channel };
   };
 }
 
@@ -31,24 +32,22 @@ const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"] as const;
 export const CHANNEL_KEYS: readonly Key[] = [
   key(DIGITS, "Show or hide this channel of the bundle", ({ state }, name) => {
     const channel = state.channels[Number(name) - 1];
-    if (channel === undefined) return no(`There is no channel ${name}.`);
+    if (channel === undefined) return no(`This bundle has no channel ${name}.`);
     return { type: "show", channel: channel.id, shown: !channel.shown };
   }),
   key("/", "Find a channel that is not shown", "find"),
   key("A", "Next page of the list of channels", ({ state, view }) => {
     const pages = pagesOf(state, view);
-    return pages === 1
-      ? no("There is one page alone.")
-      : { panel: "page", page: (view.page + 1) % pages };
+    return pages === 1 ? no(REFUSED.page) : { panel: "page", page: (view.page + 1) % pages };
   }),
-  key("c", "Next channel: the keys below mean it", pick(1)),
+  key("c", "Next channel, which the keys below change", pick(1)),
   key("C", "Previous channel", pick(-1)),
   ofChannel("x", "Hide the channel", ({ id }) => ({ type: "show", channel: id, shown: false })),
   ...keysOfChannel(VOLUME),
   ofChannel("f", "Next transfer function", ({ id, transferFunction, transferFunctions }) => {
     const name = neighbour(transferFunctions, transferFunction, 1);
     return name === null
-      ? no("It has no transfer function.")
+      ? no(REFUSED.transferless)
       : { type: "choose-transfer-function", channel: id, name };
   }),
   key("k", "Next colour that no other channel has", (context) =>

@@ -8,6 +8,7 @@
 import { valueText } from "../../annotations/measure";
 import { toHex } from "../../math/color";
 import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel";
+import { REFUSED } from "../../state/refusals";
 import { isTwoD } from "../../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
@@ -117,7 +118,7 @@ function cardOf(
           label: isTwoD(channel, each) ? `${each} (2D)` : each,
         })),
         isInline: false,
-        refusal: channel.volume ? "" : "Only volumes have one.",
+        refusal: channel.volume ? "" : REFUSED.transfer,
         to: (each) => ({ type: "choose-transfer-function", channel: id, name: each }),
       },
       ...CHANNEL.filter((row) => row !== COLOR && row !== VOLUME).map((row) =>

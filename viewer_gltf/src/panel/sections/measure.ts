@@ -3,6 +3,7 @@ import { measurementText } from "../../annotations/measure";
 import type { Action } from "../../state/actions";
 import { type Measurement, missing } from "../../state/measurements";
 import { MEASURE_PARAMETERS } from "../../state/parameters/tools";
+import { REFUSED } from "../../state/refusals";
 import type { ViewerState } from "../../state/viewer_state";
 import { command, controlsOf } from "../control_templates";
 import type { Control } from "../controls";
@@ -16,7 +17,7 @@ export function measuredText({ tool, measured, measuredAs, measureKind }: Viewer
   if (measured.length > 0) {
     const more = missing(measuredAs, measured);
     if (more === 0) return measurementText(measuredAs, measured);
-    return more === 1 ? "Now the other point." : "Now the next point.";
+    return more === 1 ? "Now choose the other point." : "Now choose the next point.";
   }
   if (tool !== "measure") return "";
   if (measureKind === "angle") return "Choose three points: the angle is at the second.";
@@ -47,8 +48,8 @@ export function measureItems(
     {
       kind: "button",
       id: "finish-measuring",
-      label: "Done: keep it",
-      refusal: isOpen ? "It needs more points." : "",
+      label: "Done: keep the measurement",
+      refusal: isOpen ? REFUSED.points : "",
       to: () => ({ type: "finish-measuring" }),
     },
     {
@@ -56,7 +57,7 @@ export function measureItems(
       id: "clear-measured",
       label: "Clear",
       name: "Clear the newest measurement",
-      refusal: clearMeasured(state) === null ? "Nothing is measured." : "",
+      refusal: clearMeasured(state) === null ? REFUSED.measured : "",
       to: () => clearMeasured(state) ?? { type: "measure", points: [] },
     },
     ...measurements.slice(-MAX_LISTED).flatMap((each, i) => {
@@ -65,7 +66,7 @@ export function measureItems(
     }),
     {
       ...command("save-csv", "Save as CSV"),
-      refusal: isOpen && measurements.length === 0 ? "Nothing is measured." : "",
+      refusal: isOpen && measurements.length === 0 ? REFUSED.measured : "",
     },
   ];
 }

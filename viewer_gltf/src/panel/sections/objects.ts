@@ -29,6 +29,7 @@ import {
   type PaletteName,
   START_OBJECTS,
 } from "../../state/objects";
+import { REFUSED } from "../../state/refusals";
 import type { ViewerState } from "../../state/viewer_state";
 import type { Control, Picture, Wish } from "../controls";
 
@@ -62,7 +63,7 @@ export function objectItems(
 const SAVE: Control = {
   kind: "button",
   id: "save-objects",
-  label: "Save as CSV: the selected, or all that show",
+  label: "Save as CSV (selected, or all shown)",
   to: () => "save-objects",
 };
 
@@ -162,7 +163,7 @@ class Layout {
   /** A column's picture, in which what shows is chosen. @param colors whether it is the one that colours */
   private columnItems(column: ObjectColumn, colors: boolean): readonly Control[] {
     const bytes = this.table.bytes(column.id);
-    if (bytes === null) return [this.text(`wait-${column.id}`, column.name, "coming …")];
+    if (bytes === null) return [this.text(`wait-${column.id}`, column.name, "loading …")];
     const [all, left] = countBytes(bytes, this.objects.flags);
     const table = tableOf(column, colors ? this.view : { ...this.view, ...GREY });
     const state = [
@@ -191,7 +192,7 @@ class Layout {
     const picture: Picture = {
       kind: "picture",
       id: this.id(`column-${column.id}`),
-      label: `${column.name}: a tap leaves out`,
+      label: `${column.name}: tap one to leave it out`,
       about: column.about,
       height: 0.12 * indices.length,
       version: `${version} ${without} ${page}`,
@@ -220,11 +221,11 @@ class Layout {
       picture,
       this.text(
         `legend-${column.id}`,
-        "Of these",
+        "Categories",
         `${first + 1} to ${first + indices.length} of ${count}`,
       ),
-      turn("legend-next", "Next of these", page + 1),
-      turn("legend-back", "Earlier ones", page - 1),
+      turn("legend-next", "Next categories", page + 1),
+      turn("legend-back", "Previous categories", page - 1),
     ];
   }
 
@@ -319,7 +320,7 @@ class Layout {
       {
         kind: "toggle",
         id: this.id("stain"),
-        label: `${stainName} painted over it`,
+        label: `${stainName} painted on the objects`,
         value: this.view.isStained,
         to: (isStained) => this.change({ isStained }),
       },
@@ -352,7 +353,7 @@ class Layout {
     const { table, view } = this;
     const row = view.picked;
     if (row === null || row >= table.count) {
-      return [this.text("card", "Object", "A tap on one, or a gaze, opens its card.")];
+      return [this.text("card", "Object", "Tap an object, or look at it, to open its card.")];
     }
     const title = table.title(row);
     const label = table.label(row);
@@ -361,26 +362,26 @@ class Layout {
     return [
       this.text("card", "Object", title === label ? title : `${title} (${label})`),
       this.button("fly", "Go there", { aim: { row } }),
-      this.button("only", "Only this one", { only: [row] }),
+      this.button("only", "Only this object", { only: [row] }),
       ...(table.hasNeighbours
         ? [this.button("only-next", "Only it and its neighbours", { only: [row, ...others] })]
         : []),
       this.button(
         "select",
-        view.selected.includes(row) ? "Out of the selection" : "Into the selection",
+        view.selected.includes(row) ? "Take out of the selection" : "Add to the selection",
         {
           selected: view.selected.includes(row)
             ? view.selected.filter((each) => each !== row)
             : [...view.selected, row],
         },
       ),
-      this.button("hide", "Hide it", { hidden: [...view.hidden, row], picked: null }),
+      this.button("hide", "Hide this object", { hidden: [...view.hidden, row], picked: null }),
       this.button("close", "Close the card", { picked: null }),
       ...table.columns.map((column) =>
         this.text(`card-${column.id}`, column.name, this.valueText(column, row)),
       ),
       ...(table.hasNeighbours ? [this.text("card-next", "Neighbours", String(others.length))] : []),
-      ...(wall === "" ? [] : [this.text("card-wall", "Largest wall, to", wall)]),
+      ...(wall === "" ? [] : [this.text("card-wall", "Largest interface, with", wall)]),
     ];
   }
 
@@ -396,7 +397,7 @@ class Layout {
   private choiceOfMany(): readonly Control[] {
     const { view, objects } = this;
     const { selected } = view;
-    const none = selected.length === 0 ? "Nothing is selected." : "";
+    const none = selected.length === 0 ? REFUSED.objects : "";
     const isWhole = view.hidden.length === 0 && view.only === null && filtered(view).length === 0;
     return [
       this.text(
@@ -417,7 +418,7 @@ class Layout {
         "all",
         "Show all",
         { hidden: [], only: null, ranges: {}, without: {} },
-        isWhole ? "All are shown." : "",
+        isWhole ? "All objects are shown." : "",
       ),
     ];
   }
@@ -458,7 +459,7 @@ class Layout {
       return colors && bytes ? `rgb(${colors[at]} ${colors[at + 1]} ${colors[at + 2]})` : "#8fa3c0";
     };
     if (xs === null || ys === null)
-      return [...choices, this.text("wait-scatter", "Plot", "coming …")];
+      return [...choices, this.text("wait-scatter", "Plot", "loading …")];
     const lassoed = (lasso: ObjectView["lasso"]) =>
       this.change({ lasso, selected: inLasso(lasso, objects.flags, [xs, ys]) });
     const name = (column: ObjectColumn) => `${column.name} ${unitText(column.unit)}`.trim();
@@ -467,7 +468,7 @@ class Layout {
       {
         kind: "picture",
         id: this.id("scatter"),
-        label: `Draw round points to select: ${name(axes[0])} across, ${name(axes[1])} up`,
+        label: `Draw around points to select them: ${name(axes[0])} across, ${name(axes[1])} up`,
         height: 0.75,
         version: [
           objects.version,

@@ -1,5 +1,6 @@
 /** The panel's section of pictures and videos, and its keys. Pure. */
 import { PICTURE_PARAMETERS } from "../../state/parameters/tools";
+import { REFUSED } from "../../state/refusals";
 import type { ViewerState } from "../../state/viewer_state";
 import { command, controlsOf } from "../control_templates";
 import type { Control } from "../controls";
@@ -8,23 +9,23 @@ import { type Key, key, keysOf, no } from "../key";
 export function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
   const { length } = state.keptViews;
   const path = length > 1 ? `through ${length} views` : "once round";
-  const none = length === 0 ? "No view is kept." : "";
+  const none = length === 0 ? REFUSED.views : "";
   return [
     ...controlsOf(PICTURE_PARAMETERS, state),
-    command("save-picture", isFilming ? "Leave it" : "Save the picture"),
-    command("save-video", isFilming ? "Leave it" : `Save a video, ${path}`),
+    command("save-picture", isFilming ? "Cancel" : "Save the picture"),
+    command("save-video", isFilming ? "Cancel" : `Save a video, ${path}`),
     command("keep-view", length === 0 ? "Keep this view" : `Keep this view (${length} kept)`),
     { ...command("next-view", "Next kept view"), refusal: none },
-    { ...command("forget-views", "Forget them"), name: "Forget the kept views", refusal: none },
+    { ...command("forget-views", "Forget the kept views"), refusal: none },
   ];
 }
 
-const NO_VIEW = no("No view is kept: ' keeps this one.");
+const NO_VIEW = no(REFUSED.views);
 
 export const SAVE_KEYS: readonly Key[] = [
   ...PICTURE_PARAMETERS.flatMap(keysOf),
-  key('"', "Save the picture; again: leave it", "save-picture"),
-  key(")", "Save a video: once round, or through the kept views; again: leave it", "save-video"),
+  key('"', "Save the picture; again: cancel", "save-picture"),
+  key(")", "Save a video: once round, or through the kept views; again: cancel", "save-video"),
   key("'", "Keep this view for a video", "keep-view"),
   key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? NO_VIEW : "next-view")),
   key("End", "Forget the kept views", ({ state }) =>

@@ -2,11 +2,11 @@
 import { setTo, shareOf, valueAtShare } from "../../state/parameters/kinds";
 import {
   isSliced,
-  NO_SLICES,
   SLICE_NUMBERS,
   SLICE_PICTURES,
   SLICE_PLANES,
 } from "../../state/parameters/slices";
+import { REFUSED } from "../../state/refusals";
 import { type Key, key, keysOf, neighbour, no, refusalOf } from "../key";
 import { STRAIGHT } from "./slices";
 
@@ -26,14 +26,14 @@ function turn(steps: number): Key["to"] {
 export const SLICE_KEYS: readonly Key[] = [
   ...keysOf(SLICE_PICTURES),
   ...keysOf(SLICE_PLANES),
-  key("^", "Next number of the slices: where they meet, how they are turned", ({ view }) => {
+  key("^", "Next setting of the slices: where they meet, how they are turned", ({ view }) => {
     const ids = SLICE_NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, 1);
     return parameter === null ? no("There is no number.") : { panel: "parameter", parameter };
   }),
-  key("{", "Less of it", turn(-STEPS)),
-  key("}", "More of it", turn(STEPS)),
-  key("~", "Slices to the middle, straight", ({ state }) =>
-    isSliced(state) ? STRAIGHT : no(NO_SLICES),
+  key("{", "Less of that setting", turn(-STEPS)),
+  key("}", "More of that setting", turn(STEPS)),
+  key("~", "Slices back to the middle, not turned", ({ state }) =>
+    isSliced(state) ? STRAIGHT : no(REFUSED.slices),
   ),
 ];

@@ -14,7 +14,17 @@ export const STRAIGHT = {
 export function sliceItems(state: ViewerState, values: readonly string[]): readonly Control[] {
   return [
     ...controlsOf(SLICES, state),
-    { kind: "button", id: "straight-slices", label: "To the middle, straight", to: () => STRAIGHT },
-    { kind: "text", id: "slice-values", label: "Where they meet", value: values.join(" · ") },
+    {
+      kind: "button",
+      id: "straight-slices",
+      label: "Back to the middle, not turned",
+      to: () => STRAIGHT,
+    },
+    {
+      kind: "text",
+      id: "slice-values",
+      label: "Where they meet",
+      value: values.join(" · ") || "–",
+    },
   ];
 }

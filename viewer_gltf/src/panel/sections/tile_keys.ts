@@ -1,4 +1,7 @@
 /** The keys of the tiles. Pure. */
+import { setTo } from "../../state/parameters/kinds";
+import { SCREEN_STEREO } from "../../state/parameters/tools";
+import { REFUSED } from "../../state/refusals";
 import { type Key, key, neighbour, no } from "../key";
 import { chosenTile } from "./tiles";
 
@@ -6,7 +9,7 @@ function nextTile(by: number): Key["to"] {
   return ({ state }) => {
     const ids = state.tiles.map(({ id }) => id);
     const tile = neighbour(ids, state.isolated ?? state.selected ?? undefined, by);
-    if (tile === null) return no("There is no tile.");
+    if (tile === null) return no(REFUSED.tileAhead);
     return state.isolated === null ? { type: "select", tile } : { type: "isolate", tile };
   };
 }
@@ -18,13 +21,15 @@ export const TILE_KEYS: readonly Key[] = [
     const { state, focusTile } = context;
     if (state.isolated !== null) return { type: "isolate", tile: null };
     const tile = state.selected ?? focusTile;
-    if (tile === null) return no("Choose a tile, or look at one.");
+    if (tile === null) return no(REFUSED.tile);
     return { type: "isolate", tile };
   }),
   key("g", "Choose the tile that is looked at", ({ state, focusTile }) =>
-    focusTile === null ? no("No tile is looked at.") : chosenTile(state, focusTile),
+    focusTile === null ? no(REFUSED.tileAhead) : chosenTile(state, focusTile),
   ),
-  key(["Escape", "Backspace"], "Back: all tiles, then none chosen", ({ state }) =>
-    state.isolated === null && state.selected === null ? no("No tile is chosen.") : "back",
-  ),
+  key(["Escape", "Backspace"], "Back: out of stereo, all tiles, then none chosen", ({ state }) => {
+    if (state.screenStereo !== "off") return setTo(SCREEN_STEREO, "off");
+    const isChosen = state.isolated !== null || state.selected !== null;
+    return isChosen ? "back" : no(REFUSED.back);
+  }),
 ];

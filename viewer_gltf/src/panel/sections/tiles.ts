@@ -1,5 +1,6 @@
 /** The panel's tiles: a map by row and column, or a list. Pure. */
 
+import { REFUSED } from "../../state/refusals";
 import { tileName } from "../../state/tile_name";
 import type { ViewerState } from "../../state/viewer_state";
 import { command } from "../control_templates";
@@ -56,12 +57,12 @@ export function tileItems(state: ViewerState, focusTile: string | null): readonl
       id: "isolate",
       label: isolated === null ? "Only this tile" : `Only ${tileName(isolated)}`,
       value: isolated !== null,
-      refusal: alone === null ? "Choose a tile, or look at one." : "",
+      refusal: alone === null ? REFUSED.tile : "",
       to: (value) => ({ type: "isolate", tile: value ? alone : null }),
     },
     {
       ...command("back", "Back"),
-      refusal: selected === null && isolated === null ? "No tile is chosen." : "",
+      refusal: selected === null && isolated === null ? REFUSED.back : "",
     },
   );
   return items;

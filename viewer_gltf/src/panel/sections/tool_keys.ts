@@ -3,13 +3,14 @@
 import { allOf, missing } from "../../state/measurements";
 import { groupNotices } from "../../state/notice_groups";
 import { MEASURE_PARAMETERS } from "../../state/parameters/tools";
+import { REFUSED } from "../../state/refusals";
 import { chosenClipPart, clipPartName, clipPartsOf, moveClipPart } from "../clip_by_key";
 import { type Key, key, keysOf, neighbour, no } from "../key";
 import { middleBox, middlePlane } from "../layout";
 import { clearMeasured } from "./measure";
 
-const NOT_CUT = no("Nothing is cut: b cuts by a box, n by a plane.");
-const NOT_MEASURED = no("Nothing is measured.");
+const NOT_CUT = no(REFUSED.cut);
+const NOT_MEASURED = no(REFUSED.measured);
 
 function nextClipPart(by: number): Key["to"] {
   return ({ state: { clip }, view }) => {
@@ -33,8 +34,8 @@ export const TOOL_KEYS: readonly Key[] = [
   ...MEASURE_PARAMETERS.flatMap(keysOf),
   key("Enter", "Tap in the middle of the view", "press"),
   key("_", "The measurement is done: it goes to the list", ({ state }) => {
-    if (state.measured.length === 0) return no("No measurement is being made.");
-    if (missing(state.measuredAs, state.measured) > 0) return no("It needs more points.");
+    if (state.measured.length === 0) return NOT_MEASURED;
+    if (missing(state.measuredAs, state.measured) > 0) return no(REFUSED.points);
     return { type: "finish-measuring" };
   }),
   key("u", "Clear the newest measurement", ({ state }) => clearMeasured(state) ?? NOT_MEASURED),
@@ -57,10 +58,10 @@ export const TOOL_KEYS: readonly Key[] = [
   key("l", "Copy a link to this view", "share"),
   key("Delete", "Dismiss the newest notice", ({ state }) => {
     const newest = groupNotices(state.notices).at(-1);
-    return newest === undefined ? no("There is no notice.") : { type: "dismiss", texts: newest.of };
+    return newest === undefined ? no(REFUSED.notice) : { type: "dismiss", texts: newest.of };
   }),
   key("R", "Try again what the network failed to bring", ({ state }) =>
-    state.mendable.length === 0 ? no("Nothing has failed to come.") : "retry",
+    state.mendable.length === 0 ? no(REFUSED.failed) : "retry",
   ),
   key("h", "Hide or show the panel", { panel: "hide" }),
   key("?", "This list", { panel: "help" }),

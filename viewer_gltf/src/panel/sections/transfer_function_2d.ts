@@ -3,6 +3,7 @@
 import { MAX_SHAPES, type Shape, type Shapes } from "../../bundle/transfer_2d";
 import { fromHex, toHex } from "../../math/color";
 import type { Action } from "../../state/actions";
+import { REFUSED } from "../../state/refusals";
 import { editedName } from "../../state/transfer_functions_2d";
 import { removeShape, replaceShape, resize } from "../../state/transfer_shapes";
 import type { ChannelState } from "../../state/viewer_state";
@@ -27,7 +28,7 @@ export function setShapes(channel: ChannelState, shapes: Shapes): Action {
 
 /** Why no shapes can be edited now; "": they can. */
 export function refusalOf(channel: ChannelState): string {
-  if (!channel.volume) return "Only volumes have one.";
+  if (!channel.volume) return REFUSED.transfer;
   const name = editedName(channel);
   const isOfBundle =
     channel.transferFunctions2d.includes(name) && !Object.hasOwn(channel.shapes, name);

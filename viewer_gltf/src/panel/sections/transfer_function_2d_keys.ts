@@ -1,25 +1,27 @@
 /** The keys of the shapes of a two-dimensional transfer function. Pure. */
 import { MAX_SHAPES, type Shape } from "../../bundle/transfer_2d";
 import { fromHex, toHex } from "../../math/color";
+import { REFUSED } from "../../state/refusals";
 import { removeShape, replaceShape } from "../../state/transfer_shapes";
 import type { ChannelState } from "../../state/viewer_state";
-import type { PanelView, Wish } from "../controls";
+import type { PanelView, Refusal, Wish } from "../controls";
 import { editedShapes, meantShape, SHAPE_NUMBERS, withNewShape } from "../edit_shapes";
-import { type Key, key, neighbour, no, ofChannel, type Refusal, withChannel } from "../key";
+import { type Key, key, neighbour, no, ofChannel, withChannel } from "../key";
 import { nextColour } from "../palettes";
 import { refusalOf, setShapes } from "./transfer_function_2d";
 
 /** One step of a shape's number, 0..1: five cells of its table. */
 const SHAPE_STEP = 5 / 255;
 
-const NO_SHAPE = no("There is no shape: Q adds a rectangle, Y a triangle.");
+const NO_SHAPE = no(REFUSED.shape);
 
 function addShapeOf(kind: Shape["kind"]) {
   return (channel: ChannelState): Wish | Refusal => {
     const reason = refusalOf(channel);
     if (reason !== "") return no(reason);
     const shapes = withNewShape(channel, kind);
-    if (shapes.length > MAX_SHAPES) return no(`There are ${MAX_SHAPES} shapes: no more.`);
+    if (shapes.length > MAX_SHAPES)
+      return no(`A transfer function has at most ${MAX_SHAPES} shapes.`);
     return setShapes(channel, shapes);
   };
 }

@@ -1,4 +1,6 @@
 /** The parameters of the three slice planes: whether they show, where they meet, how they are turned. Pure. */
+
+import { REFUSED } from "../refusals";
 import { lensesOf, type NumberParameter, type Parameter, type SwitchParameter } from "./kinds";
 
 /** The slices of a bundle that has just opened. */
@@ -45,8 +47,6 @@ export const SLICE_PLANES: SwitchParameter<SliceSettings> = {
 export const isSliced = ({ hasSlicePictures, hasSlicePlanes }: SliceSettings) =>
   hasSlicePictures || hasSlicePlanes;
 
-/** Why nothing of the slices can be set. */
-export const NO_SLICES = "No slices are shown.";
 const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 const degrees = (angle: number) => `${Number(angle.toFixed(1))}°`;
 
@@ -68,7 +68,7 @@ export const SLICE_AT: readonly NumberParameter<SliceSettings>[] = (
   steps: 200,
   rounded: (share) => Number(share.toFixed(4)),
   text: percent,
-  refusal: (on) => (isSliced(on) ? "" : NO_SLICES),
+  refusal: (on) => (isSliced(on) ? "" : REFUSED.slices),
   spoken: (on) => `Slices: ${axis} ${percent(on[field])}`,
 }));
 
@@ -90,7 +90,7 @@ export const SLICE_TURN: readonly NumberParameter<SliceSettings>[] = (
   steps: 144,
   rounded: (angle) => Number(angle.toFixed(2)),
   text: degrees,
-  refusal: (on) => (isSliced(on) ? "" : NO_SLICES),
+  refusal: (on) => (isSliced(on) ? "" : REFUSED.slices),
   spoken: (on) => `Slices: turned about ${axis} by ${degrees(on[field])}`,
 }));
 

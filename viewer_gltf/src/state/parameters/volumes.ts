@@ -1,4 +1,6 @@
 /** The parameters of where volumes show. Pure. */
+
+import { REFUSED } from "../refusals";
 import { type ChoiceParameter, lensesOf, type NumberParameter, type Parameter } from "./kinds";
 
 /**
@@ -34,7 +36,8 @@ export type VolumeSettings = Readonly<typeof START_VOLUMES>;
 type Volumes = VolumeSettings &
   Readonly<{ canTrace: boolean; tiles: readonly Readonly<{ representation: string }>[] }>;
 
-const NO_FLOATS = "This device can't draw into textures of floats: light can't be gathered here.";
+const NO_FLOATS =
+  "This device can't gather light: its graphics can't draw into textures of floats.";
 /** One step of a distance, as a factor: near and far feel alike. */
 const DISTANCE_FACTOR = 1.1;
 
@@ -46,6 +49,15 @@ function modesOf({ tiles, canTrace }: Volumes): readonly Mode[] {
   return MODES.filter((mode) => (mode === "stage" ? isStaged : mode !== "traced" || canTrace));
 }
 
+const MODE_NAMES: Readonly<Record<Mode, string>> = {
+  disc: "Focus disc of volume",
+  tile: "One tile as volume",
+  all: "Volumes everywhere",
+  stage: "As set in the stage",
+  traced: "Volumes in natural light (path-traced)",
+  off: "Surfaces only",
+};
+
 export const MODE: ChoiceParameter<Volumes, Mode> = {
   kind: "choice",
   id: "mode",
@@ -54,18 +66,11 @@ export const MODE: ChoiceParameter<Volumes, Mode> = {
   link: "mode",
   ...lens("mode"),
   values: MODES,
-  names: {
-    disc: "Surfaces; near, a disc of volume",
-    tile: "Surfaces; near, one tile as volume",
-    all: "Volumes everywhere",
-    stage: "As the stage has it",
-    traced: "Volumes in natural light (path-traced)",
-    off: "Surfaces only",
-  },
+  names: MODE_NAMES,
   options: modesOf,
   fault: ({ canTrace }, mode) => (mode === "traced" && !canTrace ? NO_FLOATS : null),
   key: ["m", "Next mode: where volumes show"],
-  spoken: ({ mode }) => `Volumes: ${mode}`,
+  spoken: ({ mode }) => MODE_NAMES[mode],
 };
 
 const metres = (value: number) => `${value.toPrecision(2)} m`;
@@ -73,9 +78,8 @@ const metres = (value: number) => `${value.toPrecision(2)} m`;
 export const SWITCH_DISTANCE: NumberParameter<Volumes> = {
   kind: "number",
   id: "switch-distance",
-  label: "Switch distance",
-  name: () => "Switch distance: volumes show within",
-  about: "Nearer than this the disc or tile shows the volume; farther off, surfaces.",
+  label: "Volume distance",
+  name: () => "Volume distance: volumes show within",
   link: "switch",
   ...lens("switchDistance_m"),
   limits: [0.1, 10],
@@ -83,11 +87,10 @@ export const SWITCH_DISTANCE: NumberParameter<Volumes> = {
   isLogarithmic: true,
   rounded: (value) => Number(value.toPrecision(3)),
   text: metres,
-  refusal: ({ mode }) =>
-    mode === "disc" || mode === "tile" ? "" : "Only the modes Disc and Tile have one.",
+  refusal: ({ mode }) => (mode === "disc" || mode === "tile" ? "" : REFUSED.near),
   keys: {
-    less: ["s", "Smaller switch distance"],
-    more: ["S", "Larger switch distance"],
+    less: ["s", "Smaller volume distance"],
+    more: ["S", "Larger volume distance"],
     next: (value, direction) => Number((value * DISTANCE_FACTOR ** direction).toPrecision(3)),
   },
   spoken: ({ switchDistance_m }) => `Volumes within ${metres(switchDistance_m)}`,
@@ -98,35 +101,31 @@ const degrees = (value: number) => `${Number(value.toFixed(1))}°`;
 export const DISC_RADIUS: NumberParameter<Volumes> = {
   kind: "number",
   id: "disc-radius",
-  label: "Disc radius",
-  about: "Of the round window, in the middle of the view, in which volumes show.",
+  label: "Focus disc",
   link: "disc",
   ...lens("discRadius_deg"),
   limits: [2, 40],
   steps: 76,
   rounded: (value) => Number(value.toFixed(2)),
   text: degrees,
-  refusal: ({ mode }) => (mode === "disc" ? "" : "Only the mode Disc has one."),
+  refusal: ({ mode }) => (mode === "disc" ? "" : REFUSED.disc),
   keys: {
-    less: ["d", "Smaller disc"],
-    more: ["D", "Larger disc"],
+    less: ["d", "Smaller focus disc"],
+    more: ["D", "Larger focus disc"],
     next: (value, direction) => value + direction,
   },
-  spoken: ({ discRadius_deg }) => `Disc ${degrees(discRadius_deg)}`,
+  spoken: ({ discRadius_deg }) => `Focus disc ${degrees(discRadius_deg)}`,
 };
 
 export const COMPOSITING: ChoiceParameter<Volumes, Compositing> = {
   kind: "choice",
   id: "compositing",
   label: "Along a ray",
-  about:
-    "Of things behind one another: the front veils the rest, the brightest shows, or all add up.",
   link: "ray",
   ...lens("compositing"),
   values: COMPOSITINGS,
   names: { over: "Opacity", maximum: "Maximum", sum: "Sum" },
-  refusal: ({ mode }) =>
-    mode === "traced" || mode === "off" ? "Only volumes that are marched have one." : "",
+  refusal: ({ mode }) => (mode === "traced" || mode === "off" ? REFUSED.marched : ""),
   key: ["%", "Next: opacity, maximum or sum along a ray"],
   spoken: ({ compositing }) => `Along a ray: ${compositing}`,
 };
@@ -137,7 +136,6 @@ export const DEPTH_SHADING: NumberParameter<Volumes> = {
   kind: "number",
   id: "depth-shading",
   label: "Depth shading",
-  about: "What is enclosed is darker, and what lies before something throws a shadow on it.",
   link: "depth",
   ...lens("depthShading"),
   limits: [0, 1],
@@ -145,9 +143,9 @@ export const DEPTH_SHADING: NumberParameter<Volumes> = {
   rounded: (value) => Number(value.toFixed(2)),
   text: percent,
   refusal: ({ mode, compositing }) => {
-    if (mode === "traced" || mode === "off") return "Only volumes that are marched have one.";
-    if (mode !== "all") return "Beside surfaces volumes are lit as those are: choose All.";
-    return compositing === "over" ? "" : "Only opacity along a ray has one.";
+    if (mode === "traced" || mode === "off") return REFUSED.marched;
+    if (mode !== "all") return REFUSED.shaded;
+    return compositing === "over" ? "" : REFUSED.opacity;
   },
   keys: {
     less: ["PageDown", "Less depth shading"],

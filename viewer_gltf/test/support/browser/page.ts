@@ -18,9 +18,11 @@ export class ViewerPage {
     await this.page.evaluate(() => window.stereocell?.ready);
   }
 
-  /** A click that is no second one of a double click. */
+  /** A click that is no second one of a double click, and that no card of a click before it lies over. */
   async clickOnce(x: number, y: number): Promise<void> {
     await this.page.waitForTimeout(Math.max(0, this.clicked_ms + APART_MS - Date.now()));
+    const close = this.page.locator('[data-control="tap-close"]');
+    if (await close.isVisible()) await close.click();
     await this.page.mouse.click(x, y);
     this.clicked_ms = Date.now();
   }

@@ -49,7 +49,8 @@ export function difference(a: Picture, b: Picture): number {
 export async function withoutMarks<T>(page: Page, job: () => Promise<T>): Promise<T> {
   const show = (visibility: string) =>
     page.evaluate((value) => {
-      const marks = ".scale-bar, .orientation-mark, .name-mark, .said, .first-hint";
+      const marks =
+        ".scale-bar, .orientation-mark, .name-mark, .said, .first-hint, .tap-area, .view-message";
       for (const mark of document.querySelectorAll<HTMLElement | SVGElement>(marks)) {
         mark.style.visibility = value;
       }

@@ -34,11 +34,13 @@ async function slide({ random }: Reader, slider: Locator): Promise<void> {
   for (let i = 0; i < 3; i++) await slider.fill(String(Math.round(random() * most)));
 }
 
-async function work(reader: Reader, control: Locator): Promise<void> {
+/** @returns the control's name */
+async function work(reader: Reader, control: Locator): Promise<string> {
   const { random } = reader;
-  const [tag, type] = await control.evaluate((each) => [
+  const [tag, type, name] = await control.evaluate((each) => [
     each.tagName,
     (each as HTMLInputElement).type,
+    (each as HTMLElement).dataset.control ?? "",
   ]);
   if (tag === "SELECT") {
     const values = await control.evaluate((each) =>
@@ -55,6 +57,7 @@ async function work(reader: Reader, control: Locator): Promise<void> {
   } else if (tag === "BUTTON" || type === "checkbox" || type === "radio") {
     await control.evaluate((each) => (each as HTMLElement).click());
   }
+  return name;
 }
 
 async function someControl({ page, random }: Reader, selector: string): Promise<Locator | null> {
@@ -120,7 +123,7 @@ export const ACTS: readonly Act[] = [
     weight: 6,
     run: async (reader) => {
       const control = await someControl(reader, "[data-control]");
-      if (control !== null) await work(reader, control);
+      return control === null ? "none" : work(reader, control);
     },
   },
   {
@@ -216,6 +219,7 @@ export const IN_STEREO: readonly Act[] = [
 
 /** Enter the split screen; leave it. */
 export async function enterStereo({ page }: Reader): Promise<void> {
+  await page.evaluate(() => (document.activeElement as HTMLElement | null)?.blur()); // letters go to no field
   await page.keyboard.press("P");
   await page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
 }

@@ -21,7 +21,8 @@ export type Act = Readonly<{
   changes: readonly Change[];
   /** Of all acts, so many parts. */
   weight: number;
-  run: (reader: Reader) => Promise<void>;
+  /** @returns the name of the control, if it was one */
+  run: (reader: Reader) => Promise<unknown>;
 }>;
 
 /** Largest change of a length that is none, m: what is left of a glide. */

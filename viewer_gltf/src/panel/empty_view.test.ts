@@ -1,0 +1,123 @@
+import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../../test/support/fixture/manifest";
+import { cornersOf } from "../math/box";
+import { initialState } from "../state/initial_state";
+import { reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
+import { type Content, type EmptyView, emptyViewOf } from "./empty_view";
+
+const MANIFEST = sampleManifest(3);
+const start = initialState(MANIFEST);
+const [{ id: TILE, bounds_um }] = MANIFEST.tiles;
+const CONTENT: Content = {
+  tiles: MANIFEST.tiles,
+  opening: start,
+  outline: () => cornersOf(MANIFEST.specimen.bounds_um),
+  hasSurface: () => true,
+  hasVolume: () => true,
+  objectsLeft: () => null,
+};
+
+const each = (state: ViewerState, change: Partial<ViewerState["channels"][number]>) => ({
+  ...state,
+  channels: state.channels.map((channel) => ({ ...channel, ...change })),
+});
+
+/** The state that the button of an empty picture leads to. */
+function after(state: ViewerState, empty: EmptyView | null): ViewerState {
+  if (empty === null) throw new Error("the picture is not empty");
+  expect(empty.text).toMatch(/^[A-Z].*\.$/);
+  return empty.offer.to.reduce<ViewerState>((now, each) => {
+    if (typeof each === "string") throw new Error("no action");
+    return reduce(now, each);
+  }, state);
+}
+
+/** The sentence of a state whose button leads to a picture that shows something. */
+function explained(state: ViewerState, content: Content = CONTENT): string {
+  const empty = emptyViewOf(state, content);
+  expect(emptyViewOf(after(state, empty), content)).toBeNull();
+  return empty?.text ?? "";
+}
+
+describe("an empty picture", () => {
+  it("is none where something shows", () => {
+    expect(emptyViewOf(start, CONTENT)).toBeNull();
+    const alone = reduce(start, { type: "isolate", tile: TILE });
+    expect(emptyViewOf(alone, CONTENT)).toBeNull();
+  });
+
+  it("says that all channels are hidden, and brings those of the opening back", () => {
+    const hidden = each(start, { shown: false });
+    expect(explained(hidden)).toBe("All channels are hidden.");
+    const shown = ({ channels }: ViewerState) => channels.map((channel) => channel.shown);
+    expect(shown(after(hidden, emptyViewOf(hidden, CONTENT)))).toEqual(shown(start));
+  });
+
+  it("says that what is shown is transparent", () => {
+    expect(explained(each(start, { opacity: 0 }))).toContain("opacity of 0 %");
+  });
+
+  it("says that a cut leaves nothing, by a box or by a plane", () => {
+    const { min } = MANIFEST.specimen.bounds_um;
+    const beside = { min: [min[0] - 9, min[1], min[2]], max: [min[0] - 8, 0, 9] } as const;
+    const byBox = reduce(start, { type: "set-clip", clip: { box: beside, plane: null } });
+    expect(explained(byBox)).toBe("The cut leaves nothing of the specimen.");
+    const plane = { normal: [0, 0, 1], offset_um: min[2] } as const;
+    const byPlane = reduce(start, { type: "set-clip", clip: { box: null, plane } });
+    expect(explained(byPlane)).toBe("The cut leaves nothing of the specimen.");
+  });
+
+  it("sees that a cut leaves only the empty margin of the specimen", () => {
+    const { min, max } = MANIFEST.specimen.bounds_um;
+    const middle = (min[2] + max[2]) / 2;
+    const inside = { min: [min[0], min[1], middle], max } as const;
+    const content = { ...CONTENT, outline: () => cornersOf(inside) };
+    const plane = { normal: [0, 0, 1], offset_um: middle - 0.1 } as const;
+    const cut = reduce(start, { type: "set-clip", clip: { box: null, plane } });
+    expect(emptyViewOf(cut, CONTENT)).toBeNull();
+    expect(explained(cut, content)).toContain("The cut leaves nothing");
+  });
+
+  it("says that the only tile is cut away", () => {
+    const alone = reduce(start, { type: "isolate", tile: TILE });
+    const plane = { normal: [0, 0, 1], offset_um: bounds_um.min[2] } as const;
+    const cut = reduce(alone, { type: "set-clip", clip: { box: null, plane } });
+    expect(explained(cut)).toBe("The cut leaves nothing of row 1, column 1.");
+  });
+
+  it("says that the only tile, or the one for volumes, holds nothing", () => {
+    const bare = {
+      ...CONTENT,
+      hasSurface: (_: string, tile: string) => tile !== TILE,
+      hasVolume: (_: string, tile: string) => tile !== TILE,
+    };
+    const alone = reduce(start, { type: "isolate", tile: TILE });
+    expect(explained(alone, bare)).toContain("lies in row 1, column 1.");
+    const chosen = reduce({ ...start, mode: "tile" }, { type: "select", tile: TILE });
+    expect(explained(chosen, bare)).toContain("lies in row 1, column 1.");
+    // as long as nobody knows, nothing is said
+    expect(emptyViewOf(alone, { ...bare, hasVolume: () => null })).toBeNull();
+  });
+
+  it("says that the only tile has volumes alone, which show from near", () => {
+    const content = { ...CONTENT, hasSurface: () => false };
+    const alone = reduce(start, { type: "isolate", tile: TILE });
+    expect(explained(alone, content)).toContain("Volumes show from near.");
+  });
+
+  it("says that channels without surfaces have their volumes off", () => {
+    const off = { ...each(start, { hasSurface: false }), mode: "off" } as const;
+    expect(explained(off)).toContain("have no surface");
+    expect(explained(each(start, { hasSurface: false, volume: false }))).toContain("switched off");
+  });
+
+  it("says that all objects are left out, and shows them again", () => {
+    const state = reduce(each(start, { hasObjects: true }), {
+      ...{ type: "objects", channel: "c0", change: { only: [], hidden: [1] } },
+    });
+    const content = { ...CONTENT, objectsLeft: () => 0 };
+    const next = after(state, emptyViewOf(state, content));
+    expect([next.objects.c0.only, next.objects.c0.hidden]).toEqual([null, []]);
+  });
+});

@@ -1,0 +1,97 @@
+import { readdirSync, readFileSync } from "node:fs";
+import { describe, expect, it } from "vitest";
+import { FLAT_FACTS } from "../../test/support/fixture/facts";
+import { sampleManifest } from "../../test/support/fixture/manifest";
+import { STAYS } from "../state/commands";
+import { initialState } from "../state/initial_state";
+import { CHANNEL } from "../state/parameters/channel";
+import { PARAMETERS } from "../state/parameters/table";
+import { REFUSED } from "../state/refusals";
+import type { ViewerState } from "../state/viewer_state";
+import { type Control, START_VIEW } from "./controls";
+import { EXPLAINED, isExplained } from "./explained";
+import { CHOICES, EXPLANATIONS, explanationOf, explanationOfChoice } from "./explanations";
+import { KEYS } from "./keys";
+import { layOut } from "./layout";
+
+const start = initialState(sampleManifest(3));
+const STATES: readonly ViewerState[] = (["disc", "tile", "all", "traced", "off"] as const).map(
+  (mode) => ({ ...start, mode }),
+);
+const CONTROLS: readonly Control[] = STATES.flatMap((state) =>
+  layOut(state, FLAT_FACTS, { ...START_VIEW, picked: "c0" })
+    .sections.flatMap(({ items }) => items)
+    .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item])),
+);
+
+/** Functions that the pipeline writes, by its sources. */
+function functionsOfPipeline(): readonly string[] {
+  const folder = new URL("../../../pipeline/stereocell/transfer/", import.meta.url);
+  const sources = readdirSync(folder).filter(
+    (name) => name.endsWith(".py") && name !== "windows.py",
+  );
+  return sources.flatMap((name) => {
+    const text = readFileSync(new URL(name, folder), "utf8");
+    const names = [...text.matchAll(/^(?:NAMES?|THRESHOLD) = (.+)$/gm)].map(([, value]) => value);
+    const tissues = /^TISSUES[^{]*\{([^}]*)\}/m.exec(text)?.[1] ?? "";
+    const keys = [...tissues.matchAll(/"(\w+)":/g)].map(([, key]) => key);
+    return [
+      ...names.flatMap((value) => [...value.matchAll(/"(\w+)"/g)].map(([, each]) => each)),
+      ...keys,
+    ];
+  });
+}
+
+describe("the explanations", () => {
+  it("are there for each control that has a question mark, in whole sentences", () => {
+    expect(Object.keys(EXPLANATIONS).toSorted()).toEqual(EXPLAINED.toSorted());
+    const asked = new Set(CONTROLS.map(({ id }) => id).filter(isExplained));
+    expect(asked.size).toBeGreaterThan(12);
+    for (const id of asked) expect(explanationOf(id), id).toMatch(/^[A-Z0-9].*\.$/);
+  });
+
+  it("are there for each setting whose name can't say it all", () => {
+    // what these do, anyone sees: of another the table has to say it
+    const plain =
+      /^(color|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|sharpness|lamp|post).*|lamp-.*)$/;
+    const silent = [...PARAMETERS, ...CHANNEL].filter(
+      ({ id, about }) => !about && !isExplained(id),
+    );
+    expect(silent.map(({ id }) => id).filter((id) => !plain.test(id))).toEqual([]);
+  });
+
+  it("say of each mode and each transfer function what one will see", () => {
+    for (const control of CONTROLS) {
+      if (control.kind !== "choice" || !(control.id in CHOICES)) continue;
+      for (const { value } of control.options) {
+        expect(explanationOfChoice(control.id, value), value).toMatch(/^[A-Z].*\.$/);
+      }
+    }
+    const names = functionsOfPipeline();
+    expect(names.length).toBeGreaterThan(10);
+    for (const name of names) expect(Object.keys(CHOICES["transfer-function"])).toContain(name);
+    expect(explanationOfChoice("c0/transfer-function", "my own")).toContain(
+      "came with this bundle",
+    );
+  });
+});
+
+describe("the words of the panel", () => {
+  /** Terms of the code, and what HOUSE's glossary calls otherwise, as whole words. */
+  const PRIVATE =
+    /\b(switch distance|brick|mip|LOD|march\w*|stand-in|wish|rung|ladder|quad|texel|anew|once more|by turns|spoilt)\b/i;
+
+  it("are those of the field, without terms of the code", () => {
+    const ofControls = CONTROLS.flatMap(({ id: _, ...control }) =>
+      [control.label, control.name, control.refusal, control.about]
+        .concat(control.kind === "choice" ? control.options.map(({ label }) => label) : [])
+        .filter((text) => text !== undefined),
+    );
+    const ofKeys = KEYS.flatMap(({ name, keys }) => [name, ...keys.map(({ label }) => label)]);
+    const others = [EXPLANATIONS, ...Object.values(CHOICES), REFUSED, STAYS].flatMap((table) =>
+      Object.values(table),
+    );
+    const found = [...ofControls, ...ofKeys, ...others].filter((text) => PRIVATE.test(text));
+    expect(found).toEqual([]);
+  });
+});

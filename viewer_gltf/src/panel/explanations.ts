@@ -1,0 +1,92 @@
+/**
+ * What each setting does, and what one will see of each choice, in plain words. A part of the code by itself, loaded
+ * when somebody first asks. Pure.
+ */
+
+/** By the last part of a control's ID. */
+export const EXPLANATIONS: Readonly<Record<string, string>> = {
+  mode: "Where the specimen shows its surfaces, and where its volumes.",
+  "switch-distance":
+    "From nearer than this, the focus disc or the tile shows the volume. From farther away it shows surfaces.",
+  "disc-radius":
+    "Half of the angle that the round window in the middle of the view takes. Volumes show inside it.",
+  compositing: "What one sees of things that lie behind one another.",
+  "depth-shading":
+    "Enclosed places are darker, and things that lie before others throw shadows on them.",
+  volume: "Switched off, the channel stays a surface in every mode.",
+  "transfer-function": "Which values of the volume are visible, and how dense they look.",
+  opacity: "How dense the channel looks, as a surface and as a volume.",
+  window: "The values that are darkest and brightest. A narrower window has more contrast.",
+  tool: "What a click, a tap or a resting gaze does on the specimen.",
+  "measure-kind": "What the next measurement will be.",
+  quality: "How finely volumes are drawn while the view moves.",
+  dwell: "In stereo, looking at something for 1.5 s is the same as pressing a button.",
+  "eye-distance":
+    "The distance between your pupils, for the split screen. A headset knows its own.",
+  "stereo-strength": "100 % is as your eyes see it. At 0 % both eyes see the same.",
+  "specimen-size": "The length of the specimen's longest edge in stereo.",
+  letters: "Switched off, only ?, the arrows, Escape and keys with Ctrl work.",
+};
+
+/** What one will see of each choice, by the last part of the control's ID and the choice. */
+export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>> = {
+  mode: {
+    disc: "Surfaces from afar. From near, a round window in the middle shows the volume.",
+    tile: "Surfaces from afar. From near, the tile that you chose or look at shows its volume.",
+    all: "Translucent volumes in every tile, from any distance.",
+    stage: "Each tile as an artist has set it: surface, volume or both.",
+    traced: "Volumes with soft shadows, as in a photograph. The picture clears up at rest.",
+    off: "Surfaces alone, which draw fastest.",
+  },
+  compositing: {
+    over: "What lies in front veils what lies behind.",
+    maximum: "Only the brightest place behind each point shows, as in a maximum projection.",
+    sum: "The light of all places adds up, as in an X-ray, and nothing veils.",
+  },
+  "transfer-function": {
+    default: "The background is clear, the material translucent, its bright parts denser.",
+    soft: "A thin veil: faint material shows too, and the inside stays visible.",
+    sharp: "A solid body with a crisp edge, almost opaque.",
+    surface: "A thin shell where the surface lies. Inside and outside are clear.",
+    threshold: "All that is brighter than the channel's threshold, and nothing below it.",
+    arcs: "Boundaries between materials, found by how steeply the values rise there.",
+    heat: "Little is dark red, much is bright, as PET and SPECT are read.",
+    grey: "Tissues in shades of grey, as on a slice.",
+    tissues: "Skin, muscle and bone in colours of their own.",
+    air: "Only what is as thin as air, such as lungs and sinuses.",
+    fat: "Only what has the density of fat.",
+    soft_tissue: "Only what has the density of muscles and organs.",
+    blood: "Only what has the density of blood.",
+    bone: "Only what is as dense as bone.",
+    own: "The shapes that you drew in the plane of value and gradient.",
+  },
+  tool: {
+    select: "A card names what lies there, and hides, recolours or isolates it.",
+    measure: "Each point adds to a length, an angle or a line.",
+  },
+  "measure-kind": {
+    distance: "The length between two points.",
+    angle: "The angle at the second of three points.",
+    line: "The length of a line through several points.",
+  },
+  quality: {
+    auto: "As finely as this device can draw in time.",
+    low: "Coarse, for slow devices.",
+    high: "As finely as possible, however slowly.",
+  },
+};
+
+/** A choice that the table does not have was named by whoever made the bundle. */
+const OF_THE_BUNDLE = "A transfer function that came with this bundle.";
+
+const lastPart = (id: string) => id.slice(id.lastIndexOf("/") + 1);
+
+export function explanationOf(id: string): string {
+  return EXPLANATIONS[lastPart(id)] ?? "";
+}
+
+/** What one will see of a choice; "": nothing needs to be said. */
+export function explanationOfChoice(id: string, value: string): string {
+  const part = lastPart(id);
+  return CHOICES[part]?.[value] ?? (part === "transfer-function" ? OF_THE_BUNDLE : "");
+}

@@ -1,0 +1,65 @@
+/** A question mark beside a control's label, which opens the explanation below it. */
+import { element } from "../../dom/element";
+import type { Control } from "../controls";
+import { isExplained } from "../explained";
+
+const load = () => import("../explanations");
+
+export type Explainer = Readonly<{ button: HTMLElement; note: HTMLElement }>;
+
+/** null: the control needs no explanation. */
+export function explainerOf(control: Control): Explainer | null {
+  const { id, label, name = label, about } = control;
+  if (about === undefined && !isExplained(id)) return null;
+  const note = element("div", { className: "explanation", role: "note", hidden: true });
+  const button = element(
+    "button",
+    { type: "button", className: "explain", textContent: "?", ariaLabel: `About: ${name}` },
+    { explain: id },
+  );
+  button.ariaExpanded = "false";
+  button.addEventListener("click", async (event) => {
+    event.preventDefault(); // the label around it would work the control
+    const isOpen = button.ariaExpanded === "true";
+    button.ariaExpanded = String(!isOpen);
+    if (note.childElementCount === 0) note.replaceChildren(...(await linesOf(control)));
+    note.hidden = isOpen;
+  });
+  return { button, note };
+}
+
+async function linesOf(control: Control): Promise<readonly HTMLElement[]> {
+  const { id, about } = control;
+  const { explanationOf, explanationOfChoice } = await load();
+  const lines = [element("p", { textContent: about ?? explanationOf(id) })];
+  if (control.kind !== "choice") return lines;
+  for (const { value, label } of control.options) {
+    const text = explanationOfChoice(id, value);
+    if (text === "") continue;
+    lines.push(element("p", {}, {}, element("b", { textContent: label }), ` ${text}`));
+  }
+  return lines;
+}
+
+/** Give each option of a list a tooltip, as soon as somebody comes near the list. */
+export function explainOptions(select: HTMLSelectElement, { id }: Control): void {
+  if (!isExplained(id)) return;
+  const explain = async () => {
+    const { explanationOfChoice } = await load();
+    for (const option of select.options) option.title = explanationOfChoice(id, option.value);
+  };
+  for (const kind of ["pointerenter", "focus"]) select.addEventListener(kind, () => void explain());
+}
+
+/** A control with its question mark in the same row, and the note below; the control alone where there is none. */
+export function withExplainer(control: Control, root: HTMLElement): HTMLElement {
+  const explainer = explainerOf(control);
+  if (explainer === null) return root;
+  return element("div", { className: "explained" }, {}, root, explainer.button, explainer.note);
+}
+
+/** A control whose label has the question mark, with the note below. */
+export function withNote(root: HTMLElement, explainer: Explainer | null): HTMLElement {
+  if (explainer === null) return root;
+  return element("div", { className: "explained" }, {}, root, explainer.note);
+}

@@ -1,0 +1,75 @@
+import { describe, expect, it } from "vitest";
+import { sampleManifest } from "../../test/support/fixture/manifest";
+import { initialState } from "../state/initial_state";
+import { reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
+import type { Control, Wish } from "./controls";
+import { type TapCardContent, tapCardOf } from "./tap_card";
+
+const start = initialState(sampleManifest(3));
+const [{ id: tile }] = start.tiles;
+
+const labels = ({ controls }: TapCardContent) => controls.map(({ label }) => label);
+
+function pressed(state: ViewerState, control: Control | undefined): ViewerState {
+  if (control?.kind !== "button") throw new Error("no button");
+  const wish: Wish = control.to();
+  if (typeof wish === "string" || "panel" in wish) throw new Error("no action");
+  return reduce(state, wish);
+}
+
+describe("the card of a tapped place", () => {
+  it("offers to hide the channel, and to show it again", () => {
+    const content = tapCardOf(start, { tile, channel: "c0" }, null);
+    const { name } = start.channels[0];
+    expect(content.title).toBe(name);
+    const hide = content.controls.find(({ id }) => id === "tap-hide");
+    expect(hide?.label).toBe(`Hide ${name}`);
+    const hidden = pressed(start, hide);
+    expect(hidden.channels[0].shown).toBe(false);
+    expect(labels(tapCardOf(hidden, { tile, channel: "c0" }, null))).toContain(`Show ${name}`);
+  });
+
+  it("offers eight colours that no other channel has", () => {
+    const { controls } = tapCardOf(start, { tile, channel: "c0" }, null);
+    const colours = controls.find(({ kind }) => kind === "colour");
+    if (colours?.kind !== "colour") throw new Error("no colours");
+    const hexes = colours.palettes.flatMap(({ colors }) => colors.map(({ hex }) => hex));
+    expect(new Set(hexes).size).toBe(8);
+    for (const { name } of colours.palettes[0].colors) expect(name).not.toBe("");
+  });
+
+  it("says of a single tile nothing about tiles", () => {
+    const alone = { ...start, tiles: start.tiles.slice(0, 1) };
+    const { subtitle, controls } = tapCardOf(alone, { tile, channel: "c0" }, null);
+    expect(subtitle).toBe("");
+    expect(controls.map(({ id }) => id)).not.toContain("tap-isolate");
+  });
+
+  it("names an object and its label map, shows it alone, and all again", () => {
+    const channels = start.channels.map((each) => ({ ...each, hasObjects: true }));
+    const state = { ...start, channels };
+    const tapped = { tile, channel: "c0", object: { row: 4, name: "Cell 105" } };
+    const content = tapCardOf(state, tapped, null);
+    expect([content.title, content.subtitle]).toEqual([
+      "Cell 105",
+      expect.stringContaining(channels[0].name),
+    ]);
+    const only = pressed(
+      state,
+      content.controls.find(({ id }) => id === "tap-only-object"),
+    );
+    expect(only.objects.c0.only).toEqual([4]);
+    const back = tapCardOf(only, tapped, null).controls.find(({ id }) => id === "tap-only-object");
+    expect(pressed(only, back).objects.c0.only).toBeNull();
+    // its colours are a column's, which a colour of the channel would not change
+    expect(content.controls.some(({ kind }) => kind === "colour")).toBe(false);
+  });
+
+  it("undoes the last change, and says why it can't", () => {
+    const undo = (text: string | null) =>
+      tapCardOf(start, { tile, channel: null }, text).controls.find(({ id }) => id === "tap-undo");
+    expect(undo("only tile")?.label).toBe("Undo: only tile");
+    expect(undo(null)?.refusal).toMatch(/^[A-Z].*\.$/);
+  });
+});

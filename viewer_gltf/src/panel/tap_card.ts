@@ -1,0 +1,112 @@
+/** The card beside a tapped place, as plain data: what lies there, and what can be done with it. Pure. */
+import { toHex } from "../math/color";
+import { START_OBJECTS } from "../state/objects";
+import { COLOR } from "../state/parameters/channel";
+import { REFUSED } from "../state/refusals";
+import { tileName } from "../state/tile_name";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
+import { colourOf } from "./control_templates";
+import type { Button, Control, Wish } from "./controls";
+import { labelMapsOf, objectsSection } from "./layout";
+import { freeColours, nameOfColour } from "./palettes";
+
+/** What a ray from a tap meets. */
+export type Tapped = Readonly<{
+  tile: string;
+  /** null: the place is inside a tile, but nothing shows there. */
+  channel: string | null;
+  /** An object of a label map: its row in the table, and its name there. */
+  object?: Readonly<{ row: number; name: string }>;
+}>;
+
+export type TapCardContent = Readonly<{
+  title: string;
+  /** Where the place is; empty: there is nothing to add. */
+  subtitle: string;
+  controls: readonly Control[];
+}>;
+
+/** @param undo the change that undoing takes back, in words; null: there is none */
+export function tapCardOf(
+  state: ViewerState,
+  { tile, channel: id, object }: Tapped,
+  undo: string | null,
+): TapCardContent {
+  const channel = state.channels.find((each) => each.id === id);
+  const place = state.tiles.length > 1 ? `Tile in ${tileName(tile)}` : "";
+  const titles = [object?.name, channel?.name, place].filter((each) => each !== undefined);
+  const [title, ...rest] = titles.filter((each) => each !== "");
+  const controls = [
+    ...(object === undefined || channel === undefined
+      ? []
+      : objectControls(state, channel.id, object.row)),
+    ...tileControls(state, tile),
+    ...(channel === undefined ? [] : channelControls(state, channel)),
+    undoButton(undo),
+  ];
+  return { title: title ?? "Nothing shows here", subtitle: rest.join(" · "), controls };
+}
+
+function button(id: string, label: string, wish: Wish): Button {
+  return { kind: "button", id: `tap-${id}`, label, to: () => wish };
+}
+
+function tileControls({ tiles, isolated }: ViewerState, tile: string): readonly Control[] {
+  if (tiles.length < 2) return [];
+  return isolated === null
+    ? [button("isolate", "Only this tile", { type: "isolate", tile })]
+    : [button("isolate", "All tiles", { type: "isolate", tile: null })];
+}
+
+function channelControls(state: ViewerState, channel: ChannelState): readonly Control[] {
+  const { id, name, shown } = channel;
+  const hide = button("hide", `${shown ? "Hide" : "Show"} ${name}`, {
+    type: "show",
+    channel: id,
+    shown: !shown,
+  });
+  // the colours of a column take the place of the channel's
+  const isPlain = !channel.hasObjects || state.objects[id]?.colorBy === "";
+  return shown && isPlain ? [hide, coloursOf(state, channel)] : [hide];
+}
+
+/** Eight colours that no other channel has. */
+function coloursOf({ channels }: ViewerState, channel: ChannelState): Control {
+  const others = channels.filter(({ id }) => id !== channel.id).map(({ color }) => toHex(color));
+  const colors = freeColours(others).map((hex) => ({ hex, name: nameOfColour(hex) }));
+  return {
+    ...colourOf(COLOR, channel, channel.id),
+    id: "tap-colour",
+    label: `Colour of ${channel.name}`,
+    palettes: [{ name: `Colour of ${channel.name}`, colors }],
+  };
+}
+
+function objectControls(state: ViewerState, channel: string, row: number): readonly Control[] {
+  const { only, hidden } = state.objects[channel] ?? START_OBJECTS;
+  const change = (change: Partial<typeof START_OBJECTS>): Wish => ({
+    ...{ type: "objects", channel, change },
+  });
+  const section = objectsSection(channel, labelMapsOf(state).length);
+  const isHidden = hidden.includes(row);
+  const left = hidden.filter((each) => each !== row);
+  return [
+    only === null
+      ? button("only-object", "Only this object", change({ only: [row] }))
+      : button("only-object", "All objects", change({ only: null })),
+    isHidden
+      ? button("hide-object", "Show this object", change({ hidden: left }))
+      : button("hide-object", "Hide this object", change({ hidden: [...hidden, row] })),
+    button("values", "Its values", {
+      ...{ panel: "reveal", section, control: `${channel}/objects-card` },
+    }),
+  ];
+}
+
+function undoButton(undo: string | null): Control {
+  return {
+    ...button("undo", undo === null ? "Undo" : `Undo: ${undo}`, "undo"),
+    isStep: true,
+    refusal: undo === null ? REFUSED.undo : "",
+  };
+}

@@ -1,0 +1,56 @@
+/** What leads on from a refusal: the button beside its sentence. Pure. */
+import type { Box } from "../math/box";
+import { setTo } from "../state/parameters/kinds";
+import { TRACED_ALONE } from "../state/parameters/light";
+import { SLICE_PICTURES } from "../state/parameters/slices";
+import { TOOL } from "../state/parameters/tools";
+import { COMPOSITING, MODE, type Mode } from "../state/parameters/volumes";
+import { REFUSED } from "../state/refusals";
+import { tileName } from "../state/tile_name";
+import type { ViewerState } from "../state/viewer_state";
+import type { Offer } from "./controls";
+import { middlePlane } from "./layout";
+
+export type WayOn = Readonly<{
+  state: ViewerState;
+  /** The specimen, or the tile that is shown alone, um. */
+  shown: Box;
+  /** Rows of the objects that show, by channel. */
+  objects: ReadonlyMap<string, readonly number[]>;
+}>;
+
+const mode = (label: string, value: Mode) => (): Offer => ({ label, to: [setTo(MODE, value)] });
+const EVERYWHERE = mode("Show volumes everywhere", "all");
+const measure = (): Offer => ({ label: "Measure", to: [setTo(TOOL, "measure")] });
+
+const WAYS: Readonly<Record<string, (now: WayOn) => Offer>> = {
+  [REFUSED.tile]: ({ state: { middle } }) => ({
+    label: `Only ${tileName(middle)}`,
+    to: [{ type: "isolate", tile: middle }],
+  }),
+  [REFUSED.near]: mode("Show a focus disc", "disc"),
+  [REFUSED.disc]: mode("Show a focus disc", "disc"),
+  [REFUSED.marched]: EVERYWHERE,
+  [REFUSED.shaded]: EVERYWHERE,
+  [REFUSED.opacity]: () => ({ label: "Choose Opacity", to: [setTo(COMPOSITING, "over")] }),
+  [TRACED_ALONE]: mode("Show natural light", "traced"),
+  [REFUSED.slices]: () => ({ label: "Show slices", to: [setTo(SLICE_PICTURES, true)] }),
+  [REFUSED.measuring]: measure,
+  [REFUSED.measured]: measure,
+  [REFUSED.cut]: ({ state: { clip }, shown }) => ({
+    label: "Cut by a plane",
+    to: [{ type: "set-clip", clip: { ...clip, plane: middlePlane(shown) } }],
+  }),
+  [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }),
+  [REFUSED.objects]: ({ objects }) => ({
+    label: "Select all that show",
+    to: [...objects].map(([channel, selected]) => ({
+      ...{ type: "objects", channel, change: { selected } },
+    })),
+  }),
+};
+
+/** null: nothing leads on but what the sentence says. */
+export function offerFor(refusal: string, now: WayOn): Offer | null {
+  return WAYS[refusal]?.(now) ?? null;
+}

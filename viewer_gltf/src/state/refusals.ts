@@ -1,0 +1,35 @@
+/**
+ * Why a request does nothing now, each a sentence that names what is missing and what to do about it. One table, so
+ * that panel, keys and the button beside the sentence agree. Pure.
+ */
+
+const MODES = "under Surfaces and volumes";
+
+export const REFUSED = {
+  tile: "No tile is chosen, and none is in the middle of the view: choose one under Tiles.",
+  tileAhead: "No tile is in the middle of the view.",
+  back: "No tile is chosen, so there is nothing to go back from.",
+  near: `This mode shows volumes at every distance, or none: choose one with near volumes ${MODES}.`,
+  disc: `This mode has no focus disc: choose the one that has it ${MODES}.`,
+  marched: `This mode draws no translucent volumes: choose “Volumes everywhere” ${MODES}.`,
+  shaded: `Volumes beside surfaces have no depth shading: choose “Volumes everywhere” ${MODES}.`,
+  opacity: "Depth shading needs Opacity: choose it above, where rays are set.",
+  transfer: "This channel is drawn as a surface: switch its volume on for transfer functions.",
+  transferless: "This channel has no transfer function.",
+  slices: "No slices are shown: switch pictures or planes on under Slices.",
+  measuring: "A tap selects now: choose Measure first.",
+  measured: "Nothing is measured yet: choose Measure (p), then two points.",
+  points: "The measurement needs more points: choose them first.",
+  cut: "Nothing is cut open yet: cut by a box (b) or by a plane (n).",
+  views: "No view is kept yet: keep this one (').",
+  objects: "No object is selected: select some first.",
+  channel: "No channel is shown: switch one on under Channels.",
+  page: "All channels fit on one page.",
+  notice: "There is no notice to dismiss.",
+  failed: "Nothing has failed to load.",
+  shape: "There is no shape yet: add a rectangle (Q) or a triangle (Y).",
+  volumes: "This bundle has objects alone, and no volume.",
+  undo: "There is nothing to undo.",
+  redo: "There is nothing to redo.",
+  key: "This key changes nothing now.",
+} as const;
