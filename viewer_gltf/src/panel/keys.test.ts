@@ -118,6 +118,7 @@ describe("the keys", () => {
       room: true,
       undo: true,
       redo: true,
+      "full-screen": true,
       split: true,
       scan: true,
       share: true,
@@ -186,9 +187,11 @@ describe("the keys", () => {
       lenses: true,
       hide: true,
       help: true,
+      reveal: false,
       find: false,
       code: false,
       letters: false, // a key could not switch it back on
+      keys: false, // the list of keys has it
       unfold: false,
     };
     for (const [panel, isWanted] of Object.entries(wanted)) {
@@ -333,7 +336,7 @@ describe("the keys", () => {
     expect(after("o")).toBe("Marker 0: opacity 95 %");
     expect(after("e")).toBe("Marker 0: window 100 – 1104");
     expect(after("1")).toBe("Marker 0: hidden");
-    expect(after("D")).toBe("Focus disc 13°");
+    expect(after("D")).toBe("Focus disc 17°");
     expect(after("b")).toBe("Not cut");
     expect(after("n")).toBe("Cut by a box and a plane");
     expect(after(".")).toBe("Box: x from 1.00 µm");

@@ -118,6 +118,19 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
   };
 }
 
+/** A label map that is shown has its section from the start, so that no row moves when its table has come. */
+const LOADING: Section["items"] = [
+  { kind: "text", id: "objects-loading", label: "Objects", value: "loading …" },
+];
+
+/** The ID of the section of a label map, where so many are shown. */
+export function objectsSection(channel: string, count: number): string {
+  return count === 1 ? "objects" : `objects/${channel}`;
+}
+
+export const labelMapsOf = ({ channels }: ViewerState) =>
+  channels.filter(({ shown, hasObjects }) => shown && hasObjects);
+
 type Make = (id: string, label: string, items: Section["items"]) => Section;
 
 function firstSections(
@@ -133,11 +146,11 @@ function firstSections(
     section("notices", "Notices", isStereo ? noticeItems(state) : []),
     ...(isPatient && !isStereo ? [slices] : []),
     section("channels", "Channels", channelItems(state, facts, view)),
-    ...(facts.objects ?? []).map(({ id, name, items }, _, { length }) =>
-      length === 1
-        ? section("objects", "Objects", items)
-        : section(`objects/${id}`, `Objects: ${name}`, items),
-    ),
+    ...labelMapsOf(state).map(({ id, name }, _, { length }) => {
+      const ofMap = facts.objects?.find((each) => each.id === id)?.items;
+      const label = length === 1 ? "Objects" : `Objects: ${name}`;
+      return section(objectsSection(id, length), label, ofMap ?? (isStereo ? [] : LOADING));
+    }),
     section("volumes", "Surfaces and volumes", hasAny ? [controlOf(MODE, state)] : []),
     section("tiles", "Tiles", tileItems(state, facts.focusTile)),
     section("cut", "Cut open", cutItems(state, facts.shown)),
@@ -171,7 +184,7 @@ function deeperSections(
       "Volume settings",
       ofVolumes([...controlsOf(settings, state), discNow(state, facts)]),
     ),
-    section("light", "Light", ofVolumes(lightItems(state, view, facts.isStereo))),
+    section("light", "Path tracing", ofVolumes(lightItems(state, view, facts.isStereo))),
     section("share", "Share and keys", [
       command("share", "Copy a link to this view"),
       ...(view.link === ""
@@ -283,7 +296,7 @@ function aboutItems(facts: Facts): readonly Control[] {
       kind: "text",
       id: "volume-detail",
       label: "Volumes",
-      value: volumeLevel === null ? "" : volumesText(volumeLevel),
+      value: volumeLevel === null ? "none" : volumesText(volumeLevel),
     },
   ];
   if (settings !== null) {
@@ -308,7 +321,7 @@ function samplesText(samples: number): string {
 }
 
 function trianglesText(triangles: number): string {
-  if (triangles === 0) return "";
+  if (triangles === 0) return "none";
   if (triangles < 1000) return `${triangles} triangles`;
   return `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`;
 }
@@ -334,6 +347,6 @@ const STATUS: Readonly<Record<ViewerState["mode"], string>> = {
   tile: "Surfaces, one tile as volume from near",
   all: "Volumes",
   stage: "As set in the stage",
-  traced: "Volumes, path-traced",
+  traced: "Volumes, path tracing",
   off: "Surfaces",
 };
