@@ -74,7 +74,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture careless bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -295,6 +295,11 @@ torture: setup ## 50 builds killed, evenly over their phases; all malformed inpu
 	$(SUPPORT).torture 50
 	$(BIN)/python tests/malformed
 	$(BIN)/python tests/malformed/sweep.py
+
+careless: setup browser ## Ten minutes of scripted, careless use of a built bundle's page:  [OUT=out/demo] (figures in out/careless.json)
+	out="$$(realpath -- "$$OUT")" && report="$$PWD/out/careless.json" && cd $(VIEWER) && \
+	  STEREOCELL_TEST_BUNDLE="$$out/bundle" STEREOCELL_CARELESS_S=600 STEREOCELL_CARELESS_REPORT="$$report" \
+	  npm exec --silent -- vitest run --project built test/page/careless.built.test.ts -t asked
 
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py

@@ -13,7 +13,7 @@ import pytest
 from stereocell.cli.__main__ import main
 from stereocell.export import volume_files
 from stereocell.export.options import ExportOptions, parse_region
-from stereocell.export.write import FORMATS, export_stage
+from stereocell.export.write import FORMATS, PAGE_TAKES, export_stage
 from stereocell.model.errors import OutputError, UsageError
 from support.exhaustive import sweep
 
@@ -95,7 +95,8 @@ def test_no_part_of_a_build_and_no_edit_is_written_over(
 
 def test_every_ending_says_its_own_options_in_the_flags_of_the_command() -> None:
     known = {field.name for field in fields(ExportOptions)}
-    assert set().union(*(way.takes for way in FORMATS.values())) | {"channels"} == known
+    takes = (way.takes for way in FORMATS.values())
+    assert PAGE_TAKES.union(*takes) | {"channels"} == known
 
 
 def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

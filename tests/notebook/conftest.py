@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from stereocell.bundle import blob_page
 from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.notebook import page
@@ -33,9 +34,9 @@ def built_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path
         "assets/viewer-1.js.br": "other",
     }.items():
         (folder / name).write_text(content)
-    monkeypatch.setattr(page, "viewer_dist", lambda: folder)
-    page.files.cache_clear()
+    monkeypatch.setattr(blob_page, "viewer_dist", lambda: folder)
+    blob_page.files.cache_clear()
     page.key.cache_clear()
     yield folder
-    page.files.cache_clear()
+    blob_page.files.cache_clear()
     page.key.cache_clear()

@@ -69,9 +69,9 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
 
 def test_a_build_that_nobody_keeps_goes_when_python_ends(built_page, tmp_path):
     code = BALLS + (
-        "from stereocell.notebook import page\n"
+        "from stereocell.bundle import blob_page\n"
         "from stereocell.report import phase; phase.run_report = lambda out: None\n"
-        f"from pathlib import Path; page.viewer_dist = lambda: Path({str(built_page)!r})\n"
+        f"from pathlib import Path; blob_page.viewer_dist = lambda: Path({str(built_page)!r})\n"
         "import tempfile; viewer = stereocell.show(ball, spacing_um=(.5, .25, .25))\n"
         "print(viewer._files.answer('manifest.json')[0])\n"
         "print(len(list(Path(tempfile.gettempdir()).iterdir())))"

@@ -20,7 +20,7 @@ from PIL import Image
 from pxr import Sdf
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
-_DATA_URI = re.compile(rb"base64,([A-Za-z0-9+/=]{40,})")
+_DATA_URI = re.compile(rb"(?:base64,|octet-stream\"[^>]*>)([A-Za-z0-9+/=]{40,})")
 
 
 def forms(word: str) -> dict[str, re.Pattern[bytes]]:

@@ -9,7 +9,7 @@ from stereocell.cli.__main__ import main
 from support import phantoms
 
 # Endings that are exported once each. Films are left out: they take long.
-EXPORTS = (".glb", ".stl", ".obj", ".usda", ".usdz", ".png", ".nrrd", ".nii.gz", ".raw")
+EXPORTS = (".glb", ".stl", ".obj", ".usda", ".usdz", ".png", ".nrrd", ".nii.gz", ".raw", ".html")
 
 
 @dataclass(frozen=True, slots=True)

@@ -189,6 +189,7 @@ def test_no_identity_is_in_any_byte_of_what_a_build_leaves(
     assert main(["build", str(series), "-o", str(out), "--workers", "1", "--grid", "2x1"]) == 0
     assert main(["slices", str(series), "-o", str(out / "slices")]) == 0
     assert main(["build", str(series), "-o", str(out), "--series", "list"]) == 0
+    assert main(["export", str(out), str(out / "scene.html")]) == 0
     library = BrickLibrary(out / "bundle", out / "bricks")  # as `serve` caches it
     for tile, channel in library.volumes():
         library.open(tile, channel)

@@ -10,7 +10,7 @@ import pytest
 from stereocell import samples
 from stereocell.cli.__main__ import main
 from stereocell.cli.places import PLACES
-from stereocell.export.write import FORMATS
+from stereocell.export.write import ENDINGS
 from support.digests import digests_of
 from support.outputs import make_build, make_source
 
@@ -40,7 +40,7 @@ def _writing(name: str) -> dict[str, tuple[str, Given]]:
     if name == "export":
         return {
             f"export {ending}": (ending, lambda _, build, place: [name, build, place])
-            for ending in FORMATS
+            for ending in ENDINGS
         }
     if name == "publish":
         return {name: ("", lambda _, build, place: [name, build, place])}
@@ -66,6 +66,7 @@ BEGINNINGS = (
     "building.tissue._learn",
     "bundle.write.write_bundle",
     "export.write.Chosen",
+    "export.write.write_scene",
     "preview.iso_value.measure_window",
     "preview.png_slices.cut_planes",
     "publish.publish._require_whole",

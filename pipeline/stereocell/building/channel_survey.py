@@ -65,6 +65,7 @@ from stereocell.isosurface.options import CONNECTED
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.lattice_field import make_iso_field
+from stereocell.model.modality import SEGMENTATION
 from stereocell.model.tiling import Tile
 from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed
@@ -212,10 +213,14 @@ def _of_channel(
         level=surface,
         confidence=confidence,
         doubt=found.doubt or find_doubt(found, chosen, list(iso.values())),
-        modality="" if channel.source else plan.modality,
+        modality=SEGMENTATION if channel.source else plan.modality,
         is_hounsfield=plan.is_hounsfield,
         unevenness=max(plan.spacing_um) / min(plan.spacing_um),
         level_percentile=plan.settings.window.volume_percentile,
+        depth_voxels=min(
+            n * spacing / min(plan.spacing_um)
+            for n, spacing in zip(plan.region.shape, plan.spacing_um, strict=True)
+        ),
     )
     most_faces = max((one["kept_faces"] for one in components.values()), default=0)
     large, thin = (

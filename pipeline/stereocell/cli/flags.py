@@ -446,6 +446,16 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
         const=True,
         help="one channel in .raw or .nrrd, upright, as UnityVolumeRendering reads it",
     )
+    pages = parser.add_argument_group("a page in one file, .html")
+    pages.add_argument(
+        "--max-mb",
+        type=_positive,
+        metavar="MB",
+        help="the finest levels of surfaces and volumes that fit are taken (default 25)",
+    )
+    pages.add_argument(
+        "--view", metavar="LINK", help="a link that the viewer has made: how the page opens"
+    )
 
 
 def declare_publish(parser: argparse.ArgumentParser) -> None:

@@ -34,6 +34,8 @@ class ExportOptions:
     unity          one channel, as UnityVolumeRendering's importers read it
     wall_mm        what is thinner in print is named
     width          pixels of a picture
+    max_mb         the most that a page in one file takes, millions of bytes
+    view           a link of the viewer: the view that a page opens with
     """
 
     channels: tuple[str, ...] = ()
@@ -50,6 +52,8 @@ class ExportOptions:
     unity: bool | None = None
     wall_mm: float | None = None
     width: int | None = None
+    max_mb: float | None = None
+    view: str | None = None
 
     def __post_init__(self) -> None:
         for flag, value, (least, most) in (

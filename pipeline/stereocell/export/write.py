@@ -22,6 +22,7 @@ from stereocell.export.pictures import (
     write_turntable,
 )
 from stereocell.export.print_solids import write_print
+from stereocell.export.scene import MAX_MB, write_scene
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import described_by, write_nifti, write_nrrd, write_raw
 from stereocell.export.written import is_own, remember
@@ -29,7 +30,7 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.atomic_write import put_in_place
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
-from stereocell.storage.workspace import is_file
+from stereocell.storage.workspace import fetch, is_file
 from stereocell.usd.stage_files import dependencies
 from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.write_usdz import MAX_TRIANGLES
@@ -87,6 +88,9 @@ FORMATS = {
     ".nii": Format(write_nifti, _VOLUME),
     ".precomputed": Format(write_precomputed, frozenset({"tiles", "region", "bits"})),
 }
+PAGE = ".html"  # of the bundle, where all others are of the stage
+PAGE_TAKES = frozenset({"max_mb", "view"})
+ENDINGS = (*FORMATS, PAGE)
 
 
 def export(
@@ -102,8 +106,11 @@ def export(
     Raises UsageError for an ending or an option that can't be, StageError for a stage that can't be
     read, OutputError where the file can't be written.
     """
-    find_ending(file)
     out_folder = OutFolder(out)
+    if find_ending(file) == PAGE:
+        line, made = _export_page(out_folder, file, options, is_staged=stage is not None)
+        remember(out, made)
+        return line
     require_documents(out_folder, "export")
     out_folder.require_finished("stage")
     path = stage if stage is not None else out_folder.stage_file
@@ -140,10 +147,11 @@ def _export(
     is_ours  whether what lies at a path may be replaced unasked
     """
     ending = find_ending(file)
+    if ending == PAGE:
+        raise UsageError(f"{file}: a page is made of a bundle, expected `stereocell export OUT`")
     way = FORMATS[ending]
-    _require_takes(ending, way, options)
-    if not file.parent.is_dir():
-        raise OutputError(f"{file.parent}: no such folder")
+    _require_takes(ending, way.takes, options)
+    _require_folder(file)
     for place in (file, *way.beside(file, options)):  # before the work
         require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
     with usd_boundary(stage_path):
@@ -152,16 +160,50 @@ def _export(
             chosen.show_as_viewer()
     with usd_boundary(stage_path), _folder_beside(file) as beside:
         line = _write_smallest(chosen, way, beside / file.name)
-        # what goes with the file comes first: whoever sees the file sees it whole
-        made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
-        places = [file.parent / one.name for one in made]
-        for place in places:
-            require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
-        for one, place in zip(made, places, strict=True):
-            put_in_place(one, place, beside / "old")
+        places = _put_all_in_place(file, beside, is_ours)
     for layer in sorted(chosen.as_written.changed):
         report(f"{layer}: {CHANGED}: taken as it is")
     return line, places
+
+
+def _put_all_in_place(file: Path, beside: Path, is_ours: Callable[[Path], bool]) -> list[Path]:
+    """Move all that was written into a folder beside the file; return the final paths."""
+    # what goes with the file comes first: whoever sees the file sees it whole
+    made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
+    places = [file.parent / one.name for one in made]
+    for place in places:
+        require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
+    for one, place in zip(made, places, strict=True):
+        put_in_place(one, place, beside / "old")
+    return places
+
+
+def _export_page(
+    out_folder: OutFolder, file: Path, options: ExportOptions, *, is_staged: bool
+) -> tuple[str, list[Path]]:
+    """Write a page of OUT's bundle; return a line about it, and its path."""
+    if is_staged:
+        raise UsageError(
+            f"--stage can't be for {PAGE}, which holds the bundle: run `stereocell bundle OUT "
+            "--stage FILE` first, and export without it"
+        )
+    _require_takes(PAGE, PAGE_TAKES, options)
+    require_documents(out_folder, "publish")
+    out_folder.require_finished("bundle")
+    _require_outside(file, out_folder, [])
+    _require_folder(file)
+    ours = partial(is_own, out_folder.out)
+    require_free(file, expected=_EXPECTED, is_ours=ours(file))
+    fetch(out_folder.bundle_dir)
+    with _folder_beside(file) as beside:
+        line = write_scene(
+            out_folder.bundle_dir,
+            beside / file.name,
+            channels=options.channels,
+            max_mb=options.max_mb or MAX_MB,
+            view=options.view or "",
+        )
+        return line, _put_all_in_place(file, beside, ours)
 
 
 def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
@@ -213,14 +255,20 @@ def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -
 def find_ending(file: Path) -> str:
     """Return the ending by which a format is chosen. Raises UsageError for an unknown one."""
     name = file.name.lower()
-    for ending in FORMATS:
+    for ending in ENDINGS:
         if name.endswith(ending) and len(name) > len(ending):
             return ending
-    raise UsageError(f"{file}: expected a name that ends in {', '.join(FORMATS)}")
+    raise UsageError(f"{file}: expected a name that ends in {', '.join(ENDINGS)}")
 
 
-def _require_takes(ending: str, way: Format, options: ExportOptions) -> None:
-    for name in sorted(options.given() - way.takes - {"channels"}):
-        able = [other for other, one in FORMATS.items() if name in one.takes]
+def _require_folder(file: Path) -> None:
+    if not file.parent.is_dir():
+        raise OutputError(f"{file.parent}: no such folder")
+
+
+def _require_takes(ending: str, takes: frozenset[str], options: ExportOptions) -> None:
+    every = {**{other: one.takes for other, one in FORMATS.items()}, PAGE: PAGE_TAKES}
+    for name in sorted(options.given() - takes - {"channels"}):
+        able = [other for other, taken in every.items() if name in taken]
         flag = name.replace("_", "-")
         raise UsageError(f"--{flag} can't be for {ending}, expected one of {', '.join(able)}")

@@ -123,6 +123,38 @@ def _encode(levels: list[NDArray[np.uint8]], dimensions: int) -> Ktx2:
     return Ktx2(b"".join(parts), tuple(found))
 
 
+def without_finest(data: bytes, dropped: int) -> Ktx2:
+    """Return a 3D texture as `encode_3d` wrote it without its finest levels; the frames stay.
+
+    Raises SourceError, without the file's name, if it has no level left then.
+
+    >>> volume = np.arange(4 * 6 * 8, dtype=np.uint8).reshape(4, 6, 8)
+    >>> whole = encode_3d([volume, volume[::2, ::2, ::2]])
+    >>> without_finest(whole.data, 1).data == encode_3d([volume[::2, ::2, ::2]]).data
+    True
+    """
+    at = len(_IDENTIFIER) + _HEADER.size
+    header = list(_HEADER.unpack_from(data, len(_IDENTIFIER)))
+    count = header[7]
+    if not 0 <= dropped < count:
+        raise SourceError(f"{count} mip levels, expected more than {dropped}")
+    kept = [_LEVEL.unpack_from(data, at + _LEVEL.size * k) for k in range(dropped, count)]
+    moved = _LEVEL.size * dropped  # bytes by which all behind the index lies nearer to the start
+    header[2:5] = (max(1, n >> dropped) for n in header[2:5])
+    header[7] = len(kept)
+    header[9] -= moved
+    header[11] -= moved
+    index = [_LEVEL.pack(offset - moved, length, plain) for offset, length, plain in kept]
+    end = kept[0][0] + kept[0][1]  # the smallest level is the first in the file
+    parts = [_IDENTIFIER, _HEADER.pack(*header), *index, data[at + _LEVEL.size * count : end]]
+    width, height, depth = header[2:5]
+    levels = [
+        Level((max(1, width >> k), max(1, height >> k), max(1, depth >> k)), offset - moved, length)
+        for k, (offset, length, _) in enumerate(kept)
+    ]
+    return Ktx2(b"".join(parts), tuple(levels))
+
+
 def _describe(components: int) -> bytes:
     """Return the data format descriptor: basic block, RGBSDA, BT.709, linear, straight alpha."""
     size = 24 + 16 * components

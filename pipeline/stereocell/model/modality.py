@@ -5,5 +5,6 @@ _TERMS = (
     "KER LEN LP LS M3D MG MR NM OAM OCT OP OPM OPT OPTBSV OPTENF OPV OSS OT PA PT PX RF RG "
     "RTDOSE RTIMAGE SM SRF SEG TG US VA XA XC"
 )
+SEGMENTATION = "SEG"  # of channels that a command has derived from another image
 TRACER_MODALITIES = ("PT", "NM")  # PET and SPECT: how much of a tracer there is
 MODALITIES = frozenset(_TERMS.split())  # terms of modalities that make images

@@ -6,8 +6,8 @@ The bundle's own list says which there are. A path that it does not have, as one
 
 from pathlib import Path
 
+from stereocell.bundle.blob_page import find_page
 from stereocell.bundle.manifest import FILES, MANIFEST, REMEDY, read_manifest
-from stereocell.notebook.page import find_page
 from stereocell.serve.static_files import parse_range
 from stereocell.storage.file_list import read_list
 

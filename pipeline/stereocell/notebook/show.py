@@ -63,8 +63,8 @@ def show(
         viewer = stereocell.show(stack, spacing_um=(0.5, 0.25, 0.25))
     """
     import_extra("anywidget", extra="notebook", wanted_by="a notebook's viewer")
+    from stereocell.bundle.blob_page import find_page
     from stereocell.notebook.arrays import is_array
-    from stereocell.notebook.page import find_page
     from stereocell.storage.location import Location
     from stereocell.storage.overwriting import IN_PYTHON, forcing
 

@@ -14,6 +14,7 @@ import anywidget
 import traitlets
 from IPython.display import display, update_display
 
+from stereocell.bundle import blob_page
 from stereocell.notebook import page
 from stereocell.notebook.bundle_files import NotebookBundle
 from stereocell.notebook.picture import Looks, no_picture
@@ -127,7 +128,7 @@ class Viewer(anywidget.AnyWidget):
         about = {"id": content.get("id")}
         match content.get("ask"):
             case "page":
-                files = page.files()
+                files = blob_page.files()
                 answer = {**about, "html": page.document(), "names": list(files)}
                 self.send(answer, list(files.values()))
             case "file":

@@ -30,7 +30,7 @@ from stereocell.transfer.adaptive_threshold import (
 )
 from stereocell.transfer.boundaries import SuggestedShapes
 from stereocell.transfer.ct_tissues import BONE_LEVEL_HU, opening_function, tissue_functions
-from stereocell.transfer.opacity import make_transfer_functions
+from stereocell.transfer.opacity import SOFT, make_transfer_functions
 from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import fall_back
 
@@ -104,14 +104,17 @@ def make_appearance(
     is_hounsfield: bool = True,
     unevenness: float = 1.0,
     level_percentile: float = 99.0,
+    depth_voxels: float = 0.0,
 ) -> Appearance:
     """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
 
     doubt     why there is no level, or why the level cannot be called clear; empty: it can
-    modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes
+    modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes. Empty: of a
+        microscope, whose volumes open translucent, so that bodies show within others
     is_hounsfield  whether a CT's values are Hounsfield units: else it has no functions by tissue
     unevenness  coarsest over finest voxel spacing; a CT of thick slices opens in one colour
     level_percentile  percent of the voxels below the level of a volume without a surface
+    depth_voxels  shortest edge of the volume, in finest voxel spacings; 0: not known
     """
     iso_value, threshold = None, None
     if level is not None:
@@ -148,8 +151,9 @@ def make_appearance(
         has_magnitudes=modality == "MR",
         level_percentile=level_percentile,
         is_calibrated=modality == "CT",
+        depth_voxels=depth_voxels,
     )
-    function = None
+    function = SOFT if modality == "" and level is not None else None
     if modality == "CT" and is_hounsfield:
         functions |= tissue_functions(statistics.window)
         function = opening_function(iso_value, functions)

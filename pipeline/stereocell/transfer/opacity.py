@@ -12,6 +12,12 @@ from scipy import ndimage
 from stereocell.model.channel import OpacityPoints
 
 NAMES = ("default", "soft", "sharp", "surface")
+SOFT = "soft"  # name of the translucent function
+# Mean optical depth of the whole volume along its shortest edge, at most, by the soft function.
+# Light then crosses it, and bodies show within others, however many voxels the volume has. Chosen
+# by eye on stained cells, nuclei, an ovule and a cleared brain, of 15 to 270 voxels.
+SOFT_DEPTH = 0.6
+LEAST_SHARE = 0.2  # of the soft absorption: with less, steps of 8 bits would show as bands
 THRESHOLD = "threshold"  # name of the function of channels that have a threshold
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
@@ -42,6 +48,7 @@ def make_transfer_functions(
     has_magnitudes: bool = False,
     level_percentile: float = 99.0,
     is_calibrated: bool = False,
+    depth_voxels: float = 0.0,
 ) -> dict[str, OpacityPoints]:
     """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
 
@@ -51,6 +58,7 @@ def make_transfer_functions(
     level_percentile      percent of the voxels below the level of a channel without a surface
     has_magnitudes        whether values are magnitudes, as of MR: the air is noise, voxel by voxel
     is_calibrated         whether values lie on an absolute scale, as the Hounsfield units of CT
+    depth_voxels          shortest edge of the volume, in finest voxel spacings; 0: not known
 
     The level is the iso-value, or a percentile in a channel without a clear surface.
     """
@@ -69,10 +77,10 @@ def make_transfer_functions(
     floor, top, bright = rise
     start = AT_SURFACE_OF_MAGNITUDES if has_magnitudes else AT_SURFACE
     at_top = start + (IN_BODY - start) * (top - level) / (bright - level)
-    soft = floor if is_calibrated and has_surface else 0.6 * floor
+    soft = _points((floor, 0.0), (level, 0.04), (1.0, 0.2))
     functions = {
         "default": _points((floor, 0.0), (top, at_top), (bright, IN_BODY), (1.0, 0.6)),
-        "soft": _points((soft, 0.0), (level, 0.04), (1.0, 0.2)),
+        SOFT: _thinned(soft, histogram, depth_voxels),
         "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
         "surface": _points(
             (0.85 * level, 0.0), (level, 0.5), (min(1.15 * level, 0.99), 0.0), (1.0, 0.0)
@@ -83,6 +91,21 @@ def make_transfer_functions(
         top = start + min(RAMP, 0.9 * (1 - start))
         functions[THRESHOLD] = _points((start, 0.0), (top, 0.45), (1.0, 0.6))
     return functions
+
+
+def _thinned(
+    points: OpacityPoints, histogram: NDArray[np.int64], depth_voxels: float
+) -> OpacityPoints:
+    """Return the points with opacities so low that the volume's mean optical depth is SOFT_DEPTH.
+
+    The absorption becomes LEAST_SHARE of what it was at the least.
+    """
+    absorbed = -np.log1p(-evaluate(points, size=len(histogram)).astype(np.float64))
+    depth = depth_voxels * float(absorbed @ histogram) / max(1, int(histogram.sum()))
+    if depth <= SOFT_DEPTH:
+        return points
+    share = max(LEAST_SHARE, SOFT_DEPTH / depth)
+    return _points(*((x, 1 - (1 - opacity) ** share) for x, opacity in points[1:]))
 
 
 def _rise_of_body(level: float) -> tuple[float, float, float]:

@@ -68,6 +68,7 @@ function captionOf({ navigation, height_px, specimen, state, manifest, colorsOf 
     axes: axesOf(manifest.specimen.sides),
     head: camera.matrixWorld,
     specimen,
+    isLight: document.documentElement.dataset.theme === "light",
     labels: [], // in a video they move, and nothing is to hop about for them
   };
 }

@@ -10,6 +10,7 @@ import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
 import { toggleFullScreen } from "../dom/full_screen";
 import { fileName, saveFile } from "../dom/save_file";
+import { store, stored } from "../dom/stored";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import type { Ray } from "../math/vec3";
@@ -34,6 +35,7 @@ import { wishOf } from "../panel/keys";
 import { type Facts, layOut, MORE } from "../panel/layout";
 import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
+import { withTyped, writeAddress } from "../share/address";
 import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
 import type { Action } from "../state/actions";
@@ -79,11 +81,11 @@ const EYE_ROWS = [EYE_DISTANCE, STEREO_STRENGTH] as const;
 /** The user's phone viewer, from the visit before. */
 function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
   try {
-    const { lenses, code } = JSON.parse(localStorage.getItem(LENS_KEY) ?? "{}");
+    const { lenses, code } = JSON.parse(stored(LENS_KEY) ?? "{}");
     const isKnown = lenses === "own" || lenses in BUILT_IN;
     return isKnown && typeof code === "string" ? { lenses, code } : {};
   } catch {
-    return {}; // no storage here, or another's words in it: then as at first
+    return {}; // another program has written other words there
   }
 }
 
@@ -95,7 +97,7 @@ const LETTERS_KEY = "stereocell-letters";
  * would move when a table has come.
  */
 function rememberedOpen(): readonly string[] {
-  const text = remembered(OPEN_KEY);
+  const text = stored(OPEN_KEY);
   const sections = text === null ? START_VIEW.open : text.split(" ");
   return sections.filter((id) => !id.startsWith("objects"));
 }
@@ -106,41 +108,17 @@ const EYES_KEY = "stereocell-eyes";
 /** CSS pixels in an inch of this screen, as it was measured; null: it was not. */
 function rememberedScreen(): number | null {
   const [least, most] = PER_INCH;
-  const perInch = Number(remembered(SCREEN_KEY));
+  const perInch = Number(stored(SCREEN_KEY));
   return perInch >= least && perInch <= most ? perInch : null;
 }
 
 /** What the user has set for the eyes, on a visit before. */
 function rememberedEyes(): readonly Action[] {
-  const texts = (remembered(EYES_KEY) ?? "").split(",");
+  const texts = (stored(EYES_KEY) ?? "").split(",");
   return EYE_ROWS.flatMap((row, i) => {
     const value = Number(texts[i] || Number.NaN);
     return Number.isFinite(value) ? [setTo(row, value)] : [];
   });
-}
-
-function remembered(key: string): string | null {
-  try {
-    return localStorage.getItem(key);
-  } catch {
-    return null; // no storage here
-  }
-}
-
-function remember(key: string, text: string): void {
-  try {
-    localStorage.setItem(key, text);
-  } catch {
-    // no storage here: it has to be set anew next time
-  }
-}
-
-function rememberLens(lens: Pick<PanelView, "lenses" | "code">): void {
-  try {
-    localStorage.setItem(LENS_KEY, JSON.stringify(lens));
-  } catch {
-    // no storage here: it has to be chosen anew next time
-  }
 }
 
 /** Parts of the state that can leave the picture empty. */
@@ -167,7 +145,7 @@ export class Controller {
     ...START_VIEW,
     ...rememberedLens(),
     open: rememberedOpen(),
-    hasLetters: remembered(LETTERS_KEY) !== "off",
+    hasLetters: stored(LETTERS_KEY) !== "off",
   };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
   private readonly help: Help;
@@ -249,7 +227,7 @@ export class Controller {
     this.view = keepPlaces(this.view, this.viewer.state);
     this.panel.update(this.layOut());
     const eyes = EYE_ROWS.map((row) => row.get(this.viewer.state)).join();
-    if (eyes !== this.eyes) remember(EYES_KEY, eyes);
+    if (eyes !== this.eyes) store(EYES_KEY, eyes);
     this.eyes = eyes;
     this.help.update(this.view.isHelpOpen);
     this.tapped?.update();
@@ -270,8 +248,8 @@ export class Controller {
       if (wish.panel === "hide" && this.viewer.stereo.togglePanel()) return;
       this.view = changePanel(this.view, wish);
       if (laysOutCards(wish)) this.view = { ...this.view, channelsWithCard: null };
-      if (wish.panel === "unfold") remember(OPEN_KEY, this.view.open.join(" "));
-      if (wish.panel === "letters") remember(LETTERS_KEY, wish.areOn ? "on" : "off");
+      if (wish.panel === "unfold") store(OPEN_KEY, this.view.open.join(" "));
+      if (wish.panel === "letters") store(LETTERS_KEY, wish.areOn ? "on" : "off");
       this.refresh();
       if (wish.panel === "reveal") this.panel.reveal(wish.control);
     } else this.viewer.dispatch(wish);
@@ -281,7 +259,7 @@ export class Controller {
   followAddress(search: string, hash: string): void {
     const { viewer } = this;
     const { bounds_um } = viewer.bundle.manifest.specimen;
-    const { actions, camera } = readLink(hash, viewer.state, bounds_um);
+    const { actions, camera } = readLink(withTyped(hash), viewer.state, bounds_um);
     const asked = [...settingsOf(search), ...actions];
     for (const action of asked) viewer.dispatch(action);
     const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
@@ -360,7 +338,7 @@ export class Controller {
     const { lenses, code } = this.view;
     try {
       use(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
-      rememberLens({ lenses, code });
+      store(LENS_KEY, JSON.stringify({ lenses, code }));
     } catch (error) {
       if (!(error instanceof ProfileError)) throw error;
       this.say(error.message);
@@ -375,7 +353,7 @@ export class Controller {
       return;
     }
     this.card ??= new part.CardMeasure(parent, (perInch) => {
-      remember(SCREEN_KEY, String(perInch));
+      store(SCREEN_KEY, String(perInch));
       viewer.setScreen(perInch);
       this.say(
         `The screen has ${perInch} pixels an inch: split the screen to see it in true size.`,
@@ -482,7 +460,10 @@ export class Controller {
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
-    if (hasAddress()) history.replaceState(history.state, "", address);
+    // A notebook's frame has no address. The step that the split screen has made in the history goes when it is left,
+    // and its address with it; the address follows the view then.
+    const isSplit = viewer.stereo.kind === "split";
+    if (hasAddress() && !isSplit) writeAddress(address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
     viewer.stereo.showInPanel({ link: address.href });

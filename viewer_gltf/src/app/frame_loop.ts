@@ -11,6 +11,7 @@ import { RestPace } from "../render/pacing/redraw_at_rest";
 import { GatherPace } from "../render/pacing/samples_per_frame";
 import type { Room } from "../render/scene";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
+import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
 import { MAX_STEPS } from "../volumes/tile_raymarch";
@@ -282,7 +283,10 @@ export class FrameLoop {
   private poseMono(dt_s: number): Camera {
     const { navigation, contents, state } = this.options.shown();
     const outline = contents.outline(state);
-    if (outline !== null) navigation.surround(outline);
+    if (outline !== null) {
+      navigation.surround(outline);
+      this.options.room.standUnder(navigation.occupied);
+    }
     navigation.update(dt_s);
     this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
     return navigation.camera;
@@ -335,10 +339,16 @@ export class FrameLoop {
       panes: surfaces.blended,
       overlays: [...marks.overlays, ...slices.overlays, ...stereo.overlays],
       bounds: this.options.bounds,
+      openTile: this.openTile(state),
       solids: surfaces.triangles + slices.solid,
     };
     const clip = { ...state.clip, corner: slices.cornerTowards(this.eyeOnSpecimen(head)) };
     stereo.present(() => picture.draw(head, drawn, clip, pace));
+  }
+
+  private openTile(state: ViewerState): Bounds | null {
+    const { room, hybrid } = this.options;
+    return room.boundsOf(marchedTile(state, hybrid.focusTiles));
   }
 
   /** um, world. */

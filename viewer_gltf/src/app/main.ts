@@ -15,17 +15,19 @@ import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { hasFullScreen } from "../dom/full_screen";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
-import { keepOffline } from "../offline/register";
 import { isKept } from "../offline/request_plan";
 import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
 import { opensAr, WaysIn } from "../panel/html/ways_in";
+import type { Theme } from "../render/theme";
 import { flightAsked } from "../share/bench_parameter";
-import { panelOf } from "../share/page_parameters";
+import { isLight, isPlain, panelOf } from "../share/page_parameters";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
 import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
+import type { Opened } from "./address_bar";
 import type { StereoCellApi } from "./automation_api";
 import { Controller } from "./controller";
+import type { Later } from "./later_parts";
 import type { NotebookPart } from "./notebook_part";
 import { Viewer } from "./viewer";
 
@@ -47,6 +49,8 @@ function describeSize({ specimen, tiles }: Manifest): string {
 }
 
 const said = new Said();
+/** The view that the address has opened. */
+let openedAs: Opened | null = null;
 
 /** On the page that stands until there is a picture: see boot/. */
 function sayAtStart(text: string): void {
@@ -77,7 +81,25 @@ function alsoKept({ bundle }: Viewer): readonly string[] {
   return usdz !== null && isKept(bundle.manifest.usdz ?? null) ? [usdz] : [];
 }
 
+const LIGHT = matchMedia("(prefers-color-scheme: light)");
+const CONTRAST = matchMedia("(prefers-contrast: more)");
+
+/** The page's colours, as the address or the system has them. */
+function dressPage(): Theme {
+  const theme = isLight(new URL(pageAddress()).search, LIGHT.matches) ? "light" : "dark";
+  document.documentElement.dataset.theme = theme;
+  return theme;
+}
+
+/** The background of the picture, too; a system's colours may change by night. */
+function followSystem(viewer: Viewer, search: string): void {
+  const dress = () => viewer.dress(dressPage(), isPlain(search, CONTRAST.matches));
+  for (const query of [LIGHT, CONTRAST]) query.addEventListener("change", dress);
+  dress();
+}
+
 async function open(parent: HTMLElement): Promise<Viewer> {
+  dressPage();
   checkWebGl2();
   sayAtStart("Reading the bundle");
   const page = pageAddress();
@@ -119,6 +141,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
       notebook?.note();
     },
   );
+  followSystem(viewer, search);
   controller = new Controller(viewer, parent, said, {
     subtitle: describeSize(manifest),
     onStereo: () => void enterStereo(viewer, "immersive-vr"),
@@ -129,6 +152,13 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   viewer.layOut = layOut.bind(controller);
   notices.update(viewer.state);
   controller.followAddress(search, hash);
+  openedAs = { state: viewer.state, camera: viewer.cameraView };
+  viewer.renderer.domElement.addEventListener("webglcontextlost", (event) => {
+    const canvas = event.target as HTMLCanvasElement;
+    void import("./lost_context").then(({ offerReload }) =>
+      offerReload(canvas, () => later?.addressBar?.write()),
+    );
+  });
   hint.update(viewer.state);
   whenTouched(() => {
     viewer.stopTurning();
@@ -222,24 +252,21 @@ opened.catch((error: unknown) => {
   showFatal(app, "This bundle can't be shown", error.message);
 });
 let viewer: Viewer | null = null;
+let later: Later | null = null;
 void opened.then(
   (made) => {
     viewer = made;
   },
   () => undefined, // reported above
 );
-const sayReady = () => said.say("Ready offline: what has been shown opens without a network, too.");
-void ready.then(
-  () => keepOffline(sayReady, viewer === null ? [] : alsoKept(viewer)),
-  () => undefined,
-);
-const WAITING =
-  "The host does not answer. The page tries again, and what has loaded stays on screen.";
-watchWaiting((isWaiting) =>
-  viewer?.dispatch(
-    isWaiting ? { type: "notify", text: WAITING } : { type: "dismiss", texts: [WAITING] },
-  ),
-);
+void ready
+  .then(async () => {
+    const { startLater } = await import("./later_parts");
+    if (viewer === null || openedAs === null) return;
+    later = startLater(viewer, openedAs, (text) => said.say(text), alsoKept(viewer));
+  })
+  .catch(() => undefined); // without these parts the page shows all the same
+watchWaiting((jobs) => viewer?.noteWaiting(jobs));
 ready.catch(() => undefined); // reported above; a caller that awaits `ready` still sees it
 
 /** Bugs: the console has the details, the page reports that something is amiss. */

@@ -14,8 +14,10 @@ import { pickTile, shownBox, shownTiles } from "../math/pick";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { Layout, Lenses, PanelView } from "../panel/controls";
 import { chosenTile } from "../panel/sections/tiles";
+import type { Backdrop } from "../render/backdrop";
 import { StageSize } from "../render/canvas_size";
 import { Hybrid } from "../render/gaze_focus";
+import { pixelShare } from "../render/pixel_share";
 import {
   OVER_FLOOR_M,
   place,
@@ -25,6 +27,7 @@ import {
   XR_DISTANCE_M,
 } from "../render/placement";
 import { Room } from "../render/scene";
+import type { Theme } from "../render/theme";
 import type { CameraView } from "../share/camera_link";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
@@ -77,6 +80,11 @@ const NO_LAYOUT: Layout = {
   more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
 };
 
+const WAITING = "The host does not answer: trying again. What has come stays on screen.";
+const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
+/** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
+const FINER = /^\S+\.(glb|ktx2):/;
+
 export class Viewer {
   readonly renderer: WebGLRenderer;
   readonly stereo: Stereo;
@@ -108,6 +116,8 @@ export class Viewer {
   private readonly size: StageSize;
   private readonly steps: Steps;
   private nextView = 0;
+  /** Resolves when the background of the flat picture has come. */
+  private dressed: Promise<void> = Promise.resolve();
   private readonly disposed = new AbortController();
 
   /**
@@ -477,6 +487,24 @@ export class Viewer {
     this.follow();
   }
 
+  /**
+   * The background of the flat picture; the specimen has the same colours before all of them.
+   *
+   * @param isPlain one colour and no shadow: for cutting out, and for readers who ask for more contrast
+   */
+  dress(theme: Theme, isPlain: boolean): void {
+    const dressIn = (backdrop: Backdrop | null) => {
+      this.room.dress(theme, backdrop);
+      this.loop.change();
+    };
+    dressIn(null);
+    if (isPlain) return;
+    this.dressed = import("../render/backdrop").then(
+      ({ Backdrop }) => dressIn(new Backdrop()),
+      () => undefined, // a picture without it is as true
+    );
+  }
+
   /** Someone has touched the page. */
   stopTurning(): void {
     this.navigation.stopTurning();
@@ -519,7 +547,8 @@ export class Viewer {
   }
 
   /** Resolves when nothing loads any more and the picture shows all of it. */
-  settled(): Promise<void> {
+  async settled(): Promise<void> {
+    await this.dressed;
     return this.loop.settled();
   }
 
@@ -541,11 +570,38 @@ export class Viewer {
 
   report(error: unknown): void {
     if (!(error instanceof BundleError)) throw error;
-    const isMendable = error instanceof TemporaryError;
-    const text = isMendable ? error.notice : error.message;
+    const isOffline = navigator.onLine === false;
+    if (isOffline && FINER.test(error.message) && !this.isIncomplete) return;
+    const isMendable = isOffline || error instanceof TemporaryError;
+    const text = isOffline
+      ? OFFLINE
+      : error instanceof TemporaryError
+        ? error.notice
+        : error.message;
     // it would be reported again for each of a host's files
     if (isMendable && this.state.mendable.includes(text)) return;
     this.dispatch({ type: "notify", text, isMendable });
+  }
+
+  /**
+   * Files are awaited. A device without a network shows what it has, and mentions it if that is not all.
+   *
+   * @param files so many; one more than before, or none any more
+   */
+  noteWaiting(files: number): void {
+    const text = navigator.onLine ? WAITING : OFFLINE;
+    if (files === 0) this.dispatch({ type: "dismiss", texts: [WAITING, OFFLINE] });
+    else if (this.state.notices.includes(text)) return;
+    else if (navigator.onLine ? files === 1 : this.isIncomplete) {
+      this.dispatch({ type: "notify", text });
+    }
+  }
+
+  /** Whether a part of the picture is missing, not merely coarse. */
+  private get isIncomplete(): boolean {
+    const { surfaces, volumes } = this.contents;
+    const isNone = ({ level }: { level: number | null }) => level === null;
+    return !surfaces.overview.isComplete || volumes.status().some(isNone);
   }
 
   /** Light the traced picture by a file of the user's. Throws BundleError. */
@@ -619,7 +675,7 @@ export class Viewer {
     if (this.renderer.xr.isPresenting) return;
     const { clientWidth, clientHeight } = this.stage;
     if (clientWidth === 0 || clientHeight === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO) * pixelShare());
     this.renderer.setSize(clientWidth, clientHeight);
     const style = getComputedStyle(this.stage);
     const share = (name: string) => Number.parseFloat(style.getPropertyValue(name)) / clientHeight;

@@ -28,7 +28,9 @@ export function request(url: string, path: string, options: RequestInit = {}): P
   const whole = async () => {
     const response = await requestOnce(url, path, options);
     const status = response.status === PART ? PART : 200;
-    return new Response(await readBody(response, path), { status, headers: response.headers });
+    const body = await readBody(response, path);
+    noteAsked(url, options.headers, true);
+    return new Response(body, { status, headers: response.headers });
   };
   return withRetries(whole, options.signal);
 }

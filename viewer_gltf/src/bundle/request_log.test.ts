@@ -1,16 +1,15 @@
 import { expect, it, vi } from "vitest";
 
-it("notes each address and range once, until the notes are taken", async () => {
-  vi.resetModules(); // others of this process may have taken theirs
-  const { noteAsked, takeAsked } = await import("./request_log");
+it("notes each address and range once, and whether its answer has come", async () => {
+  vi.resetModules(); // other tests of this process have requests of their own
+  const { noteAsked, allAsked, allCome } = await import("./request_log");
   noteAsked("https://host/a", undefined);
-  noteAsked("https://host/a", {});
   noteAsked("https://host/a", { Range: "bytes=0-9" });
+  noteAsked("https://host/a", { range: "bytes=0-9" }, true);
   noteAsked("https://host/a", { range: "bytes=0-9" });
-  expect(takeAsked()).toEqual([
+  expect(allAsked()).toEqual([
     { url: "https://host/a", range: null },
     { url: "https://host/a", range: "bytes=0-9" },
   ]);
-  noteAsked("https://host/b", undefined);
-  expect(takeAsked()).toEqual([]);
+  expect(allCome()).toEqual([{ url: "https://host/a", range: "bytes=0-9" }]);
 });

@@ -1,18 +1,24 @@
-/** The requests to the bundle's host so far, for a service worker that starts later. */
+/** The requests to the bundle's host so far: those that a service worker has not seen, and those that it should have kept. */
 
 /** `range`: the Range header. */
 export type Asked = Readonly<{ url: string; range: string | null }>;
 
-let log: Map<string, Asked> | null = new Map();
+/** By address and range; true: the answer has come. */
+const log = new Map<string, Readonly<{ asked: Asked; hasCome: boolean }>>();
 
-export function noteAsked(url: string, headers: HeadersInit | undefined): void {
-  const range = new Headers(headers).get("Range");
-  log?.set(`${url} ${range}`, { url, range });
+export const keyOf = ({ url, range }: Asked) => `${url} ${range}`;
+
+export function noteAsked(url: string, headers: HeadersInit | undefined, hasCome = false): void {
+  const asked = { url, range: new Headers(headers).get("Range") };
+  const before = log.get(keyOf(asked));
+  log.set(keyOf(asked), { asked, hasCome: hasCome || before?.hasCome === true });
 }
 
-/** All of it, once; nothing is noted from then on. */
-export function takeAsked(): readonly Asked[] {
-  const asked = [...(log?.values() ?? [])];
-  log = null;
-  return asked;
+export function allAsked(): readonly Asked[] {
+  return [...log.values()].map(({ asked }) => asked);
+}
+
+/** Those that were answered. */
+export function allCome(): readonly Asked[] {
+  return [...log.values()].filter(({ hasCome }) => hasCome).map(({ asked }) => asked);
 }

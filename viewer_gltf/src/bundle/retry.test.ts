@@ -27,16 +27,16 @@ describe("a job that may be tried again", () => {
     await expect(withRetries(job, null, [0, 0])).rejects.toThrow("not found");
   });
 
-  it("is reported once as waiting, and once as done, however many wait", async () => {
-    const reported: boolean[] = [];
-    watchWaiting((isWaiting) => reported.push(isWaiting));
+  it("is reported as waiting, and as done once none waits", async () => {
+    const reported: number[] = [];
+    watchWaiting((jobs) => reported.push(jobs));
     const jobs = [1, 2, 3].map((n) => failing(n, new TemporaryError("busy")));
     await Promise.all(jobs.map((job) => withRetries(job, null, [5, 5, 5])));
-    expect(reported).toEqual([true, false]);
+    expect(reported).toEqual([1, 2, 3, 0]);
     await expect(withRetries(failing(9, new TemporaryError("busy")), null, [0])).rejects.toThrow();
-    expect(reported).toEqual([true, false, true, false]);
+    expect(reported).toEqual([1, 2, 3, 0, 1, 0]);
     await withRetries(async () => 1, null, [0]);
-    expect(reported).toHaveLength(4);
+    expect(reported).toHaveLength(6);
   });
 
   it("stops at once when it is no longer wanted while it rests", async () => {

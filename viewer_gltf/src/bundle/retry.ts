@@ -6,8 +6,8 @@ export const PAUSES_MS: readonly number[] = [300, 1200, 4000];
 /** Longest wait for a network at each pause, ms, on a device that knows that it has none. */
 const OFFLINE_MS = 30_000;
 
-/** Told when jobs begin to wait for another try, and when none waits any more. */
-export type WaitListener = (isWaiting: boolean) => void;
+/** Hears how many jobs wait for another try, when one more begins to and when none does any more. */
+export type WaitListener = (jobs: number) => void;
 
 let listener: WaitListener = () => undefined;
 let waiting = 0;
@@ -17,9 +17,8 @@ export function watchWaiting(onWaiting: WaitListener): void {
 }
 
 function count(change: 1 | -1): void {
-  const before = waiting;
   waiting += change;
-  if (before === 0 || waiting === 0) listener(waiting > 0);
+  if (change === 1 || waiting === 0) listener(waiting);
 }
 
 /** The pause, or less where the network comes back or the job is no longer wanted. */

@@ -16,9 +16,16 @@ export type Caption = Readonly<{
   axes: readonly Axis[];
   head: Matrix4;
   specimen: Matrix4;
+  /** Whether the background is light: then the words are dark. */
+  isLight: boolean;
   /** Labels in the picture, pixels of the screen: what is written keeps clear of them. */
   labels: readonly Rect[];
 }>;
+
+/** Of the scale bar and the names, of what lies round them so that they show on anything, of other words. */
+const DARK_INKS = { ink: "#fff", halo: "#000", faint: "#cfd6e4" } as const;
+const LIGHT_INKS = { ink: "#1a1f29", halo: "#fff", faint: "#3d4656" } as const;
+type Inks = Readonly<Record<keyof typeof DARK_INKS, string>>;
 
 const FONT = 'system-ui, "Noto Sans", sans-serif';
 const BAR_FONT = `13px ${FONT}`;
@@ -41,7 +48,7 @@ export function drawCaption(
   context: CanvasRenderingContext2D,
   { width, height }: Readonly<{ width: number; height: number }>,
   scale: number,
-  { um_per_px, legend, axes, head, specimen, labels }: Caption,
+  { um_per_px, legend, axes, head, specimen, labels, isLight }: Caption,
 ): void {
   context.save();
   context.scale(scale, scale);
@@ -52,7 +59,8 @@ export function drawCaption(
     taken.push(place);
     return place;
   };
-  context.shadowColor = "#000";
+  const inks = isLight ? LIGHT_INKS : DARK_INKS;
+  context.shadowColor = inks.halo;
   context.shadowBlur = 3 * scale;
   context.textBaseline = "middle";
   context.lineCap = "round";
@@ -61,15 +69,20 @@ export function drawCaption(
     context.font = BAR_FONT;
     const { width } = context.measureText(bar.label);
     const place = placeFor("bar", Math.max(bar.length_px, width), BAR_HEIGHT);
+    context.strokeStyle = context.fillStyle = inks.ink;
     drawScaleBar(context, place, bar);
   }
   const square = placeFor("axes", AXES, AXES);
   const middle = AXES / 2;
+  // the axes' colours are for a dark picture
+  if (isLight) context.filter = "brightness(0.6)";
   drawAxes(context, square.x + middle, square.y + middle, axes, axesSeen(head, specimen, axes));
+  context.filter = "none";
   drawLegend(
     context,
     placeFor("legend", legendWidth(context, legend), LINE * legend.length),
     legend,
+    inks,
   );
   context.restore();
 }
@@ -80,7 +93,6 @@ function drawScaleBar(
   { length_px, label }: Readonly<{ length_px: number; label: string }>,
 ): void {
   const line = y + 6;
-  context.strokeStyle = context.fillStyle = "#fff";
   context.lineWidth = 2;
   context.beginPath();
   context.moveTo(x, line - 4);
@@ -114,6 +126,7 @@ function drawLegend(
   context: CanvasRenderingContext2D,
   { x, y: top }: Rect,
   legend: readonly LegendEntry[],
+  { ink, faint }: Inks,
 ): void {
   context.textAlign = "left";
   legend.forEach((entry, i) => {
@@ -122,13 +135,13 @@ function drawLegend(
     drawMark(context, x, y, colors);
     let at = x + markOf(entry);
     if (name !== "") {
-      context.fillStyle = "#fff";
+      context.fillStyle = ink;
       context.font = NAME_FONT;
       context.fillText(name, at, y);
       at += context.measureText(name).width + GAP;
     }
     context.font = TEXT_FONT;
-    context.fillStyle = "#cfd6e4";
+    context.fillStyle = faint;
     context.fillText(text, at, y);
   });
 }

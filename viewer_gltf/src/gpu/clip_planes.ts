@@ -1,7 +1,8 @@
 /** The cuts of clip box and plane for the surfaces' shaders: planes in the room, by reference. */
 import { type Matrix4, Vector3, Vector4 } from "three";
+import type { Box } from "../math/box";
 import type { Clip, ClipPlane } from "../math/clip";
-import type { Vec3 } from "../math/vec3";
+import { AXES, type Vec3, withPart } from "../math/vec3";
 import { CORNER_PLANES, type MarchClip, noCorner } from "./clip_uniforms";
 
 const MAX_PLANES = 7; // six faces of the box, and the plane
@@ -19,6 +20,8 @@ export class Cuts {
     value: Array.from({ length: MAX_PLANES + CORNER_PLANES }, () => new Vector4()),
   };
   readonly uCutCount = { value: 0 };
+  /** The tile that is drawn as a volume among surfaces; all zeros: there is none. */
+  readonly uOpen = { value: Array.from({ length: 6 }, () => new Vector4()) };
   /** The same for the march, um. */
   readonly march: MarchClip = {
     min: new Vector3(),
@@ -29,29 +32,19 @@ export class Cuts {
 
   follow({ box, plane, corner }: Clip, specimen: Matrix4): void {
     let count = 0;
-    const put = (i: number, [x, y, z]: Vec3, offset_um: number) => {
-      const normal = new Vector3(x, y, z).transformDirection(specimen);
-      const on = new Vector3(x, y, z).multiplyScalar(offset_um).applyMatrix4(specimen);
-      this.uCuts.value[i].set(normal.x, normal.y, normal.z, normal.dot(on));
-    };
-    const add = (x: number, y: number, z: number, offset_um: number) =>
-      put(count++, [x, y, z], offset_um);
+    const put = (i: number, normal: Vec3, offset_um: number) =>
+      setPlane(this.uCuts.value[i], normal, offset_um, specimen);
     this.march.min.setScalar(-FAR);
     this.march.max.setScalar(FAR);
     this.march.plane.set(0, 0, 0, 1);
     if (box !== null) {
       const [a, b] = [box.min, box.max];
-      add(-1, 0, 0, -a[0]);
-      add(0, -1, 0, -a[1]);
-      add(0, 0, -1, -a[2]);
-      add(1, 0, 0, b[0]);
-      add(0, 1, 0, b[1]);
-      add(0, 0, 1, b[2]);
+      for (const { normal, offset_um } of facesOf(box)) put(count++, normal, offset_um);
       this.march.min.set(...a);
       this.march.max.set(...b);
     }
     if (plane !== null) {
-      add(...plane.normal, plane.offset_um);
+      put(count++, plane.normal, plane.offset_um);
       this.march.plane.set(...plane.normal, plane.offset_um);
     }
     this.uCutCount.value = count;
@@ -61,4 +54,29 @@ export class Cuts {
       put(MAX_PLANES + i, normal, offset_um);
     });
   }
+
+  /** @param tile the one that is drawn as a volume among surfaces, um; null: there is none */
+  open(tile: Box | null, specimen: Matrix4): void {
+    if (tile === null) for (const plane of this.uOpen.value) plane.set(0, 0, 0, 0);
+    else {
+      for (const [i, { normal, offset_um }] of facesOf(tile).entries()) {
+        setPlane(this.uOpen.value[i], normal, offset_um, specimen);
+      }
+    }
+  }
+}
+
+/** The planes of a box's faces, with the normals outwards. */
+function facesOf({ min, max }: Box): readonly ClipPlane[] {
+  return AXES.flatMap((axis) => [
+    { normal: withPart([0, 0, 0], axis, -1), offset_um: -min[axis] },
+    { normal: withPart([0, 0, 0], axis, 1), offset_um: max[axis] },
+  ]);
+}
+
+/** Set a plane of the room, m, to one of the specimen, um. */
+function setPlane(plane: Vector4, normal: Vec3, offset_um: number, specimen: Matrix4): void {
+  const along = new Vector3(...normal).transformDirection(specimen);
+  const on = new Vector3(...normal).multiplyScalar(offset_um).applyMatrix4(specimen);
+  plane.set(along.x, along.y, along.z, along.dot(on));
 }

@@ -65,7 +65,7 @@ export class Navigation {
   private flight: Readonly<{ from: Look; to: Look; elapsed_s: number }> | null = null;
   private readonly reach: Vector3;
   /** Outermost points of what is there of the specimen, room: the opening is framed on them. */
-  private occupied: readonly Vec3[];
+  occupied: readonly Vec3[];
   /** The opening is framed on what is free of the picture. */
   private covered: Covered = { top: 0, bottom: 0 };
 
@@ -154,6 +154,11 @@ export class Navigation {
   /** null: as a bundle opens, which follows the window's shape. */
   get look(): Look | null {
     return this.stand === "opening" && !this.isTurning ? null : this.lookNow;
+  }
+
+  /** The named view that still holds; null: someone has moved. */
+  get standing(): Stand | null {
+    return this.stand;
   }
 
   /** Whether the specimen is seen as a room has it that nobody has turned. */

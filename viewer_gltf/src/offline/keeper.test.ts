@@ -74,6 +74,22 @@ describe("the keeper", () => {
     expect(textOf(kept.get(key)?.body as ArrayBuffer)).toBe("voxels");
   });
 
+  it("names the requests that need no network: those that are kept, and those that are no file of the bundle", async () => {
+    const { keeper, url } = await prepare();
+    const asked = [url, `${BUNDLE}manifest.json`, `${BUNDLE}values?at=1`, "https://other/file"];
+    const areKept = () =>
+      keeper.areKept(
+        PAGE,
+        asked.map((each) => ({ url: each, range: null })),
+      );
+    expect(await areKept()).toEqual([false, false, false, true]);
+    await keeper.adopt(PAGE, []);
+    expect(await areKept()).toEqual([false, true, true, true]);
+    await keeper.adopt(PAGE, [{ url, range: null }]);
+    expect(await areKept()).toEqual([true, true, true, true]);
+    expect(await keeper.areKept(PAGE, [{ url, range: "bytes=0-1" }])).toEqual([true]); // in the whole file
+  });
+
   it("answers from what it has kept, whatever the host has by then", async () => {
     const { keeper, ask, url } = await prepare();
     await keeper.adopt(PAGE, [{ url, range: null }]);

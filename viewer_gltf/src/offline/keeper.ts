@@ -106,6 +106,22 @@ export class Keeper {
     return this.store.has(this.keys.page);
   }
 
+  /** For each request of a page whether its answer needs no network, or is none of the bundle's files. */
+  areKept(page: string, asked: readonly Asked[]): Promise<readonly boolean[]> {
+    return Promise.all(asked.map(({ url, range }) => this.isKept(this.plan(url, page), range)));
+  }
+
+  private async isKept(plan: Plan, range: string | null): Promise<boolean> {
+    if (plan.kind === "manifest") return this.store.has(this.keys.manifest(plan.base));
+    if (plan.kind !== "file") return true;
+    const { base, path } = plan;
+    const listed = await this.listedOf(base);
+    if (listed === null) return false;
+    if (!Object.hasOwn(listed, path)) return true;
+    const { sha256 } = listed[path];
+    return [null, range].some((part) => this.store.has(this.keys.file(base, sha256, part)));
+  }
+
   /** Resolves once what was used and kept is written down. */
   save(): Promise<void> {
     return this.store.save();

@@ -1,7 +1,7 @@
 /** Make the viewer and what it has shown usable without a network, where the browser can. */
-import { takeAsked } from "../bundle/request_log";
+import { type Asked, allAsked } from "../bundle/request_log";
 import { ownBundle } from "./request_plan";
-import type { Opened } from "./sw";
+import type { IsKept, Opened } from "./sw";
 import workerAddress from "./sw?worker&url";
 
 /** Longest time until a worker takes its pages over, ms. */
@@ -12,47 +12,65 @@ export function canKeep(page: string, isSecure: boolean): boolean {
   return /^https?:/.test(page) && isSecure && ownBundle(page) !== null;
 }
 
-/**
- * Start the service worker and hand it what was loaded before; for after the first picture. Sets
- * `data-offline="ready"` on the page's root once all that was shown is kept, or "refused" where the
- * browser keeps nothing, as on a full disk: the viewer then works as before.
- *
- * @param onReady called once on the visit that made it so
- * @param also addresses of files of the bundle that the page has not asked for
- */
-export async function keepOffline(onReady: () => void, also: readonly string[]): Promise<void> {
-  const isAble = !import.meta.env.DEV && canKeep(location.href, isSecureContext);
-  // a frame without an origin may not even ask for it
-  const { serviceWorker } = (isAble ? navigator : {}) as { serviceWorker?: ServiceWorkerContainer };
-  if (serviceWorker === undefined) {
-    takeAsked(); // nobody will want the log
-    return;
+/** The way to the service worker that keeps what was shown. */
+export class Keeping {
+  private constructor(
+    private readonly worker: ServiceWorker,
+    /** Whether the page was opened through the worker, as on a later visit. */
+    readonly wasServed: boolean,
+  ) {}
+
+  /** Start the service worker; null: this browser keeps nothing for this page. */
+  static async start(): Promise<Keeping | null> {
+    const isAble = !import.meta.env.DEV && canKeep(location.href, isSecureContext);
+    // a frame without an origin may not even ask for it
+    const { serviceWorker } = (isAble ? navigator : {}) as {
+      serviceWorker?: ServiceWorkerContainer;
+    };
+    if (serviceWorker === undefined) return null;
+    const wasServed = serviceWorker.controller !== null;
+    try {
+      await serviceWorker.register(workerAddress);
+    } catch {
+      return null; // such as where cookies are blocked
+    }
+    const { active } = await serviceWorker.ready;
+    await served(serviceWorker);
+    return active && new Keeping(active, wasServed);
   }
-  const wasServed = serviceWorker.controller !== null;
-  try {
-    await serviceWorker.register(workerAddress);
-  } catch {
-    takeAsked();
-    return; // such as where cookies are blocked
+
+  /**
+   * Hand over what was loaded before the worker took the page over, or has been missed since.
+   *
+   * @param also addresses of files of the bundle that the page has not asked for
+   * @returns whether the page would open without a network
+   */
+  adopt(missed: readonly Asked[] | null, also: readonly string[]): Promise<boolean> {
+    const asked = missed ?? (this.wasServed ? [] : allAsked());
+    const loaded = performance.getEntriesByType("resource").map(({ name }) => name);
+    return this.ask<boolean>({
+      type: "opened",
+      page: location.href,
+      asked: [...asked, ...also.map((url) => ({ url, range: null }))],
+      loaded,
+    });
   }
-  const { active } = await serviceWorker.ready;
-  await served(serviceWorker);
-  const { port1, port2 } = new MessageChannel();
-  port1.onmessage = ({ data }: MessageEvent<boolean>) => {
-    document.documentElement.dataset.offline = data ? "ready" : "refused";
-    if (data && !wasServed) onReady();
-    port1.close();
-  };
-  // Requests from now on pass the worker; the page reports the earlier ones to it.
-  const asked = takeAsked();
-  const loaded = performance.getEntriesByType("resource").map(({ name }) => name);
-  const message: Opened = {
-    type: "opened",
-    page: location.href,
-    asked: [...(wasServed ? [] : asked), ...also.map((url) => ({ url, range: null }))],
-    loaded,
-  };
-  active?.postMessage(message, [port2]);
+
+  /** For each request whether its answer is kept, or is not the bundle's to keep. */
+  isKept(asked: readonly Asked[]): Promise<readonly boolean[]> {
+    return this.ask<readonly boolean[]>({ type: "is-kept", page: location.href, asked });
+  }
+
+  private ask<T>(message: Opened | IsKept): Promise<T> {
+    const { port1, port2 } = new MessageChannel();
+    return new Promise((resolve) => {
+      port1.onmessage = ({ data }: MessageEvent<T>) => {
+        port1.close();
+        resolve(data);
+      };
+      this.worker.postMessage(message, [port2]);
+    });
+  }
 }
 
 /** Resolves once the page's requests pass the worker, or it is clear that they won't. */

@@ -20,6 +20,9 @@ export type Opened = Readonly<{
   loaded: readonly string[];
 }>;
 
+/** A page's question for each request whether its answer needs no network; the answers come on the port. */
+export type IsKept = Readonly<{ type: "is-kept"; page: string; asked: readonly Asked[] }>;
+
 // TypeScript's types of pages and of service workers exclude each other; this is what is used here.
 type Extendable = Event & { waitUntil(work: Promise<unknown>): void };
 type FetchRequest = Extendable & {
@@ -27,7 +30,7 @@ type FetchRequest = Extendable & {
   clientId: string;
   respondWith(response: Promise<Response>): void;
 };
-type Message = Extendable & { data: Opened; ports: readonly MessagePort[] };
+type Message = Extendable & { data: Opened | IsKept; ports: readonly MessagePort[] };
 type ServiceWorkerScope = {
   registration: { scope: string };
   skipWaiting(): Promise<void>;
@@ -103,16 +106,20 @@ worker.addEventListener("fetch", (event) => {
   event.waitUntil(finish());
 });
 
+async function adopt({ page, asked, loaded }: Opened): Promise<boolean> {
+  const keeper = await opened;
+  // a part that decodes textures has others, which its own worker has loaded unseen
+  if (loaded.some(isOptional)) await keeper?.keepViewer(FILES.filter(isOptional));
+  await keeper?.adopt(page, asked).catch(() => undefined); // the network went; the next visit does
+  await keeper?.save();
+  return keeper?.hasPage === true;
+}
+
 worker.addEventListener("message", (event) => {
-  if (event.data.type !== "opened") return;
-  const { page, asked, loaded } = event.data;
-  const adopt = async () => {
-    const keeper = await opened;
-    // a part that decodes textures has others, which its own worker has loaded unseen
-    if (loaded.some(isOptional)) await keeper?.keepViewer(FILES.filter(isOptional));
-    await keeper?.adopt(page, asked).catch(() => undefined); // the network went; the next visit does
-    await keeper?.save();
-    event.ports[0]?.postMessage(keeper?.hasPage === true);
+  const { data } = event;
+  const answer = async () => {
+    if (data.type === "opened") return adopt(data);
+    return (await opened)?.areKept(data.page, data.asked) ?? data.asked.map(() => false);
   };
-  event.waitUntil(adopt());
+  event.waitUntil(answer().then((words) => event.ports[0]?.postMessage(words)));
 });

@@ -335,7 +335,7 @@ describe("the keys", () => {
     expect(after("o")).toBe("Marker 0: opacity 95 %");
     expect(after("e")).toBe("Marker 0: window 100 – 1104");
     expect(after("1")).toBe("Marker 0: hidden");
-    expect(after("D")).toBe("Focus disc 13°");
+    expect(after("D")).toBe("Focus disc 17°");
     expect(after("b")).toBe("Not cut");
     expect(after("n")).toBe("Cut by a box and a plane");
     expect(after(".")).toBe("Box: x from 1.00 µm");

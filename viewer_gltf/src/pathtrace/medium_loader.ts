@@ -128,19 +128,20 @@ export class MediumLoader {
       type: "module",
     });
     const { worker } = this;
-    return new Promise((resolve, reject) => {
+    const answered = new AbortController();
+    const { signal } = answered;
+    return new Promise<Assembled>((resolve, reject) => {
       const hear = ({ data }: MessageEvent<Assembled>) => {
-        if (data.id !== request.id) return;
-        worker.removeEventListener("message", hear);
-        resolve(data);
+        if (data.id === request.id) resolve(data);
       };
-      worker.addEventListener("message", hear);
-      worker.addEventListener("error", (event) => {
+      const fail = (event: ErrorEvent) => {
         event.preventDefault();
         reject(new Error(`tiles can't be put together: ${event.message || "no worker"}`));
-      });
+      };
+      worker.addEventListener("message", hear, { signal });
+      worker.addEventListener("error", fail, { signal });
       worker.postMessage(request, { transfer: request.parts.map((part) => part.texels.buffer) });
-    });
+    }).finally(() => answered.abort());
   }
 
   dispose(): void {

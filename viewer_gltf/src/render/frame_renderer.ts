@@ -40,6 +40,8 @@ export type Drawn = Readonly<{
   overlays: readonly Object3D[];
   /** Of the specimen, um. */
   bounds: Bounds;
+  /** The tile that is drawn as a volume among surfaces, um; null: there is none. */
+  openTile: Bounds | null;
   /** A number that changes with the opaque surfaces. */
   solids: number;
 }>;
@@ -142,8 +144,10 @@ export class Picture {
     const specimen = room.specimen.group.matrixWorld;
     renderer.info.reset();
     room.light(head);
+    room.isFlat = this.eyes.all.length === 1;
     this.both.takeIn(room.scene);
     this.cuts.follow(clip, specimen);
+    this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
     this.marchFrame.uIsCrossing.value = volumes.isInDisc;
     this.march.hide();

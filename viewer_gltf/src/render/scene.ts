@@ -10,13 +10,14 @@ import {
   type Object3D,
   Scene,
 } from "three";
-import type { Manifest } from "../bundle/generated/bundle";
+import type { Bounds, Manifest } from "../bundle/generated/bundle";
 import { FILL, FILL_AT, GROUND, KEY, KEY_AT, SHINES_AT, SKY } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
 import type { Vec3 } from "../math/vec3";
+import type { Backdrop } from "./backdrop";
 import { Specimen } from "./specimen_pose";
+import { FAR, type Theme } from "./theme";
 
-const BACKGROUND = 0x0b0d12;
 const OUTLINE = 0x5b6678;
 
 export class Room {
@@ -25,7 +26,12 @@ export class Room {
   private readonly key = new DirectionalLight(colorOf(KEY), Math.PI);
   private readonly fill = new DirectionalLight(colorOf(FILL), Math.PI);
   private readonly outline: Box3Helper;
-  private readonly dark = new Color(BACKGROUND);
+  private readonly dark = new Color(FAR.dark);
+  private readonly flat = new Color(FAR.dark);
+  private isUsers = false;
+  private backdrop: Backdrop | null = null;
+  /** Outermost points of what is shown, in the room, m. */
+  private outermost: readonly Vec3[] = [];
 
   constructor(private readonly manifest: Manifest) {
     this.specimen = new Specimen(manifest.specimen.bounds_um);
@@ -43,13 +49,42 @@ export class Room {
 
   /** Whether it is the user's own room: nothing of ours is behind the specimen. */
   set isSeeThrough(is: boolean) {
-    this.scene.background = is ? null : this.dark;
+    this.isUsers = is;
+  }
+
+  /** Whether it is seen on a flat screen, and by one eye. */
+  set isFlat(is: boolean) {
+    const isFlat = is && !this.isUsers;
+    this.scene.background = this.isUsers ? null : isFlat ? this.flat : this.dark;
+    if (this.backdrop !== null) this.backdrop.mesh.visible = isFlat;
+  }
+
+  /** @param backdrop null: the background of the flat picture has one colour */
+  dress(theme: Theme, backdrop: Backdrop | null): void {
+    this.flat.set(FAR[theme]);
+    this.backdrop?.mesh.removeFromParent();
+    this.backdrop = backdrop;
+    if (backdrop === null) return;
+    backdrop.dress(theme);
+    backdrop.standUnder(this.outermost);
+    this.scene.add(backdrop.mesh);
+  }
+
+  /** @param points outermost ones of what is shown, in the room, m */
+  standUnder(points: readonly Vec3[]): void {
+    this.outermost = points;
+    this.backdrop?.standUnder(points);
   }
 
   /** The lamp hangs over the viewer's left shoulder, wherever the viewer goes. */
   light(eye: Matrix4): void {
     aim(this.key, eye, KEY_AT);
     aim(this.fill, eye, FILL_AT);
+  }
+
+  /** um, world; null: of no tile. */
+  boundsOf(tile: string | null): Bounds | null {
+    return this.manifest.tiles.find(({ id }) => id === tile)?.bounds_um ?? null;
   }
 
   /** Outline a tile among others, or none. */
@@ -64,7 +99,7 @@ export class Room {
 
   /** Everything but what is opaque, which the pass for the depth has to leave out. */
   get overlays(): readonly Object3D[] {
-    return [this.outline];
+    return this.backdrop === null ? [this.outline] : [this.outline, this.backdrop.mesh];
   }
 }
 

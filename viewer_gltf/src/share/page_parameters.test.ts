@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { settingsOf } from "./page_parameters";
+import { isLight, isPlain, settingsOf } from "./page_parameters";
 
 describe("the page's address", () => {
   it("sets mode, switch distance and disc", () => {
@@ -10,6 +10,23 @@ describe("the page's address", () => {
       { type: "set", id: "disc-radius", value: 20 },
     ]);
     expect(settingsOf("?bundle=x")).toEqual([]);
+  });
+
+  it("chooses a light or a dark page, which follows the system otherwise", () => {
+    for (const isSystemLight of [true, false]) {
+      expect(isLight("?theme=light", isSystemLight)).toBe(true);
+      expect(isLight("?theme=dark", isSystemLight)).toBe(false);
+      for (const query of ["", "?theme=blue"])
+        expect(isLight(query, isSystemLight)).toBe(isSystemLight);
+    }
+  });
+
+  it("chooses a background of one colour, as readers have who ask for more contrast", () => {
+    expect([isPlain("?backdrop=plain", false), isPlain("", true), isPlain("", false)]).toEqual([
+      true,
+      true,
+      false,
+    ]);
   });
 
   it("is reported where it can't be read", () => {

@@ -1,6 +1,7 @@
 /**
  * What the page's address asks for: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
- * high), `switch` (metres of the room), `disc` (degrees), `view` (front, side, top), `panel` (off). Pure.
+ * high), `switch` (metres of the room), `disc` (degrees), `view` (front, side, top), `panel` (off), `theme`
+ * (light, dark), `backdrop` (plain). Pure.
  */
 import { STANDS, type Stand } from "../interaction/orbit_camera";
 import type { Action } from "../state/actions";
@@ -23,6 +24,17 @@ export function standOf(search: string): Stand | null {
 /** Whether the page has a panel: `panel=off` leaves it out, for a page that holds this one in a frame. */
 export function panelOf(search: string): "on" | "off" {
   return new URLSearchParams(search).get("panel") === "off" ? "off" : "on";
+}
+
+/** Whether the page and its background are light: as `theme=` says, or else as the system has it. */
+export function isLight(search: string, isSystemLight: boolean): boolean {
+  const asked = new URLSearchParams(search).get("theme");
+  return asked === "light" || (asked !== "dark" && isSystemLight);
+}
+
+/** Whether the background is of one colour: as `backdrop=plain` says, or for a reader who asks for more contrast. */
+export function isPlain(search: string, asksForContrast: boolean): boolean {
+  return asksForContrast || new URLSearchParams(search).get("backdrop") === "plain";
 }
 
 /** null: none of the parameter's. */

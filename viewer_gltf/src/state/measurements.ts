@@ -24,7 +24,7 @@ export const MAX_MEASUREMENTS = 100;
 export const MAX_POINTS = 64;
 export const LONGEST_NAME = 60;
 
-const NAMES: Readonly<Record<MeasureKind, string>> = {
+export const NAMES: Readonly<Record<MeasureKind, string>> = {
   distance: "Distance",
   angle: "Angle",
   line: "Line",
@@ -57,7 +57,8 @@ export function finished<S extends Measuring>(state: S): S {
   return { ...state, measured: [], measurements: kept };
 }
 
-function freeName(kind: MeasureKind, others: readonly Measurement[]): string {
+/** The first name of a kind with a number that no other has. */
+export function freeName(kind: MeasureKind, others: readonly Measurement[]): string {
   const taken = new Set(others.map(({ name }) => name));
   for (let i = 1; ; i++) if (!taken.has(`${NAMES[kind]} ${i}`)) return `${NAMES[kind]} ${i}`;
 }

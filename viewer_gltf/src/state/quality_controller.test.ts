@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { seeded } from "../../test/support/seeded";
+import { START_VOLUMES } from "./parameters/volumes";
 import {
   advanceQuality,
   frameBudget_ms,
@@ -95,7 +96,7 @@ describe("quality", () => {
     expect(qualitySettings(quality)).toEqual({
       steps: 32,
       resolution: 1 / 3,
-      discShare: 0.5,
+      discShare: 0.75,
       errorFactor: 4,
     });
     const keys = ["steps", "resolution", "discShare", "errorFactor"] as const;
@@ -106,6 +107,13 @@ describe("quality", () => {
     });
     expect(changed).toEqual([...changed].sort());
     expect(LADDER[0]).toEqual({ steps: 100, resolution: 1, discShare: 1, errorFactor: 1 });
+  });
+
+  it("leaves the opening disc at least 12 degrees on the slowest device", () => {
+    const low = qualitySettings(withLevel(start(), "low"));
+    for (const { discShare } of [...LADDER, low]) {
+      expect(discShare * START_VOLUMES.discRadius_deg).toBeGreaterThanOrEqual(12);
+    }
   });
 
   it("comes back in full when the load goes, from wherever it was", () => {
@@ -145,7 +153,7 @@ describe("quality", () => {
           s.steps <= 100 &&
           s.resolution >= 1 / 3 &&
           s.resolution <= 1 &&
-          s.discShare >= 0.5 &&
+          s.discShare >= 0.75 &&
           s.discShare <= 1 &&
           s.errorFactor >= 1 &&
           s.errorFactor <= 4 &&

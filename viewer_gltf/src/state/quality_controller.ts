@@ -29,7 +29,7 @@ export const LADDER: readonly QualitySettings[] = [
   HIGH,
   ...([80, 64, 50, 40, 32] as const).map((steps) => ({ ...HIGH, steps })),
   ...([0.75, 0.5, 1 / 3] as const).map((resolution) => ({ ...HIGH, steps: 32, resolution })),
-  ...([0.84, 0.7, 0.59, 0.5] as const).map((discShare) => ({
+  ...([0.93, 0.87, 0.81, 0.75] as const).map((discShare) => ({
     ...HIGH,
     steps: 32,
     resolution: 1 / 3,
@@ -38,7 +38,7 @@ export const LADDER: readonly QualitySettings[] = [
   ...([1.4, 2, 2.8, 4] as const).map((errorFactor) => ({
     steps: 32,
     resolution: 1 / 3,
-    discShare: 0.5,
+    discShare: 0.75,
     errorFactor,
   })),
 ];

@@ -57,7 +57,7 @@ export function representationOf(
 function isMarched(state: ViewerState, tile: string, focusTiles: FocusTiles): boolean {
   switch (state.mode) {
     case "tile":
-      return tile === focusTileOf(state, focusTiles) && focusTiles.near.has(tile);
+      return tile === marchedTile(state, focusTiles);
     case "disc":
       return focusTiles.disc.includes(tile);
     case "all":
@@ -67,6 +67,12 @@ function isMarched(state: ViewerState, tile: string, focusTiles: FocusTiles): bo
     case "off":
       return false;
   }
+}
+
+/** The one tile that is a volume among surfaces; null: there is none. */
+export function marchedTile(state: ViewerState, focusTiles: FocusTiles): string | null {
+  const tile = focusTileOf(state, focusTiles);
+  return state.mode === "tile" && tile !== null && focusTiles.near.has(tile) ? tile : null;
 }
 
 /** Whether a channel's volumes show in the disc alone. */

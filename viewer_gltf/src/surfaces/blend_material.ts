@@ -1,8 +1,8 @@
 /**
  * Surfaces that give way to their volume: inside the disc, or as a whole, and surfaces that are
  * made translucent. Depth is written first, without colour, so that of a translucent surface only
- * what lies in front shows. Where a solid is cut open its inside is drawn as the plane of the cut:
- * flat, and lit as that.
+ * what lies in front shows. Where a solid is cut open, or ends at the tile that is a volume, its inside
+ * is drawn as the plane there: flat, and lit as that.
  */
 import {
   AlwaysStencilFunc,
@@ -37,7 +37,7 @@ import { includeChunks } from "../gpu/glsl_include";
  */
 export type SurfaceFrame = Readonly<{
   uniforms: Pick<Disc, "uDisc" | "uApex" | "uAxis"> &
-    Pick<Cuts, "uCuts" | "uCutCount"> &
+    Pick<Cuts, "uCuts" | "uCutCount" | "uOpen"> &
     MarchedUniforms &
     BothEyesUniforms;
   both: BothEyes;
@@ -46,10 +46,10 @@ export type SurfaceFrame = Readonly<{
 export function makeSurfaceFrame(
   { uDisc, uApex, uAxis }: Disc,
   picture: MarchedUniforms,
-  { uCuts, uCutCount }: Pick<Cuts, "uCuts" | "uCutCount">,
+  { uCuts, uCutCount, uOpen }: Pick<Cuts, "uCuts" | "uCutCount" | "uOpen">,
   both: BothEyes,
 ): SurfaceFrame {
-  const shared = { uDisc, uApex, uAxis, uCuts, uCutCount };
+  const shared = { uDisc, uApex, uAxis, uCuts, uCutCount, uOpen };
   return { uniforms: { ...shared, ...picture, ...both.uniforms }, both };
 }
 
@@ -158,6 +158,7 @@ void main() {
   return material;
 }
 
+const OPENED = includeChunks("#include <chunks/open_tile>\n", CHUNKS);
 /** The picture of the volumes. */
 const MARCHED = `${includeChunks("#include <chunks/marched_light>", CHUNKS)}\n`;
 /**
@@ -249,7 +250,13 @@ export class BlendedSurface {
           TO_EACH_EYE +
           vertex.end,
       );
-      shader.fragmentShader = (DECLARED + MARCHED + fragment.declared + shader.fragmentShader)
+      shader.fragmentShader = (
+        DECLARED +
+        OPENED +
+        MARCHED +
+        fragment.declared +
+        shader.fragmentShader
+      )
         .replace("#include <dithering_fragment>", `${BLENDED}\n#include <dithering_fragment>`)
         .replace(
           "#include <color_fragment>",
@@ -257,8 +264,9 @@ export class BlendedSurface {
         )
         .replace(
           "#include <normal_fragment_maps>",
-          "#include <normal_fragment_maps>\n\tif (uCutCount > 0 && !gl_FrontFacing) {\n" +
+          "#include <normal_fragment_maps>\n\tif (!gl_FrontFacing) {\n" +
             "\t\tvec3 flatNormal = cutNormal(cameraPosition, vRoom);\n" +
+            "\t\tif (flatNormal == vec3(0.0)) flatNormal = openNormal(cameraPosition, vRoom);\n" +
             "\t\tif (flatNormal != vec3(0.0)) {\n" +
             "\t\t\tnormal = normalize((viewMatrix * vec4(flatNormal, 0.0)).xyz);\n\t\t}\n\t}",
         );

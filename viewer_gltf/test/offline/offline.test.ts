@@ -19,7 +19,8 @@ const CHANGED = "channels/Balls/r0_c0/lod2.glb";
 const OTHER = "channels/Balls/r0_c1/lod2.glb";
 
 const offlineState = () => document.documentElement.dataset.offline;
-const isReady = () => document.documentElement.dataset.offline === "ready";
+/** All that was shown is kept, be it every place or not. */
+const isReady = () => /^(partly|ready)$/.test(document.documentElement.dataset.offline ?? "");
 
 /** Hashes of what is kept of the bundle; a part of a file with its range. */
 const keptFiles = (page: Page) =>

@@ -17,14 +17,36 @@ const ON_THE_WIRE_BYTES = 500_000;
 /** Of ten tiles, as the demo has. */
 const FIRST_PICTURE_BYTES = 300_000;
 const DEMO_TILES = 10;
-/**
- * Fetched where they are wanted: textures, bricks from a server, paths of light, what shades volumes, pictures
- * and videos, stereo, the benchmark, the slices, the objects of label maps, dialogs about the screen
- * and the phone viewer, what a notebook or a page around asks of the page, the card beside a tapped place, why a picture
- * is empty, and explanations of the settings.
- */
-const OPTIONAL =
-  /basis|client_worker|assemble_worker|path_tracer|shading|EXRLoader|HDRLoader|capture|fflate|interaction|split_session|unclipped|bench|slices|objects|card_measure|qr_scanner|notebook_part|frame_port|tap_part|view_message_part|explanations/;
+/** Parts of names of files that are fetched when they are first wanted, after the first picture. */
+const OPTIONAL = new RegExp(
+  [
+    "assemble_worker",
+    "backdrop",
+    "basis",
+    "bench",
+    "capture",
+    "card_measure",
+    "client_worker",
+    "explanations",
+    "EXRLoader",
+    "fflate",
+    "frame_port",
+    "HDRLoader",
+    "interaction",
+    "later_parts",
+    "lost_context",
+    "notebook_part",
+    "objects",
+    "path_tracer",
+    "qr_scanner",
+    "shading",
+    "slices",
+    "split_session",
+    "tap_part",
+    "unclipped",
+    "view_message_part",
+  ].join("|"),
+);
 const CODE = /\.(js|css|wasm|html)$/;
 
 async function gzipBytes(): Promise<Map<string, number>> {

@@ -32,14 +32,20 @@ function meansWithin(a: Picture, b: Picture): Readonly<{ pixels: number; means: 
   return { pixels, means: sums.map(([r, g, b]) => [r / pixels, g / pixels, b / pixels] as const) };
 }
 
-type Case = Readonly<{ name: string; bundle: string | undefined; channels: readonly string[] }>;
+/** `solid`: the transfer function by which the volume looks as the surface does; null: it opens so. */
+type Case = Readonly<{
+  name: string;
+  bundle: string | undefined;
+  channels: readonly string[];
+  solid: string | null;
+}>;
 const CASES: readonly Case[] = [
-  { name: "the demo", bundle: DEMO_BUNDLE, channels: ["CD31", "Hoechst"] },
-  { name: "real cells", bundle: MAPS_BUNDLE, channels: ["Cells"] },
-  { name: "an MR head", bundle: HEAD_BUNDLE, channels: ["MR"] },
+  { name: "the demo", bundle: DEMO_BUNDLE, channels: ["CD31", "Hoechst"], solid: "default" },
+  { name: "real cells", bundle: MAPS_BUNDLE, channels: ["Cells"], solid: "default" },
+  { name: "an MR head", bundle: HEAD_BUNDLE, channels: ["MR"], solid: null },
 ];
 
-for (const { name, bundle, channels } of sweep(CASES, ({ name }) => name !== "real cells")) {
+for (const { name, bundle, channels, solid } of sweep(CASES, ({ name }) => name !== "real cells")) {
   describe.skipIf(!bundle)(name, () => {
     describeInChromium("in the disc", () => {
       const stand = prepareStand({ bundle, viewport: VIEWPORT, pixelRatio: 1 });
@@ -47,7 +53,8 @@ for (const { name, bundle, channels } of sweep(CASES, ({ name }) => name !== "re
       for (const channel of sweep(channels, (each) => each === channels[0])) {
         it(`${channel} has the surface's colour`, async () => {
           const at = async (mode: string) => {
-            const link = `v=1&cut=none&c=${channel}`;
+            const look = solid === null ? "" : `&l=${channel}:t${solid}`;
+            const link = `v=1&cut=none&c=${channel}${look}`;
             await stand.open(`&mode=${mode}&switch=9&disc=${DISC}&quality=high#${link}`);
             await stand.viewer.settled();
             return takePicture(stand.viewer.page);

@@ -8,8 +8,9 @@ describeInChromium("the graphics driver", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 270 } });
   const notices = async () => (await stand.viewer.snapshot()).state.notices;
 
-  it("drops the picture, which is drawn anew: surfaces and volumes", async () => {
-    await stand.viewer.page.addInitScript(() => {
+  /** The page's graphics context can be taken away and given back from then on. */
+  const prepareLoss = () =>
+    stand.viewer.page.addInitScript(() => {
       const original = HTMLCanvasElement.prototype.getContext;
       HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, ...given) {
         const made = (original as (...each: unknown[]) => unknown).apply(this, given);
@@ -17,6 +18,25 @@ describeInChromium("the graphics driver", () => {
         return made as never;
       };
     });
+  const call = (name: "loseContext" | "restoreContext") =>
+    stand.viewer.page.evaluate((each) => {
+      const held = window as unknown as {
+        drawnBy: WebGL2RenderingContext;
+        loss?: WEBGL_lose_context | null;
+      };
+      held.loss ??= held.drawnBy.getExtension("WEBGL_lose_context");
+      held.loss?.[each]();
+    }, name);
+  const loseAndRestore = async () => {
+    await call("loseContext");
+    await expect.poll(notices).toEqual([expect.stringContaining("dropped the picture")]);
+    await call("restoreContext");
+    await expect.poll(notices).toEqual([]);
+    await stand.viewer.settled();
+  };
+
+  it("drops the picture, which is drawn again: surfaces and volumes", async () => {
+    await prepareLoss();
     const warnings: string[] = [];
     stand.viewer.page.on("console", (message) => {
       if (message.type() === "warning") warnings.push(message.text());
@@ -24,25 +44,71 @@ describeInChromium("the graphics driver", () => {
     await stand.open("&mode=tile&switch=9&quality=high");
     await stand.viewer.chooseTile("r0_c1");
     const before = await takePicture(stand.viewer.page);
-    const call = (name: "loseContext" | "restoreContext") =>
-      stand.viewer.page.evaluate((each) => {
-        const held = window as unknown as {
-          drawnBy: WebGL2RenderingContext;
-          loss?: WEBGL_lose_context | null;
-        };
-        held.loss ??= held.drawnBy.getExtension("WEBGL_lose_context");
-        held.loss?.[each]();
-      }, name);
-    await call("loseContext");
-    await expect.poll(notices).toEqual([expect.stringContaining("dropped the picture")]);
-    await call("restoreContext");
-    await expect.poll(notices).toEqual([]);
-    await stand.viewer.settled();
+    await loseAndRestore();
     expect(difference(before, await takePicture(stand.viewer.page))).toBeLessThan(0.002);
     const { volumes } = await stand.viewer.snapshot();
     expect(volumes.every(({ level }) => level === 0)).toBe(true);
     // nothing is drawn while there is nothing to draw on, nor dropped what belongs to another
     expect(warnings.filter((text) => /TilesRenderer|does not belong/.test(text))).toEqual([]);
+  });
+
+  it("drops the picture, which is drawn again: slices, shaded volumes, a measurement and a cut", async () => {
+    await prepareLoss();
+    const cut = "cut=1,0,0,6&points=2,-2,1,8,-4,1&slices=on&planes=on&depth=0.5";
+    await stand.open(`&mode=all#v=1&${cut}`);
+    await stand.viewer.still();
+    const before = await takePicture(stand.viewer.page);
+    await loseAndRestore();
+    await stand.viewer.still();
+    expect(difference(before, await takePicture(stand.viewer.page))).toBeLessThan(0.002);
+  });
+
+  it("drops the picture, which gathers light again", async () => {
+    await prepareLoss();
+    await stand.open("&mode=traced");
+    const gathered = async () => {
+      await expect.poll(async () => (await stand.viewer.snapshot()).traced.samples > 64).toBe(true);
+      return takePicture(stand.viewer.page);
+    };
+    const before = await gathered();
+    await loseAndRestore();
+    // light arrives by chance: a share of the pixels is never quite the same
+    expect(difference(before, await gathered())).toBeLessThan(0.05);
+  });
+
+  it("does not give the picture back: the page offers a reload with fewer pixels, which keeps the view", async () => {
+    await prepareLoss();
+    await stand.open("&mode=off");
+    const { viewer } = stand;
+    const width = () => viewer.page.evaluate(() => document.querySelector("canvas")?.width ?? 0);
+    const look = async () => {
+      const { position } = (await viewer.snapshot()).look;
+      return position.map((v) => Number(v.toFixed(3)));
+    };
+    const offer = viewer.page.locator('[data-action="reload"]');
+    await viewer.page.keyboard.press("ArrowRight");
+    await viewer.still();
+    const [before, seen] = [await width(), await look()];
+    await call("loseContext");
+    await offer.waitFor();
+    await call("restoreContext");
+    await offer.waitFor({ state: "detached" }); // it has come back after all
+    await viewer.settled();
+    await call("loseContext");
+    await offer.click();
+    await viewer.page.waitForFunction(
+      (old) => (document.querySelector("canvas")?.width ?? old) < old && window.stereocell,
+      before,
+    );
+    await viewer.page.evaluate(() => window.stereocell?.ready);
+    expect(await width()).toBe(before / 2);
+    expect(await look()).toEqual(seen);
+    await expect
+      .poll(() => viewer.page.locator("[data-said]").textContent())
+      .toContain("fewer pixels");
+    await viewer.page.evaluate(() => sessionStorage.clear()); // as in another tab
+    await viewer.page.reload();
+    await expect.poll(width).toBe(before);
   });
 
   it("takes no large textures: a coarser level is shown, and the page reports it", async () => {

@@ -1,6 +1,7 @@
 /** The share link in headless Chromium: opening it shows the same view. */
 import { expect, it } from "vitest";
 import type { Snapshot } from "../../src/app/automation_api";
+import { START_VOLUMES } from "../../src/state/parameters/volumes";
 import { addHeadset } from "../support/browser/chromium";
 import { difference, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
@@ -120,7 +121,7 @@ describeInChromium("the share link", () => {
     await expect.poll(said).toBe("The link is in the clipboard.");
     const copied = await page().evaluate(() => navigator.clipboard.readText());
     expect(copied).toBe(page().url());
-    expect(copied).toContain("disc=11");
+    expect(copied).toContain(`disc=${START_VOLUMES.discRadius_deg - 1}`);
   });
 
   it("is selected in a field where the browser refuses the clipboard", async () => {

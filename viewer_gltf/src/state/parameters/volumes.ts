@@ -24,7 +24,7 @@ export const START_VOLUMES = {
   /** Metres of the room: nearer than a headset's specimen is at the start. */
   switchDistance_m: 1.25,
   /** Angle between the gaze and the disc's rim. */
-  discRadius_deg: 12,
+  discRadius_deg: 16,
   compositing: "over" as Compositing,
   /** By how much volumes shade one another, 0..1. */
   depthShading: 0.5,

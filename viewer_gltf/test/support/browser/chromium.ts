@@ -121,6 +121,8 @@ export async function enter(
     hasTouch,
     serviceWorkers,
     reducedMotion: "reduce", // what opens with a turn would never come to rest
+    colorScheme: "dark",
+    contrast: "more", // a background of one colour, which tests tell from the specimen
   });
   context.setDefaultTimeout(PATIENCE_MS);
   await context.addInitScript(() => {

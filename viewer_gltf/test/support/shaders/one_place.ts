@@ -1,11 +1,15 @@
 /** Two surfaces in one place, but for coordinates that were quantized apart: which of them shows. */
 import {
   DepthTexture,
+  DirectionalLight,
+  DoubleSide,
+  Matrix4,
   Mesh,
   MeshStandardMaterial,
   PerspectiveCamera,
   PlaneGeometry,
   Scene,
+  SphereGeometry,
   Vector2,
   Vector3,
   WebGLRenderer,
@@ -14,20 +18,15 @@ import {
 import { BothEyes } from "../../../src/gpu/both_eyes";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { marchedUniforms } from "../../../src/gpu/composite_pass";
+import type { Vec3 } from "../../../src/math/vec3";
 import { BlendedSurface, makeSurfaceFrame } from "../../../src/surfaces/blend_material";
 import { seeded } from "../seeded";
 
 const PIXELS = 64;
 const APART_M = 4e-5; // half a step of 14 bits of 1.2 m
 
-/** Pixels of the first channel, which is red, and of the second, blue, of a picture that both fill. */
-function shownOfTwo(opacity: number): readonly [number, number] {
-  const renderer = new WebGLRenderer({ antialias: false });
-  const target = new WebGLRenderTarget(PIXELS, PIXELS);
-  const camera = new PerspectiveCamera(30, 1, 0.01, 20);
-  camera.position.set(0.9, 0.4, 1.6);
-  camera.lookAt(0, 0, 0);
-  camera.layers.enableAll();
+/** What surfaces share, where nothing is a volume. */
+function makeFrame(target: WebGLRenderTarget, cuts: Cuts) {
   const disc = {
     uDisc: { value: new Vector2(3, 2) },
     uApex: { value: new Vector3() },
@@ -37,7 +36,43 @@ function shownOfTwo(opacity: number): readonly [number, number] {
   };
   const depth = { value: new DepthTexture(1, 1) };
   const picture = marchedUniforms(target.texture.clone(), depth);
-  const frame = makeSurfaceFrame(disc, picture, new Cuts(), new BothEyes());
+  return makeSurfaceFrame(disc, picture, cuts, new BothEyes());
+}
+
+function makeCamera(position: Vec3): PerspectiveCamera {
+  const camera = new PerspectiveCamera(30, 1, 0.01, 20);
+  camera.position.set(...position);
+  camera.lookAt(0, 0, 0);
+  camera.layers.enableAll();
+  return camera;
+}
+
+/** Row by row, the pixels of a scene. */
+function draw(
+  renderer: WebGLRenderer,
+  target: WebGLRenderTarget,
+  scene: Scene,
+  camera: PerspectiveCamera,
+): Uint8Array {
+  renderer.setRenderTarget(target);
+  renderer.render(scene, camera);
+  const rgba = new Uint8Array(4 * PIXELS * PIXELS);
+  renderer.readRenderTargetPixels(target, 0, 0, PIXELS, PIXELS, rgba);
+  return rgba;
+}
+
+/**
+ * Pixels of the first channel, which is red, and of the second, blue, of a picture that both fill, from each eye.
+ *
+ * @param eyes m
+ */
+function shownOfTwo(
+  opacity: number,
+  eyes: readonly Vec3[],
+): readonly (readonly [number, number])[] {
+  const renderer = new WebGLRenderer({ antialias: false });
+  const target = new WebGLRenderTarget(PIXELS, PIXELS);
+  const frame = makeFrame(target, new Cuts());
   const scene = new Scene();
   const random = seeded(7);
   [0xff0000, 0x0000ff].forEach((emissive, rank) => {
@@ -50,16 +85,47 @@ function shownOfTwo(opacity: number): readonly [number, number] {
     const surface = new BlendedSurface(mesh, [material], frame);
     surface.set({ opacity, taken: 0, isInDisc: false, isCrossing: false, rank });
   });
-  renderer.setRenderTarget(target);
-  renderer.render(scene, camera);
-  const rgba = new Uint8Array(4 * PIXELS * PIXELS);
-  renderer.readRenderTargetPixels(target, 0, 0, PIXELS, PIXELS, rgba);
-  const count = (k: number) => rgba.filter((v, i) => i % 4 === k && v > 20).length;
+  const shown = eyes.map((eye) => {
+    const rgba = draw(renderer, target, scene, makeCamera(eye));
+    const count = (k: number) => rgba.filter((v, i) => i % 4 === k && v > 20).length;
+    return [count(0), count(2)] as const;
+  });
   renderer.dispose();
   renderer.forceContextLoss();
-  return [count(0), count(2)];
+  return shown;
 }
 
-const harness = { shownOfTwo };
+/**
+ * Least and most light, of 255, on the inside of a half of a sphere that ends at z = 0, open towards the eye, at the
+ * face of a tile before it.
+ *
+ * @param isVolume whether the tile is drawn as a volume, which shows nothing there
+ */
+function insideOfHalf(isVolume: boolean): readonly [number, number] {
+  const renderer = new WebGLRenderer({ antialias: false });
+  const target = new WebGLRenderTarget(PIXELS, PIXELS);
+  const cuts = new Cuts();
+  cuts.open(isVolume ? { min: [-1, -1, 0], max: [1, 1, 1] } : null, new Matrix4());
+  const scene = new Scene();
+  const lamp = new DirectionalLight(0xffffff, 3);
+  lamp.position.set(1, 1, 1.5);
+  const half = new SphereGeometry(0.5, 64, 32, 0, Math.PI).rotateY(Math.PI);
+  const material = new MeshStandardMaterial({ side: DoubleSide, roughness: 1 });
+  const mesh = new Mesh(half, material);
+  scene.add(lamp, mesh);
+  const surface = new BlendedSurface(mesh, [material], makeFrame(target, cuts));
+  surface.set({ opacity: 1, taken: 0, isInDisc: false, isCrossing: false, rank: 0 });
+  const rgba = draw(renderer, target, scene, makeCamera([0.3, 0.2, 2]));
+  renderer.dispose();
+  renderer.forceContextLoss();
+  const inside: number[] = [];
+  const [low, high] = [0.4 * PIXELS, 0.6 * PIXELS];
+  for (let y = Math.ceil(low); y < high; y++) {
+    for (let x = Math.ceil(low); x < high; x++) inside.push(rgba[4 * (y * PIXELS + x)]);
+  }
+  return [Math.min(...inside), Math.max(...inside)];
+}
+
+const harness = { shownOfTwo, insideOfHalf };
 export type Harness = typeof harness;
 Object.assign(window, { harness });

@@ -1,0 +1,126 @@
+"""One page in one file, .html: the viewer and the bundle at the finest levels that fit.
+
+The page runs from a disk (file://) and asks no host for anything: its policy forbids it. Each file
+is a block of base64 in the document, by gzip where that is shorter; `scene.js` answers the viewer's
+requests from these blocks.
+"""
+
+import base64
+import html
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from math import ceil
+from pathlib import Path
+
+from stereocell.bundle import blob_page
+from stereocell.export.scene_files import Levels, Packed, SceneFiles
+from stereocell.model.errors import UsageError
+from stereocell.storage.atomic_write import write_bytes
+
+MAX_MB = 25.0
+MB_BYTES = 1_000_000
+_SCRIPT = Path(__file__).with_name("scene.js")
+_LONGEST_VIEW = 16_000  # characters; the viewer's longest link has 8000
+# the end of a link, as the viewer writes it (viewer_gltf/src/share/permalink.ts)
+_VIEW = re.compile(r"#v=\d+(&[\w.~:;,=!*'()%+/@$?-]*)*", re.ASCII)
+
+
+def write_scene(
+    bundle: Path,
+    file: Path,
+    *,
+    channels: tuple[str, ...] = (),
+    max_mb: float = MAX_MB,
+    view: str = "",
+) -> str:
+    """Write the scene of a bundle; return a line that says which levels it holds.
+
+    channels  by name or ID; empty: all
+    max_mb    the most that the file may take, millions of bytes
+    view      a link of the viewer, or its end from `#`; empty: as the bundle opens
+
+    Raises UsageError where the coarsest levels take more, OutputError for a damaged bundle.
+    """
+    opening = _view_of(view)
+    files = SceneFiles(bundle, channels)
+    page = [_block("page", name, Packed(data, False)) for name, data in blob_page.files().items()]
+
+    def render(levels: Levels) -> bytes:
+        blocks = [_block("file", path, packed) for path, packed in files.at(levels).items()]
+        return blob_page.document(_SCRIPT, "".join([opening, *page, *blocks])).encode()
+
+    document, levels = _finest_that_fits(files, render, round(max_mb * MB_BYTES))
+    write_bytes(file, document)
+    return _about(files, levels, len(document))
+
+
+def _finest_that_fits(
+    files: SceneFiles, render: Callable[[Levels], bytes], most: int
+) -> tuple[bytes, Levels]:
+    """Return the document of at most so many bytes, and its levels.
+
+    From the coarsest levels on, surfaces or volumes become finer by one level, whichever adds less,
+    until neither has a finer level that fits.
+    """
+    levels = Levels(max(0, files.surface_levels - 1), max(0, files.volume_levels - 1))
+    document = render(levels)
+    if len(document) > most:
+        raise UsageError(
+            f"--max-mb is {most / MB_BYTES:g}: the page with the coarsest surfaces and volumes "
+            f"takes {ceil(len(document) / MB_BYTES * 100) / 100:.2f} MB: expected as much, or "
+            "fewer --channels"
+        )
+    growing = [kind for kind in ("surfaces", "volumes") if getattr(levels, kind) > 0]
+    while growing:
+        finer = {kind: replace(levels, **{kind: getattr(levels, kind) - 1}) for kind in growing}
+        least = {kind: files.least_bytes(one) for kind, one in finer.items()}
+        kind = min(growing, key=least.__getitem__)
+        tried = render(finer[kind]) if least[kind] * 4 // 3 <= most else None
+        if tried is not None and len(tried) <= most:
+            document, levels = tried, finer[kind]
+        else:
+            growing.remove(kind)
+        growing = [kind for kind in growing if getattr(levels, kind) > 0]
+    return document, levels
+
+
+def _about(files: SceneFiles, levels: Levels, size: int) -> str:
+    """Return one sentence: the levels that the file holds, and the parts that were left out."""
+    holds, out = [], []
+    if files.surface_levels:
+        holds.append(f"surfaces at lod{levels.surfaces}")
+        out += _finer(levels.surfaces, "surfaces")
+    if files.volume_levels:
+        voxels = " x ".join(map(str, files.largest_volume(levels)))
+        holds.append(f"volumes at mip level {levels.volumes} (up to {voxels} voxels a tile)")
+        out += _finer(levels.volumes, "volumes")
+    if files.has_usdz:
+        out.append("specimen.usdz")
+    left = f"left out: {', '.join(out)}" if out else "nothing left out"
+    return f"{size / MB_BYTES:.2f} MB with {' and '.join(holds) or 'no surface'}; {left}"
+
+
+def _finer(count: int, of: str) -> list[str]:
+    """Return the words for levels that were left out; none where there are none."""
+    return [f"{count} finer level{'s' if count > 1 else ''} of {of}"] if count else []
+
+
+def _view_of(link: str) -> str:
+    """Return the block that holds the end of a link. Raises UsageError for another text."""
+    if not link:
+        return ""
+    view = link[link.find("#") :]
+    if len(view) > _LONGEST_VIEW or not _VIEW.fullmatch(view):
+        raise UsageError(
+            f"--view is {link[:80]!r}, expected a link that the viewer has made, with #v=1 in it"
+        )
+    return f'    <script type="text/plain" data-view>{view}</script>\n'
+
+
+def _block(kind: str, name: str, packed: Packed) -> str:
+    text = base64.b64encode(packed.data).decode()
+    attributes = f'data-{kind}="{html.escape(name)}" data-bytes="{len(packed.data)}"'
+    if packed.is_packed:
+        attributes += " data-packed"
+    return f'    <script type="application/octet-stream" {attributes}>{text}</script>\n'

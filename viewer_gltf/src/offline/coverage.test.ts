@@ -1,0 +1,49 @@
+import { expect, it } from "vitest";
+import { type Asked, keyOf } from "../bundle/request_log";
+import { coverageOf, coverageText, type Layer } from "./coverage";
+
+const file = (name: string): Asked => ({ url: `https://host/${name}`, range: null });
+/** Three levels of two tiles, fine before coarse. */
+const LAYER: Layer = ["a", "b"].map((tile) => ({
+  tile,
+  levels: [0, 1, 2].map((level) => [file(`${tile}/${level}`)]),
+}));
+const keysOf = (...names: readonly string[]) => new Set(names.map((name) => keyOf(file(name))));
+const coverage = (come: readonly string[], kept = come) =>
+  coverageOf(["a", "b"], [LAYER], come.map(file), keysOf(...kept)).tiles;
+
+it("counts every tile while all of them were shown at the same level", () => {
+  expect(coverage(["a/2", "b/2"])).toBe(2);
+});
+
+it("counts the tiles alone that have the finest level that was shown anywhere", () => {
+  expect(coverage(["a/2", "b/2", "a/1"])).toBe(1);
+  expect(coverage(["a/2", "b/2", "a/1", "a/0", "b/1"])).toBe(1);
+  expect(coverage(["a/2", "b/2", "a/1", "b/1"])).toBe(2);
+});
+
+it("counts no tile whose level was shown and is not kept", () => {
+  expect(coverage(["a/2", "b/2"], ["a/2"])).toBe(1);
+});
+
+it("counts a level that an earlier visit has kept", () => {
+  expect(coverage(["a/2", "b/2", "a/0"], ["a/2", "b/2", "a/0", "b/0"])).toBe(2);
+});
+
+it("expects the finest level of a tile that has fewer levels", () => {
+  const short: Layer = [LAYER[0], { tile: "b", levels: LAYER[1].levels.slice(0, 1) }];
+  const come = ["a/2", "b/0"];
+  expect(coverageOf(["a", "b"], [short], come.map(file), keysOf(...come)).tiles).toBe(1);
+  const fine = ["a/0", "b/0"];
+  expect(coverageOf(["a", "b"], [short], fine.map(file), keysOf(...fine)).tiles).toBe(2);
+});
+
+it("wants nothing of a layer that nobody has seen", () => {
+  expect(coverageOf(["a", "b"], [LAYER], [], new Set()).tiles).toBe(2);
+});
+
+it("promises every place, or names what is kept", () => {
+  expect(coverageText({ tiles: 10 }, 10)).toMatch(/^Ready offline: /);
+  expect(coverageText({ tiles: 3 }, 10)).toBe("Kept for offline: the overview and 3 of 10 tiles.");
+  expect(coverageText({ tiles: 0 }, 10)).toBe("Kept for offline: the overview.");
+});

@@ -1,0 +1,51 @@
+/**
+ * How much of a specimen a visit without a network would show. A place counts if it is kept at the finest level that
+ * was shown anywhere: that is what a reader expects to find there. Pure.
+ */
+import { type Asked, keyOf } from "../bundle/request_log";
+
+/** The requests for each level of one tile, the finest level first. */
+export type Levels = Readonly<{ tile: string; levels: readonly (readonly Asked[])[] }>;
+/** The surfaces of one channel, or its volumes. */
+export type Layer = readonly Levels[];
+
+export type Coverage = Readonly<{
+  /** Number of tiles that are kept, at the finest level that was shown. */
+  tiles: number;
+}>;
+
+/**
+ * @param come the requests that were answered
+ * @param kept keys of the requests that need no network
+ */
+export function coverageOf(
+  tiles: readonly string[],
+  layers: readonly Layer[],
+  come: readonly Asked[],
+  kept: ReadonlySet<string>,
+): Coverage {
+  const shown = new Set(come.map(keyOf));
+  const hasAll = (asked: readonly Asked[], keys: ReadonlySet<string>) =>
+    asked.every((each) => keys.has(keyOf(each)));
+  const missing = new Set<string>();
+  for (const layer of layers) {
+    const finest = layer
+      .map(({ levels }) => levels.findIndex((asked) => hasAll(asked, shown)))
+      .filter((index) => index >= 0);
+    if (finest.length === 0) continue; // nobody has seen any of it
+    const wanted = Math.min(...finest);
+    for (const { tile, levels } of layer) {
+      const asked = levels[Math.min(wanted, levels.length - 1)] ?? [];
+      if (!hasAll(asked, kept)) missing.add(tile);
+    }
+  }
+  return { tiles: tiles.filter((tile) => !missing.has(tile)).length };
+}
+
+/** What a page announces of it. */
+export function coverageText({ tiles }: Coverage, of: number): string {
+  if (tiles === of)
+    return "Ready offline: every place opens without a network, as you have seen it.";
+  const places = tiles === 0 ? "" : ` and ${tiles} of ${of} tiles`;
+  return `Kept for offline: the overview${places}.`;
+}

@@ -1,0 +1,86 @@
+/**
+ * The place that a flat screen gives the specimen: a gentle gradient, a pool of light on the ground, and a soft
+ * shadow under the specimen. It is drawn behind all else, and covers nothing. Stereo has a dark room with a
+ * grid on the ground, and the user's own room has a ground.
+ */
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  GLSL3,
+  Mesh,
+  NoColorSpace,
+  RawShaderMaterial,
+  Vector3,
+  Vector4,
+} from "three";
+import { BACKDROP_FRAGMENT, BACKDROP_VERTEX } from "../gpu/shaders/backdrop_sources";
+import { around } from "../math/box";
+import type { Vec3 } from "../math/vec3";
+import { FAR, type Theme } from "./theme";
+
+/** Share of a room's height by which the ground lies under the specimen: it stands on its shadow. */
+const GAP = 0.02;
+/** Before all else that is drawn. */
+const RENDER_ORDER = -2;
+
+/** sRGB: high up, and beside the specimen; share of the light that its shadow takes. */
+const LOOKS = {
+  dark: [0x171c26, 0x1d232f, 0.72],
+  light: [0xfafbfd, 0xffffff, 0.34],
+} as const;
+
+export class Backdrop {
+  private readonly uniforms = {
+    uFar: { value: new Vector3() },
+    uHigh: { value: new Vector3() },
+    uPool: { value: new Vector3() },
+    uShade: { value: 0 },
+    uFoot: { value: new Vector4() },
+    uGround: { value: 0 },
+  };
+  readonly mesh = new Mesh(
+    new BufferGeometry(),
+    new RawShaderMaterial({
+      glslVersion: GLSL3,
+      vertexShader: BACKDROP_VERTEX,
+      fragmentShader: BACKDROP_FRAGMENT,
+      uniforms: this.uniforms,
+      depthTest: false,
+      depthWrite: false,
+    }),
+  );
+
+  constructor() {
+    const corners = new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]);
+    this.mesh.geometry.setAttribute("position", new BufferAttribute(corners, 3));
+    this.mesh.frustumCulled = false;
+    this.mesh.renderOrder = RENDER_ORDER;
+  }
+
+  dress(theme: Theme): void {
+    const [high, pool, shade] = LOOKS[theme];
+    const { uFar, uHigh, uPool, uShade } = this.uniforms;
+    uFar.value.copy(srgb(FAR[theme]));
+    uHigh.value.copy(srgb(high));
+    uPool.value.copy(srgb(pool));
+    uShade.value = shade;
+  }
+
+  /** @param points outermost ones of what is shown, in the room, m */
+  standUnder(points: readonly Vec3[]): void {
+    if (points.length === 0) return;
+    const { min, max } = around(points);
+    this.uniforms.uFoot.value.set(min[0], min[2], max[0], max[2]);
+    this.uniforms.uGround.value = min[1] - GAP;
+  }
+
+  dispose(): void {
+    this.mesh.geometry.dispose();
+    this.mesh.material.dispose();
+  }
+}
+
+function srgb(hex: number): Vector3 {
+  return new Vector3(...new Color().setHex(hex, NoColorSpace).toArray());
+}

@@ -1,0 +1,24 @@
+import { expect, it } from "vitest";
+import type { Measurement } from "../state/measurements";
+import { untypedNames } from "./untyped_names";
+
+const measured = (name: string, kind: Measurement["kind"] = "distance"): Measurement => ({
+  name,
+  kind,
+  points: [
+    [0, 0, 0],
+    [1, 0, 0],
+    [1, 1, 0],
+  ],
+});
+
+it("keeps the names that the viewer has made up", () => {
+  const list = [measured("Distance 1"), measured("Angle 3", "angle"), measured("Distance 2")];
+  expect(untypedNames(list)).toEqual(list);
+});
+
+it("replaces names that a reader has typed by ones that no other measurement has", () => {
+  const list = [measured("Doe, Jane"), measured("Distance 1"), measured("Distance 1b")];
+  const names = untypedNames(list).map(({ name }) => name);
+  expect(names).toEqual(["Distance 2", "Distance 1", "Distance 3"]);
+});

@@ -1,0 +1,117 @@
+/** The words about a visit without a network are true: every place that they promise shows as it was seen. */
+import { cp, mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { afterAll, afterEach, beforeAll, beforeEach, expect, inject, it } from "vitest";
+import type { Browser } from "../support/browser/chromium";
+import { Host } from "../support/browser/host";
+import { ViewerPage } from "../support/browser/page";
+import { difference, isBackground, type Picture, takePicture } from "../support/browser/picture";
+import { openBrowser } from "../support/browser/shared_browser";
+import { describeInChromium } from "../support/browser/skip";
+import { DIST } from "../support/browser/stand";
+
+/** Of the picture's pixels, beside those that blend differently from one drawing to the next. */
+const SAME = 0.002;
+
+describeInChromium("the words about a visit without a network", () => {
+  let root: string;
+  let host: Host;
+  let browser: Browser;
+  let viewer: ViewerPage;
+
+  beforeAll(async () => {
+    root = await mkdtemp(join(tmpdir(), "stereocell-places-"));
+    await cp(inject("fixture"), root, { recursive: true });
+    await cp(DIST, root, { recursive: true }); // the bundle holds its viewer, as on any host
+    host = await Host.start({ "/": root });
+  });
+
+  beforeEach(async () => {
+    browser = await openBrowser({ viewport: { width: 400, height: 300 } });
+    viewer = new ViewerPage(await browser.context.newPage());
+    await viewer.page.addInitScript(() => {
+      localStorage.setItem("stereocell-open", "channels more volumes tiles");
+      const said: string[] = [];
+      Object.assign(window, { said });
+      new MutationObserver(() => {
+        const text = document.querySelector("[data-said]")?.textContent ?? "";
+        if (/offline/.test(text) && said.at(-1) !== text) said.push(text);
+      }).observe(document, { childList: true, subtree: true, characterData: true });
+    });
+    await viewer.open(`${host.address}/?quality=low&mode=tile&switch=9&view=front#v=1&depth=0`);
+    await viewer.settled();
+  });
+
+  afterEach(async () => {
+    await browser.context.setOffline(false);
+    await browser.close();
+  });
+
+  afterAll(async () => {
+    await host?.stop();
+    await rm(root, { recursive: true, force: true });
+  });
+
+  const said = () =>
+    viewer.page.evaluate(() => (window as unknown as { said: readonly string[] }).said);
+  const offline = () => viewer.page.evaluate(() => document.documentElement.dataset.offline);
+  const notices = async () => (await viewer.snapshot()).state.notices;
+  const tiles = async () => (await viewer.snapshot()).state.tiles.map(({ id }) => id);
+
+  async function visit(tile: string): Promise<Picture> {
+    await viewer.chooseTile(tile);
+    await viewer.still();
+    expect((await viewer.snapshot()).volumes.map((volume) => volume.tile)).toContain(tile);
+    return takePicture(viewer.page);
+  }
+
+  async function reload(): Promise<void> {
+    await viewer.page.reload();
+    await viewer.page.waitForFunction(() => window.stereocell !== undefined);
+    await viewer.page.evaluate(() => window.stereocell?.ready);
+    await viewer.settled();
+  }
+
+  it("promise every place once each has been seen, and each shows without a network", async () => {
+    const all = await tiles();
+    const first = `Kept for offline: the overview and 1 of ${all.length} tiles.`;
+    await expect.poll(said).toEqual([first]);
+    expect(await offline()).toBe("partly");
+    const seen = new Map<string, Picture>();
+    for (const tile of all) seen.set(tile, await visit(tile));
+    await expect.poll(offline).toBe("ready");
+    expect(await said()).toEqual([first, expect.stringMatching(/^Ready offline: /)]);
+
+    await viewer.page.waitForTimeout(1000); // the last place is in the address by then
+    const atLast = await takePicture(viewer.page);
+    await browser.context.setOffline(true);
+    const asked = host.requests.length;
+    await reload();
+    expect(difference(atLast, await takePicture(viewer.page))).toBeLessThan(SAME);
+    for (const [tile, picture] of seen) {
+      expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+      if ((await viewer.snapshot()).state.selected === tile) await viewer.chooseTile(all[0]);
+      expect(difference(picture, await visit(tile)), tile).toBeLessThan(SAME);
+    }
+    expect(await notices()).toEqual([]);
+    expect(host.requests.length).toBe(asked);
+    expect(await said()).toEqual([]); // it has been announced
+  });
+
+  it("name the tiles that are kept; elsewhere the page speaks of being offline, until it is online", async () => {
+    const [volume] = (await viewer.snapshot()).volumes;
+    await expect.poll(offline).toBe("partly");
+    const other = (await tiles()).find((tile) => tile !== volume.tile) ?? "";
+    await browser.context.setOffline(true);
+    await reload();
+    expect(await notices()).toEqual([]);
+    await viewer.page.locator(`[data-tile-choice="${other}"]`).click();
+    await expect.poll(notices).toEqual([expect.stringMatching(/^This device is offline/)]);
+    await browser.context.setOffline(false);
+    await expect.poll(notices).toEqual([]);
+    await viewer.settled();
+    const { volumes } = await viewer.snapshot();
+    expect(volumes.find(({ tile }) => tile === other)?.level).toBe(volume.level);
+  });
+});

@@ -1,0 +1,166 @@
+/** The viewer and a bundle in one file, opened from a disk: it shows what the served page shows, and asks no host. */
+import { mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
+import { afterAll, beforeAll, beforeEach, describe, expect, it } from "vitest";
+import { type Browser, hasChromium } from "../support/browser/chromium";
+import { Firefox, HOW_TO_GET_FIREFOX, hasFirefox } from "../support/browser/firefox";
+import { ViewerPage } from "../support/browser/page";
+import { difference, isBackground, Picture, takePicture } from "../support/browser/picture";
+import { decodePng } from "../support/browser/png";
+import { openBrowser } from "../support/browser/shared_browser";
+import { prepareStand } from "../support/browser/stand";
+import { askPython, hasPython } from "../support/python";
+
+const VIEWPORT = { width: 480, height: 300 };
+/** Share of pixels that may differ: what is gathered at rest is noise, averaged. */
+const SAME = 0.01;
+const VIEW = "#v=1&eye=0.5,0.4,1.2,0,0,0";
+
+describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
+  const stand = prepareStand({ viewport: VIEWPORT });
+  let folder: string;
+  let browser: Browser;
+  let viewer: ViewerPage;
+  /** Addresses that the page has asked for, without those that lie in itself. */
+  let asked: string[];
+
+  const fileOf = (name: string) => join(folder, `${name}.html`);
+  const write = (name: string, ...more: readonly string[]) =>
+    askPython("scene_page", [stand.bundle, fileOf(name), ...more], "");
+  const open = (name: string, end = "") => viewer.open(pathToFileURL(fileOf(name)).href + end);
+
+  beforeAll(async () => {
+    folder = await mkdtemp(join(tmpdir(), "stereocell-scene-"));
+    browser = await openBrowser({ viewport: VIEWPORT });
+    await write("whole");
+  });
+
+  afterAll(async () => {
+    await browser?.close();
+    if (folder !== undefined) await rm(folder, { recursive: true, force: true });
+  });
+
+  beforeEach(async () => {
+    await viewer?.page.close();
+    viewer = new ViewerPage(await browser.context.newPage());
+    await viewer.page.context().setOffline(true);
+    asked = [];
+    viewer.page.on("request", (request) => {
+      if (!/^(blob|data):/.test(request.url())) asked.push(request.url());
+    });
+  });
+
+  it("shows the served page's picture without a network, and asks for nothing but itself", async () => {
+    await stand.open(`&mode=all${VIEW}`);
+    await stand.viewer.settled();
+    const served = await takePicture(stand.viewer.page);
+    await open("whole", `?mode=all&quality=low&view=front${VIEW}&depth=0`);
+    await viewer.settled();
+    const { state, volumes } = await viewer.snapshot();
+    expect(state.notices).toEqual([]);
+    expect(volumes.length).toBeGreaterThan(0);
+    const picture = await takePicture(viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    expect(difference(picture, served)).toBeLessThan(SAME);
+    expect(asked.map((address) => new URL(address).pathname)).toEqual([
+      pathToFileURL(fileOf("whole")).pathname,
+    ]);
+  });
+
+  it("has a policy by which no host can be reached, also by code of its own", async () => {
+    await open("whole");
+    const tries = await viewer.page.evaluate(async () => {
+      const fails = (job: () => Promise<unknown>) =>
+        job().then(
+          () => "reached",
+          () => "refused",
+        );
+      const image = () =>
+        new Promise((resolve, reject) => {
+          const made = new Image();
+          made.onload = resolve;
+          made.onerror = reject;
+          made.src = "https://host.example/a.png";
+        });
+      const violations: string[] = [];
+      addEventListener("securitypolicyviolation", (event) =>
+        violations.push(event.effectiveDirective),
+      );
+      const results = [await fails(() => fetch("https://host.example/a.json")), await fails(image)];
+      await new Promise((resolve) => setTimeout(resolve, 0));
+      return { results, violations: violations.sort() };
+    });
+    expect(tries).toEqual({
+      results: ["refused", "refused"],
+      violations: ["connect-src", "img-src"],
+    });
+  });
+
+  it("opens with the view of a link, keeps a view in its address, and reloads it", async () => {
+    await write("view", "25", `https://host.example/page${VIEW}`);
+    await open("view");
+    const eye = async () => (await viewer.snapshot()).look.position.map((v) => v.toFixed(2));
+    expect(await eye()).toEqual(["0.50", "0.40", "1.20"]);
+    const [channel] = (await viewer.snapshot()).state.channels;
+    await viewer.show(channel.id, false);
+    await viewer.page.keyboard.press("l");
+    await expect.poll(() => viewer.page.url()).toContain("#v=1&c=");
+    await viewer.page.reload();
+    await viewer.page.waitForFunction(() => window.stereocell !== undefined);
+    await viewer.page.evaluate(() => window.stereocell?.ready);
+    expect((await viewer.snapshot()).state.channels[0].shown).toBe(false);
+    expect(await eye()).toEqual(["0.50", "0.40", "1.20"]);
+  });
+
+  it("draws the coarse levels alone that fit, without a notice", async () => {
+    const refusal = await write("none", "0.1").catch((error: Error) => error.message);
+    const [, least] = /takes ([\d.]+) MB: expected as much/.exec(refusal) ?? [];
+    expect(Number(least)).toBeGreaterThan(0.5);
+    const about = await write("small", String(Number(least) + 0.005));
+    expect(about).toMatch(/left out: \d+ finer levels? of surfaces, \d+ finer levels? of volumes/);
+    await open("small", "?mode=all&quality=low");
+    await viewer.settled();
+    const { state, volumes } = await viewer.snapshot();
+    expect(state.notices).toEqual([]);
+    expect(Math.max(...volumes.map(({ level }) => level ?? -1))).toBe(0);
+    const picture = await takePicture(viewer.page);
+    expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    await viewer.chooseMode("off");
+    expect((await viewer.snapshot()).triangles).toBeGreaterThan(0);
+  });
+
+  if (!hasFirefox) process.stderr.write(`skipped: a scene in Firefox: ${HOW_TO_GET_FIREFOX}\n`);
+  it.skipIf(!hasFirefox)("opens in Firefox from a disk and asks no host", async () => {
+    const firefox = await Firefox.start();
+    try {
+      await firefox.open(`${pathToFileURL(fileOf("whole")).href}?mode=all&quality=low`);
+      const told = await firefox.run(IN_FIREFOX);
+      expect(told).toEqual({ notices: [], hasVolumes: true, hosts: [] });
+      const { width, height, rgba } = decodePng(await firefox.screenshot());
+      const picture = new Picture(width, height, rgba);
+      expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(5000);
+    } finally {
+      await firefox.stop();
+    }
+  });
+});
+
+/** Runs in the page: what it shows, and the addresses of hosts that it has asked. */
+const IN_FIREFOX = `
+  const resolve = arguments[arguments.length - 1];
+  const wait = (time_ms) => new Promise((then) => setTimeout(then, time_ms));
+  (async () => {
+    while (window.stereocell === undefined) await wait(50);
+    await window.stereocell.ready;
+    await window.stereocell.settled();
+    const { state, volumes } = window.stereocell.snapshot();
+    const names = performance.getEntriesByType("resource").map(({ name }) => name);
+    resolve({
+      notices: state.notices,
+      hasVolumes: volumes.length > 0,
+      hosts: names.filter((name) => !/^(blob|data):/.test(name)),
+    });
+  })().catch((error) => resolve(String(error)));
+`;

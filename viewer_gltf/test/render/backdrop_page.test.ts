@@ -1,0 +1,82 @@
+/** The place of the specimen on a flat screen: gradient and shadow, light and dark; the specimen stays as it is. */
+import { expect, it } from "vitest";
+import { type Picture, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+/** Largest difference of a part of a colour, of 255, between two pictures of the same surface. */
+const SAME = 3;
+
+describeInChromium("the background of the flat picture", () => {
+  const stand = prepareStand({ viewport: { width: 480, height: 360 }, pixelRatio: 1 });
+
+  /** Surfaces alone, from a little above, in a theme. */
+  async function pictureIn(theme: string, query = ""): Promise<Picture> {
+    await stand.viewer.page.emulateMedia({ contrast: "no-preference" });
+    await stand.open(`&mode=off&view=opening&theme=${theme}&quality=high${query}`);
+    await stand.viewer.settled();
+    return takePicture(stand.viewer.page);
+  }
+
+  const light = (picture: Picture, x: number, y: number) =>
+    picture.at(x, y).reduce((sum, v) => sum + v, 0);
+
+  it("is lighter beside the specimen than in its shadow, in both themes", async () => {
+    for (const theme of ["dark", "light"]) {
+      const [room, plain] = [await pictureIn(theme), await pictureIn(theme, "&backdrop=plain")];
+      const ground = plain.at(1, 1);
+      // where the plain picture shows its one colour there is no specimen
+      const bare = plain.where((pixel) => pixel.join() === ground.join());
+      const lights = bare.map(([x, y]) => light(room, x, y));
+      const [darkest, lightest] = [Math.min(...lights), Math.max(...lights)];
+      const far = light(room, 1, 1);
+      expect(lightest - darkest, theme).toBeGreaterThan(25);
+      expect(darkest, theme).toBeLessThan(far);
+      // the darkest place lies below the middle, under the specimen
+      const [, row] = bare[lights.indexOf(darkest)];
+      expect(row / room.height, theme).toBeGreaterThan(0.5);
+    }
+  });
+
+  it("leaves the specimen's colours as they are", async () => {
+    const pictures = [
+      await pictureIn("dark"),
+      await pictureIn("light"),
+      await pictureIn("dark", "&backdrop=plain"),
+    ];
+    const isInside = ([r, g, b]: readonly number[]) => Math.max(r, g, b) - Math.min(r, g, b) > 60;
+    const near = [-2, -1, 0, 1, 2];
+    // edges are smoothed: they are of both
+    const inside = pictures[2]
+      .where(isInside)
+      .filter(([x, y]) =>
+        near.every((u) => near.every((v) => isInside(pictures[2].at(x + u, y + v)))),
+      );
+    expect(inside.length).toBeGreaterThan(1000);
+    for (const [x, y] of inside) {
+      const [dark, light, plain] = pictures.map((picture) => picture.at(x, y));
+      const apart = [light, plain].map((pixel) =>
+        Math.max(...pixel.map((v, i) => Math.abs(v - dark[i]))),
+      );
+      expect(Math.max(...apart), `${x}, ${y}`).toBeLessThanOrEqual(SAME);
+    }
+  });
+
+  it("is the same each time", async () => {
+    const [first, again] = [await pictureIn("light"), await pictureIn("light")];
+    const differing = first
+      .where(() => true)
+      .filter(([x, y]) => first.at(x, y).join() !== again.at(x, y).join());
+    expect(differing).toEqual([]);
+  });
+
+  it("follows the system where the address names no theme", async () => {
+    const { page } = stand.viewer;
+    await page.emulateMedia({ colorScheme: "light", contrast: "no-preference" });
+    await stand.open("&mode=off");
+    const themeOf = () => page.evaluate(() => document.documentElement.dataset.theme);
+    expect(await themeOf()).toBe("light");
+    await page.emulateMedia({ colorScheme: "dark" });
+    await expect.poll(themeOf).toBe("dark");
+  });
+});

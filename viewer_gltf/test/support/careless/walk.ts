@@ -1,0 +1,82 @@
+/**
+ * A careless reader: acts at random, as the same seed always does, and compares what each act has changed with what
+ * it asked for.
+ */
+import type { Page } from "playwright-core";
+import type { Snapshot } from "../../../src/app/automation_api";
+import type { ViewerPage } from "../browser/page";
+
+/** Parts of the state that an act may change; "look": from where the specimen is seen; "any": whatever a control sets. */
+export type Change = keyof Snapshot["state"] | "look" | "any";
+
+export type Reader = Readonly<{
+  viewer: ViewerPage;
+  page: Page;
+  /** 0..1, the next one of the seed's. */
+  random: () => number;
+}>;
+
+export type Act = Readonly<{
+  name: string;
+  changes: readonly Change[];
+  /** Of all acts, so many parts. */
+  weight: number;
+  /** @returns the name of the control, if it was one */
+  run: (reader: Reader) => Promise<unknown>;
+}>;
+
+/** Largest change of a length that is none, m: what is left of a glide. */
+const SAME_M = 1e-3;
+/** Changes by themselves: what has come, and what could not come. */
+const NOBODYS: ReadonlySet<string> = new Set(["notices", "mendable"]);
+
+type View = Readonly<{ state: Snapshot["state"]; look: Snapshot["look"] }>;
+
+function channelsOf({ channels }: Snapshot["state"]): string {
+  return JSON.stringify(channels.map(({ turn, transfer2d, ...channel }) => channel));
+}
+
+/** The names of all that differs. */
+export function changesBetween(before: View, after: View): readonly string[] {
+  const keys = Object.keys(before.state) as (keyof Snapshot["state"])[];
+  const changed: string[] = keys.filter((key) => {
+    if (NOBODYS.has(key)) return false;
+    if (key === "channels") return channelsOf(before.state) !== channelsOf(after.state);
+    return JSON.stringify(before.state[key]) !== JSON.stringify(after.state[key]);
+  });
+  const [was, is] = [before.look, after.look].map((look) => [...look.position, ...look.target]);
+  if (was.some((v, i) => Math.abs(v - is[i]) > SAME_M)) changed.push("look");
+  return changed;
+}
+
+export function unasked({ changes }: Act, changed: readonly string[]): readonly string[] {
+  const isAsked = (name: string) =>
+    changes.includes(name as Change) || (changes.includes("any") && name !== "look");
+  return changed.filter((name) => !isAsked(name));
+}
+
+/** Wait until a glide or a flight has ended. */
+export async function comeToRest({ page, viewer }: Reader): Promise<View> {
+  let before = await viewer.snapshot();
+  for (let i = 0; i < 60; i++) {
+    await page.waitForTimeout(150);
+    const after = await viewer.snapshot();
+    const isSame = changesBetween(before, after).length === 0;
+    before = after;
+    if (isSame) break;
+  }
+  return before;
+}
+
+export function choose<T>(random: () => number, list: readonly T[]): T {
+  return list[Math.floor(random() * list.length)];
+}
+
+export function chooseAct(random: () => number, acts: readonly Act[]): Act {
+  let left = random() * acts.reduce((sum, { weight }) => sum + weight, 0);
+  for (const act of acts) {
+    left -= act.weight;
+    if (left < 0) return act;
+  }
+  return acts[acts.length - 1];
+}
