@@ -117,7 +117,9 @@ export function savePicture(
   const { renderer, studio, navigation } = scene;
   const { camera } = navigation;
   const { width, height } = renderer.domElement;
-  const scale = Math.max(1, Math.min(wanted, Math.floor(Math.sqrt(MAX_PIXELS / (width * height)))));
+  const isTwo = scene.state.screenStereo === "side-by-side"; // whose halves are no parts of one picture
+  const most = isTwo ? 1 : Math.floor(Math.sqrt(MAX_PIXELS / (width * height)));
+  const scale = Math.max(1, Math.min(wanted, most));
   return studio.apart(async () => {
     const { canvas, context } = canvasOf(scale * width, scale * height);
     const words = clearCaptionOf(scene); // before the camera sees parts alone
@@ -136,7 +138,7 @@ export function savePicture(
     } finally {
       camera.clearViewOffset();
     }
-    drawCaption(context, canvas, scale * renderer.getPixelRatio(), words);
+    if (!isTwo) drawCaption(context, canvas, scale * renderer.getPixelRatio(), words);
     return pngOf(canvas);
   });
 }

@@ -10,11 +10,12 @@ import { Pace } from "../render/pacing/frame_budget";
 import { RestPace } from "../render/pacing/redraw_at_rest";
 import { GatherPace } from "../render/pacing/samples_per_frame";
 import type { Room } from "../render/scene";
+import { isTraced } from "../state/parameters/volumes";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
 import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
-import { MAX_STEPS } from "../volumes/tile_raymarch";
+import { MAX_STEPS, REST_STEPS } from "../volumes/tile_raymarch";
 import type { Stereo } from "../xr/stereo";
 import { Pulse } from "./pulse";
 import type { Contents } from "./scene_contents";
@@ -190,7 +191,7 @@ export class FrameLoop {
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
     // too slow a device to turn the specimen by itself shows it at rest, as well as can be
     if (settings.resolution < MIN_TURNING) this.options.shown().navigation.stopTurning();
-    this.picture.marchFrame.uSteps.value = settings.steps;
+    this.picture.marchFrame.uSteps.value = stepsOf(this.options.shown().state) ?? settings.steps;
     hybrid.radiusShare = settings.discShare;
     const [eye] = this.picture.eyes.all; // a headset has none before its first pose
     if (eye !== undefined) {
@@ -258,9 +259,9 @@ export class FrameLoop {
    * @param begun what it has returned for the same view, to go on with
    */
   drawStill(most_ms: number, begun: Still | null = null): Still {
-    const { contents, navigation, state } = this.options.shown();
+    const { contents, state } = this.options.shown();
     const { traced, surfaces } = contents;
-    this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
+    this.followScreen();
     surfaces.dressAll();
     const start_ms = performance.now();
     const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
@@ -288,8 +289,14 @@ export class FrameLoop {
       this.options.room.standUnder(navigation.occupied);
     }
     navigation.update(dt_s);
-    this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
+    this.followScreen();
     return navigation.camera;
+  }
+
+  private followScreen(): void {
+    const { stereo, navigation } = this.options.shown();
+    const { camera, controls } = navigation;
+    stereo.followScreen(this.picture.eyes, camera, controls.target);
   }
 
   /** Follow the gaze, and go on with what moves and with what fades; whether it goes on. */
@@ -365,4 +372,9 @@ export class FrameLoop {
     this.picture.dispose();
     this.pace.dispose();
   }
+}
+
+/** Steps of the march that stands in for paths of light; null: as many as the frame's budget allows. */
+function stepsOf({ mode, trace: { steps } }: ViewerState): number | null {
+  return isTraced({ mode }) && steps > 0 ? Math.min(REST_STEPS, Math.ceil(steps)) : null;
 }

@@ -13,7 +13,7 @@ export const CHUNKS = byName(
     [
       "./chunks/*.glsl",
       "!./chunks/{delta_tracking,environment,medium,medium_2d,phase_function}.glsl",
-      "!./chunks/{random,reproject_search,temporal_history,tone_map}.glsl",
+      "!./chunks/{calibrated_light,random,reproject_search,temporal_history,tone_map}.glsl",
     ],
     { query: "?raw", import: "default", eager: true },
   ),

@@ -5,7 +5,7 @@ export const PATH_TRACE_CHUNKS = byName(
   import.meta.glob(
     [
       "./chunks/{delta_tracking,environment,medium,medium_2d,phase_function}.glsl",
-      "./chunks/{random,reproject_search,temporal_history,tone_map}.glsl",
+      "./chunks/{calibrated_light,random,reproject_search,temporal_history,tone_map}.glsl",
     ],
     { query: "?raw", import: "default", eager: true },
   ),

@@ -191,6 +191,7 @@ describe("the keys", () => {
       find: false,
       code: false,
       letters: false, // a key could not switch it back on
+      keys: false, // the list of keys has it
       unfold: false,
     };
     for (const [panel, isWanted] of Object.entries(wanted)) {

@@ -183,7 +183,7 @@ function deeperSections(
       "Volume settings",
       ofVolumes(controlsOf(settings, state).map((item) => discItem(item, state, facts))),
     ),
-    section("light", "Light", ofVolumes(lightItems(state, view, facts.isStereo))),
+    section("light", "Path tracing", ofVolumes(lightItems(state, view, facts.isStereo))),
     section("share", "Share and keys", [
       command("share", "Copy a link to this view"),
       ...(view.link === ""
@@ -344,6 +344,6 @@ const STATUS: Readonly<Record<ViewerState["mode"], string>> = {
   tile: "Surfaces, one tile as volume from near",
   all: "Volumes",
   stage: "As set in the stage",
-  traced: "Volumes, path-traced",
+  traced: "Volumes, path tracing",
   off: "Surfaces",
 };

@@ -17,6 +17,7 @@ import { drawEyes, partOf } from "../gpu/offscreen_target";
 import { ScreenPass } from "../gpu/screen_pass";
 import type { TraceSettings } from "../state/path_trace_settings";
 import { areSame, type TraceView } from "./eye_rays";
+import type { LightProbe } from "./light_probe";
 import { TRACE_DENOISE, TRACE_MEAN, TRACE_SHOW, TRACE_WARP } from "./shaders/sources";
 
 /** Samples with which a pixel is left as it is: see denoise.frag.glsl. */
@@ -38,6 +39,8 @@ export class DenoiseAndTone {
   readonly picture = byteTarget();
   /** Pixels of the picture to one of the frame buffer. */
   scale = 1;
+  /** The same of the mean. */
+  private meanScale = 1;
   private readonly mean = floatTarget(2, HalfFloatType);
   private readonly spares = [floatTarget(1, HalfFloatType), floatTarget(1, HalfFloatType)];
   private color: Texture = this.mean.textures[0];
@@ -67,6 +70,8 @@ export class DenoiseAndTone {
     uEyeThere: { value: new Vector3() },
   });
   private readonly showPass = new ScreenPass(TRACE_SHOW, {
+    uTracedLight: nothing(),
+    uMarchedLight: nothing(),
     uColor: nothing(),
     uExposure: { value: 1 },
     uSharpness: { value: 0 },
@@ -77,6 +82,9 @@ export class DenoiseAndTone {
     uRounds: { value: 0 },
     uMarchedPart: { value: new Vector4() },
   });
+
+  /** @param probe what finds the light of the stand-in */
+  constructor(private readonly probe: LightProbe) {}
 
   /** @param size um: what is gathered from now on is of another box */
   expect(size: Vector3): void {
@@ -117,14 +125,9 @@ export class DenoiseAndTone {
         this.color = target.texture;
       }
     }
-    this.scale = scale;
+    this.meanScale = scale;
     this.began = views;
     this.shown = [];
-  }
-
-  /** Whether the picture is of paths that began there. */
-  isOf(views: readonly TraceView[]): boolean {
-    return areSame(this.began, views);
   }
 
   /**
@@ -140,12 +143,15 @@ export class DenoiseAndTone {
     isOther: boolean,
     standIn: StandIn | null = null,
   ): void {
-    const { began, showPass, scale } = this;
-    if (began.length !== views.length) return;
-    if (!isOther && areSame(views, this.shown)) return;
+    const { began, showPass } = this;
+    const isAlone = standIn !== null && standIn.rounds === 0;
+    if (!isAlone && began.length !== views.length) return;
+    if (!isOther && standIn === null && areSame(views, this.shown)) return;
     this.shown = views;
+    this.scale = isAlone ? standIn.scale : this.meanScale;
     const { uniforms } = showPass;
-    uniforms.uColor.value = areSame(views, began) ? this.color : this.warp(renderer, eyes, views);
+    const isSame = isAlone || areSame(views, began);
+    uniforms.uColor.value = isSame ? this.color : this.warp(renderer, eyes, views);
     const { isPostOn } = settings;
     uniforms.uExposure.value = isPostOn ? 2 ** settings.exposure : 1;
     uniforms.uSharpness.value = isPostOn ? settings.sharpness : 0;
@@ -157,7 +163,9 @@ export class DenoiseAndTone {
     uniforms.uGuide.value = this.mean.textures[1];
     uniforms.uRounds.value = standIn?.rounds ?? 0;
     uniforms.uMarched.value = standIn?.picture ?? null;
-    drawEyes(renderer, showPass.scene, eyes, this.picture, scale, (eye, part) => {
+    uniforms.uTracedLight.value = this.probe.light.traced;
+    uniforms.uMarchedLight.value = this.probe.light.marched;
+    drawEyes(renderer, showPass.scene, eyes, this.picture, this.scale, (eye, part) => {
       showPass.uPart.value.copy(part);
       if (standIn === null) uniforms.uMarchedPart.value.setZ(0);
       else partOf(eye, standIn.scale, uniforms.uMarchedPart.value);
@@ -172,7 +180,7 @@ export class DenoiseAndTone {
     uniforms.uEdge.value = Math.max(...this.size);
     const middle = this.size.clone().multiplyScalar(0.5);
     let k = 0;
-    drawEyes(renderer, scene, eyes, target, this.scale, (_, part) => {
+    drawEyes(renderer, scene, eyes, target, this.meanScale, (_, part) => {
       const [now, there] = [views[k], this.began[k]];
       uPart.value.copy(part);
       uniforms.uToBox.value.copy(now.toBox);

@@ -22,14 +22,11 @@ export type MediumAppearance = Readonly<{
  * If any channel has a two-dimensional transfer function, each has a row for each gradient.
  *
  * @param voxel_um the path that an opacity of the tables holds for
- * @param bias added to an intensity before its table: a grey value's opacity is that of
- *   another grey value
  * @param density factor to the extinction
  */
 export function mediumTable(
   appearances: readonly MediumAppearance[],
   voxel_um: number,
-  bias: number,
   density: number,
 ): Float32Array<ArrayBuffer> {
   const count = rowsOf(appearances);
@@ -43,7 +40,7 @@ export function mediumTable(
         continue;
       }
       const row = table2d?.cells.subarray(j * length, (j + 1) * length) ?? table;
-      fillRow(rows.subarray(to, to + length), row, color, voxel_um, bias, density);
+      fillRow(rows.subarray(to, to + length), row, color, voxel_um, density);
     }
   });
   return rows;
@@ -59,18 +56,11 @@ function fillRow(
   table: Uint8Array,
   color: MediumAppearance["color"],
   voxel_um: number,
-  bias: number,
   density: number,
 ): void {
   for (let i = 0; i < ENTRIES; i++) {
-    const at = Math.min(ENTRIES - 1, Math.max(0, i + bias * (ENTRIES - 1)));
-    const left = Math.min(ENTRIES - 2, Math.floor(at));
-    for (let k = 0; k < 4; k++) {
-      const a = table[4 * left + k];
-      row[4 * i + k] = (a + (table[4 * left + 4 + k] - a) * (at - left)) / 255;
-    }
-    for (let k = 0; k < 3; k++) row[4 * i + k] *= color[k];
-    const opacity = Math.min(row[4 * i + 3], MAX_OPACITY);
+    for (let k = 0; k < 3; k++) row[4 * i + k] = (color[k] * table[4 * i + k]) / 255;
+    const opacity = Math.min(table[4 * i + 3] / 255, MAX_OPACITY);
     row[4 * i + 3] = opacity === 0 ? 0 : (-Math.log(1 - opacity) / voxel_um) * density;
   }
 }

@@ -4,12 +4,8 @@
  * anew.
  */
 import {
-  type Data3DTexture,
-  type DataTexture,
   FloatType,
   Matrix4,
-  RGBAFormat,
-  RGFormat,
   type Texture,
   type Vector3,
   type WebGLRenderer,
@@ -17,37 +13,33 @@ import {
 } from "three";
 import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { Eyes } from "../gpu/eyes";
-import { drawWhole, float3D, floatTarget, floatTexture } from "../gpu/float_targets";
+import { floatTarget } from "../gpu/float_targets";
 import { drawEyes } from "../gpu/offscreen_target";
+import { GROUND, SKY } from "../gpu/room_light";
 import { ScreenPass } from "../gpu/screen_pass";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
-import { brickCounts } from "../volumes/skip_bricks";
-import { ENTRIES, edgeContrast } from "../volumes/transfer_luts";
-import { tablesInto } from "../volumes/transfer_table_2d";
+import type { MarchLight } from "../volumes/tile_raymarch";
 import { DenoiseAndTone, type Marched } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
-import {
-  coarserMajorants,
-  type MediumAppearance,
-  majorants,
-  mediumTable,
-  rowsOf,
-} from "./extinction";
+import type { MediumAppearance } from "./extinction";
 import { areNear, areSame, type History, type TraceView, viewOf } from "./eye_rays";
+import { LightProbe } from "./light_probe";
+import { type Hemispheres, hemispheresOf, lightMarch } from "./march_light";
 import type { MediumTexels } from "./medium_loader";
-import { TRACE_FRAGMENT, TRACE_NOISE } from "./shaders/sources";
+import { MediumTextures } from "./medium_textures";
+import { TRACE_FRAGMENT } from "./shaders/sources";
+import { NOISE_TILE, TileNoise } from "./tile_noise";
 import {
+  keyOf,
   lowCorner,
+  matterOf,
   sceneInto,
-  sumUniforms,
   type TraceScene,
   type TraceUniforms,
   texelsInto,
   traceUniforms,
 } from "./uniforms";
 
-/** Pixels along the edge of a tile that rests or is sampled as a whole. */
-export const NOISE_TILE = 16;
 /** Samples between two looks at the noise of the tiles. */
 const NOISE_EVERY = 8;
 /** Noise at which a tile is as good as done. */
@@ -81,29 +73,31 @@ export class Tracer {
   /** Those of them with paths from the present view. */
   rested = 0;
   private readonly sums = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
-  private readonly noise = floatTarget(1, FloatType);
-  private readonly denoiseAndTone = new DenoiseAndTone();
-  private readonly medium = floatTexture(ENTRIES, 1, RGBAFormat);
-  private majorantTexture: Data3DTexture = float3D(new Float32Array(1), [1, 1, 1]);
-  private environment: DataTexture = floatTexture(1, 1, RGBAFormat);
-  private aliases: DataTexture = floatTexture(1, 1, RGFormat);
+  private readonly noise = new TileNoise();
+  private readonly probe = new LightProbe();
+  private readonly denoiseAndTone = new DenoiseAndTone(this.probe);
   private roomLight: readonly [number, number, number] = [0, 0, 0];
+  private hemispheres: Hemispheres = { sky: SKY, ground: GROUND };
   private texels: MediumTexels | null = null;
   /** From where paths begin: where the eyes were, as long as they only tremble. */
   private anchors: readonly TraceView[] = [];
   /** Where the eyes were in the frame before. */
   private seen: readonly TraceView[] = [];
+  /** Pictures of paths so far: their sums are drawn alternately into two targets. */
   private drawn = 0;
+  /** The number that seeds the random numbers of a pass. */
+  private sample = 0;
   private shownWith: TraceSettings | null = null;
   /** Where among the tiles the next turn begins, 0..1. */
   private turn = 0;
   private key = "";
+  private matter = "";
   private gatheredScale = 1;
   private isDraft = false;
   /** Whether a marched picture stands in for pixels with few samples. */
   isStoodIn = false;
   private readonly pathPass: ScreenPass<TraceUniforms>;
-  private readonly noisePass = new ScreenPass(TRACE_NOISE, sumUniforms(), { NOISE_TILE });
+  private readonly textures: MediumTextures;
 
   /**
    * @param brick texels along an edge of a brick of majorants: SKIP_BRICK or a multiple
@@ -111,13 +105,14 @@ export class Tracer {
    */
   constructor(
     sceneDepth: { value: Texture },
-    private readonly brick = 2 * SKIP_BRICK,
+    brick = 2 * SKIP_BRICK,
     private readonly calm = CALM,
   ) {
     this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth, MAX_ASIDE), {
       CHANNELS: 1,
       NOISE_TILE,
     });
+    this.textures = new MediumTextures(this.pathPass, brick);
   }
 
   /** The picture, encoded and premultiplied. */
@@ -139,7 +134,14 @@ export class Tracer {
     return this.texels !== null;
   }
 
+  /** What paths gather is another: its medium, its light. */
   restart(): void {
+    this.probe.forget();
+    this.begin();
+  }
+
+  /** Begin a picture of another view. */
+  private begin(): void {
     this.anchors = [];
     this.samples = this.rested = this.turn = 0;
     this.shownWith = null;
@@ -158,43 +160,22 @@ export class Tracer {
     this.denoiseAndTone.expect(uniforms.uSize.value);
   }
 
-  /** @param looks of the channels, in the order of the texture's */
+  /** @param appearances of the channels, in the order of the texture's */
   setAppearances(appearances: readonly MediumAppearance[], settings: TraceSettings): void {
     if (this.texels === null) return;
-    const { frame, bricks, size } = this.texels;
-    const voxel = Math.min(...frame.spacing_um);
-    const table = mediumTable(appearances, voxel, settings.bias, settings.density);
-    this.medium.dispose();
-    const rows = rowsOf(appearances);
-    this.medium.image = { data: table, width: ENTRIES, height: rows * appearances.length };
-    this.medium.needsUpdate = true;
-    this.majorantTexture.dispose();
-    const fine = majorants(table, bricks);
-    const coarse = coarserMajorants(fine, brickCounts(size), this.brick / SKIP_BRICK);
-    this.majorantTexture = float3D(coarse.majorants, coarse.counts);
-    const { uniforms } = this.pathPass;
-    this.pathPass.define("TWO_D", rows === 1 ? null : 1);
-    tablesInto(
-      uniforms,
-      appearances.map(({ table2d }) => table2d),
-    );
-    uniforms.uMedium.value = this.medium;
-    appearances.forEach((each, c) => {
-      uniforms.uContrast.value.setComponent(c, edgeContrast(each.table));
-    });
-    uniforms.uMajorants.value = this.majorantTexture;
-    uniforms.uBrick.value.setScalar(this.brick);
+    this.textures.setAppearances(this.texels, appearances, settings.density);
     this.restart();
   }
 
-  lightBy({ width, height, light, aliases, mean }: EnvironmentTables): void {
-    this.roomLight = mean;
-    this.environment.dispose();
-    this.aliases.dispose();
-    this.environment = floatTexture(width, height, RGBAFormat, light);
-    this.aliases = floatTexture(width, height, RGFormat, aliases);
-    this.pathPass.uniforms.uEnvironment.value = this.environment;
-    this.pathPass.uniforms.uAliases.value = this.aliases;
+  /** @param toEye from the specimen's axes to those of the eye */
+  lightMarch(march: MarchLight, settings: TraceSettings, toEye: Matrix4): void {
+    lightMarch(march, settings, this.hemispheres, toEye);
+  }
+
+  lightBy(tables: EnvironmentTables): void {
+    this.roomLight = tables.mean;
+    this.hemispheres = hemispheresOf(tables);
+    this.textures.lightBy(tables);
     this.restart();
   }
 
@@ -213,9 +194,29 @@ export class Tracer {
   }
 
   /**
+   * Make the picture of the stand-in alone: the view moves, and what was gathered is of another one.
+   *
+   * @param marched of this view
+   */
+  standIn(
+    renderer: WebGLRenderer,
+    eyes: Eyes,
+    scene: TraceScene,
+    settings: TraceSettings,
+    marched: Marched,
+  ): void {
+    if (this.texels === null) return;
+    this.prepare(eyes, scene, settings, this.gatheredScale, false);
+    this.begin();
+    const views = this.viewsOf(eyes, scene);
+    this.probeLight(renderer, eyes, views, settings, marched);
+    this.isStoodIn = true;
+    this.denoiseAndTone.show(renderer, eyes, views, settings, true, { ...marched, rounds: 0 });
+  }
+
+  /**
    * Gather so many more samples of every pixel, or of a share of them, and make the picture, as soon
    * as each pixel has one. A picture with enough of them only follows the eyes.
-   *
    */
   render(
     renderer: WebGLRenderer,
@@ -225,18 +226,11 @@ export class Tracer {
     { scale, passes, mayTremble, isDraft, standIn = null }: Gathering,
   ): void {
     if (this.texels === null) return;
-    const { frame } = this.texels;
-    const box = this.boxMatrix(scene.specimen);
-    sceneInto(this.pathPass.uniforms, scene, frame, box, settings, isDraft, this.roomLight);
-    const key = keyOf(eyes, scene, scale, isDraft);
-    if (key !== this.key) this.restart();
-    this.key = key;
-    this.gatheredScale = scale;
-    this.isDraft = isDraft;
+    this.prepare(eyes, scene, settings, scale, isDraft);
     const views = this.viewsOf(eyes, scene);
     let history = this.historyFor(views, mayTremble);
     this.seen = views;
-    if (history === "none") this.restart();
+    if (history === "none") this.begin();
     if (history === "aside") {
       this.samples = Math.min(this.samples, MAX_ASIDE);
       this.rested = 0;
@@ -255,11 +249,10 @@ export class Tracer {
       this.rested += share;
       this.turn = (this.turn + share) % 1;
       const isDue = Math.floor(before / NOISE_EVERY) < Math.floor(this.samples / NOISE_EVERY);
-      if (isDue) this.judge(renderer, this.gathered);
+      if (isDue) this.noise.judge(renderer, this.gathered);
     }
     const { denoiseAndTone } = this;
-    if (standIn === null || this.samples >= STOOD_IN) this.isStoodIn = false;
-    else if (!denoiseAndTone.isOf(begins)) this.isStoodIn = true;
+    this.isStoodIn = standIn !== null && this.samples < STOOD_IN;
     // A part of the pixels alone is not shown: until all have their turn, the picture before stays, or
     // the marched one that stands in.
     const isRound = Math.floor(this.samples) > Math.floor(started);
@@ -270,9 +263,50 @@ export class Tracer {
       denoiseAndTone.denoise(renderer, eyes, gathered, samples, begins, scale, settings);
       this.shownWith = settings;
     }
+    if (this.isStoodIn && standIn !== null) {
+      this.probeLight(renderer, eyes, views, settings, standIn);
+    }
     const rounds = Math.floor(this.samples);
     const marched = this.isStoodIn && standIn !== null ? { ...standIn, rounds } : null;
     denoiseAndTone.show(renderer, eyes, views, settings, isOther, marched);
+  }
+
+  /** Follow the scene; what was gathered of another one is dropped. */
+  private prepare(
+    eyes: Eyes,
+    scene: TraceScene,
+    settings: TraceSettings,
+    scale: number,
+    isDraft: boolean,
+  ): void {
+    if (this.texels === null) return;
+    const box = this.boxMatrix(scene.specimen);
+    const { uniforms } = this.pathPass;
+    sceneInto(uniforms, scene, this.texels.frame, box, settings, isDraft, this.roomLight);
+    const matter = matterOf(scene);
+    if (matter !== this.matter) this.restart();
+    this.matter = matter;
+    const key = keyOf(eyes, scene, scale, isDraft);
+    if (key !== this.key) this.begin();
+    this.key = key;
+    this.gatheredScale = scale;
+    this.isDraft = isDraft;
+  }
+
+  /** Find how much light there is, by a few paths, for the stand-in. */
+  private probeLight(
+    renderer: WebGLRenderer,
+    eyes: Eyes,
+    views: readonly TraceView[],
+    { isPostOn, occlusion }: TraceSettings,
+    { picture }: Marched,
+  ): void {
+    this.probe.measure(renderer, eyes, picture, isPostOn ? occlusion : 0, (target, scale) => {
+      const { uniforms } = this.pathPass;
+      uniforms.uCalm.value = 0;
+      uniforms.uTurn.value.set(0, 1);
+      this.drawPaths(renderer, eyes, views, views, "none", target, scale);
+    });
   }
 
   private viewsOf(eyes: Eyes, { specimen }: TraceScene): TraceView[] {
@@ -306,17 +340,31 @@ export class Tracer {
     begins: readonly TraceView[],
     history: History,
   ): void {
-    const { uniforms, uPart, scene } = this.pathPass;
+    const { uniforms } = this.pathPass;
     const before = this.gathered;
     uniforms.uSums.value = before.textures[0];
     uniforms.uMoments.value = before.textures[1];
     uniforms.uNoisiness.value = this.noise.texture;
     uniforms.uCalm.value = this.samples > NOISE_EVERY ? this.calm : 0;
     this.drawn++;
-    uniforms.uSample.value = this.drawn;
+    const { gathered, gatheredScale } = this;
+    this.drawPaths(renderer, eyes, views, begins, history, gathered, gatheredScale);
+  }
+
+  private drawPaths(
+    renderer: WebGLRenderer,
+    eyes: Eyes,
+    views: readonly TraceView[],
+    begins: readonly TraceView[],
+    history: History,
+    target: WebGLRenderTarget,
+    scale: number,
+  ): void {
+    const { uniforms, uPart, scene } = this.pathPass;
+    uniforms.uSample.value = ++this.sample;
     uniforms.uHistory.value = { none: 0, same: 1, aside: 2 }[history];
     let k = 0;
-    drawEyes(renderer, scene, eyes, this.gathered, this.gatheredScale, ({ viewport }, part) => {
+    drawEyes(renderer, scene, eyes, target, scale, ({ viewport }, part) => {
       uPart.value.copy(part);
       uniforms.uEye.value.copy(viewport);
       uniforms.uSceneToBox.value.copy(views[k].toBox);
@@ -330,20 +378,6 @@ export class Tracer {
     });
   }
 
-  /** How noisy each tile is. */
-  private judge(renderer: WebGLRenderer, sums: WebGLRenderTarget): void {
-    const { uniforms, scene } = this.noisePass;
-    uniforms.uSums.value = sums.textures[0];
-    uniforms.uMoments.value = sums.textures[1];
-    drawWhole(
-      renderer,
-      scene,
-      this.noise,
-      Math.ceil(sums.width / NOISE_TILE),
-      Math.ceil(sums.height / NOISE_TILE),
-    );
-  }
-
   /** From um of the box to the room. */
   private boxMatrix(specimen: Matrix4): Matrix4 {
     if (this.texels === null) throw new Error("there is nothing to trace");
@@ -355,23 +389,12 @@ export class Tracer {
   }
 
   dispose(): void {
-    for (const target of [...this.sums, this.noise]) target.dispose();
-    for (const texture of [this.medium, this.majorantTexture, this.environment, this.aliases]) {
-      texture.dispose();
-    }
+    for (const target of this.sums) target.dispose();
+    this.textures.dispose();
     this.texels?.release();
     this.pathPass.dispose();
-    this.noisePass.dispose();
+    this.noise.dispose();
+    this.probe.dispose();
     this.denoiseAndTone.dispose();
   }
-}
-
-/** What a picture can't be gathered on without: another one begins anew. */
-function keyOf(
-  { width_px, height_px }: Eyes,
-  { solids, clip }: TraceScene,
-  scale: number,
-  isDraft: boolean,
-): string {
-  return `${width_px} ${height_px} ${scale} ${isDraft} ${solids} ${JSON.stringify(clip)}`;
 }

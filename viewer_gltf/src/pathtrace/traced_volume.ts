@@ -1,5 +1,5 @@
 /** The path-traced picture's subject: follows the state, loads what is missing, and is drawn. */
-import { Group, type Texture, type WebGLRenderer } from "three";
+import { Group, type Matrix4, type Texture, type WebGLRenderer } from "three";
 import { pageAddress } from "../bundle/address";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import { LAST, Overlay } from "../gpu/composite_pass";
@@ -11,7 +11,7 @@ import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import type { BrickTile } from "../volumes/bricks/brick_atlas";
 import type { BrickService } from "../volumes/bricks/brick_service";
 import type { VolumeLimits } from "../volumes/mip_levels";
-import type { Appearance } from "../volumes/tile_raymarch";
+import type { Appearance, MarchLight } from "../volumes/tile_raymarch";
 import type { Packed } from "../volumes/tile_texture";
 import type { TransferTable2d } from "../volumes/transfer_table_2d";
 import { showsBelow } from "../volumes/volume_set";
@@ -185,7 +185,11 @@ export class TracedVolume {
     const isWorn = eyes.all.length > 1; // by a head, which never rests
     const isOther = isMoving && !tracer.goesOn(eyes, scene, isWorn);
     // a view that moves is marched where it can be: sharp, and without a trace of the view before
-    if (isOther && !isWorn && standIn !== null) return;
+    if (isOther && !isWorn && standIn !== null) {
+      tracer.standIn(renderer, eyes, scene, this.state.trace, standIn);
+      overlay.show(eyes, tracer.scale);
+      return;
+    }
     // what came to rest first clears up as it is, then is begun anew at its full size
     const isClearing = this.isSmall && tracer.rested < FIRST_SAMPLES && standIn === null;
     const isFirst = isOther || isClearing;
@@ -203,6 +207,17 @@ export class TracedVolume {
       standIn,
     });
     overlay.show(eyes, tracer.scale);
+  }
+
+  /**
+   * Light the march that stands in as paths of light do.
+   *
+   * @param specimen its pose in the room
+   */
+  lightMarch(march: MarchLight, specimen: Matrix4, head: Matrix4): void {
+    if (this.state === null) return;
+    const toEye = head.clone().invert().multiply(specimen);
+    this.tracer?.lightMarch(march, this.state.trace, toEye);
   }
 
   /** Show what has come of bricks; whether there is more. */
@@ -360,13 +375,13 @@ export class TracedVolume {
     const { state, texels } = this;
     if (state === null || texels === null) return;
     const appearances = texels.channels.map((id) => this.volumes.appearance(state, id));
-    const { bias, density } = state.trace;
+    const { density } = state.trace;
     const { brickTile } = this;
-    if (brickTile !== null && (bias !== 0 || showsBelow(brickTile, appearances))) {
+    if (brickTile !== null && showsBelow(brickTile, appearances)) {
       this.loadFiles(); // what bricks leave out may show
       return;
     }
-    const dressed = JSON.stringify([appearances.map(({ color }) => color), bias, density]);
+    const dressed = JSON.stringify([appearances.map(({ color }) => color), density]);
     const tables = appearances.map(({ table }) => table.join()).join();
     const tables2d = appearances.map(({ table2d }) => table2d ?? null);
     const isSame = tables2d.every((table2d, c) => table2d === (this.tables2d[c] ?? null));

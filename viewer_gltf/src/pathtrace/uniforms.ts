@@ -3,6 +3,7 @@ import { Matrix3, Matrix4, type Texture, Vector2, Vector3, Vector4 } from "three
 import type { Bounds } from "../bundle/generated/bundle";
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import { clipInto, type MarchClip, noCorner } from "../gpu/clip_uniforms";
+import type { Eyes } from "../gpu/eyes";
 import { nothing } from "../gpu/float_targets";
 import { LAMPS, type TraceSettings } from "../state/path_trace_settings";
 import { tableUniforms } from "../volumes/transfer_table_2d";
@@ -35,6 +36,21 @@ export type TraceScene = Readonly<{
   bounds: Bounds;
 }>;
 
+/** What a picture can't be gathered on without: another one begins anew. */
+export function keyOf(
+  { width_px, height_px }: Eyes,
+  scene: TraceScene,
+  scale: number,
+  isDraft: boolean,
+): string {
+  return `${width_px} ${height_px} ${scale} ${isDraft} ${matterOf(scene)}`;
+}
+
+/** What there is besides the medium: opaque things, and cuts. */
+export function matterOf({ solids, clip }: TraceScene): string {
+  return `${solids} ${JSON.stringify(clip)}`;
+}
+
 export type TraceUniforms = ReturnType<typeof traceUniforms>;
 
 export function sumUniforms() {
@@ -58,6 +74,7 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
     ...tableUniforms(),
     uMajorants: nothing(),
     uBrick: { value: new Vector3(SKIP_BRICK, SKIP_BRICK, SKIP_BRICK) },
+    uStride: { value: 0 },
     uClipLow: { value: new Vector3() },
     uClipHigh: { value: new Vector3() },
     uClipPlane: { value: new Vector4(0, 0, 0, 1) },
@@ -141,6 +158,8 @@ export function sceneInto(
   uniforms.uScatters.value = settings.isMultiple ? most : 1;
   const beyond = settings.isMultiple && isDraft ? settings.environmentLight : 0;
   uniforms.uBeyond.value.set(...roomLight).multiplyScalar(beyond);
+  const { steps } = settings;
+  uniforms.uStride.value = steps > 0 ? uniforms.uSize.value.length() / Math.max(1, steps) : 0;
   uniforms.uAnisotropy.value = settings.anisotropy;
   uniforms.uSurface.value = settings.surface;
   uniforms.uShine.value = settings.shine;

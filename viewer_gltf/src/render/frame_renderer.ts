@@ -22,7 +22,7 @@ import { KEY_AT, towards } from "../gpu/room_light";
 import type { Clip } from "../math/clip";
 import type { TracedVolume } from "../pathtrace/traced_volume";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "../surfaces/blend_material";
-import { makeFrame, REST_STEPS } from "../volumes/tile_raymarch";
+import { lightByRoom, makeFrame, REST_STEPS } from "../volumes/tile_raymarch";
 import type { VolumeSet } from "../volumes/volume_set";
 import { CrossFade } from "./cross_fade";
 import { DepthPass } from "./depth_pass";
@@ -169,6 +169,8 @@ export class Picture {
       volumes.placeAs(specimen);
       const lamp = this.lamp.set(...towards(KEY_AT)).transformDirection(head);
       lamp.transformDirection(toSpecimen);
+      if (isTraced) traced.lightMarch(this.marchFrame, specimen, head);
+      else lightByRoom(this.marchFrame);
       volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march, lamp);
       this.shiftNoise(isMoving, gathers);
       const marchBy = (pass: MarchPass, blended = panes) => {

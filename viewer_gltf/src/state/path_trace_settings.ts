@@ -46,11 +46,28 @@ const stops = (value: number) => `${value >= 0 ? "+" : ""}${value.toFixed(1)} st
 export const MEDIUM_NUMBERS = {
   /** Added to the intensities before the transfer function. */
   bias: {
-    label: "Bias",
+    label: "Transmission",
     start: 0,
     limits: [-1, 1],
     text: plain,
-    about: "More shows darker material, too; less leaves the brightest alone.",
+    about:
+      "Shifts the transfer function: more shows darker material, too; less only the brightest.",
+  },
+  /** Share of the intensities; 0: the transfer function alone decides what is empty. */
+  threshold: {
+    label: "Threshold",
+    start: 0,
+    limits: [0, 1],
+    text: (value) => (value === 0 ? "auto" : percent(value)),
+    about: "Voxels below it are empty. Auto: as the transfer function has it.",
+  },
+  /** Along the specimen's diagonal; 0: as many as the frame's budget allows. */
+  steps: {
+    label: "Steps",
+    start: 0,
+    limits: [0, 500],
+    text: (value) => (value === 0 ? "auto" : value.toFixed(0)),
+    about: "Along a ray through the specimen: few are fast, many are exact. Auto: as time allows.",
   },
   /** Factor to the extinction. */
   density: {
@@ -107,7 +124,7 @@ export const POST_NUMBERS = {
   /** Factor. */
   saturation: { label: "Saturation", start: 1, limits: [0, 3], text: percent },
   /** Added. */
-  lightness: { label: "Lightness", start: 0, limits: [-0.5, 0.5], text: percent },
+  lightness: { label: "Luminance", start: 0, limits: [-0.5, 0.5], text: percent },
   occlusion: {
     label: "Ambient occlusion",
     start: 0.3,

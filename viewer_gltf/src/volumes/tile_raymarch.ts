@@ -60,6 +60,32 @@ const OPAQUE = 0.99;
 /** Shortest step, in voxels. */
 const STEP_VOXELS = 1;
 
+/** The light on all tiles: see gpu/chunks/shade.glsl. The directions are in the axes of the eye. */
+export type MarchLight = ReturnType<typeof marchLight>;
+
+function marchLight() {
+  return {
+    uLight: { value: new Vector3() },
+    uFill: { value: new Vector3() },
+    uKeyLight: { value: new Vector3() },
+    uFillLight: { value: new Vector3() },
+    uSkyLight: { value: new Vector3() },
+    uGroundLight: { value: new Vector3() },
+    uGloss: { value: GLOSS },
+  };
+}
+
+/** The room's own light, which surfaces have too. */
+export function lightByRoom(light: MarchLight): void {
+  light.uLight.value.set(...towards(KEY_AT)).normalize();
+  light.uFill.value.set(...towards(FILL_AT)).normalize();
+  light.uKeyLight.value.set(...KEY);
+  light.uFillLight.value.set(...FILL);
+  light.uSkyLight.value.set(...SKY);
+  light.uGroundLight.value.set(...GROUND);
+  light.uGloss.value = GLOSS;
+}
+
 /** Uniforms that all tiles share in a frame, by reference. */
 export type MarchFrame = Readonly<{
   uSceneDepth: { value: DepthTexture };
@@ -84,7 +110,10 @@ export type MarchFrame = Readonly<{
   /** Light that comes to each cell of a coarse grid, and by how much it counts, 0..1. */
   uReached: { value: Data3DTexture | null };
   uDepthShading: { value: number };
-}>;
+  /** Factor to the opacities' optical depth. */
+  uDensity: { value: number };
+}> &
+  MarchLight;
 
 /** Depth of what is opaque, and of the nearest that is translucent. */
 export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
@@ -92,7 +121,10 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
   noise.wrapS = noise.wrapT = RepeatWrapping;
   noise.minFilter = noise.magFilter = NearestFilter;
   noise.needsUpdate = true;
+  const light = marchLight();
+  lightByRoom(light);
   return {
+    ...light,
     uSceneDepth: { value: depth },
     uPaneDepth: { value: pane },
     uHasPane: { value: false },
@@ -107,6 +139,7 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
     uSteps: { value: MAX_STEPS },
     uReached: { value: null },
     uDepthShading: { value: 0 },
+    uDensity: { value: 1 },
   };
 }
 
@@ -218,13 +251,6 @@ export class TileMarch {
         uWindowLow: { value: new Vector4() },
         uWindowHigh: { value: new Vector4(1, 1, 1, 1) },
         uBrickSlack: { value: 0 },
-        uLight: { value: new Vector3(...towards(KEY_AT)).normalize() },
-        uFill: { value: new Vector3(...towards(FILL_AT)).normalize() },
-        uKeyLight: { value: new Vector3(...KEY) },
-        uFillLight: { value: new Vector3(...FILL) },
-        uSkyLight: { value: new Vector3(...SKY) },
-        uGroundLight: { value: new Vector3(...GROUND) },
-        uGloss: { value: GLOSS },
         uToShading: { value: new Matrix4() },
         uShadingCell: { value: 0 },
         uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },

@@ -22,6 +22,7 @@ import { Residency, type Resident } from "./residency";
 import { brickCounts } from "./skip_bricks";
 import { type Appearance, floorOf, type MarchFrame, TileMarch } from "./tile_raymarch";
 import { type Packed, TileTexture } from "./tile_texture";
+import { tracedTable, tracedTable2d } from "./traced_table";
 import { lookUpTable, opacities } from "./transfer_luts";
 import { NO_ENTRIES, type TransferTable2d, transferTable2d } from "./transfer_table_2d";
 import type { VolumeSource } from "./volume_source";
@@ -91,6 +92,15 @@ export class VolumeSet {
       this.channels.isLoading ||
       this.residents.all.some(({ texture }) => texture.isLoading)
     );
+  }
+
+  /** Whether a volume that is wanted shows at no level. */
+  get isIncomplete(): boolean {
+    return this.wanted.some(({ tile, channels }) => {
+      const shown = this.residents.get(tile)?.texture.shown?.channels ?? [];
+      const isThere = (id: string) => this.channels.get(id)?.sources.has(tile) ?? true;
+      return channels.some((id) => !shown.includes(id) && isThere(id));
+    });
   }
 
   /** Whether anything is to be marched. */
@@ -200,6 +210,8 @@ export class VolumeSet {
     const drawn = this.drawn();
     for (const { march } of drawn) boxes.add(march);
     this.shade(drawn, clip, lamp);
+    const { state } = this;
+    this.frame.uDensity.value = state !== null && isTraced(state) ? state.trace.density : 1;
     for (const { march } of drawn) {
       this.shading?.place(march);
       march.sortBy(eye);
@@ -373,7 +385,7 @@ export class VolumeSet {
       this.group.add(march.mesh);
     }
     resident.packed = shown;
-    march.composite(state.compositing);
+    march.composite(isTraced(state) ? "over" : state.compositing);
     const differs = march.setAppearances(appearances);
     if (differs || isNewSet || march !== before) void this.findSkips(march, shown, appearances);
   }
@@ -386,6 +398,17 @@ export class VolumeSet {
 
   /** The appearance of a channel. The channel's list must have come. */
   appearance(state: ViewerState, id: string): Appearance {
+    const appearance = this.ownAppearance(state, id);
+    if (!isTraced(state)) return appearance;
+    const { trace } = state;
+    const { table2d } = appearance;
+    if (table2d == null) return { ...appearance, table: tracedTable(appearance.table, trace) };
+    const shifted = tracedTable2d(table2d, trace);
+    return { ...appearance, table2d: shifted, table: shifted.envelope };
+  }
+
+  /** Its appearance by its transfer function alone. */
+  private ownAppearance(state: ViewerState, id: string): Appearance {
     const channel = state.channels.find((c) => c.id === id);
     const volumes = this.channels.get(id);
     if (channel === undefined || volumes === undefined) {

@@ -47,8 +47,31 @@ float majorantOf(Bricks b) {
   return texelFetch(uMajorants, clamp(b.cell, ivec3(0), last), 0).r;
 }
 
+// With a number of steps of the reader's own (uStride), the medium is looked up once in each step instead, at
+// random: few steps are quick and pass over what is thin, many come to the same.
+float trackBySteps(vec3 origin, vec3 dir, float from, float to, out vec4 medium) {
+  medium = vec4(0.0);
+  for (float t = from; t < to; t += uStride) {
+    float stride = min(uStride, to - t);
+    float at = t + random() * stride;
+    medium = mediumAt(origin + at * dir);
+    if (random() >= exp(-medium.a * stride)) return at;
+  }
+  return -1.0;
+}
+
+float transmittanceBySteps(vec3 origin, vec3 dir, float from, float to) {
+  float depth = 0.0;
+  for (float t = from; t < to; t += uStride) {
+    float stride = min(uStride, to - t);
+    depth += stride * mediumAt(origin + (t + random() * stride) * dir).a;
+  }
+  return exp(-depth);
+}
+
 // Where the path meets the medium, and what is there; -1: it leaves.
 float track(vec3 origin, vec3 dir, float from, float to, out vec4 medium) {
+  if (uStride > 0.0) return trackBySteps(origin, dir, from, to, medium);
   Bricks b = enterBricks(origin, dir, from);
   float t = from;
   float depth = -log(1.0 - random());  // optical depth of the majorants to the next event
@@ -73,6 +96,7 @@ float track(vec3 origin, vec3 dir, float from, float to, out vec4 medium) {
 
 // Share of light that comes through, by ratio tracking (Novak et al. 2014): right in the mean.
 float transmittance(vec3 origin, vec3 dir, float from, float to) {
+  if (uStride > 0.0) return transmittanceBySteps(origin, dir, from, to);
   Bricks b = enterBricks(origin, dir, from);
   float t = from;
   float share = 1.0;

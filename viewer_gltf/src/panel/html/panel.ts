@@ -153,7 +153,7 @@ export class Panel {
       type: "button",
       className: "fold",
       ariaLabel: "Panel",
-      title: "Hide or show the panel (h)",
+      title: "Hide or show the panel",
       onclick: () => send({ panel: "hide" }),
     });
     this.fold.setAttribute("aria-controls", this.body.id);

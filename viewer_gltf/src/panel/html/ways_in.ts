@@ -56,15 +56,14 @@ export class WaysIn {
   /** @param onClick called within the click, as browsers want it */
   offerStereo(way: "stereo" | "split" | null, onClick: () => void): void {
     this.stereo.hidden = way === null;
-    this.stereo.title =
-      way === "split" ? "Split the screen for a phone viewer (P)" : "Enter stereo (V)";
+    this.stereo.title = way === "split" ? "Split the screen for a phone viewer" : "Enter stereo";
     this.stereo.onclick = onClick;
   }
 
   /** @param onClick called within the click */
   offerRoom(onClick: () => void): void {
     this.room.hidden = false;
-    this.room.title = "The specimen in your room, by this device's camera (Home)";
+    this.room.title = "The specimen in your room, by this device's camera";
     this.room.onclick = onClick;
   }
 

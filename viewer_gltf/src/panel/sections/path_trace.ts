@@ -41,7 +41,7 @@ export function lightItems(
       {
         kind: "button",
         id: "trace",
-        label: "Trace paths of light",
+        label: "Path tracing",
         to: () => setTo(MODE, "traced"),
       },
     ];

@@ -38,7 +38,7 @@ function turn(steps: number): Key["to"] {
 }
 
 export const LIGHT_KEYS: readonly Key[] = [
-  key("G", "Paths of light on or off", ({ state }) =>
+  key("G", "Path tracing on or off", ({ state }) =>
     setTo(MODE, isTraced(state) ? "all" : "traced"),
   ),
   key("F", "Next number of the light, or of stereo: the two keys below mean it", nextNumber(1)),

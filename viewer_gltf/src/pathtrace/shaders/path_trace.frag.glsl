@@ -18,6 +18,7 @@ uniform float uFresh;
 uniform sampler2D uMedium;  // 256 x CHANNELS: albedo, extinction per um; TWO_D: 64 rows each, by gradient
 uniform sampler3D uMajorants;  // largest extinction per um in each brick
 uniform vec3 uBrick;  // texels along a brick's edges
+uniform float uStride;  // um, a step along a ray; 0: flights are as long as the medium has them
 uniform vec3 uClipLow;
 uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;

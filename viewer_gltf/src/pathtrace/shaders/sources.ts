@@ -4,6 +4,7 @@ import { CHUNKS } from "../../gpu/glsl_chunks";
 import { includeChunks } from "../../gpu/glsl_include";
 import { PATH_TRACE_CHUNKS } from "../../gpu/path_trace_chunks";
 import denoise from "./denoise.frag.glsl?raw";
+import probe from "./light_probe.frag.glsl?raw";
 import mean from "./mean.frag.glsl?raw";
 import trace from "./path_trace.frag.glsl?raw";
 import warp from "./reproject.frag.glsl?raw";
@@ -14,6 +15,7 @@ const ALL = { ...CHUNKS, ...PATH_TRACE_CHUNKS };
 
 export const TRACE_FRAGMENT = includeChunks(trace, ALL);
 export const TRACE_NOISE = noise;
+export const TRACE_PROBE = probe;
 export const TRACE_MEAN = mean;
 export const TRACE_DENOISE = denoise;
 export const TRACE_WARP = includeChunks(warp, ALL);

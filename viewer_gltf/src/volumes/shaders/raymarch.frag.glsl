@@ -13,6 +13,7 @@ uniform vec3 uTexLow;  // texture coordinates at the box's low corner ...
 uniform vec3 uTexHigh;  // ... and at its high corner
 uniform vec3 uTexels;  // of mip level 0
 uniform float uVoxel;  // um: the opacities of the transfer functions hold for a path this long
+uniform float uDensity;  // ... times this
 uniform float uMinStep;  // um
 uniform vec4 uFloor;  // intensities of each channel up to which its table shows nothing
 uniform vec4 uContrast;  // factor to the gradients of each channel, by which they are shaded
@@ -211,9 +212,9 @@ void main() {
       if (any(greaterThan(v, uFloor))) {
 #endif
 #ifdef DISC
-        vec4 voxels = here / uVoxel * weights(start + at * dir);
+        vec4 voxels = here * uDensity / uVoxel * weights(start + at * dir);
 #else
-        vec4 voxels = vec4(here / uVoxel * uPresence);
+        vec4 voxels = vec4(here * uDensity / uVoxel * uPresence);
 #endif
         vec4 shares;
 #ifdef TWO_D

@@ -74,7 +74,7 @@ export type Gathered = Readonly<{
   samples: number;
 }>;
 
-function texelsOf(run: Run): MediumTexels {
+export function texelsOf(run: Run): MediumTexels {
   const count = run.channels ?? 1;
   const texels = Uint8Array.from(run.texels);
   const many = Uint8Array.from(run.texels.flatMap((v) => new Array<number>(count).fill(v)));
@@ -132,7 +132,7 @@ function inBricks(size: Run["size"], texels: Uint8Array) {
 }
 
 /** Alike channels share the opacity. */
-function appearancesOf(run: Run) {
+export function appearancesOf(run: Run) {
   const count = run.channels ?? 1;
   const table = new Uint8Array(1024).fill(255);
   run.opacities.forEach((opacity, i) => {

@@ -1,0 +1,81 @@
+/**
+ * A small traced picture of the view, which finds how bright and how coloured the traced light is. The marched
+ * picture that stands in while the view moves is lit by it: whatever a lamp, a room or the medium does to the
+ * light, both then look alike in the mean.
+ */
+import { FloatType, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import type { Eyes } from "../gpu/eyes";
+import { drawWhole, floatTarget, nothing } from "../gpu/float_targets";
+import { ScreenPass } from "../gpu/screen_pass";
+import { TRACE_PROBE } from "./shaders/sources";
+
+/** Pixels of the small picture, both eyes together. */
+const PIXELS = 600;
+/** Samples of each after a change, and in a frame that only moves. */
+const FIRST_SAMPLES = 8;
+/** Share of the earlier sums that a sample leaves: about as many samples count as after a change. */
+const KEPT = 1 - 1 / FIRST_SAMPLES;
+
+/** Sums of light and coverage, a texel each. */
+export type ProbedLight = Readonly<{ traced: Texture; marched: Texture }>;
+
+/** Draws one sample of every pixel, at `scale` pixels to one of the frame buffer. */
+export type DrawSample = (target: WebGLRenderTarget, scale: number) => void;
+
+export class LightProbe {
+  private readonly sums = floatTarget(2, FloatType);
+  private readonly found = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
+  private measured = 0;
+  private readonly pass = new ScreenPass(TRACE_PROBE, {
+    uSums: nothing(),
+    uMoments: nothing(),
+    uMarched: nothing(),
+    uTracedBefore: nothing(),
+    uMarchedBefore: nothing(),
+    uKept: { value: 0 },
+    uOcclusion: { value: 0 },
+  });
+
+  /** The light is another: what was found is worth nothing. */
+  forget(): void {
+    this.measured = 0;
+  }
+
+  get light(): ProbedLight {
+    const [traced, marched] = this.found[this.measured % 2].textures;
+    return { traced, marched };
+  }
+
+  /**
+   * @param marched of the same view, linear and premultiplied
+   * @param occlusion by how much the picture darkens what is enclosed
+   */
+  measure(
+    renderer: WebGLRenderer,
+    { width_px, height_px }: Eyes,
+    marched: Texture,
+    occlusion: number,
+    draw: DrawSample,
+  ): void {
+    const { uniforms, scene } = this.pass;
+    if (uniforms.uOcclusion.value !== occlusion) this.forget();
+    const scale = Math.min(1, Math.sqrt(PIXELS / (width_px * height_px)));
+    uniforms.uMarched.value = marched;
+    uniforms.uOcclusion.value = occlusion;
+    for (let i = this.measured === 0 ? FIRST_SAMPLES : 1; i > 0; i--) {
+      draw(this.sums, scale);
+      [uniforms.uSums.value, uniforms.uMoments.value] = this.sums.textures;
+      const { traced, marched: before } = this.light;
+      uniforms.uTracedBefore.value = traced;
+      uniforms.uMarchedBefore.value = before;
+      uniforms.uKept.value = this.measured === 0 ? 0 : KEPT;
+      this.measured++;
+      drawWhole(renderer, scene, this.found[this.measured % 2], 1, 1);
+    }
+  }
+
+  dispose(): void {
+    for (const target of [this.sums, ...this.found]) target.dispose();
+    this.pass.dispose();
+  }
+}

@@ -1,0 +1,64 @@
+/**
+ * The lamps and the room's light of the traced picture, as the march has them that stands in for it. The march
+ * knows two lamps without shadows, a sky and a ground; LightProbe then makes it as bright as the traced picture.
+ */
+import { type Matrix4, Vector3 } from "three";
+import { GLOSS } from "../gpu/room_light";
+import type { Rgb } from "../math/color";
+import { type Lamp, MEDIUM_NUMBERS, type TraceSettings } from "../state/path_trace_settings";
+import type { MarchLight } from "../volumes/tile_raymarch";
+import type { EnvironmentTables } from "./environment_sampling";
+
+/** Mean radiance of the upper and of the lower half of the room. */
+export type Hemispheres = Readonly<{ sky: Rgb; ground: Rgb }>;
+
+export function hemispheresOf({ width, height, light }: EnvironmentTables): Hemispheres {
+  const sums = [
+    [0, 0, 0],
+    [0, 0, 0],
+  ];
+  const weights = [0, 0];
+  for (let i = 0; i < width * height; i++) {
+    const row = Math.floor(i / width);
+    const [top, bottom] = [row, row + 1].map((v) => Math.cos((v / height) * Math.PI));
+    // of a row across the horizon, the part above it and the part below it
+    const parts = [Math.max(top, 0) - Math.max(bottom, 0), Math.min(top, 0) - Math.min(bottom, 0)];
+    parts.forEach((part, half) => {
+      weights[half] += part;
+      for (let k = 0; k < 3; k++) sums[half][k] += part * light[4 * i + k];
+    });
+  }
+  const mean = (half: number): Rgb => {
+    const [r, g, b] = sums[half].map((v) => v / weights[half]);
+    return [r, g, b];
+  };
+  return { sky: mean(0), ground: mean(1) };
+}
+
+/** @param toEye from the specimen's axes to those of the eye */
+export function lightMarch(
+  march: MarchLight,
+  { lamps, environmentLight, shine }: TraceSettings,
+  { sky, ground }: Hemispheres,
+  toEye: Matrix4,
+): void {
+  march.uSkyLight.value.set(...sky).multiplyScalar(environmentLight);
+  march.uGroundLight.value.set(...ground).multiplyScalar(environmentLight);
+  march.uGloss.value = (GLOSS * shine) / MEDIUM_NUMBERS.shine.start;
+  const lit = lamps.filter(({ isOn, strength }) => isOn && strength > 0);
+  const [key, ...others] = lit.sort((a, b) => b.strength - a.strength);
+  place(march.uLight.value, march.uKeyLight.value, key === undefined ? [] : [key], toEye);
+  place(march.uFill.value, march.uFillLight.value, others, toEye);
+}
+
+/** Lamps as one, from where most of their light comes. */
+function place(towards: Vector3, light: Vector3, lamps: readonly Lamp[], toEye: Matrix4): void {
+  towards.set(0, 0, 0);
+  light.set(0, 0, 0);
+  for (const { x, y, z, strength, color } of lamps) {
+    towards.addScaledVector(new Vector3(x, y, z).normalize(), strength);
+    light.addScaledVector(new Vector3(...color), strength);
+  }
+  if (towards.lengthSq() === 0) towards.set(0, 0, 1);
+  towards.transformDirection(toEye);
+}
