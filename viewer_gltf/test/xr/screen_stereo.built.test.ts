@@ -25,6 +25,15 @@ const FIELD_OF_VIEW_RAD = (40 * Math.PI) / 180;
 describeInChromium("stereo on the screen", () => {
   const stand = prepareStand({ viewport: VIEWPORT, pixelRatio: 1 });
 
+  const openSideBySide = async () => {
+    await stand.open(`&mode=off&stereo=side-by-side${LINK}`);
+    // its part of the page comes after the first picture
+    await stand.viewer.page.waitForFunction(() =>
+      performance.getEntriesByType("resource").some(({ name }) => name.includes("screen_stereo")),
+    );
+    await stand.viewer.settled();
+  };
+
   const eyesOf = async () => {
     const box = await stand.viewer.page.locator(".stage").boundingBox();
     if (box === null) throw new Error("no stage");
@@ -46,7 +55,7 @@ describeInChromium("stereo on the screen", () => {
 
   it("lies side by side as far apart as two eyes see a ball, and Escape leaves it", async () => {
     const { viewer } = stand;
-    await stand.open(`&mode=off&stereo=side-by-side${LINK}`);
+    await openSideBySide();
     await viewer.showOnly("Balls");
     const { left, right, width, height } = await eyesOf();
     const { scale, center } = place(stand.manifest.specimen.bounds_um);
@@ -71,7 +80,7 @@ describeInChromium("stereo on the screen", () => {
 
   it("saves both pictures as the screen shows them, and shows them as before", async () => {
     const { viewer } = stand;
-    await stand.open(`&mode=off&stereo=side-by-side${LINK}`);
+    await openSideBySide();
     await viewer.settled();
     const before = await takePicture(viewer.page);
     await viewer.unfold("save");
@@ -88,7 +97,7 @@ describeInChromium("stereo on the screen", () => {
 
   it("hits what is clicked in either eye's picture", async () => {
     const { viewer } = stand;
-    await stand.open(`&mode=off&stereo=side-by-side${LINK}`);
+    await openSideBySide();
     await viewer.settled();
     const box = await viewer.page.locator(".stage").boundingBox();
     if (box === null) throw new Error("no stage");
