@@ -110,7 +110,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
 
   const stage = element("div", { className: "stage" });
   stage.ariaLabel = "The specimen: the arrow keys turn it, ? lists all keys";
-  stage.role = "img";
+  stage.role = "group"; // an image would hide the marks and the buttons in it from screen readers
   const progress = new ProgressBar();
   const notices = new Notices(
     (texts) => viewer.dispatch({ type: "dismiss", texts }),

@@ -533,11 +533,14 @@ export class Viewer {
       this.loop.change();
     };
     dressIn(null);
-    if (isPlain) return;
-    this.dressed = import("../render/backdrop").then(
-      ({ Backdrop }) => dressIn(new Backdrop()),
+    const fetched = isPlain ? Promise.resolve() : import("../render/backdrop");
+    const dressed: Promise<void> = fetched.then(
+      (part) => {
+        if (part && this.dressed === dressed) dressIn(new part.Backdrop());
+      },
       () => undefined, // a picture without it is as true
     );
+    this.dressed = dressed;
   }
 
   /** Someone has touched the page. */

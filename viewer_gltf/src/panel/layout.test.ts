@@ -209,12 +209,12 @@ describe("the panel's layout", () => {
     expect(choose()).toEqual(["r0_c3", null]);
   });
 
-  it("tells where the limit of tiles ends the disc, and only there", () => {
+  it("tells where the limit of tiles ends the focus disc, and only there", () => {
     const now = (state: ViewerState, discLimit_deg: number | null) =>
-      find(laid(state, START_VIEW, { ...FACTS, discLimit_deg }), "text", "disc-now").value;
-    expect(now(start(), 3.2)).toMatch(/^3°, since it holds at most 4 tiles/);
-    expect(now(start(), null)).toBe("");
-    expect(now(reduce(start(), { type: "set", id: "mode", value: "all" }), 3.2)).toBe("");
+      find(laid(state, START_VIEW, { ...FACTS, discLimit_deg }), "slider", "disc-radius").text;
+    const set = now(start(), null);
+    expect(now(start(), 3.2)).toBe(`${set}, now 3°`);
+    expect(now(reduce(start(), { type: "set", id: "mode", value: "all" }), 3.2)).toBe(set);
   });
 
   it("lists the tiles where their names are no rows and columns", () => {

@@ -1,10 +1,9 @@
 /** The panel's content for a state: see controls.ts. Pure. */
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
-import { MAX_DISC_TILES } from "../state/focus_tiles";
 import { groupNotices } from "../state/notice_groups";
 import { QUALITY_PARAMETERS } from "../state/parameters/tools";
-import { MODE, VOLUMES } from "../state/parameters/volumes";
+import { DISC_RADIUS, MODE, VOLUMES } from "../state/parameters/volumes";
 import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import type { QualitySettings } from "../state/quality_controller";
 import type { StereoSupport } from "../state/stereo";
@@ -182,7 +181,7 @@ function deeperSections(
     section(
       "volume-settings",
       "Volume settings",
-      ofVolumes([...controlsOf(settings, state), discNow(state, facts)]),
+      ofVolumes(controlsOf(settings, state).map((item) => discItem(item, state, facts))),
     ),
     section("light", "Path tracing", ofVolumes(lightItems(state, view, facts.isStereo))),
     section("share", "Share and keys", [
@@ -229,13 +228,11 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
   ];
 }
 
-/** Why the disc is smaller than it was set; "": it is not, and so there is nothing to see. */
-function discNow({ mode }: ViewerState, { discLimit_deg = null }: Facts): Control {
-  const isCut = mode === "disc" && discLimit_deg !== null;
-  const value = isCut
-    ? `${discLimit_deg.toFixed(0)}°, since it holds at most ${MAX_DISC_TILES} tiles. “Volumes everywhere” has no limit.`
-    : "";
-  return { kind: "text", id: "disc-now", label: "Focus disc now", value };
+/** The focus disc's slider, with its radius now where the limit of tiles makes it smaller than it was set. */
+function discItem(item: Control, { mode }: ViewerState, { discLimit_deg = null }: Facts): Control {
+  const isCut = item.id === DISC_RADIUS.id && mode === "disc" && discLimit_deg !== null;
+  if (!isCut || item.kind !== "slider") return item;
+  return { ...item, text: `${item.text}, now ${discLimit_deg.toFixed(0)}°` };
 }
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */

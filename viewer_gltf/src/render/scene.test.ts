@@ -46,13 +46,14 @@ describe("the room of a light page", () => {
     room.isSeeThrough = false;
   });
 
-  it("has the shadow under what is shown, also of what came first", () => {
+  it("has the shadow under what is shown, and keeps it in another theme", () => {
     room.standUnder([
       [-1, -0.2, -0.5],
       [0.5, 0.3, 0.5],
     ]);
     const later = new Backdrop();
     room.dress("dark", later);
+    expect(backdrop.mesh.parent).toBe(null);
     for (const each of [backdrop, later]) {
       const { uFoot, uGround } = each.mesh.material.uniforms;
       expect(uFoot.value.toArray()).toEqual([-1, -0.5, 0.5, 0.5]);

@@ -110,6 +110,7 @@ describeInChromium("axe-core", () => {
     await stand.viewer.unfold("stereo");
     await page().locator('[data-control="lenses"]').selectOption("own");
     expect(await findings()).toEqual([]);
+    await page().locator('[data-control="lenses"]').selectOption("v2");
     await page().keyboard.press("P");
     await page().getByText("Turn the phone on its side").waitFor();
     expect(await findings()).toEqual([]);

@@ -359,7 +359,8 @@ describeInChromium("a stain that is painted on objects", () => {
   });
 
   it("lies over their colour, and can be taken off; a column's colour stays beside it", async () => {
-    await open();
+    await stand.open();
+    await stand.viewer.unfold("objects");
     await stand.viewer.settled();
     const row = rowAt(1, 2, 1, 1);
     const [x, y, z] = centerOf(row);

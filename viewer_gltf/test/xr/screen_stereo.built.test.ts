@@ -1,7 +1,9 @@
 /** Stereo on the page's own screen: what each eye sees lies where two eyes see it, and greys stay grey. */
+import { readFile } from "node:fs/promises";
 import { expect, it } from "vitest";
 import { place } from "../../src/render/placement";
-import { type Picture, takePicture } from "../support/browser/picture";
+import { difference, isBackground, Picture, takePicture } from "../support/browser/picture";
+import { decodePng } from "../support/browser/png";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { colorDifference, toLab } from "../support/color_difference";
@@ -59,6 +61,23 @@ describeInChromium("stereo on the screen", () => {
     await viewer.page.keyboard.press("Escape");
     await expect.poll(async () => (await viewer.snapshot()).state.screenStereo).toBe("off");
     expect(await viewer.page.locator(".scale-bar").isVisible()).toBe(true);
+  });
+
+  it("saves both pictures as the screen shows them, and shows them as before", async () => {
+    const { viewer } = stand;
+    await stand.open(`&mode=off&stereo=side-by-side${LINK}`);
+    await viewer.settled();
+    const before = await takePicture(viewer.page);
+    await viewer.unfold("save");
+    const saving = viewer.page.waitForEvent("download");
+    await viewer.page.locator('[data-action="save-picture"]').click();
+    const { width, height, rgba } = decodePng(await readFile(await (await saving).path()));
+    const saved = new Picture(width, height, rgba);
+    await viewer.settled();
+    expect([width, height]).toEqual([before.width, before.height]);
+    expect(saved.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
+    expect(difference(saved, before)).toBeLessThan(0.03);
+    expect(difference(await takePicture(viewer.page), before)).toBeLessThan(0.01);
   });
 
   it("hits what is clicked in either eye's picture", async () => {

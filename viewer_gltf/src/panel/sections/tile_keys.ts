@@ -1,4 +1,5 @@
 /** The keys of the tiles. Pure. */
+
 import { setTo } from "../../state/parameters/kinds";
 import { SCREEN_STEREO } from "../../state/parameters/tools";
 import { REFUSED } from "../../state/refusals";

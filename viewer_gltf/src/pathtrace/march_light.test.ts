@@ -1,0 +1,65 @@
+import { Matrix4, Vector3 } from "three";
+import { describe, expect, it } from "vitest";
+import { GLOSS } from "../gpu/room_light";
+import { START_TRACE } from "../state/path_trace_settings";
+import { environmentTables } from "./environment_sampling";
+import { hemispheresOf, lightMarch } from "./march_light";
+
+const roomOf = (height: number, ...rows: readonly number[]) =>
+  hemispheresOf(
+    environmentTables({
+      ...{ width: 2, height },
+      rgb: Float32Array.from(rows.flatMap((v) => [v, v / 2, 0, v, v / 2, 0])),
+    }),
+  );
+
+const lightOf = () => ({
+  uLight: { value: new Vector3() },
+  uFill: { value: new Vector3() },
+  uKeyLight: { value: new Vector3() },
+  uFillLight: { value: new Vector3() },
+  uSkyLight: { value: new Vector3() },
+  uGroundLight: { value: new Vector3() },
+  uGloss: { value: 0 },
+});
+
+describe("the light of the march that stands in for paths of light", () => {
+  it("has the room's mean radiance above and below", () => {
+    const { sky, ground } = roomOf(2, 4, 1);
+    expect([...sky, ...ground]).toEqual([4, 2, 0, 1, 0.5, 0]);
+  });
+
+  it("shares a row across the horizon between both halves, by solid angle", () => {
+    // the middle one of three rows reaches from 60 to 120 degrees: half of each half of the sphere
+    const { sky, ground } = roomOf(3, 8, 2, 0);
+    expect(sky[0]).toBeCloseTo(5, 5);
+    expect(ground[0]).toBeCloseTo(1, 5);
+  });
+
+  it("has the strongest lamp as the key, and the others as one lamp beside it, in the axes of the eye", () => {
+    const [lamp] = START_TRACE.lamps;
+    const lamps = [
+      { ...lamp, isOn: true, x: 0, y: 2, z: 0, strength: 1, color: [0, 1, 0] as const },
+      { ...lamp, isOn: true, x: 0, y: 0, z: -3, strength: 4, color: [1, 0, 0] as const },
+      { ...lamp, isOn: false, x: 1, y: 0, z: 0, strength: 9 },
+    ];
+    const light = lightOf();
+    const settings = { ...START_TRACE, lamps, environmentLight: 2 };
+    const toEye = new Matrix4().makeRotationY(Math.PI / 2); // -z of the specimen becomes -x of the eye
+    lightMarch(light, settings, roomOf(2, 3, 1), toEye);
+    expect(light.uKeyLight.value.toArray()).toEqual([4, 0, 0]);
+    expect(light.uLight.value.distanceTo(new Vector3(-1, 0, 0))).toBeLessThan(1e-6);
+    expect(light.uFillLight.value.toArray()).toEqual([0, 1, 0]);
+    expect(light.uFill.value.distanceTo(new Vector3(0, 1, 0))).toBeLessThan(1e-6);
+    expect(light.uSkyLight.value.x).toBe(6);
+    expect(light.uGloss.value).toBeCloseTo(GLOSS, 6);
+  });
+
+  it("is dark where no lamp is on", () => {
+    const light = lightOf();
+    const lamps = START_TRACE.lamps.map((lamp) => ({ ...lamp, isOn: false }));
+    lightMarch(light, { ...START_TRACE, lamps }, roomOf(2, 1, 1), new Matrix4());
+    expect(light.uKeyLight.value.length() + light.uFillLight.value.length()).toBe(0);
+    expect(light.uLight.value.length()).toBeCloseTo(1, 6);
+  });
+});
