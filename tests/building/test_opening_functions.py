@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from stereocell.building.channels import Channel, has_brain, opens
 from stereocell.building.settings import load, preset_names
+from stereocell.building.survey_file import ChannelSurvey
 from stereocell.isosurface.options import parse_level
+from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance, SurfaceLevel
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
 from stereocell.transfer.ct_colors import tissue_shapes
@@ -161,6 +163,28 @@ def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
     assert replace(plain, channels=(*plain.channels, *head[:2])).opens_cut
     # a channel of the input may have such a name
     assert not has_brain([replace(one, source="") for one in head])
+
+
+@pytest.mark.parametrize(("enclosed", "is_body"), [(0.01, False), (0.2, True)])
+def test_only_a_body_is_cut_open_and_vessels_are_shown_whole(
+    enclosed: float, is_body: bool
+) -> None:
+    rng = np.random.default_rng(0)
+    inside = round(100_000 * enclosed)
+    voxels = np.concatenate([rng.rayleigh(12, 100_000 - inside), rng.normal(220, 30, inside)])
+    statistics = find_statistics(voxels, load("mri", None, flags={}).window)
+    look = make_appearance(
+        "MR",
+        (1, 1, 1),
+        statistics=statistics,
+        level=SurfaceLevel(90.0, None, 1.0),
+        confidence=1.0,
+        doubt="",
+        modality="MR",
+    )
+    repair = RepairOptions(0, 0, 0, 0, 0, 0)
+    survey = ChannelSurvey(statistics, "", {}, repair, look, (), None)
+    assert survey.is_body is is_body
 
 
 def test_autofluorescence_is_off_at_first_beside_other_channels() -> None:

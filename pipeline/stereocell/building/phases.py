@@ -299,6 +299,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         out_folder.require_units_of(plan)
         index, survey = out_folder.index(), read_survey(out_folder)
         appearances = [survey[channel.id].appearance for channel in plan.channels]
+        opens_cut = plan.opens_cut and any(survey[one.id].is_body for one in plan.channels)
         appearances += [
             appearance_of_labels(labels, painter=painter.id if painter else "")
             for labels in plan.labels
@@ -320,7 +321,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             names,
             list(plan.placement),
             plan.has_sides,
-            plan.opens_cut,
+            opens_cut,
             {id_: digest_of_table(table) for id_, table in tables.items()},
         ]
         key = key_of(depends, stage_tasks, usdz_writer)
@@ -344,7 +345,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             modality=plan.modality,
             placement=plan.placement,
             has_sides=plan.has_sides,
-            opens_cut=plan.opens_cut,
+            opens_cut=opens_cut,
             tables=tables,
         )
         out_folder.remove_other_folders(

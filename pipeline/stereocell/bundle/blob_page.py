@@ -26,7 +26,7 @@ _DOCUMENT = """<!doctype html>
     <meta charset="utf-8" />
     <meta http-equiv="Content-Security-Policy" content="{policy}" />
     <meta name="viewport" content="width=device-width, initial-scale=1, viewport-fit=cover" />
-    <meta name="color-scheme" content="dark" />
+    <meta name="color-scheme" content="dark light" />
     <title>StereoCell</title>
     <link rel="icon" href="data:," />
   </head>

@@ -120,7 +120,7 @@ class SceneFiles:
 
     def at(self, levels: Levels) -> dict[str, Packed]:
         """Return all files by path, packed: a bundle at some levels, and the viewer's lights."""
-        made = {}
+        made: dict[str, bytes | None] = {}
         manifest = {**self._manifest, "channels": [], "usdz": None, "usdz_reason": _NO_USDZ}
         for channel in self.channels:
             files, entry = self._channel(channel, levels)
@@ -128,8 +128,8 @@ class SceneFiles:
             manifest["channels"].append(entry)
         listed = {path: _entry(data) for path, data in made.items() if data is not None}
         listed |= {path: dict(self._listed[path]) for path, data in made.items() if data is None}
-        made[FILES] = encode(listed)
-        manifest["files"] = {"path": FILES, **_entry(made[FILES])}
+        index = made[FILES] = encode(listed)
+        manifest["files"] = {"path": FILES, **_entry(index)}
         made[MANIFEST] = to_json(sealed(manifest))
         lights = sorted((find_page() / "environments").glob("*.hdr"))
         made |= {f"environments/{file.name}": file.read_bytes() for file in lights}
@@ -156,8 +156,8 @@ class SceneFiles:
             root = without_finer(tileset["root"], levels.surfaces)
             files |= {folder + uri: None for uri, _ in surfaces(root)}
             path = channel["tileset"]["path"]
-            files[path] = compact_json({**tileset, "root": root})
-            entry["tileset"] = {"path": path, **_entry(files[path])}
+            document = files[path] = compact_json({**tileset, "root": root})
+            entry["tileset"] = {"path": path, **_entry(document)}
             for name in {"triangles", "distances"} & channel.keys():
                 entry[name] = channel[name][min(levels.surfaces, len(channel[name]) - 1) :]
         path = channel["volumes"]["path"]
@@ -166,8 +166,8 @@ class SceneFiles:
             made, texture = self._volume(volume, levels.volumes)
             files |= {volume["file"]["path"]: texture, volume["bricks"]["path"]: None}
             entries.append(made)
-        files[path] = compact_json({"volumes": entries})
-        entry["volumes"] = {"path": path, **_entry(files[path])}
+        document = files[path] = compact_json({"volumes": entries})
+        entry["volumes"] = {"path": path, **_entry(document)}
         return files, entry
 
     def _volume(self, volume: dict[str, Any], finest: int) -> tuple[dict[str, Any], bytes | None]:

@@ -117,7 +117,10 @@ export function savePicture(
   const { renderer, studio, navigation } = scene;
   const { camera } = navigation;
   const { width, height } = renderer.domElement;
-  const scale = Math.max(1, Math.min(wanted, Math.floor(Math.sqrt(MAX_PIXELS / (width * height)))));
+  const isTwo = scene.state.screenStereo === "side-by-side"; // whose halves are no parts of one picture
+  const most = isTwo ? 1 : Math.floor(Math.sqrt(MAX_PIXELS / (width * height)));
+  const scale = Math.max(1, Math.min(wanted, most));
+  const eye = isTwo ? width / 2 : width; // of what the camera sees
   return studio.apart(async () => {
     const { canvas, context } = canvasOf(scale * width, scale * height);
     const words = clearCaptionOf(scene); // before the camera sees parts alone
@@ -125,7 +128,7 @@ export function savePicture(
       for (let row = 0; row < scale; row++) {
         for (let column = 0; column < scale; column++) {
           const [x, y] = [column * width, row * height];
-          camera.setViewOffset(scale * width, scale * height, x, y, width, height);
+          camera.setViewOffset(scale * eye, scale * height, x, y, eye, height);
           const part = `part ${row * scale + column + 1} of ${scale * scale}`;
           const isWhole = await drawPart(studio, part, onPart, signal);
           if (!isWhole) return null;
@@ -136,7 +139,7 @@ export function savePicture(
     } finally {
       camera.clearViewOffset();
     }
-    drawCaption(context, canvas, scale * renderer.getPixelRatio(), words);
+    if (!isTwo) drawCaption(context, canvas, scale * renderer.getPixelRatio(), words);
     return pngOf(canvas);
   });
 }
@@ -203,7 +206,9 @@ export function saveVideo(
       await studio.arrive(1 / FRAMES_PER_S, ARRIVAL_MS);
       studio.drawStill(isTraced(state) ? TRACED_FRAME_MS : FRAME_MS);
       context.drawImage(renderer.domElement, 0, 0, canvas.width, canvas.height);
-      drawCaption(context, canvas, shrink * renderer.getPixelRatio(), captionOf(scene));
+      if (state.screenStereo !== "side-by-side") {
+        drawCaption(context, canvas, shrink * renderer.getPixelRatio(), captionOf(scene));
+      }
       await writer.add(canvas);
       if (i % FRAMES_PER_S === 0) onSecond(i + 1, path.length);
       await turn();

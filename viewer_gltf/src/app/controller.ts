@@ -8,6 +8,7 @@ import { unitOf } from "../annotations/measure";
 import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
+import { toggleFullScreen } from "../dom/full_screen";
 import { fileName, saveFile } from "../dom/save_file";
 import { store, stored } from "../dom/stored";
 import type { Box } from "../math/box";
@@ -25,12 +26,12 @@ import {
   type Wish,
 } from "../panel/controls";
 import type { CardMeasure } from "../panel/html/card_measure";
-import { Help } from "../panel/html/key_list";
+import type { Help } from "../panel/html/key_list";
 import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
 import { isRefusal, type KeyContext } from "../panel/key";
 import { isWritten, listenForKeys } from "../panel/key_events";
-import { wishOf } from "../panel/keys";
+import { type KeyChanges, labelOf, standsFor, wishOf, withKeys } from "../panel/keys";
 import { type Facts, layOut, MORE } from "../panel/layout";
 import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
@@ -59,7 +60,7 @@ import {
 } from "../xr/cardboard/viewer_profile";
 import type { TapPart } from "./tap_part";
 import type { ViewMessagePart } from "./view_message_part";
-import type { Viewer } from "./viewer";
+import type { Mark, Viewer } from "./viewer";
 
 /** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
@@ -68,6 +69,7 @@ const REFRESH_MS = 250;
 
 const NOT_COME = "This part of the page could not be loaded: check the connection and try again.";
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
+const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
 const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 
 const LENS_KEY = "stereocell-lens";
@@ -89,11 +91,27 @@ function rememberedLens(): Partial<Pick<PanelView, "lenses" | "code">> {
 
 const OPEN_KEY = "stereocell-open";
 const LETTERS_KEY = "stereocell-letters";
+const KEYS_KEY = "stereocell-keys";
 
-/** The sections of the panel that the reader had open on the visit before. */
+/** The keys that the reader has changed on a visit before. */
+function rememberedKeys(): KeyChanges {
+  try {
+    const found: unknown = JSON.parse(stored(KEYS_KEY) ?? "{}");
+    const pairs = Object.entries(found ?? {}).filter((pair) => typeof pair[1] === "string");
+    return Object.fromEntries(pairs);
+  } catch {
+    return {}; // another program's words: then as at first
+  }
+}
+
+/**
+ * The sections of the panel that the reader had open on the visit before, but for those of label maps: the rows below
+ * would move when a table has come.
+ */
 function rememberedOpen(): readonly string[] {
   const text = stored(OPEN_KEY);
-  return text === null ? START_VIEW.open : text.split(" ");
+  const sections = text === null ? START_VIEW.open : text.split(" ");
+  return sections.filter((id) => !id.startsWith("objects"));
 }
 
 const SCREEN_KEY = "stereocell-screen";
@@ -123,6 +141,13 @@ const mayBeEmpty = (state: ViewerState, opening: ViewerState) =>
   EMPTYING.some((key) => state[key] !== opening[key]) ||
   (state.mode === "off" && !state.channels.some(({ shown, hasSurface }) => shown && hasSurface));
 
+/** What was there before a key was pressed. */
+type Before = Readonly<{ mark: Mark; view: PanelView }>;
+const HIDDEN: Readonly<Record<string, string>> = {
+  true: "The panel is hidden.",
+  false: "The panel is shown.",
+};
+
 export type ControllerOptions = Readonly<{
   subtitle: string;
   /** Enter stereo; called from within a click or a key, as is the other. */
@@ -140,10 +165,11 @@ export class Controller {
     ...rememberedLens(),
     open: rememberedOpen(),
     hasLetters: stored(LETTERS_KEY) !== "off",
+    keyChanges: rememberedKeys(),
   };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
-  private readonly help: Help;
-  /** Once it was asked for. */
+  /** Once it was asked for, as is the next one. */
+  private help: Help | null = null;
   private card: CardMeasure | null = null;
   /** The card beside a tapped place, once something was tapped. */
   private tapped: TapPart | null = null;
@@ -162,6 +188,8 @@ export class Controller {
   private hasRoom = false;
   /** While a picture or a video is made. */
   private filming: AbortController | null = null;
+  /** The change by a key that can still be taken back, with the newest step after it. */
+  private accident: (Before & Readonly<{ after: object | null }>) | null = null;
 
   constructor(
     private readonly viewer: Viewer,
@@ -175,9 +203,6 @@ export class Controller {
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
     this.panel = new Panel((wish) => this.perform(wish));
     parent.append(this.panel.root);
-    this.help = new Help(parent, () => {
-      if (this.view.isHelpOpen) this.perform({ panel: "help" });
-    });
     viewer.setScreen(rememberedScreen());
     for (const action of rememberedEyes()) viewer.dispatch(action);
     viewer.onAnnounce = (text) => this.say(text);
@@ -223,7 +248,12 @@ export class Controller {
     const eyes = EYE_ROWS.map((row) => row.get(this.viewer.state)).join();
     if (eyes !== this.eyes) store(EYES_KEY, eyes);
     this.eyes = eyes;
-    this.help.update(this.view.isHelpOpen);
+    this.help?.update(this.view.isHelpOpen, this.view.keyChanges);
+    if (this.view.isHelpOpen && this.help === null) void this.loadHelp();
+    if (this.accident !== null && this.accident.after !== this.viewer.newestStep) {
+      this.accident = null;
+      this.said.withdraw();
+    }
     this.tapped?.update();
     if (mayBeEmpty(this.viewer.state, this.opening)) void this.loadMessage();
     this.message?.update();
@@ -244,7 +274,9 @@ export class Controller {
       if (laysOutCards(wish)) this.view = { ...this.view, channelsWithCard: null };
       if (wish.panel === "unfold") store(OPEN_KEY, this.view.open.join(" "));
       if (wish.panel === "letters") store(LETTERS_KEY, wish.areOn ? "on" : "off");
+      if (wish.panel === "keys") store(KEYS_KEY, JSON.stringify(wish.changes));
       this.refresh();
+      if (wish.panel === "reveal") this.panel.reveal(wish.control);
     } else this.viewer.dispatch(wish);
   }
 
@@ -264,7 +296,8 @@ export class Controller {
   }
 
   private run(command: Command): void {
-    if (command === "share") void this.share();
+    if (command === "undo" && this.accident !== null) this.takeBack(this.accident);
+    else if (command === "share") void this.share();
     else if (command === "stereo") {
       if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
       else if (this.stereo.isAvailable) this.options.onStereo();
@@ -273,6 +306,8 @@ export class Controller {
       if (this.viewer.stereo.kind !== null) this.viewer.stereo.end();
       else if (this.hasRoom) this.options.onRoom();
       else this.say(NO_ROOM);
+    } else if (command === "full-screen") {
+      void toggleFullScreen().then((isDone) => isDone || this.say(NO_FULL_SCREEN));
     } else if (command === "split") {
       this.splitScreen();
     } else if (command === "scan") {
@@ -297,6 +332,7 @@ export class Controller {
 
   /** On the page, and in stereo before the eyes, which don't see the page. */
   private say(text: string): void {
+    this.accident = null;
     this.said.say(text);
     this.viewer.stereo.announce(text);
   }
@@ -360,10 +396,11 @@ export class Controller {
 
   /** Say why a request does nothing now, with a button where something leads on. */
   private async explain({ refusal }: Refusal): Promise<void> {
-    this.say(refusal);
+    const words = withKeys(refusal, this.view.keyChanges);
+    this.say(words);
     if (this.viewer.stereo.kind !== null) return;
     const button = (await this.loadMessage())?.buttonFor(refusal, this.shown) ?? null;
-    if (button !== null) this.said.offer(refusal, button.label, button.act);
+    if (button !== null) this.said.offer(words, button.label, button.act);
   }
 
   private async loadMessage(): Promise<ViewMessagePart | null> {
@@ -417,19 +454,21 @@ export class Controller {
     }
   }
 
-  private press(name: string): boolean {
+  private press(pressed: string): boolean {
     const { viewer, view } = this;
-    if (!view.hasLetters && isWritten(name) && name !== "?") return false;
+    if (!view.hasLetters && isWritten(pressed) && pressed !== "?") return false;
+    const name = standsFor(pressed, view.keyChanges);
+    const mark = viewer.mark;
     const context: KeyContext = {
       state: viewer.state,
       view,
       shown: this.shown,
       focusTile: viewer.snapshot().gazed,
     };
-    const wish = wishOf(name, context);
-    if (wish === null || isRefusal(wish)) {
-      if (wish !== null) void this.explain(wish);
-      else if (isWritten(name)) this.say(`No key ${name}: ? lists the keys.`);
+    const wish = name === null ? null : wishOf(name, context);
+    if (name === null || wish === null || isRefusal(wish)) {
+      if (wish !== null && isRefusal(wish)) void this.explain(wish);
+      else if (isWritten(pressed)) this.say(`No key ${pressed}: ? lists the keys.`);
       return false;
     }
     this.perform(wish);
@@ -440,8 +479,48 @@ export class Controller {
     const text =
       announcementOf(context.state, viewer.state, tiles) ??
       spokenFeedback(wish, context.state, viewer.state, this.ranges);
-    if (text !== "") this.say(text);
+    if (!isWritten(pressed) || !this.offerBack(wish, text || labelOf(name), { mark, view })) {
+      if (text !== "") this.say(text);
+    }
     return true;
+  }
+
+  /** Announce what a key has changed, and offer to take it back: it may have been hit by accident. */
+  private offerBack(wish: Wish, text: string, { mark, view }: Before): boolean {
+    const { viewer } = this;
+    const isOwnAnswer = wish === "share" || this.view.isHelpOpen || viewer.stereo.kind !== null;
+    if (isOwnAnswer || !(viewer.hasChangedSince(mark) || view !== this.view)) return false;
+    const words = view.isHidden === this.view.isHidden ? text : HIDDEN[String(this.view.isHidden)];
+    const accident = { mark, view, after: viewer.newestStep };
+    this.say(words);
+    this.said.offer(words, "Undo", () => this.takeBack(accident));
+    this.accident = accident;
+    return true;
+  }
+
+  private takeBack({ mark, view }: Before): void {
+    this.accident = null;
+    this.viewer.takeBack(mark);
+    this.view = view;
+    this.refresh();
+    this.say("Undone.");
+  }
+
+  private async loadHelp(): Promise<void> {
+    const part = await import("../panel/html/key_list").catch(() => null);
+    if (part === null) {
+      this.view = { ...this.view, isHelpOpen: false };
+      this.say(NOT_COME);
+      return;
+    }
+    this.help ??= new part.Help(
+      this.parent,
+      () => {
+        if (this.view.isHelpOpen) this.perform({ panel: "help" });
+      },
+      (changes) => this.perform({ panel: "keys", changes }),
+    );
+    this.refresh();
   }
 
   /** The address of this view, in the clipboard, in the address bar and in the panel. */
@@ -614,7 +693,7 @@ export class Controller {
     clearTimeout(this.timer);
     this.disposed.abort();
     this.panel.root.remove();
-    this.help.dispose();
+    this.help?.dispose();
     this.card?.dispose();
     this.tapped?.dispose();
     this.message?.dispose();

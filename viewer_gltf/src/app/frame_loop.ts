@@ -259,9 +259,9 @@ export class FrameLoop {
    * @param begun what it has returned for the same view, to go on with
    */
   drawStill(most_ms: number, begun: Still | null = null): Still {
-    const { contents, navigation, state } = this.options.shown();
+    const { contents, state } = this.options.shown();
     const { traced, surfaces } = contents;
-    this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
+    this.followScreen();
     surfaces.dressAll();
     const start_ms = performance.now();
     const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
@@ -289,8 +289,14 @@ export class FrameLoop {
       this.options.room.standUnder(navigation.occupied);
     }
     navigation.update(dt_s);
-    this.picture.eyes.followScreen(this.options.renderer, navigation.camera);
+    this.followScreen();
     return navigation.camera;
+  }
+
+  private followScreen(): void {
+    const { stereo, navigation } = this.options.shown();
+    const { camera, controls } = navigation;
+    stereo.followScreen(this.picture.eyes, camera, controls.target);
   }
 
   /** Follow the gaze, and go on with what moves and with what fades; whether it goes on. */

@@ -2,6 +2,7 @@
 import "./lost_context.css";
 import { element } from "../dom/element";
 import { takeFewerPixels } from "../render/pixel_share";
+import { DROPPED, type Viewer } from "./viewer";
 
 /** Time until the page offers a reload, ms: most drivers are back within a second. */
 const PATIENCE_MS = 5000;
@@ -13,7 +14,8 @@ const OFFER = "Reload with fewer pixels";
  *
  * @param beforeReload called before the page is loaded again, to keep the view
  */
-export function offerReload(canvas: HTMLCanvasElement, beforeReload: () => void): void {
+export function offerReload(viewer: Viewer, beforeReload: () => void): void {
+  const canvas = viewer.renderer.domElement;
   const reload = () => {
     beforeReload();
     takeFewerPixels();
@@ -27,7 +29,10 @@ export function offerReload(canvas: HTMLCanvasElement, beforeReload: () => void)
     element("button", { textContent: OFFER, onclick: reload }, { action: "reload" }),
   );
   // in the stage, which covers the whole page in the split screen
-  const timer = setTimeout(() => canvas.parentElement?.append(card), PATIENCE_MS);
+  const timer = setTimeout(() => {
+    canvas.parentElement?.append(card);
+    viewer.dispatch({ type: "dismiss", texts: [DROPPED] });
+  }, PATIENCE_MS);
   const come = () => {
     clearTimeout(timer);
     card.remove();

@@ -4,6 +4,7 @@ import "../panel/html/panel.css";
 import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
+import "../panel/html/forced_colors.css";
 import "../annotations/annotations.css";
 import { sizeText } from "../annotations/measure";
 import { bundleAddress, pageAddress } from "../bundle/address";
@@ -13,9 +14,10 @@ import type { Manifest } from "../bundle/generated/bundle";
 import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
+import { hasFullScreen } from "../dom/full_screen";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
 import { isKept } from "../offline/request_plan";
-import { FirstHint, Notices, ProgressBar, Said, showFatal } from "../panel/html/overlays";
+import { FirstHint, Notices, ProgressBar, Said, showFatal, WayBack } from "../panel/html/overlays";
 import { opensAr, WaysIn } from "../panel/html/ways_in";
 import type { Theme } from "../render/theme";
 import { flightAsked } from "../share/bench_parameter";
@@ -108,7 +110,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
 
   const stage = element("div", { className: "stage" });
   stage.ariaLabel = "The specimen: the arrow keys turn it, ? lists all keys";
-  stage.role = "img";
+  stage.role = "group"; // an image would hide the marks and the buttons in it from screen readers
   const progress = new ProgressBar();
   const notices = new Notices(
     (texts) => viewer.dispatch({ type: "dismiss", texts }),
@@ -117,8 +119,9 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const waysIn = new WaysIn();
   const isTouch = matchMedia("(pointer: coarse)").matches;
   const hint = new FirstHint(isTouch);
-  const over = [hint.root, progress.root, said.root, notices.root, waysIn.root];
-  parent.replaceChildren(element("div", { className: "view" }, {}, stage, ...over));
+  const wayBack = new WayBack(() => viewer.run("back"));
+  const over = [hint.root, progress.root, said.root, notices.root, waysIn.root, wayBack.root];
+  parent.replaceChildren(element("main", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
   let notebook: NotebookPart | null = null;
   const isFramed = window.parent !== window;
@@ -132,6 +135,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
       controller?.refresh();
       notices.update(state);
       hint.update(state);
+      wayBack.update(state);
       notebook?.note();
     },
     () => {
@@ -152,10 +156,9 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   notices.update(viewer.state);
   controller.followAddress(search, hash);
   openedAs = { state: viewer.state, camera: viewer.cameraView };
-  viewer.renderer.domElement.addEventListener("webglcontextlost", (event) => {
-    const canvas = event.target as HTMLCanvasElement;
+  viewer.renderer.domElement.addEventListener("webglcontextlost", () => {
     void import("./lost_context").then(({ offerReload }) =>
-      offerReload(canvas, () => later?.addressBar?.write()),
+      offerReload(viewer, () => later?.addressBar?.write()),
     );
   });
   hint.update(viewer.state);
@@ -169,6 +172,7 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   const way = wayToStereo(support, isTouch);
   waysIn.offerStereo(way, () => way && controller.perform(way));
   if (way !== null || hasRoom) void prepareStereo(viewer);
+  if (hasFullScreen()) waysIn.offerFullScreen(() => controller.perform("full-screen"));
   if (hasRoom) waysIn.offerRoom(() => controller.perform("room"));
   const usdz = usdzFor(bundle);
   if (usdz !== null) waysIn.offerLink(usdz);

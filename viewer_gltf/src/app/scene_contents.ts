@@ -5,6 +5,7 @@ import type { Bundle } from "../bundle/load";
 import { ValuesHost } from "../bundle/values_host";
 import { memoryBudget } from "../gpu/memory_budget";
 import { type Box, cornersOf } from "../math/box";
+import { behindPlane } from "../math/clip";
 import { extremePoints } from "../math/extreme_points";
 import type { Vec3 } from "../math/vec3";
 import { TracedVolume } from "../pathtrace/traced_volume";
@@ -177,7 +178,7 @@ export class Contents {
   }
 
   /**
-   * Outermost points of all that shows, um, world, as far as they are known; null: none are, or nothing better than was
+   * Outermost points of all that shows and is not cut away, um, world, as far as they are known; null: none are, or nothing better than was
    * told before. A channel without a surface may show in all of the specimen.
    */
   outline(state: ViewerState): readonly Vec3[] | null {
@@ -193,7 +194,9 @@ export class Contents {
       points.push(...outline);
     }
     this.isOutlined = this.hasOverview;
-    return points.length === 0 ? null : extremePoints(points);
+    if (points.length === 0) return null;
+    const { plane } = state.clip;
+    return extremePoints(plane === null ? points : behindPlane(points, plane));
   }
 
   /** True once, when the overview has come: then `follow` again. */

@@ -75,6 +75,18 @@ export class Steps {
     return this.take(redone(this.history, moment));
   }
 
+  /** The newest step; null: there is none. It marks a place in the history. */
+  get newest(): object | null {
+    return this.history.past.at(-1) ?? null;
+  }
+
+  /** How many steps were made since that one was the newest, moves of the camera included. */
+  since(newest: object | null): number {
+    this.note();
+    const past: readonly (object | null)[] = this.history.past;
+    return past.length - 1 - past.lastIndexOf(newest);
+  }
+
   forget(): void {
     this.history = NO_HISTORY;
     this.seenFrom = this.now().camera;

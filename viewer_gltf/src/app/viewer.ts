@@ -6,7 +6,7 @@ import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
-import { isSameLook, Navigation, type Stand } from "../interaction/orbit_camera";
+import { isSameLook, type Look, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";
@@ -38,7 +38,7 @@ import { initialState } from "../state/initial_state";
 import type { ObjectView } from "../state/objects";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
-import { START_TOOLS } from "../state/parameters/tools";
+import { SCREEN_STEREO, START_TOOLS } from "../state/parameters/tools";
 import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
 import { newNotice, reduce } from "../state/reduce";
 import { REFUSED } from "../state/refusals";
@@ -73,17 +73,26 @@ const ASIDE = [1, 0, -1].flatMap((z) =>
 const BEHIND_OTHERS = "Other objects hide it from all sides: its card shows it alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
-const NEXT_KEPT = "` goes to the next one.";
+const NEXT_KEPT = "“Next kept view” goes through them.";
 
 const NO_LAYOUT: Layout = {
   ...{ title: "", subtitle: "", sections: [], status: "", isHidden: true },
   more: { isOpen: false, opener: { panel: "unfold", section: "more" } },
 };
 
+export type Mark = Readonly<{
+  state: ViewerState;
+  camera: CameraView | null;
+  look: Look;
+  newest: object | null;
+}>;
+
+/** While the graphics driver has its time to give the picture back. */
+export const DROPPED = "The graphics driver has dropped the picture: it is drawn again.";
 const WAITING = "The host does not answer: trying again. What has come stays on screen.";
 const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
 /** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
-const FINER = /^\S+\.(glb|ktx2):/;
+const FINER = /^(channels|volumes)\/\S+\.(glb|ktx2):/;
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -202,7 +211,7 @@ export class Viewer {
     );
     this.navigation.controls.addEventListener("start", () => this.steps.note());
     const rayAt = (point: Vector2) =>
-      rayUnder(point, this.navigation.camera, this.room.specimen.group);
+      rayUnder(this.withinEye(point), this.navigation.camera, this.room.specimen.group);
     const { signal } = this.disposed;
     listenForHandles(
       stage,
@@ -227,9 +236,8 @@ export class Viewer {
         else void this.flyAlong(rayAt(point));
       },
     );
-    const lost = "The graphics driver has dropped the picture: it is drawn anew.";
     canvas.addEventListener("webglcontextlost", () => {
-      this.dispatch({ type: "notify", text: lost });
+      this.dispatch({ type: "notify", text: DROPPED });
       volumes.forget(); // their texels went with the context
       this.contents.traced.forget();
       this.loop.forget();
@@ -239,7 +247,7 @@ export class Viewer {
       this.contents.traced.forget();
       this.loop.renew(); // the times that were asked for went, too
       this.follow();
-      this.dispatch({ type: "dismiss", texts: [lost] });
+      this.dispatch({ type: "dismiss", texts: [DROPPED] });
     });
     addEventListener("online", () => this.retry(), { signal });
     this.size = new StageSize(stage, () => this.fit());
@@ -423,6 +431,33 @@ export class Viewer {
     return this.steps.redoes;
   }
 
+  /** A moment that `takeBack` can return to. */
+  get mark(): Mark {
+    const { state, cameraView: camera } = this;
+    return { state, camera, look: this.navigation.lookNow, newest: this.steps.newest };
+  }
+
+  /** Whether the user would see a difference since then. */
+  hasChangedSince({ state, look }: Mark): boolean {
+    return !isSameView(state, this.state) || !isSameLook(look, this.navigation);
+  }
+
+  /** The newest step of the history. */
+  get newestStep(): object | null {
+    return this.steps.newest;
+  }
+
+  /** Return to the state of a moment and to where the specimen was seen from. */
+  takeBack({ state, camera, newest }: Mark): void {
+    if (!isSameView(state, this.state)) {
+      // a change that was joined with the step before it made no step of its own
+      for (let left = Math.max(1, this.steps.since(newest)); left > 0; left--) this.step("undo");
+    }
+    if (this.stereo.kind === null) this.transition.restore(camera);
+    this.loop.change();
+    this.onState(this.state);
+  }
+
   /** From here on: what came before was no user's. */
   forgetSteps(): void {
     this.steps.forget();
@@ -498,11 +533,14 @@ export class Viewer {
       this.loop.change();
     };
     dressIn(null);
-    if (isPlain) return;
-    this.dressed = import("../render/backdrop").then(
-      ({ Backdrop }) => dressIn(new Backdrop()),
+    const fetched = isPlain ? Promise.resolve() : import("../render/backdrop");
+    const dressed: Promise<void> = fetched.then(
+      (part) => {
+        if (part && this.dressed === dressed) dressIn(new part.Backdrop());
+      },
       () => undefined, // a picture without it is as true
     );
+    this.dressed = dressed;
   }
 
   /** Someone has touched the page. */
@@ -600,8 +638,7 @@ export class Viewer {
   /** Whether a part of the picture is missing, not merely coarse. */
   private get isIncomplete(): boolean {
     const { surfaces, volumes } = this.contents;
-    const isNone = ({ level }: { level: number | null }) => level === null;
-    return !surfaces.overview.isComplete || volumes.status().some(isNone);
+    return !surfaces.overview.isComplete || volumes.isIncomplete;
   }
 
   /** Light the traced picture by a file of the user's. Throws BundleError. */
@@ -665,10 +702,32 @@ export class Viewer {
     });
     const { manifest } = this.bundle;
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
+    this.followScreenStereo();
     this.contents.follow(this.state, this.hybrid);
     this.room.mark(isolated === null ? selected : null);
     this.loop.setLevel(quality);
     this.loop.change();
+  }
+
+  /** Bring the page's own screen to the stereo that is asked for. */
+  private followScreenStereo(): void {
+    const { screenStereo } = this.state;
+    if (this.stage.dataset.stereo === screenStereo) return;
+    this.stage.dataset.stereo = screenStereo;
+    this.stereo.showOnScreen(screenStereo).then(
+      () => this.loop.change(),
+      (error) => {
+        this.report(error);
+        this.dispatch(setTo(SCREEN_STEREO, "off"), false);
+      },
+    );
+    this.fit();
+  }
+
+  /** A point of the screen, -1..1, in the picture of the eye that shows there. */
+  private withinEye(point: Vector2): Vector2 {
+    if (this.state.screenStereo !== "side-by-side") return point;
+    return point.clone().setX(2 * point.x + (point.x < 0 ? 1 : -1));
   }
 
   private fit(): void {
@@ -680,7 +739,8 @@ export class Viewer {
     const style = getComputedStyle(this.stage);
     const share = (name: string) => Number.parseFloat(style.getPropertyValue(name)) / clientHeight;
     const covered = { top: share("--over-top") || 0, bottom: share("--over-bottom") || 0 };
-    this.navigation.fit(clientWidth / clientHeight, covered);
+    const pictures = this.state.screenStereo === "side-by-side" ? 2 : 1;
+    this.navigation.fit(clientWidth / pictures / clientHeight, covered);
     this.loop.change();
   }
 

@@ -6,8 +6,9 @@ import type { RoomRay } from "./ray_pointer";
 /** Longest time and way between the clicks of a double click or the taps of a double tap. */
 const DOUBLE_MS = 400;
 const DOUBLE_PX = 24;
-/** Most px between down and up of a click; a pointer that moves further orbits. */
+/** Most px between down and up of a click; a pointer that moves further orbits. A finger rolls as it taps. */
 const CLICK_PX = 5;
+const TAP_PX = 14;
 
 /** The ray from `eye` through `towards` (room) in the specimen's own space (um, world). */
 function rayInto(specimen: Object3D, eye: Vector3, towards: Vector3): Ray {
@@ -60,7 +61,8 @@ export function listenForClicks(
     const start = down.get(event.pointerId);
     down.delete(event.pointerId);
     if (start === undefined || !isTap || event.button !== 0) return;
-    if (start.distanceTo(new Vector2(event.clientX, event.clientY)) > CLICK_PX) return;
+    const most_px = event.pointerType === "touch" ? TAP_PX : CLICK_PX;
+    if (start.distanceTo(new Vector2(event.clientX, event.clientY)) > most_px) return;
     const box = canvas.getBoundingClientRect();
     const x = ((event.clientX - box.left) / box.width) * 2 - 1;
     const y = 1 - ((event.clientY - box.top) / box.height) * 2;

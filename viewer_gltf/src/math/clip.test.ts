@@ -2,6 +2,7 @@ import { describe, expect, it } from "vitest";
 import { seeded } from "../../test/support/seeded";
 import type { Box } from "./box";
 import {
+  behindPlane,
   boxHandles,
   type Clip,
   clipSpan,
@@ -22,6 +23,25 @@ function unit(v: Vec3): Vec3 {
   const length = Math.hypot(...v);
   return [v[0] / length, v[1] / length, v[2] / length];
 }
+
+describe("what a plane leaves of a body", () => {
+  const plane = { normal: [1, 0, 0], offset_um: 2 } as const;
+
+  it("lies within the body's points, of which none is beyond the plane", () => {
+    const corners: Vec3[] = [
+      [0, 0, 0],
+      [6, 0, 0],
+      [0, 3, 0],
+      [6, 3, 4],
+    ];
+    expect(behindPlane(corners, plane)).toEqual([
+      [0, 0, 0],
+      [2, 0, 0],
+      [0, 3, 0],
+      [2, 3, 4],
+    ]);
+  });
+});
 
 describe("a ray's span", () => {
   it("is cut by the box and by the plane", () => {

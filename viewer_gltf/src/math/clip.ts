@@ -68,6 +68,17 @@ export function isKept(point: Vec3, { box, plane, corner }: Clip): boolean {
   return isInBox && !(plane !== null && isBeyond(plane)) && !corner?.every(isBeyond);
 }
 
+/**
+ * Points of a body of which those beyond a plane are brought straight onto it: what the plane leaves of the body lies
+ * within them.
+ */
+export function behindPlane(points: readonly Vec3[], plane: ClipPlane): readonly Vec3[] {
+  return points.map((point) => {
+    const beyond = dot(plane.normal, point) - plane.offset_um;
+    return beyond > 0 ? along(point, plane.normal, -beyond) : point;
+  });
+}
+
 /** Whether nothing is left of a box. */
 export function isCutAway(of: Box, { box, plane }: Clip): boolean {
   const min = AXES.map((i) => (box === null ? of.min[i] : Math.max(of.min[i], box.min[i])));

@@ -38,6 +38,10 @@ export type PanelChange =
   | Readonly<{ panel: "code"; text: string }>
   /** Whether keys that write a character do anything (WCAG 2.1.4). */
   | Readonly<{ panel: "letters"; areOn: boolean }>
+  /** The keys that differ from the tables: see keys.ts. */
+  | Readonly<{ panel: "keys"; changes: Readonly<Record<string, string>> }>
+  /** Open a section, and scroll to one of its controls. */
+  | Readonly<{ panel: "reveal"; section: string; control: string }>
   | Readonly<{ panel: "hide" }>
   | Readonly<{ panel: "help" }>;
 
@@ -70,6 +74,7 @@ export type PanelView = Readonly<{
   lenses: Lenses;
   code: string;
   hasLetters: boolean;
+  keyChanges: Readonly<Record<string, string>>;
   isHidden: boolean;
   isHelpOpen: boolean;
   /** The last link that was shared; "": none. */
@@ -87,10 +92,11 @@ export const START_VIEW: PanelView = {
   shape: null,
   grasp: null,
   shapeNumber: null,
-  open: ["channels", "objects", "volumes"],
+  open: ["channels", "volumes"],
   lenses: "v2",
   code: "",
   hasLetters: true,
+  keyChanges: {},
   isHidden: false,
   isHelpOpen: false,
   link: "",
@@ -311,12 +317,16 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
       const open = isOpen ? view.open.filter((id) => id !== section) : [...view.open, section];
       return { ...view, open };
     }
+    case "reveal":
+      return { ...view, isHidden: false, open: [...new Set([...view.open, change.section])] };
     case "lenses":
       return change.lenses === view.lenses ? view : { ...view, lenses: change.lenses };
     case "code":
       return change.text === view.code ? view : { ...view, code: change.text };
     case "letters":
       return change.areOn === view.hasLetters ? view : { ...view, hasLetters: change.areOn };
+    case "keys":
+      return { ...view, keyChanges: change.changes };
     case "hide":
       return { ...view, isHidden: !view.isHidden };
     case "help":

@@ -9,7 +9,7 @@ export const EXPLANATIONS: Readonly<Record<string, string>> = {
   "switch-distance":
     "From nearer than this, the focus disc or the tile shows the volume. From farther away it shows surfaces.",
   "disc-radius":
-    "Half of the angle that the round window in the middle of the view takes. Volumes show inside it.",
+    "Half of the angle that the round window in the middle of the view takes. Volumes show inside it. It ends where a fifth tile would begin.",
   compositing: "What one sees of things that lie behind one another.",
   "depth-shading":
     "Enclosed places are darker, and things that lie before others throw shadows on them.",

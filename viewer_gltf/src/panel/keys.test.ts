@@ -118,6 +118,7 @@ describe("the keys", () => {
       room: true,
       undo: true,
       redo: true,
+      "full-screen": true,
       split: true,
       scan: true,
       share: true,
@@ -186,9 +187,11 @@ describe("the keys", () => {
       lenses: true,
       hide: true,
       help: true,
+      reveal: false,
       find: false,
       code: false,
       letters: false, // a key could not switch it back on
+      keys: false, // the list of keys has it
       unfold: false,
     };
     for (const [panel, isWanted] of Object.entries(wanted)) {

@@ -35,6 +35,26 @@ const BY_KEY: ReadonlyMap<string, Key> = new Map(
 const OF_VOLUMES: ReadonlySet<Key> = new Set([...VOLUME_KEYS, ...SLICE_KEYS, ...LIGHT_KEYS]);
 const NO_VOLUMES = no(REFUSED.volumes);
 
+/** Keys that a reader has changed: from a name in these tables to the key that is pressed instead. */
+export type KeyChanges = Readonly<Record<string, string>>;
+
+/** The name in these tables that a pressed key stands for; null: none. */
+export function standsFor(pressed: string, changes: KeyChanges): string | null {
+  const changed = Object.keys(changes).find((name) => changes[name] === pressed);
+  if (changed !== undefined) return changed;
+  return BY_KEY.has(pressed) && !Object.hasOwn(changes, pressed) ? pressed : null;
+}
+
+/** A sentence that names keys in brackets, with the keys that a reader has set instead. */
+export function withKeys(text: string, changes: KeyChanges): string {
+  return text.replace(/\((.)\)/g, (_, name: string) => `(${changes[name] ?? name})`);
+}
+
+/** The words for a key, as the list of keys has them. */
+export function labelOf(name: string): string {
+  return BY_KEY.get(name)?.label ?? "";
+}
+
 /** What a key asks for, or why it does nothing now; null: there is no such key. */
 export function wishOf(name: string, context: KeyContext): Wish | Refusal | null {
   const found = BY_KEY.get(name);

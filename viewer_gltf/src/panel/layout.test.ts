@@ -54,6 +54,7 @@ describe("the panel's layout", () => {
   it("has no sections of volumes where there are only objects", () => {
     const names = (state: ViewerState) => laid(state).sections.map(({ id }) => id);
     const [all, left] = [names(start()), names(ofObjects(start()))];
+    expect(left.filter((id) => id.startsWith("objects"))).toHaveLength(3);
     expect(all.filter((id) => !left.includes(id))).toEqual([
       "volumes",
       "slices",
@@ -62,7 +63,7 @@ describe("the panel's layout", () => {
     ]);
     const [first, ...others] = start().channels;
     const mixed = { ...start(), channels: [...ofObjects(start()).channels, first, ...others] };
-    expect(names(mixed)).toEqual(all);
+    expect(names(mixed).filter((id) => !id.startsWith("objects"))).toEqual(all);
   });
 
   it("opens with at most twelve rows, and lists the rest under More", () => {
@@ -208,12 +209,12 @@ describe("the panel's layout", () => {
     expect(choose()).toEqual(["r0_c3", null]);
   });
 
-  it("tells where the limit of tiles ends the disc, and only there", () => {
+  it("tells where the limit of tiles ends the focus disc, and only there", () => {
     const now = (state: ViewerState, discLimit_deg: number | null) =>
-      find(laid(state, START_VIEW, { ...FACTS, discLimit_deg }), "text", "disc-now").value;
-    expect(now(start(), 3.2)).toMatch(/^3°, since it holds at most 4 tiles/);
-    expect(now(start(), null)).toBe("");
-    expect(now(reduce(start(), { type: "set", id: "mode", value: "all" }), 3.2)).toBe("");
+      find(laid(state, START_VIEW, { ...FACTS, discLimit_deg }), "slider", "disc-radius").text;
+    const set = now(start(), null);
+    expect(now(start(), 3.2)).toBe(`${set}, now 3°`);
+    expect(now(reduce(start(), { type: "set", id: "mode", value: "all" }), 3.2)).toBe(set);
   });
 
   it("lists the tiles where their names are no rows and columns", () => {
@@ -235,18 +236,28 @@ describe("the panel's layout", () => {
   });
 
   it("gives each of several label maps a section of its own", () => {
-    const items = [{ kind: "text", id: "objects-count", label: "Objects", value: "3" } as const];
-    const map = (id: string) => ({ id, name: id.toUpperCase(), colors: [], items });
-    const named = (ids: readonly string[]) =>
-      laid(start(), START_VIEW, { ...FACTS, objects: ids.map(map) })
+    const named = (count: number) => {
+      const state = ofObjects(start());
+      const channels = state.channels.map((each, i) => ({ ...each, shown: i < count }));
+      return laid({ ...state, channels })
         .sections.filter(({ id }) => id.startsWith("objects"))
         .map(({ id, label }) => [id, label]);
-    expect(named([])).toEqual([]);
-    expect(named(["cells"])).toEqual([["objects", "Objects"]]);
-    expect(named(["cells", "nuclei"])).toEqual([
-      ["objects/cells", "Objects: CELLS"],
-      ["objects/nuclei", "Objects: NUCLEI"],
+    };
+    const [one, other] = start().channels;
+    expect(named(0)).toEqual([]);
+    expect(named(1)).toEqual([["objects", "Objects"]]);
+    expect(named(2)).toEqual([
+      [`objects/${one.id}`, `Objects: ${one.name}`],
+      [`objects/${other.id}`, `Objects: ${other.name}`],
     ]);
+  });
+
+  it("keeps the place of a label map's section until its table has come", () => {
+    const ids = (objects: Facts["objects"]) =>
+      laid(ofObjects(start(1)), START_VIEW, { ...FACTS, objects }).sections.map(({ id }) => id);
+    const items = [{ kind: "text", id: "objects-count", label: "Objects", value: "3" } as const];
+    expect(ids([])).toEqual(ids([{ id: "c0", name: "Cells", colors: [], items }]));
+    expect(ids([])).toContain("objects");
   });
 
   it("shows the objects' own colours beside a label map's name, and one colour where they have that", () => {
@@ -338,8 +349,12 @@ describe("the panel's layout", () => {
       );
     };
     expect(figures({})).toEqual(["12 k triangles", "at 1/2 detail", "12 ms"]);
-    expect(figures({ triangles: 0, volumeLevel: 0 })).toEqual(["", "in full detail", "12 ms"]);
-    expect(figures({ triangles: 12, volumeLevel: null })).toEqual(["12 triangles", "", "12 ms"]);
+    expect(figures({ triangles: 0, volumeLevel: 0 })).toEqual(["none", "in full detail", "12 ms"]);
+    expect(figures({ triangles: 12, volumeLevel: null })).toEqual([
+      "12 triangles",
+      "none",
+      "12 ms",
+    ]);
     expect(find(layout, "text", "settings").value).toBe("64 steps a ray, 50 % resolution");
   });
 });

@@ -1,10 +1,9 @@
 /** The panel's content for a state: see controls.ts. Pure. */
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
-import { MAX_DISC_TILES } from "../state/focus_tiles";
 import { groupNotices } from "../state/notice_groups";
 import { QUALITY_PARAMETERS } from "../state/parameters/tools";
-import { MODE, VOLUMES } from "../state/parameters/volumes";
+import { DISC_RADIUS, MODE, VOLUMES } from "../state/parameters/volumes";
 import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import type { QualitySettings } from "../state/quality_controller";
 import type { StereoSupport } from "../state/stereo";
@@ -118,6 +117,19 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
   };
 }
 
+/** A label map that is shown has its section from the start, so that no row moves when its table has come. */
+const LOADING: Section["items"] = [
+  { kind: "text", id: "objects-loading", label: "Objects", value: "loading …" },
+];
+
+/** The ID of the section of a label map, where so many are shown. */
+export function objectsSection(channel: string, count: number): string {
+  return count === 1 ? "objects" : `objects/${channel}`;
+}
+
+export const labelMapsOf = ({ channels }: ViewerState) =>
+  channels.filter(({ shown, hasObjects }) => shown && hasObjects);
+
 type Make = (id: string, label: string, items: Section["items"]) => Section;
 
 function firstSections(
@@ -133,11 +145,11 @@ function firstSections(
     section("notices", "Notices", isStereo ? noticeItems(state) : []),
     ...(isPatient && !isStereo ? [slices] : []),
     section("channels", "Channels", channelItems(state, facts, view)),
-    ...(facts.objects ?? []).map(({ id, name, items }, _, { length }) =>
-      length === 1
-        ? section("objects", "Objects", items)
-        : section(`objects/${id}`, `Objects: ${name}`, items),
-    ),
+    ...labelMapsOf(state).map(({ id, name }, _, { length }) => {
+      const ofMap = facts.objects?.find((each) => each.id === id)?.items;
+      const label = length === 1 ? "Objects" : `Objects: ${name}`;
+      return section(objectsSection(id, length), label, ofMap ?? (isStereo ? [] : LOADING));
+    }),
     section("volumes", "Surfaces and volumes", hasAny ? [controlOf(MODE, state)] : []),
     section("tiles", "Tiles", tileItems(state, facts.focusTile)),
     section("cut", "Cut open", cutItems(state, facts.shown)),
@@ -169,7 +181,7 @@ function deeperSections(
     section(
       "volume-settings",
       "Volume settings",
-      ofVolumes([...controlsOf(settings, state), discNow(state, facts)]),
+      ofVolumes(controlsOf(settings, state).map((item) => discItem(item, state, facts))),
     ),
     section("light", "Path tracing", ofVolumes(lightItems(state, view, facts.isStereo))),
     section("share", "Share and keys", [
@@ -216,13 +228,11 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
   ];
 }
 
-/** Why the disc is smaller than it was set; "": it is not, and so there is nothing to see. */
-function discNow({ mode }: ViewerState, { discLimit_deg = null }: Facts): Control {
-  const isCut = mode === "disc" && discLimit_deg !== null;
-  const value = isCut
-    ? `${discLimit_deg.toFixed(0)}°, since it holds at most ${MAX_DISC_TILES} tiles. “Volumes everywhere” has no limit.`
-    : "";
-  return { kind: "text", id: "disc-now", label: "Focus disc now", value };
+/** The focus disc's slider, with its radius now where the limit of tiles makes it smaller than it was set. */
+function discItem(item: Control, { mode }: ViewerState, { discLimit_deg = null }: Facts): Control {
+  const isCut = item.id === DISC_RADIUS.id && mode === "disc" && discLimit_deg !== null;
+  if (!isCut || item.kind !== "slider") return item;
+  return { ...item, text: `${item.text}, now ${discLimit_deg.toFixed(0)}°` };
 }
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */
@@ -283,7 +293,7 @@ function aboutItems(facts: Facts): readonly Control[] {
       kind: "text",
       id: "volume-detail",
       label: "Volumes",
-      value: volumeLevel === null ? "" : volumesText(volumeLevel),
+      value: volumeLevel === null ? "none" : volumesText(volumeLevel),
     },
   ];
   if (settings !== null) {
@@ -308,7 +318,7 @@ function samplesText(samples: number): string {
 }
 
 function trianglesText(triangles: number): string {
-  if (triangles === 0) return "";
+  if (triangles === 0) return "none";
   if (triangles < 1000) return `${triangles} triangles`;
   return `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`;
 }

@@ -7,6 +7,7 @@ import { tileName } from "../state/tile_name";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { colourOf } from "./control_templates";
 import type { Button, Control, Wish } from "./controls";
+import { labelMapsOf, objectsSection } from "./layout";
 import { freeColours, nameOfColour } from "./palettes";
 
 /** What a ray from a tap meets. */
@@ -86,6 +87,7 @@ function objectControls(state: ViewerState, channel: string, row: number): reado
   const change = (change: Partial<typeof START_OBJECTS>): Wish => ({
     ...{ type: "objects", channel, change },
   });
+  const section = objectsSection(channel, labelMapsOf(state).length);
   const isHidden = hidden.includes(row);
   const left = hidden.filter((each) => each !== row);
   return [
@@ -95,6 +97,9 @@ function objectControls(state: ViewerState, channel: string, row: number): reado
     isHidden
       ? button("hide-object", "Show this object", change({ hidden: left }))
       : button("hide-object", "Hide this object", change({ hidden: [...hidden, row] })),
+    button("values", "Its values", {
+      ...{ panel: "reveal", section, control: `${channel}/objects-card` },
+    }),
   ];
 }
 

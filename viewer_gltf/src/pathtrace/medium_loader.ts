@@ -9,6 +9,7 @@ import { LoadQueue } from "../volumes/load_queue";
 import { levelsToFetch, texels as texelsOf, type VolumeLimits } from "../volumes/mip_levels";
 import type { VolumeSource } from "../volumes/volume_source";
 import { stride, volumeTexture } from "../volumes/volume_texture";
+import { askWorker } from "./ask_worker";
 import type { Assembled, AssembleRequest, Part } from "./assemble_tiles";
 import { type BlockFrame, frameOf } from "./texel_frame";
 
@@ -127,21 +128,8 @@ export class MediumLoader {
     this.worker ??= new Worker(new URL("./assemble_worker.ts", import.meta.url), {
       type: "module",
     });
-    const { worker } = this;
-    const answered = new AbortController();
-    const { signal } = answered;
-    return new Promise<Assembled>((resolve, reject) => {
-      const hear = ({ data }: MessageEvent<Assembled>) => {
-        if (data.id === request.id) resolve(data);
-      };
-      const fail = (event: ErrorEvent) => {
-        event.preventDefault();
-        reject(new Error(`tiles can't be put together: ${event.message || "no worker"}`));
-      };
-      worker.addEventListener("message", hear, { signal });
-      worker.addEventListener("error", fail, { signal });
-      worker.postMessage(request, { transfer: request.parts.map((part) => part.texels.buffer) });
-    }).finally(() => answered.abort());
+    const transfer = request.parts.map((part) => part.texels.buffer);
+    return askWorker<Assembled>(this.worker, request, transfer, "tiles can't be put together");
   }
 
   dispose(): void {

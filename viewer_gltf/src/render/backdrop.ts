@@ -26,8 +26,8 @@ const RENDER_ORDER = -2;
 
 /** sRGB: high up, and beside the specimen; share of the light that its shadow takes. */
 const LOOKS = {
-  dark: [0x171c26, 0x1d232f, 0.72],
-  light: [0xfafbfd, 0xffffff, 0.34],
+  dark: [0x171c26, 0x1f2632, 0.7],
+  light: [0xfafbfd, 0xffffff, 0.3],
 } as const;
 
 export class Backdrop {
@@ -76,6 +76,7 @@ export class Backdrop {
   }
 
   dispose(): void {
+    this.mesh.removeFromParent();
     this.mesh.geometry.dispose();
     this.mesh.material.dispose();
   }

@@ -1,5 +1,7 @@
+import type { Color } from "three";
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
+import { Backdrop } from "./backdrop";
 import { Room } from "./scene";
 
 describe("the outline of a chosen tile", () => {
@@ -18,5 +20,45 @@ describe("the outline of a chosen tile", () => {
     const room = new Room({ ...manifest, tiles: [tiles[0]] });
     room.mark(tiles[0].id);
     expect(outlineOf(room).visible).toBe(false);
+  });
+});
+
+describe("the room of a light page", () => {
+  const room = new Room(sampleManifest(1));
+  const backdrop = new Backdrop();
+  room.dress("light", backdrop);
+  const hexOf = () => (room.scene.background as Color | null)?.getHexString() ?? "none";
+
+  it("is light on a flat screen, with the specimen's shadow", () => {
+    room.isFlat = true;
+    expect([hexOf(), backdrop.mesh.visible]).toEqual(["e3e7ee", true]);
+  });
+
+  it("is dark in stereo, where light lenses would glare", () => {
+    room.isFlat = false;
+    expect([hexOf(), backdrop.mesh.visible]).toEqual(["0b0d12", false]);
+  });
+
+  it("is the user's own where the camera shows that", () => {
+    room.isSeeThrough = true;
+    room.isFlat = true; // a phone has one eye
+    expect([hexOf(), backdrop.mesh.visible]).toEqual(["none", false]);
+    room.isSeeThrough = false;
+  });
+
+  it("has the shadow under what is shown, and keeps it in another theme", () => {
+    room.standUnder([
+      [-1, -0.2, -0.5],
+      [0.5, 0.3, 0.5],
+    ]);
+    const later = new Backdrop();
+    room.dress("dark", later);
+    expect(backdrop.mesh.parent).toBe(null);
+    for (const each of [backdrop, later]) {
+      const { uFoot, uGround } = each.mesh.material.uniforms;
+      expect(uFoot.value.toArray()).toEqual([-1, -0.5, 0.5, 0.5]);
+      expect(uGround.value).toBeLessThan(-0.2);
+      expect(uGround.value).toBeGreaterThan(-0.3);
+    }
   });
 });

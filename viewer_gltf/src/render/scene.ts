@@ -62,7 +62,7 @@ export class Room {
   /** @param backdrop null: the background of the flat picture has one colour */
   dress(theme: Theme, backdrop: Backdrop | null): void {
     this.flat.set(FAR[theme]);
-    this.backdrop?.mesh.removeFromParent();
+    this.backdrop?.dispose();
     this.backdrop = backdrop;
     if (backdrop === null) return;
     backdrop.dress(theme);

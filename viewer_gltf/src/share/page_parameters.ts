@@ -1,7 +1,7 @@
 /**
  * What the page's address asks for: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
- * high), `switch` (metres of the room), `disc` (degrees), `view` (front, side, top), `panel` (off), `theme`
- * (light, dark), `backdrop` (plain). Pure.
+ * high), `switch` (metres of the room), `disc` (degrees), `stereo` (off, anaglyph, side-by-side), `view` (front,
+ * side, top), `panel` (off), `theme` (light, dark), `backdrop` (plain). Pure.
  */
 import { STANDS, type Stand } from "../interaction/orbit_camera";
 import type { Action } from "../state/actions";

@@ -5,6 +5,8 @@ export type Command =
   /** One step out: from an isolated tile to all, from a selected one to none. */
   | "back"
   | "stereo"
+  /** The page on the full screen, or back in its window. */
+  | "full-screen"
   /** Stereo, or one picture on a phone, with the user's own room behind the specimen. */
   | "room"
   /** One step of the history back, or on again. */

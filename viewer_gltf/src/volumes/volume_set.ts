@@ -94,6 +94,15 @@ export class VolumeSet {
     );
   }
 
+  /** Whether a volume that is wanted shows at no level. */
+  get isIncomplete(): boolean {
+    return this.wanted.some(({ tile, channels }) => {
+      const shown = this.residents.get(tile)?.texture.shown?.channels ?? [];
+      const isThere = (id: string) => this.channels.get(id)?.sources.has(tile) ?? true;
+      return channels.some((id) => !shown.includes(id) && isThere(id));
+    });
+  }
+
   /** Whether anything is to be marched. */
   get isEmpty(): boolean {
     return !this.group.children.some(({ visible }) => visible);

@@ -1,9 +1,17 @@
 /** Stereo, whichever way: a headset's session, or a split screen in a phone's viewer. */
-import { type Camera, Matrix4, type Object3D, type WebGLRenderer } from "three";
+import {
+  type Camera,
+  Matrix4,
+  type Object3D,
+  type PerspectiveCamera,
+  type Vector3,
+  type WebGLRenderer,
+} from "three";
 import { BundleError } from "../bundle/errors";
 import type { Eyes } from "../gpu/eyes";
 import type { PanelView } from "../panel/controls";
 import type { Command } from "../state/commands";
+import type { ScreenStereo } from "../state/parameters/tools";
 import type { ViewerState } from "../state/viewer_state";
 import type { SplitSession } from "./cardboard/split_session";
 import { askInTap } from "./cardboard/user_gesture";
@@ -12,6 +20,7 @@ import type { HandsOptions } from "./hands_options";
 import { betweenEyes } from "./head_pose";
 import type { Hands } from "./interaction";
 import type { MenuEntry } from "./panel/menu_entries";
+import type { ScreenPictures } from "./screen/screen_stereo";
 import { type ImmersiveMode, XrSession } from "./session";
 import { spreadEyes } from "./stereo_strength";
 
@@ -43,6 +52,9 @@ export class Stereo {
   /** The page's own choices, for the panel in the room as soon as it is loaded. */
   private choices: Partial<PanelView> = {};
   private split: SplitSession | null = null;
+  /** What the page's own screen shows for two eyes, once it was asked for. */
+  private pictures: ScreenPictures | null = null;
+  private onScreen: ScreenStereo = "off";
   private eyes: EyeSettings = { distance_m: 0.063, strength: 1, cssPixelsPerInch: null };
   /** A split screen that is being asked for. */
   private starting: Promise<readonly string[]> | null = null;
@@ -91,6 +103,22 @@ export class Stereo {
   /** Must be called from a click or a tap. Rejects if the browser or the user refuses. */
   startHeadset(xr: XRSystem, mode: ImmersiveMode = "immersive-vr"): Promise<void> {
     return this.headset.start(xr, mode, this.prepare());
+  }
+
+  /** Show stereo on the page's own screen. Rejects with a BundleError where its part could not be loaded. */
+  async showOnScreen(kind: ScreenStereo): Promise<void> {
+    this.onScreen = kind;
+    if (kind === "off" || this.pictures !== null) return;
+    const { ScreenPictures } = await import("./screen/screen_stereo").catch(notLoaded);
+    this.pictures ??= new ScreenPictures(this.renderer);
+  }
+
+  /** The eyes before the page's own screen, which look at `focus`: two, where it shows stereo. */
+  followScreen(eyes: Eyes, camera: PerspectiveCamera, focus: Vector3): void {
+    const { pictures, onScreen } = this;
+    const pupils_m = this.eyes.distance_m * this.eyes.strength;
+    if (pictures === null || onScreen === "off") eyes.followScreen(this.renderer, camera);
+    else pictures.follow(eyes, camera, focus, pupils_m, onScreen);
   }
 
   /** What the user has set for the eyes. */
@@ -206,7 +234,10 @@ export class Stereo {
   present(draw: () => void): void {
     const { split } = this;
     if (!split?.isRunning) {
-      draw();
+      const { pictures } = this;
+      const isAnaglyph = this.onScreen === "anaglyph" && this.kind === null;
+      if (isAnaglyph && pictures !== null) pictures.present(draw);
+      else draw();
       return;
     }
     this.renderer.setRenderTarget(split.target);
@@ -280,5 +311,6 @@ export class Stereo {
   dispose(): void {
     this.hands?.dispose();
     this.split?.dispose();
+    this.pictures?.dispose();
   }
 }

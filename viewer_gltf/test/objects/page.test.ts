@@ -31,6 +31,11 @@ describeInChromium("the objects of a label map", () => {
   });
   const control = (part: string) =>
     stand.viewer.page.locator(`[data-control="${CHANNEL}/objects-${part}"]`);
+  /** With the section of the objects open, as a reader opens it. */
+  const open = async (query = "") => {
+    await stand.open(query);
+    await stand.viewer.unfold("objects");
+  };
   const view = async () => (await stand.viewer.snapshot()).state.objects[CHANNEL];
   const shown = () => control("count").innerText();
 
@@ -54,7 +59,7 @@ describeInChromium("the objects of a label map", () => {
   };
 
   it("open in the colours of the table's own column, in one draw call a tile", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     const picture = await takePicture(stand.viewer.page);
     for (const row of [
@@ -81,7 +86,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("have columns of any name: a long one makes the panel no wider", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     const [wide, inside] = await control("color-by").evaluate((found) => {
       const select = found as HTMLSelectElement;
@@ -94,7 +99,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("are coloured anew by one upload of a byte an object", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     await stand.viewer.page.evaluate(() => {
       const uploads: number[] = [];
@@ -132,7 +137,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("are left out by category and by range, and what is left is counted", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     const row = rowAt(0, 3, 1, 1); // 23, of category 2
     await control("column-cell_type").click({ position: { x: 20, y: 60 } });
@@ -156,7 +161,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("open their card by a tap, with all columns; a hidden one lets the tap through", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     await tap(centerOf(FRONT));
     expect((await view()).picked).toBe(FRONT);
@@ -182,7 +187,7 @@ describeInChromium("the objects of a label map", () => {
 
   it("open their card in view, with what can be done", async () => {
     const { page } = stand.viewer;
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     const isInView = (part: string) =>
       control(part).evaluate((found) => {
@@ -205,7 +210,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("open their card by a gaze that rests, which is no step to undo", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     const { page } = stand.viewer;
     await page.locator('[data-action="split"]').dispatchEvent("click");
@@ -234,7 +239,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("are found by number and flown to", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     // one that lies behind another is seen from elsewhere
     await control("search").fill(String(labelOf(BEHIND)));
@@ -261,7 +266,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("that are cut open are capped in their own colour", async () => {
-    await stand.open("#v=1&cut=0,0,1,18"); // through the middles of those in front
+    await open("#v=1&cut=0,0,1,18"); // through the middles of those in front
     await stand.viewer.settled();
     const picture = await takePicture(stand.viewer.page);
     for (const row of [rowAt(0, 2, 1, 1), rowAt(0, 3, 1, 1), FRONT, rowAt(1, 2, 1, 1)]) {
@@ -274,7 +279,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("draw in from their walls by the gap", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     const drawn = async () =>
       (await takePicture(stand.viewer.page)).count((pixel) => !isBackground(pixel));
@@ -292,7 +297,7 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("are selected by a lasso in the plot, saved as a file, and all of it is in the link", async () => {
-    await stand.open();
+    await open();
     await stand.viewer.settled();
     const { page } = stand.viewer;
     await choose("scatter-0", "x_um");
@@ -336,7 +341,7 @@ describeInChromium("the objects of a label map", () => {
     await expect.poll(() => page.evaluate(() => location.hash)).toContain("objects=");
     const linked = await view();
     const hash = await page.evaluate(() => location.hash);
-    await stand.open(hash);
+    await open(hash);
     await stand.viewer.settled();
     await expect.poll(async () => (await view()).selected).toEqual(selected);
     expect(await view()).toEqual({ ...linked, lasso: [], aim: null });
@@ -355,6 +360,7 @@ describeInChromium("a stain that is painted on objects", () => {
 
   it("lies over their colour, and can be taken off; a column's colour stays beside it", async () => {
     await stand.open();
+    await stand.viewer.unfold("objects");
     await stand.viewer.settled();
     const row = rowAt(1, 2, 1, 1);
     const [x, y, z] = centerOf(row);

@@ -179,6 +179,8 @@ describeInChromium("careless use", () => {
       expect(value, name).toBeLessThanOrEqual(before[name as keyof Figures] + 2);
     }
     expect(heap_bytes).toBeLessThan(before.heap_bytes + HEAP_SLACK_BYTES);
+    await page.evaluate(() => addEventListener("leak", () => undefined));
+    expect((await figured.now()).listeners).toBe(after.listeners + 1); // one would be seen
     expect(faults).toEqual([]);
   });
 });

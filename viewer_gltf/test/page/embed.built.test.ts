@@ -84,14 +84,27 @@ describeInChromium("the viewer in another page", () => {
     const distance = () =>
       inner?.evaluate(() => Math.hypot(...(window.stereocell?.snapshot().look.position ?? [])));
     await page.locator("#toggle").click(); // the keyboard is the page's
+    await page.evaluate(() => {
+      document.body.style.minHeight = "3000px";
+    });
     const before = await distance();
+    const scrolled = () => page.evaluate(() => scrollY);
     await page.mouse.move(300, 300);
-    await page.mouse.wheel(0, -300);
-    await page.waitForTimeout(400);
+    await page.mouse.wheel(0, 30);
+    await expect.poll(scrolled).toBe(30);
     expect(await distance()).toBe(before);
+    // a pinch on a trackpad comes as a wheel with Ctrl: it zooms the specimen, and neither page
+    await page.keyboard.down("Control");
+    await page.mouse.wheel(0, -300);
+    await page.keyboard.up("Control");
+    await expect.poll(distance).not.toBe(before);
+    const pinched = await distance();
+    expect(await scrolled()).toBe(30);
+    expect(await page.evaluate(() => visualViewport?.scale)).toBe(1);
     await page.mouse.click(20, 400); // a corner of the frame, beside the specimen
     await page.mouse.move(300, 300);
     await page.mouse.wheel(0, -300);
-    await expect.poll(distance).not.toBe(before);
+    await expect.poll(distance).not.toBe(pinched);
+    expect(await scrolled()).toBe(30);
   });
 });

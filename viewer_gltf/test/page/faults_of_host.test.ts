@@ -225,13 +225,12 @@ describeInChromium("a fault on the way", () => {
   });
 
   /** Turn volumes on and come near, without a network, until all tries are used up. */
-  async function starve(viewer: ViewerPage): Promise<number> {
+  async function starve(viewer: ViewerPage, notice: RegExp): Promise<number> {
     for (let i = 0; i < 10; i++) await viewer.page.keyboard.press("+");
     await viewer.settled();
     const { triangles } = await viewer.snapshot();
     await viewer.chooseMode("all");
-    const given = /^The host .* can't be reached, or forbids this page: not all files/;
-    await expect.poll(notices).toEqual([expect.stringMatching(given)]);
+    await expect.poll(notices).toEqual([expect.stringMatching(notice)]);
     expect((await viewer.snapshot()).volumes).toEqual([]);
     return triangles;
   }
@@ -266,7 +265,7 @@ describeInChromium("a fault on the way", () => {
       await viewer.open(through("&mode=off"));
       await viewer.settled();
       await context.setOffline(true);
-      const starved = await starve(viewer);
+      const starved = await starve(viewer, /^This device is offline/);
       await context.setOffline(false);
       await expectAll(viewer, starved);
     },
@@ -280,7 +279,10 @@ describeInChromium("a fault on the way", () => {
     await viewer.settled();
     await viewer.page.unroute("**/Balls/tileset.json");
     gate.shut();
-    const starved = await starve(viewer);
+    const starved = await starve(
+      viewer,
+      /^The host .* can't be reached, or forbids this page: not all files/,
+    );
     gate.open();
     await viewer.page.locator("[data-action=retry]").click();
     await expectAll(viewer, starved);

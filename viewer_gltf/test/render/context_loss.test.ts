@@ -91,6 +91,7 @@ describeInChromium("the graphics driver", () => {
     const [before, seen] = [await width(), await look()];
     await call("loseContext");
     await offer.waitFor();
+    expect(await notices()).toEqual([]); // the offer stands in its place
     await call("restoreContext");
     await offer.waitFor({ state: "detached" }); // it has come back after all
     await viewer.settled();

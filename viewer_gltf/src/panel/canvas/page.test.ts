@@ -116,6 +116,7 @@ describe("the panel on a plane", () => {
       [
         "stereo",
         "split",
+        "screen-stereo",
         ...phone,
         ...files,
         "own-light",

@@ -1,6 +1,14 @@
-/** The list of all keys, in a dialog that keeps the focus until it is closed. */
-import { element } from "../../dom/element";
-import { KEYS } from "../keys";
+/**
+ * The list of all keys, in a dialog that keeps the focus until it is closed. Each key is a button:
+ * after a press on it the next key that is pressed does what it did.
+ */
+import "./key_list.css";
+import { element, setText } from "../../dom/element";
+import { RovingTabindex } from "../../dom/roving_tabindex";
+import type { Key } from "../key";
+import { changeKey, FIXED, keyNow } from "../key_changes";
+import { keyName } from "../key_events";
+import { KEYS, type KeyChanges, labelOf } from "../keys";
 
 const NAMES: Readonly<Record<string, string>> = {
   ArrowLeft: "←",
@@ -23,21 +31,26 @@ function textOf(key: string): string {
   return `${shift && "⇧ "}${NAMES[name] ?? name}`;
 }
 
-/** Of many keys that mean the same, such as the digits, the first and the last. */
-function shownKeys(keys: readonly string[]): readonly string[] {
-  return keys.length > 3 ? [keys[0], "…", keys[keys.length - 1]] : keys;
-}
-
-/** Most keys that are listed without a search field. */
-const MANY = 15;
-
 /** The rows that a few letters leave, each a key's and its label's; all of them where nothing is sought. */
 export function sought<T extends Readonly<{ text: string }>>(rows: readonly T[], words: string) {
   const parts = words.toLowerCase().split(/\s+/);
   return rows.filter(({ text }) => parts.every((part) => text.toLowerCase().includes(part)));
 }
 
-type Row = Readonly<{ text: string; elements: readonly HTMLElement[]; section: HTMLElement }>;
+const HOW = "Press a key of this list to change it.";
+const WAITING = "press …";
+/** Keys that are held for another one. */
+const HELD = ["Shift", "Control", "Alt", "AltGraph", "Meta", "CapsLock", "Dead", "Process"];
+
+/** One key of the list, by its name in the tables. */
+type Cap = Readonly<{ name: string; root: HTMLElement }>;
+type Row = Readonly<{
+  group: string;
+  label: string;
+  caps: readonly Cap[];
+  elements: readonly HTMLElement[];
+  section: HTMLElement;
+}>;
 
 export class Help {
   private readonly dialog: HTMLDialogElement;
@@ -48,87 +61,165 @@ export class Help {
     { control: "find-key" },
   );
   private readonly none = element("p", { textContent: "No key fits these words.", hidden: true });
+  private readonly line = element("p", { className: "hint", role: "status" }, { keyLine: "" });
+  private readonly reset = element(
+    "button",
+    { type: "button", textContent: "Reset all keys", onclick: () => this.resetAll() },
+    { action: "reset-keys" },
+  );
+  private changes: KeyChanges = {};
+  /** All keys are one stop of the Tab key, or a hundred presses would lead through them. */
+  private readonly tabindex: RovingTabindex;
+  /** The key that the next press changes, by its name in the tables. */
+  private asked: string | null = null;
 
   /** @param onClose called when the user wants it closed, at times once more than needed */
-  constructor(parent: HTMLElement, onClose: () => void) {
-    const close = element("button", {
-      type: "button",
-      textContent: "Close",
-      onclick: onClose,
-    });
-    const title = element("h1", { id: "help-title", textContent: "Keys" });
-    const groups = KEYS.map(({ name, keys }) => {
-      const rows = keys.map((each) => {
-        const shown = shownKeys(each.keys).map((key) =>
-          element("kbd", { textContent: textOf(key) }),
-        );
-        const elements = [
-          element("dt", {}, {}, ...shown),
-          element("dd", { textContent: each.label }),
-        ];
-        return {
-          text: `${name} ${elements.map(({ textContent }) => textContent).join(" ")}`,
-          elements,
-        };
-      });
-      const section = element(
-        "section",
-        {},
-        {},
-        element("h2", { textContent: name }),
-        element("dl", {}, {}, ...rows.flatMap(({ elements }) => elements)),
-      );
-      return { section, rows: rows.map((row) => ({ ...row, section })) };
-    });
-    this.rows = groups.flatMap(({ rows }) => rows);
-    this.find.hidden = this.rows.length <= MANY;
+  constructor(
+    parent: HTMLElement,
+    private readonly onClose: () => void,
+    private readonly onChange: (changes: KeyChanges) => void,
+  ) {
+    const sections = KEYS.map(({ name, keys }) => this.sectionOf(name, keys));
+    this.rows = sections.flatMap(({ rows }) => rows);
     this.find.addEventListener("input", () => this.show(this.find.value));
+    const title = element("h1", { id: "help-title", textContent: "Keys" });
+    const close = element("button", { type: "button", textContent: "Close", onclick: onClose });
+    const groups = element(
+      "div",
+      { className: "groups" },
+      {},
+      ...sections.map(({ section }) => section),
+      this.none,
+    );
     this.dialog = element(
       "dialog",
       { className: "help" },
       { help: "" },
-      element("header", {}, {}, title, this.find, close),
-      // It scrolls: so that the arrow keys reach it
-      element(
-        "div",
-        { className: "groups", tabIndex: 0 },
-        {},
-        ...groups.map(({ section }) => section),
-        this.none,
-      ),
+      element("header", {}, {}, title, this.find, this.reset, close, this.line),
+      groups,
     );
+    this.tabindex = new RovingTabindex(groups);
     this.dialog.setAttribute("aria-labelledby", title.id);
-    // The state goes first and the dialog follows: its own events come a little late.
-    this.dialog.addEventListener("cancel", (event) => {
-      event.preventDefault();
-      onClose();
-    });
-    this.dialog.addEventListener("close", () => {
-      if (!this.dialog.open) onClose(); // the browser may close it in spite of `cancel`
-    });
-    this.dialog.addEventListener("keydown", (event) => {
-      if (event.key !== "?" || this.find.value !== "") return;
-      event.preventDefault(); // or it would open again by the same key
-      onClose();
-    });
+    this.listen();
     parent.append(this.dialog);
   }
 
+  private listen(): void {
+    // The state goes first and the dialog follows: its own events come a little late.
+    this.dialog.addEventListener("cancel", (event) => {
+      event.preventDefault();
+      if (this.asked === null) this.onClose();
+      else this.ask(null);
+    });
+    this.dialog.addEventListener("close", () => {
+      if (!this.dialog.open) this.onClose(); // the browser may close it in spite of `cancel`
+    });
+    const onKey = (event: KeyboardEvent) => {
+      if (this.asked !== null) this.take(event, this.asked);
+      else if (event.key === FIXED && this.find.value === "") {
+        event.preventDefault(); // or it would open again by the same key
+        this.onClose();
+      }
+    };
+    this.dialog.addEventListener("keydown", onKey, { capture: true });
+  }
+
+  private sectionOf(name: string, keys: readonly Key[]) {
+    const section = element("section", {}, {}, element("h2", { textContent: name }));
+    const rows = keys.map((each): Row => {
+      const caps = each.keys.map((key) => ({ name: key, root: this.capOf(key) }));
+      const elements = [
+        element("dt", {}, {}, ...caps.map(({ root }) => root)),
+        element("dd", { textContent: each.label }),
+      ];
+      return { group: name, label: each.label, caps, elements, section };
+    });
+    section.append(element("dl", {}, {}, ...rows.flatMap(({ elements }) => elements)));
+    return { section, rows };
+  }
+
+  private capOf(name: string): HTMLElement {
+    if (name === FIXED) return element("kbd", { textContent: name });
+    return element(
+      "button",
+      { type: "button", className: "cap", onclick: () => this.ask(name) },
+      { key: name },
+    );
+  }
+
+  /** Let the next key that is pressed take the place of this one; null: none. */
+  private ask(name: string | null, words = ""): void {
+    this.asked = name;
+    const press = name === null ? HOW : `Press the new key for “${labelOf(name)}”; Esc leaves it.`;
+    this.write();
+    setText(this.line, words || press);
+  }
+
+  private take(event: KeyboardEvent, asked: string): void {
+    if (HELD.includes(event.key) || event.isComposing) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (event.key === "Escape") {
+      this.ask(null);
+      return;
+    }
+    const answer = changeKey(this.changes, asked, keyName(event));
+    if ("refusal" in answer) {
+      setText(this.line, answer.refusal);
+      return;
+    }
+    this.changes = answer.changes;
+    this.ask(null, `${textOf(keyNow(asked, this.changes))} does “${labelOf(asked)}” now.`);
+    this.onChange(this.changes);
+  }
+
+  private resetAll(): void {
+    this.changes = {};
+    this.ask(null, "All keys are as they were at first.");
+    this.onChange(this.changes);
+  }
+
+  /** Write each key as it is now. */
+  private write(): void {
+    for (const { label, caps } of this.rows) {
+      for (const { name, root } of caps) {
+        if (name === FIXED) continue;
+        const text = textOf(keyNow(name, this.changes));
+        const isAsked = name === this.asked;
+        setText(root, isAsked ? WAITING : text);
+        root.ariaLabel = `${isAsked ? WAITING : text}, key for: ${label}`;
+        root.classList.toggle("changed", name in this.changes);
+      }
+    }
+    this.reset.hidden = Object.keys(this.changes).length === 0;
+  }
+
   private show(words: string): void {
-    const left = new Set(sought(this.rows, words.trim()));
+    const rows = this.rows.map((row) => {
+      const keys = row.caps.map(({ name }) => textOf(keyNow(name, this.changes))).join(" ");
+      return { row, text: `${row.group} ${keys} ${row.label}` };
+    });
+    const left = new Set(sought(rows, words.trim()).map(({ row }) => row));
     const sections = new Set([...left].map(({ section }) => section));
     for (const row of this.rows) {
       for (const each of row.elements) each.hidden = !left.has(row);
       row.section.hidden = !sections.has(row.section);
     }
     this.none.hidden = left.size > 0;
+    const caps = [...left].flatMap((row) => row.caps.map(({ root }) => root));
+    this.tabindex.follow(
+      caps.filter((root) => root instanceof HTMLButtonElement),
+      1,
+    );
   }
 
-  update(isOpen: boolean): void {
+  update(isOpen: boolean, changes: KeyChanges): void {
+    this.changes = changes;
     if (isOpen === this.dialog.open) return;
     if (isOpen) {
       this.find.value = "";
       this.show("");
+      this.ask(null);
       this.dialog.showModal();
       this.find.focus();
       return;

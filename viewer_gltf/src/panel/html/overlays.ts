@@ -104,7 +104,7 @@ export class FirstHint {
   }
 }
 
-/** What a key or a button has just done, where nothing else shows it; it goes by itself. */
+/** Says in a line what a key or a button has just done. The line goes by itself, unless someone is about to undo it. */
 export class Said {
   private readonly words = element("p", { role: "status" }, { said: "" });
   private readonly button = element("button", { type: "button" }, { action: "offer" });
@@ -127,12 +127,43 @@ export class Said {
     };
   }
 
+  /** Take the button away: its offer holds no longer. */
+  withdraw(): void {
+    this.button.remove();
+  }
+
   private write(text: string, for_ms: number): void {
     setText(this.words, text);
-    this.button.remove();
+    this.withdraw();
     clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => this.write("", 0), for_ms);
-    if (text === "") clearTimeout(this.timer);
+    if (text !== "") this.leaveLater(for_ms);
+  }
+
+  private leaveLater(after_ms: number): void {
+    this.timer = window.setTimeout(() => {
+      if (this.button.matches(":hover, :focus")) this.leaveLater(SAID_MS);
+      else this.write("", 0);
+    }, after_ms);
+  }
+}
+
+/** The way back from a tile that is shown alone, for thumbs: see overlays.css. */
+export class WayBack {
+  readonly root: HTMLButtonElement;
+
+  constructor(onBack: () => void) {
+    this.root = element(
+      "button",
+      {
+        ...{ type: "button", className: "way way-back", textContent: "Back to all tiles" },
+        ...{ hidden: true, onclick: onBack },
+      },
+      { overlay: "back" },
+    );
+  }
+
+  update({ isolated }: Pick<ViewerState, "isolated">): void {
+    this.root.hidden = isolated === null;
   }
 }
 
@@ -141,10 +172,15 @@ export function showFatal(parent: HTMLElement, title: string, text: string): voi
   parent.replaceChildren(
     element(
       "main",
-      { className: "fatal", role: "alert" },
+      { className: "fatal" },
       { fatal: "" },
-      element("h1", { textContent: title }),
-      element("p", { textContent: text }),
+      element(
+        "div",
+        { role: "alert" },
+        {},
+        element("h1", { textContent: title }),
+        element("p", { textContent: text }),
+      ),
       element("button", { textContent: "Try again", onclick: () => location.reload() }),
     ),
   );

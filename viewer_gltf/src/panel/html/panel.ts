@@ -153,7 +153,7 @@ export class Panel {
       type: "button",
       className: "fold",
       ariaLabel: "Panel",
-      title: "Hide or show the panel (h)",
+      title: "Hide or show the panel",
       onclick: () => send({ panel: "hide" }),
     });
     this.fold.setAttribute("aria-controls", this.body.id);
@@ -176,6 +176,7 @@ export class Panel {
     this.title.title = layout.title;
     setText(this.subtitle, layout.subtitle);
     setText(this.status, layout.status);
+    this.status.title = layout.status;
     this.root.classList.toggle("folded", layout.isHidden);
     this.fold.ariaExpanded = String(!layout.isHidden);
     this.layout = layout;

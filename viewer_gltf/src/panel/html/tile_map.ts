@@ -8,7 +8,9 @@ import { hooks, type Send, type Widget } from "./widget";
 
 function nameOf({ id, isFocus, isSelected, isIsolated }: MapTile): string {
   const marks = [isIsolated && "shown alone", isSelected && "chosen", isFocus && "looked at"];
-  return [`Tile in ${tileName(id)}`, ...marks.filter(Boolean)].join(", ");
+  // people who speak to their computer call a button by the text on it
+  const names = [`Tile in ${tileName(id)}`, ...marks.filter(Boolean), shortTileName(id)];
+  return [...new Set(names)].join(", ");
 }
 
 export function makeMap(first: TileMap, send: Send): Widget<TileMap> {

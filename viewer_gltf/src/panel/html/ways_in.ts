@@ -1,5 +1,6 @@
 /** On the picture itself, in its corner: the ways out of the flat screen. Those that lead nowhere are hidden. */
 import { element } from "../../dom/element";
+import { isFullScreen } from "../../dom/full_screen";
 
 const IN_ROOM = "View in your room";
 /** A box on a floor and the words: the link may hold no text. */
@@ -30,20 +31,39 @@ export class WaysIn {
       height: 24,
     }),
   );
-  readonly root = element("div", { className: "ways-in" }, {}, this.link, this.room, this.stereo);
+  private readonly full = button("", "full-screen");
+  readonly root = element(
+    "div",
+    { className: "ways-in" },
+    {},
+    ...[this.link, this.room, this.stereo, this.full],
+  );
+
+  /** @param onClick called within the click, as browsers want it */
+  offerFullScreen(onClick: () => void): void {
+    this.full.hidden = false;
+    this.full.onclick = onClick;
+    const follow = () => {
+      const isFull = isFullScreen();
+      this.full.classList.toggle("is-full", isFull);
+      this.full.ariaLabel = isFull ? "Leave the full screen" : "Full screen";
+      this.full.title = `${this.full.ariaLabel} (Shift+Enter)`;
+    };
+    document.addEventListener("fullscreenchange", follow);
+    follow();
+  }
 
   /** @param onClick called within the click, as browsers want it */
   offerStereo(way: "stereo" | "split" | null, onClick: () => void): void {
     this.stereo.hidden = way === null;
-    this.stereo.title =
-      way === "split" ? "Split the screen for a phone viewer (P)" : "Enter stereo (V)";
+    this.stereo.title = way === "split" ? "Split the screen for a phone viewer" : "Enter stereo";
     this.stereo.onclick = onClick;
   }
 
   /** @param onClick called within the click */
   offerRoom(onClick: () => void): void {
     this.room.hidden = false;
-    this.room.title = "The specimen in your room, by this device's camera (Home)";
+    this.room.title = "The specimen in your room, by this device's camera";
     this.room.onclick = onClick;
   }
 

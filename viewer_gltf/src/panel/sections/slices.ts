@@ -20,6 +20,11 @@ export function sliceItems(state: ViewerState, values: readonly string[]): reado
       label: "Back to the middle, not turned",
       to: () => STRAIGHT,
     },
-    { kind: "text", id: "slice-values", label: "Where they meet", value: values.join(" · ") },
+    {
+      kind: "text",
+      id: "slice-values",
+      label: "Where they meet",
+      value: values.join(" · ") || "–",
+    },
   ];
 }

@@ -1,9 +1,9 @@
 /** The panel's stereo: a headset, or a phone in a viewer of lenses, and what the gaze does. Pure. */
 
-import { STEREO_PARAMETERS } from "../../state/parameters/tools";
+import { SCREEN_STEREO, STEREO_PARAMETERS } from "../../state/parameters/tools";
 import type { StereoSupport, XrSupport } from "../../state/stereo";
 import type { ViewerState } from "../../state/viewer_state";
-import { command, controlsOf, inline } from "../control_templates";
+import { command, controlOf, controlsOf, inline } from "../control_templates";
 import type { Button, Control, Lenses, PanelView } from "../controls";
 
 export const LENS_NAMES: Readonly<Record<Lenses, string>> = {
@@ -19,10 +19,11 @@ function onlyIf({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "s
 
 export function stereoItems(
   state: ViewerState,
-  facts: StereoSupport,
+  facts: StereoSupport & Readonly<{ isStereo: boolean }>,
   view: PanelView,
 ): readonly Control[] {
   return [
+    ...(facts.isStereo ? [] : [controlOf(SCREEN_STEREO, state)]),
     { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },
     ...(facts.hasRoom ? [command("room", "In your room (AR)")] : []),
     ...(facts.split === null ? [] : splitItems(facts.split, facts, view)),

@@ -1,5 +1,7 @@
 /** The keys of the tiles. Pure. */
 
+import { setTo } from "../../state/parameters/kinds";
+import { SCREEN_STEREO } from "../../state/parameters/tools";
 import { REFUSED } from "../../state/refusals";
 import { type Key, key, neighbour, no } from "../key";
 import { chosenTile } from "./tiles";
@@ -26,7 +28,9 @@ export const TILE_KEYS: readonly Key[] = [
   key("g", "Choose the tile that is looked at", ({ state, focusTile }) =>
     focusTile === null ? no(REFUSED.tileAhead) : chosenTile(state, focusTile),
   ),
-  key(["Escape", "Backspace"], "Back: all tiles, then none chosen", ({ state }) =>
-    state.isolated === null && state.selected === null ? no(REFUSED.back) : "back",
-  ),
+  key(["Escape", "Backspace"], "Back: out of stereo, all tiles, then none chosen", ({ state }) => {
+    if (state.screenStereo !== "off") return setTo(SCREEN_STEREO, "off");
+    const isChosen = state.isolated !== null || state.selected !== null;
+    return isChosen ? "back" : no(REFUSED.back);
+  }),
 ];

@@ -1,5 +1,5 @@
 /** The keys of the view, on the screen and in stereo. Pure. */
-import { STEREO_PARAMETERS } from "../../state/parameters/tools";
+import { SCREEN_STEREO, STEREO_PARAMETERS } from "../../state/parameters/tools";
 import { type Key, key, keysOf, neighbour, no } from "../key";
 import { LENSES } from "./stereo";
 
@@ -20,6 +20,7 @@ export const VIEW_KEYS: readonly Key[] = [
   key("r", "Reset the view", "reset"),
   key("Ctrl+z", "Undo the last change of the view", "undo"),
   key(["Ctrl+Z", "Ctrl+y"], "Redo what was undone", "redo"),
+  key("Shift+Enter", "Full screen, or back in the window", "full-screen"),
   key("V", "Enter stereo (VR), or leave it", "stereo"),
   key("Home", "The specimen in your room (AR), or leave it", "room"),
   key("L", "Next phone viewer", ({ view }) => {
@@ -29,5 +30,5 @@ export const VIEW_KEYS: readonly Key[] = [
   key("P", "Split screen for a phone viewer", "split"),
   key("K", "Scan the phone viewer's code", "scan"),
   key(":", "Measure the screen by a card, for the split screen", "measure-screen"),
-  ...STEREO_PARAMETERS.flatMap(keysOf),
+  ...[SCREEN_STEREO, ...STEREO_PARAMETERS].flatMap(keysOf),
 ];

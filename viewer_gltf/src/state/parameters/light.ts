@@ -36,7 +36,7 @@ export type LightSettings = Readonly<typeof START_LIGHT>;
 type Light = LightSettings & Pick<VolumeSettings, "mode">;
 
 /** Why nothing of the light can be set: nothing is drawn by it. */
-export const TRACED_ALONE = "Only path tracing has it: G begins it.";
+export const TRACED_ALONE = "Only path tracing has this setting: switch path tracing on first.";
 const refusal = (on: Light) => (isTraced(on) ? "" : TRACED_ALONE);
 
 const lens = lensesOf<Light>();

@@ -9,6 +9,7 @@ import {
   PICTURE_PARAMETERS,
   QUALITY,
   QUALITY_PARAMETERS,
+  SCREEN_STEREO,
   STEREO_PARAMETERS,
 } from "./tools";
 import { DISC_RADIUS, MODE, SWITCH_DISTANCE, VOLUMES } from "./volumes";
@@ -18,6 +19,7 @@ export const PARAMETERS: readonly Parameter<ViewerState>[] = [
   ...VOLUMES,
   ...SLICES,
   ...MEASURE_PARAMETERS,
+  SCREEN_STEREO,
   ...STEREO_PARAMETERS,
   ...QUALITY_PARAMETERS,
   ...PICTURE_PARAMETERS,
@@ -31,6 +33,7 @@ export const IN_ADDRESS: readonly Parameter<ViewerState>[] = [
   QUALITY,
   SWITCH_DISTANCE,
   DISC_RADIUS,
+  SCREEN_STEREO,
 ];
 
 const byId = new Map(PARAMETERS.map((row) => [row.id, row]));

@@ -20,6 +20,10 @@ export type MeasureKind = (typeof MEASURES)[number];
 const PICTURE_SIZES = ["1", "2", "4"] as const;
 export type PictureSize = (typeof PICTURE_SIZES)[number];
 
+const SCREEN_STEREO_KINDS = ["off", "anaglyph", "side-by-side"] as const;
+/** Stereo on the page's own screen: in red and cyan for glasses, or both eyes' pictures side by side. */
+export type ScreenStereo = (typeof SCREEN_STEREO_KINDS)[number];
+
 /** The tools of a bundle that has just opened. */
 export const START_TOOLS = {
   /** The effect of a tap or a dwell on the specimen. */
@@ -37,6 +41,7 @@ export const START_TOOLS = {
   stereoStrength: 1,
   /** Of the specimen's longest edge in stereo, m. */
   specimenSize_m: 1.2,
+  screenStereo: "off" as ScreenStereo,
 };
 
 export type ToolSettings = Readonly<typeof START_TOOLS>;
@@ -139,6 +144,20 @@ export const SPECIMEN_SIZE: NumberParameter<ToolSettings> = {
   rounded: (value) => Number(value.toPrecision(2)),
   text: size,
   spoken: ({ specimenSize_m }) => `The specimen's longest edge: ${size(specimenSize_m)}`,
+};
+
+export const SCREEN_STEREO: ChoiceParameter<ToolSettings, ScreenStereo> = {
+  kind: "choice",
+  id: "screen-stereo",
+  label: "On this screen",
+  about: "Esc leaves it. The eye distance and the strength below hold here as well.",
+  link: "stereo",
+  ...lens("screenStereo"),
+  values: SCREEN_STEREO_KINDS,
+  names: { off: "Off", anaglyph: "Red-cyan glasses", "side-by-side": "Side by side" },
+  isListed: true,
+  key: ["F8", "Next stereo on this screen: red-cyan glasses, side by side, off"],
+  spoken: ({ screenStereo }) => `Stereo on this screen: ${SCREEN_STEREO.names[screenStereo]}`,
 };
 
 /** They have the keys of the light's numbers. */

@@ -184,18 +184,25 @@ export const ACTS: readonly Act[] = [
   },
 ];
 
-/** Turn the phone in its viewer: at random, without a rest, from side to side. */
-async function turnHead({ page, random }: Reader, turns: number): Promise<void> {
-  const to = [360 * random(), -90 + 30 * (random() - 0.5)];
-  for (let i = 0; i < turns; i++) {
-    await page.evaluate(
-      ([alpha, gamma]) => {
-        dispatchEvent(new DeviceOrientationEvent("deviceorientation", { alpha, beta: 0, gamma }));
-      },
-      [to[0] + 9 * i, to[1]] as const,
-    );
+/** Hold the phone in its viewer: turned about the vertical, and tilted; -90 degrees is level. */
+function holdHead({ page }: Reader, alpha_deg: number, gamma_deg: number): Promise<void> {
+  return page.evaluate(
+    ([alpha, gamma]) => {
+      dispatchEvent(new DeviceOrientationEvent("deviceorientation", { alpha, beta: 0, gamma }));
+    },
+    [alpha_deg, gamma_deg] as const,
+  );
+}
+
+/** Look from side to side, and in the end far away from all that is there. */
+async function lookAround(reader: Reader): Promise<void> {
+  const { page, random } = reader;
+  const [alpha, gamma] = [360 * random(), -90 + 30 * (random() - 0.5)];
+  for (let i = 0; i < 12; i++) {
+    await holdHead(reader, alpha + 9 * i, gamma);
     await page.waitForTimeout(60);
   }
+  await holdHead(reader, alpha, -5);
 }
 
 export const IN_STEREO: readonly Act[] = [
@@ -203,7 +210,7 @@ export const IN_STEREO: readonly Act[] = [
     name: "look around without a rest",
     changes: [],
     weight: 2,
-    run: (reader) => turnHead(reader, 12),
+    run: lookAround,
   },
   {
     name: "rest a gaze anywhere",
@@ -211,7 +218,8 @@ export const IN_STEREO: readonly Act[] = [
     changes: ["any", "look"],
     weight: 2,
     run: async (reader) => {
-      await turnHead(reader, 1);
+      const { random } = reader;
+      await holdHead(reader, 360 * random(), -90 + 30 * (random() - 0.5));
       await reader.page.waitForTimeout(1800);
     },
   },

@@ -1,0 +1,21 @@
+/** The whole page on the full screen, where the browser can: iPhones and frames without leave can't. */
+
+export function hasFullScreen(): boolean {
+  return document.fullscreenEnabled === true;
+}
+
+export function isFullScreen(): boolean {
+  return document.fullscreenElement !== null;
+}
+
+/** Must be called from within a click or a key. Resolves to whether the browser did it. */
+export async function toggleFullScreen(): Promise<boolean> {
+  if (!hasFullScreen()) return false;
+  try {
+    if (isFullScreen()) await document.exitFullscreen();
+    else await document.documentElement.requestFullscreen({ navigationUI: "hide" });
+    return true;
+  } catch {
+    return false; // the browser refuses with errors of several kinds
+  }
+}

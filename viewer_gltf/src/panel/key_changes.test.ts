@@ -1,0 +1,57 @@
+import { describe, expect, it } from "vitest";
+import { changeKey, keyNow } from "./key_changes";
+import { KEYS, type KeyChanges, standsFor, withKeys } from "./keys";
+
+const changed = (changes: KeyChanges, name: string, pressed: string): KeyChanges => {
+  const answer = changeKey(changes, name, pressed);
+  if ("refusal" in answer) throw new Error(answer.refusal);
+  return answer.changes;
+};
+const refusal = (changes: KeyChanges, name: string, pressed: string) =>
+  expect(changeKey(changes, name, pressed)).toEqual({
+    refusal: expect.stringMatching(/^[A-Z][^.]*\.$/),
+  });
+
+describe("a key that a reader changes", () => {
+  it("does what the old one did, which does nothing then", () => {
+    const changes = changed({}, "o", "é");
+    expect(standsFor("é", changes)).toBe("o");
+    expect(standsFor("o", changes)).toBeNull();
+    expect(keyNow("o", changes)).toBe("é");
+    expect(keyNow("m", changes)).toBe("m");
+  });
+
+  it("leaves its old key to another action, and gets it back when that one leaves it", () => {
+    const first = changed({}, "o", "é");
+    const second = changed(first, "m", "o");
+    expect(standsFor("o", second)).toBe("m");
+    refusal(second, "o", "o");
+    const third = changed(second, "m", "m");
+    expect(changed(third, "o", "o")).toEqual({});
+  });
+
+  it("is refused in one sentence where another action has it, or the browser", () => {
+    for (const key of ["m", "Tab", "Enter", " ", "Escape", "F5", "Ctrl+t", "?"]) {
+      refusal({}, "o", key);
+    }
+  });
+
+  it("keeps each key of the tables for one action, whatever is swapped", () => {
+    const names = KEYS.flatMap(({ keys }) => keys.flatMap(({ keys }) => keys));
+    let changes: KeyChanges = changed(changed({}, "a", "é"), "b", "a");
+    changes = changed(changes, "a", "b");
+    const done = names.map((name) => standsFor(keyNow(name, changes), changes));
+    expect(done).toEqual(names);
+  });
+
+  it("is named in sentences by its new key", () => {
+    const text = "Nothing is cut open yet: cut by a box (b) or by a plane (n).";
+    expect(withKeys(text, { b: "é" })).toBe(text.replace("(b)", "(é)"));
+    expect(withKeys("two tiles (row 1)", { r: "é" })).toBe("two tiles (row 1)");
+  });
+
+  it("does nothing by a name that every object has", () => {
+    expect(standsFor("constructor", {})).toBeNull();
+    expect(standsFor("toString", {})).toBeNull();
+  });
+});

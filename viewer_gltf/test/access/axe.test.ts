@@ -1,0 +1,125 @@
+/** What axe-core finds on the page, by the rules of WCAG 2.2 at levels A and AA: nothing. */
+import axe from "axe-core";
+import { describe, expect, it } from "vitest";
+import { openAllSections } from "../support/browser/open_sections";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+
+declare global {
+  interface Window {
+    axe: typeof axe;
+  }
+}
+
+const RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"];
+/** The query and the scheme that the system prefers, by the name of the theme. */
+const THEMES = {
+  dark: { query: "", colorScheme: "dark" },
+  light: { query: "&theme=light", colorScheme: "light" },
+} as const;
+/** Two sliders share a track, and only their thumbs take the pointer: sizes.test.ts measures those. */
+const TWO_ON_A_TRACK = /window-(low|high)"/;
+const PHONE = { width: 390, height: 844 };
+
+describeInChromium("axe-core", () => {
+  const stand = prepareStand({ viewport: { width: 900, height: 600 }, isBlind: true });
+  const page = () => stand.viewer.page;
+
+  /** Each finding as one line: the rule, the element and the reason. */
+  async function findings(): Promise<readonly string[]> {
+    await page().evaluate(axe.source); // the page's policy allows no script of another's
+    const { violations } = await page().evaluate(
+      (values) => window.axe.run({ runOnly: { type: "tag", values } }),
+      RULES,
+    );
+    return violations.flatMap(({ id, nodes }) =>
+      nodes
+        .filter(({ html }) => !(id === "target-size" && TWO_ON_A_TRACK.test(html)))
+        .map(({ html, failureSummary }) => `${id}: ${html.slice(0, 160)} ${failureSummary}`),
+    );
+  }
+
+  describe.each(Object.entries(THEMES))("in the %s theme", (_, { query, colorScheme }) => {
+    const open = async () => {
+      await page().emulateMedia({ colorScheme });
+      await stand.open(`&mode=off${query}`);
+    };
+
+    it("finds nothing on the page as it opens, at a desk and on a phone", async () => {
+      await open();
+      expect(await findings()).toEqual([]);
+      await page().setViewportSize(PHONE);
+      expect(await findings()).toEqual([]);
+    });
+
+    it("finds nothing in the panel with all sections open, a link and a chosen tile", async () => {
+      await open();
+      await openAllSections(stand.viewer);
+      await page().keyboard.press("l");
+      await page().locator('[data-control="link"]').waitFor();
+      await page().keyboard.press("Escape");
+      for (const key of ["b", "n", "p", "t", "i"]) await page().keyboard.press(key);
+      expect(await findings()).toEqual([]);
+      await page().setViewportSize(PHONE);
+      expect(await findings()).toEqual([]);
+    });
+
+    it("finds nothing in the dialogs: the keys, the screen's measure", async () => {
+      await open();
+      await page().keyboard.press("?");
+      await page().locator("dialog[data-help]").waitFor();
+      expect(await findings()).toEqual([]);
+      await page().setViewportSize(PHONE);
+      expect(await findings()).toEqual([]);
+      await page().keyboard.press("Escape");
+      await page().keyboard.press(":");
+      await page().locator("dialog[data-card]").waitFor();
+      expect(await findings()).toEqual([]);
+    });
+
+    it("finds nothing in slices as pictures, in what a key did, and in a notice", async () => {
+      const { pathname } = new URL(
+        "channels/Balls/r0_c0/lod2.glb",
+        `${stand.host.address}/bundle/`,
+      );
+      stand.host.overrides.set(pathname, { status: 404, body: "gone" });
+      await open();
+      await page().locator("[data-notices] p").first().waitFor();
+      await page().keyboard.press("\\");
+      await page().locator(".slices figure").first().waitFor();
+      await page().keyboard.press("k");
+      expect(await findings()).toEqual([]);
+    });
+  });
+
+  it("finds nothing in the card of a tapped place, and in an empty picture", async () => {
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    await page().keyboard.press("Enter"); // a tap in the middle of the view
+    await page().locator(".tap-card").waitFor();
+    expect(await findings()).toEqual([]);
+    await page().keyboard.press("Escape");
+    for (const key of ["1", "2", "3"]) await page().keyboard.press(key);
+    await page().locator(".view-message").waitFor();
+    expect(await findings()).toEqual([]);
+  });
+
+  it("finds nothing in the ways into stereo of an upright phone", async () => {
+    await page().setViewportSize(PHONE);
+    await stand.open("&mode=off");
+    await stand.viewer.unfold("stereo");
+    await page().locator('[data-control="lenses"]').selectOption("own");
+    expect(await findings()).toEqual([]);
+    await page().locator('[data-control="lenses"]').selectOption("v2");
+    await page().keyboard.press("P");
+    await page().getByText("Turn the phone on its side").waitFor();
+    expect(await findings()).toEqual([]);
+  });
+
+  it("finds nothing on the page of a bundle that is not there", async () => {
+    stand.host.overrides.set("/bundle/manifest.json", { status: 404, body: "gone" });
+    await page().goto(`${stand.host.address}/app/?bundle=../bundle/`);
+    await page().locator("[data-fatal]").waitFor();
+    expect(await findings()).toEqual([]);
+  });
+});
