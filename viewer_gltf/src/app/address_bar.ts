@@ -4,7 +4,7 @@
  * The address changes once the view has been the same for two looks in a row, half a second apart. That is at most
  * once a second; Safari refuses more than a hundred changes in 30 s.
  */
-import { isOwnAddress, keepTyped, writeAddress } from "../share/address";
+import { isOwnAddress, isPassingStep, keepTyped, writeAddress } from "../share/address";
 import type { CameraView } from "../share/camera_link";
 import { settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
@@ -49,6 +49,8 @@ export class AddressBar {
     { state, camera }: Opened,
   ) {
     const { hash } = location;
+    // a page that was loaded again in the split screen is left in its step of the history
+    if (viewer.stereo.kind === null && isPassingStep()) history.replaceState(null, "");
     this.seen = this.now;
     this.written = { state, camera: HAS_CAMERA.test(hash) ? camera : null };
     this.opening = { link: this.linkTo(this.written), hash };
@@ -57,7 +59,7 @@ export class AddressBar {
   /** Bring the address to the view at once, as before a reload. */
   write(): void {
     const { now } = this;
-    if (this.viewer.stereo.kind !== null || !isOwnAddress()) return;
+    if (this.viewer.stereo.kind !== null || isPassingStep() || !isOwnAddress()) return;
     this.written = now;
     const link = this.linkTo(now);
     const isOpening = link === this.opening.link;

@@ -35,7 +35,7 @@ import { type KeyChanges, labelOf, standsFor, wishOf, withKeys } from "../panel/
 import { type Facts, layOut, MORE } from "../panel/layout";
 import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
-import { withTyped, writeAddress } from "../share/address";
+import { isPassingStep, withTyped, writeAddress } from "../share/address";
 import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";
 import type { Action } from "../state/actions";
@@ -530,10 +530,8 @@ export class Controller {
     for (const name of SETTINGS) address.searchParams.delete(name);
     const start = initialState(viewer.bundle.manifest);
     address.hash = writeLink(viewer.state, start, viewer.cameraView, viewer.linkedObjects);
-    // A notebook's frame has no address. The step that the split screen has made in the history goes when it is left,
-    // and its address with it; the address follows the view then.
-    const isSplit = viewer.stereo.kind === "split";
-    if (hasAddress() && !isSplit) writeAddress(address);
+    // the address follows the view once the split screen is left
+    if (hasAddress() && !isPassingStep()) writeAddress(address);
     this.view = { ...this.view, link: address.href };
     this.unfold("share");
     viewer.stereo.showInPanel({ link: address.href });

@@ -628,7 +628,9 @@ export class Viewer {
    */
   noteWaiting(files: number): void {
     const text = navigator.onLine ? WAITING : OFFLINE;
-    if (files === 0) this.dispatch({ type: "dismiss", texts: [WAITING, OFFLINE] });
+    // a file that has not come, though it was awaited long enough, is reported until it does
+    const passing = [WAITING, OFFLINE].filter((each) => !this.state.mendable.includes(each));
+    if (files === 0) this.dispatch({ type: "dismiss", texts: passing });
     else if (this.state.notices.includes(text)) return;
     else if (navigator.onLine ? files === 1 : this.isIncomplete) {
       this.dispatch({ type: "notify", text });

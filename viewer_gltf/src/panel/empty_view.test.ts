@@ -63,9 +63,12 @@ describe("an empty picture", () => {
     const beside = { min: [min[0] - 9, min[1], min[2]], max: [min[0] - 8, 0, 9] } as const;
     const byBox = reduce(start, { type: "set-clip", clip: { box: beside, plane: null } });
     expect(explained(byBox)).toBe("The cut leaves nothing of the specimen.");
-    const plane = { normal: [0, 0, 1], offset_um: min[2] } as const;
+    const plane = { normal: [0, 0, 1], offset_um: min[2] - 1 } as const;
     const byPlane = reduce(start, { type: "set-clip", clip: { box: null, plane } });
     expect(explained(byPlane)).toBe("The cut leaves nothing of the specimen.");
+    // at the very end of the specimen the cut face still shows
+    const atEnd = { box: null, plane: { ...plane, offset_um: min[2] } };
+    expect(emptyViewOf(reduce(start, { type: "set-clip", clip: atEnd }), CONTENT)).toBeNull();
   });
 
   it("sees that a cut leaves only the empty margin of the specimen", () => {
@@ -73,7 +76,7 @@ describe("an empty picture", () => {
     const middle = (min[2] + max[2]) / 2;
     const inside = { min: [min[0], min[1], middle], max } as const;
     const content = { ...CONTENT, outline: () => cornersOf(inside) };
-    const plane = { normal: [0, 0, 1], offset_um: middle - 0.1 } as const;
+    const plane = { normal: [0, 0, 1], offset_um: middle - 1 } as const;
     const cut = reduce(start, { type: "set-clip", clip: { box: null, plane } });
     expect(emptyViewOf(cut, CONTENT)).toBeNull();
     expect(explained(cut, content)).toContain("The cut leaves nothing");
@@ -81,7 +84,7 @@ describe("an empty picture", () => {
 
   it("says that the only tile is cut away", () => {
     const alone = reduce(start, { type: "isolate", tile: TILE });
-    const plane = { normal: [0, 0, 1], offset_um: bounds_um.min[2] } as const;
+    const plane = { normal: [0, 0, 1], offset_um: bounds_um.min[2] - 1 } as const;
     const cut = reduce(alone, { type: "set-clip", clip: { box: null, plane } });
     expect(explained(cut)).toBe("The cut leaves nothing of row 1, column 1.");
   });

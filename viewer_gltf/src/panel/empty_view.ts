@@ -67,16 +67,29 @@ function cutAway(
 ): EmptyView | null {
   if (clip.box === null && clip.plane === null) return null;
   const left = shownTiles(tiles, isolated);
-  const isGone = left.every(({ bounds_um }) => isCutAway(bounds_um, clip));
+  const { min, max } = around(tiles.flatMap(({ bounds_um }) => [bounds_um.min, bounds_um.max]));
+  const cut = relaxed(clip, SLICE_SHARE * Math.max(...max.map((v, i) => v - min[i])));
+  const isGone = left.every(({ bounds_um }) => isCutAway(bounds_um, cut));
   const hasNothing = (channel: ChannelState) => {
     const points = outline(channel);
-    return points !== null && isOutside(points, clip);
+    return points !== null && isOutside(points, cut);
   };
   // an outline is of all tiles, and so says nothing of a single one
   if (!isGone && !(isolated === null && shown.every(hasNothing))) return null;
   const what = isolated === null ? "the specimen" : tileName(isolated);
   const remove: Action = { type: "set-clip", clip: WHOLE };
   return { text: `The cut leaves nothing of ${what}.`, offer: offerOf("Remove the cut", remove) };
+}
+
+/** A plane that leaves less than this share of the specimen's longest edge still shows its cut face. */
+const SLICE_SHARE = 0.01;
+
+/** The same cut with its plane moved back by so much. */
+function relaxed(clip: Clip, by_um: number): Clip {
+  const { plane } = clip;
+  return plane === null
+    ? clip
+    : { ...clip, plane: { ...plane, offset_um: plane.offset_um + by_um } };
 }
 
 /** Whether nothing of the hull of some points is kept. */

@@ -11,6 +11,11 @@ export function isOwnAddress(): boolean {
   return location.href === own;
 }
 
+/** Whether the present step of the history is the split screen's: it goes when that is left, and its address with it. */
+export function isPassingStep(): boolean {
+  return (history.state as { split?: number } | null)?.split !== undefined;
+}
+
 /** Throws a DOMException where the browser allows no more changes. */
 export function writeAddress(address: URL): void {
   history.replaceState(history.state, "", address);

@@ -36,6 +36,17 @@ describeInChromium("high contrast", () => {
     return Array.from({ length: count }, (_, i) => i).filter(isOther).length / count;
   }
 
+  /** Share of the light pixels: the scheme is dark. */
+  const lightShare = (pixels: readonly number[]) =>
+    (4 * pixels.filter((value, i) => i % 4 === 1 && value > 128).length) / pixels.length;
+
+  it("shows the drawing on the button for the full screen", async () => {
+    const share = lightShare(await pixelsOf(page().locator('[data-overlay="full-screen"]')));
+    const empty = lightShare(await pixelsOf(page().locator(".fold")));
+    expect(empty).toBeGreaterThan(0.01); // a chevron
+    expect(share).toBeGreaterThan(0.08); // more than the ring round it
+  });
+
   it("shows whether a switch is on", async () => {
     const control = page().locator('[data-control="clip-box"]');
     const off = await pixelsOf(control);
@@ -44,9 +55,8 @@ describeInChromium("high contrast", () => {
     const on = await pixelsOf(control);
     await control.uncheck();
     expect(difference(off, on)).toBeGreaterThan(0.3);
-    const back = off.slice(0, 4);
-    const dot = Array.from({ length: off.length / 4 }, (_, i) => off.slice(4 * i, 4 * i + 4));
-    expect(dot.filter((pixel) => Math.abs(pixel[0] - back[0]) > 60).length).toBeGreaterThan(150);
+    expect(lightShare(off)).toBeGreaterThan(0.2); // its edge and its dot
+    expect(lightShare(off)).toBeLessThan(0.6);
   });
 
   it("shows which of several is chosen", async () => {

@@ -173,9 +173,10 @@ describeInChromium("while the view moves the stand-in", () => {
   });
 
   const MANY = 32;
+  const RED_LAMP = { ...START_TRACE.lamps[0], color: [1, 0, 0] as const };
   const CHANGES: [string, Partial<TraceSettings>][] = [
     ["transmission", { bias: 0.25 }],
-    ["a lamp", { lamps: [{ ...START_TRACE.lamps[0], color: [1, 0, 0], strength: 8 }] }],
+    ["the light", { environmentLight: 0, lamps: [RED_LAMP] }],
     ["hue", { hue: 90 }],
   ];
   for (const [name, settings] of CHANGES) {

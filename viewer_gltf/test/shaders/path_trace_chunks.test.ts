@@ -355,9 +355,11 @@ describeInChromium("the path tracer's chunks", () => {
       brick: number,
       majorants: readonly number[],
       body: string,
+      stride_um = 0,
     ) {
       const n = SIZE / brick;
       const head = `
+        const float uStride = ${number(stride_um)};
         const vec3 uTexLow = vec3(0.0, 1.0, 0.0);
         const vec3 uTexPerUm = ${vec(1 / SIZE, -1 / SIZE, 1 / SIZE)};
         const vec3 uTexels = vec3(${number(SIZE)});
@@ -414,6 +416,18 @@ describeInChromium("the path tracer's chunks", () => {
         // a share varies less than its being 0 or 1
         expect(Math.abs(found[3] - through), `bricks of ${brick}`).toBeLessThan(SLACK * error);
       }
+    });
+
+    it("by steps of the reader's own as far as by tracking", async () => {
+      const depth = (FROM[0] * LENGTH + (DIR[0] * LENGTH ** 2) / 2) / 32;
+      const through = Math.exp(-depth);
+      const body = `${flight}
+        sum.w += transmittance(from, dir, 0.0, ${number(LENGTH)});`;
+      // no majorants: steps look up the medium alone
+      const found = await fly("p.x / 32.0", 4, new Array(64).fill(0), body, 0.4);
+      const error = Math.sqrt(through * (1 - through));
+      expect(Math.abs(found[0] - through)).toBeLessThan(SLACK * error);
+      expect(Math.abs(found[3] - through)).toBeLessThan(SLACK * error);
     });
 
     it("freely where there is nothing", async () => {

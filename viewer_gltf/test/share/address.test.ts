@@ -110,6 +110,21 @@ describeInChromium("the address", () => {
     expect(await hash()).toBe("#v=1&disc=33");
   });
 
+  it("stays as it is in the split screen, also while the page waits for the phone to be turned", async () => {
+    await stand.open("&mode=off");
+    await page().setViewportSize({ width: 270, height: 480 });
+    await page().evaluate(() => Object.assign(window, { isSamePage: true }));
+    await calm();
+    await page().keyboard.press("P");
+    await page().keyboard.press("ArrowRight");
+    const before = await hash();
+    await calm();
+    expect(await hash()).toBe(before);
+    await page().keyboard.press("Escape");
+    await expect.poll(hash).toContain("&eye=");
+    expect(await page().evaluate(() => "isSamePage" in window)).toBe(true);
+  });
+
   it("stays as it is in a frame without a panel, unless it is asked to follow", async () => {
     const turnIn = async (query: string) => {
       await page().setContent(

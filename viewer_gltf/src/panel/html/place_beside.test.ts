@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { GAP_PX, type Point, placeBeside, type Size } from "./place_beside";
 
-const CARD: Size = { width: 236, height: 196 };
+const CARD: Size = { width: 248, height: 200 };
 /** Areas of the picture beside or above the panel, for the windows that the viewer is looked at in. */
 const AREAS: readonly Size[] = [
   { width: 390, height: 464 }, // 390 x 844

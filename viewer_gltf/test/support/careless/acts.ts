@@ -105,8 +105,10 @@ export const ACTS: readonly Act[] = [
     name: "double click the picture",
     changes: ["look", ...CHOICES],
     weight: 2,
-    run: async (reader) =>
-      reader.page.mouse.dblclick(...(await somewhere(reader, ".stage canvas"))),
+    run: async (reader) => {
+      await reader.page.mouse.dblclick(...(await somewhere(reader, ".stage canvas")));
+      await reader.page.waitForTimeout(2500); // the flight begins once it is known what lies there
+    },
   },
   {
     name: "wheel over the picture",
