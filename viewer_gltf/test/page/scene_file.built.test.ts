@@ -141,6 +141,10 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
       const { width, height, rgba } = decodePng(await firefox.screenshot());
       const picture = new Picture(width, height, rgba);
       expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(5000);
+      const { swatch, at } = (await firefox.run(SWATCH)) as { swatch: string; at: number[] };
+      const pixel = 4 * (at[1] * width + at[0]);
+      const found = [...rgba.subarray(pixel, pixel + 3)];
+      expect(`#${found.map((v) => v.toString(16).padStart(2, "0")).join("")}`).toBe(swatch);
     } finally {
       await firefox.stop();
     }
@@ -163,4 +167,14 @@ const IN_FIREFOX = `
       hosts: names.filter((name) => !/^(blob|data):/.test(name)),
     });
   })().catch((error) => resolve(String(error)));
+`;
+
+/** Runs in the page: the colour of the first channel, and the middle of its swatch in the window. */
+const SWATCH = `
+  const input = document.querySelector("input[type=color]");
+  const { left, top, width, height } = input.getBoundingClientRect();
+  arguments[arguments.length - 1]({
+    swatch: input.value,
+    at: [Math.round(left + width / 2), Math.round(top + height / 2)],
+  });
 `;

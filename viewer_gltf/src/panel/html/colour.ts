@@ -27,7 +27,9 @@ function makePicker(first: Colour, send: Send): Widget<Colour> {
     update(control) {
       now = control;
       if (input.value !== control.value) input.value = control.value;
-      input.style.setProperty("--shows", stripes(control.shows ?? []));
+      // Firefox leaves the colour itself out where a style has any image: one colour is a stripe, too
+      const { shows = [], value } = control;
+      input.style.setProperty("--shows", stripes(shows.length === 0 ? [value] : shows));
     },
   };
 }
@@ -36,7 +38,7 @@ function makePicker(first: Colour, send: Send): Widget<Colour> {
 function stripes(colors: readonly string[]): string {
   const share = 100 / colors.length;
   const stops = colors.map((color, i) => `${color} ${i * share}% ${(i + 1) * share}%`);
-  return colors.length === 0 ? "none" : `linear-gradient(90deg,${stops})`;
+  return `linear-gradient(90deg,${stops})`;
 }
 
 function makeSwatches(first: Colour, send: Send): Widget<Colour> {
