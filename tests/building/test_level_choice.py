@@ -53,12 +53,12 @@ def test_the_first_rung_of_many_else_that_of_many_that_touch_else_the_outer(
 
 
 def _surveyed(tmp_path: Path, voxels: np.ndarray, *flags: str) -> Survey:
-    """Return what a build finds of one channel, without the preset for voxels of this size."""
+    """Return what a build finds of one channel."""
     source = phantoms.write_ome_zarr(
         tmp_path / "one.ome.zarr", [voxels], scales=[dict(zip("zyx", (5.0, 2.0, 2.0), strict=True))]
     )
     out = tmp_path / "out"
-    assert main(["plan", str(source), "-o", str(out), *(flags or ("--preset", "none"))]) == 0
+    assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
     return read_survey(OutFolder(out))
 
@@ -154,7 +154,7 @@ def test_light_sheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Path) -> 
     """No one value parts cells from tissue: the bright layer is as bright as cells beside it."""
     out = tmp_path / "out"
     flags = ["--preset", "lightsheet", "--channels", "0", "--region", "8:22,100:420,0:320"]
-    assert main(["plan", str(SHEET), "-o", str(out), *(flags or ("--preset", "none"))]) == 0
+    assert main(["plan", str(SHEET), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
     (channel,) = read_survey(OutFolder(out)).values()
     level = channel.appearance.level

@@ -223,19 +223,6 @@ def test_micrometres_follow_the_spacing(tmp_path: Path) -> None:
     assert choose_preset(open_dataset(source))[0] is None
 
 
-@pytest.mark.parametrize(("finest_um", "chosen"), [(0.9, None), (2.0, "lightsheet"), (25.0, None)])
-def test_cells_are_looked_for_in_voxels_of_a_few_micrometres(
-    tmp_path: Path, finest_um: float, chosen: str | None
-) -> None:
-    """Cells have surfaces of their own in finer voxels, and wider voxels show their tissue."""
-    source = tmp_path / "a.ome.tif"
-    spacing = (2.5 * finest_um, finest_um, finest_um)
-    phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=spacing)
-    preset, reason = choose_preset(open_dataset(source))
-    assert preset == chosen
-    assert ("cells are looked for" in reason[0]) == (chosen is not None)
-
-
 def test_the_plan_of_a_microscope_s_voxels_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -21,9 +21,6 @@ from stereocell.storage.location import Location
 
 _BY_MODALITY = {"MR": "mri", "CT": "ct"}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
-# Finest spacings, um, of light sheets in cleared tissue: cells are a few voxels wide there, and
-# their tissue fills the field
-_LIGHT_SHEET_UM = (1.0, 10.0)
 _PART_UM = 20_000.0  # um: of what is smaller across, presets of patients drop pieces half as large
 
 
@@ -111,10 +108,6 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
     level = dataset.levels[0]
     finest = min(level.spacing_um)
     if not known and finest < _BODY_UM:
-        low, high = _LIGHT_SHEET_UM
-        if low <= finest <= high:
-            text = f"voxels of {finest:.3g} um, as of a light sheet in tissue: cells are looked for"
-            return "lightsheet", _describe("lightsheet", text)
         return None, _describe(None, f"voxels of {finest:.3g} um, as of a microscope")
     across = max(n * h for n, h in zip(level.shape, level.spacing_um, strict=True))
     if across < _PART_UM:
