@@ -217,6 +217,8 @@ def test_noise_that_goes_on_above_the_surface_is_no_dust_before_it() -> None:
     opacity = evaluate(functions["default"])
     assert air[opacity > 0].sum() < 0.3 * air[level + 1 :].sum()
     assert (opacity[int(MAX_SHIFT * level) + 4 :] > 0.12).all()  # what is brighter shows as before
+    for points in functions.values():
+        assert (np.diff([x for x, _ in points]) > 0).all()  # as the stage's readers expect
 
 
 def test_the_even_counts_of_an_edge_are_no_noise_above_the_surface() -> None:

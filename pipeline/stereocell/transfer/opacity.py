@@ -77,7 +77,7 @@ def make_transfer_functions(
     floor, top, bright = rise
     start = AT_SURFACE_OF_MAGNITUDES if has_magnitudes else AT_SURFACE
     at_top = start + (IN_BODY - start) * (top - level) / (bright - level)
-    soft = _points((floor, 0.0), (level, 0.04), (1.0, 0.2))
+    soft = _points((floor, 0.0), (top, 0.04), (1.0, 0.2))
     functions = {
         "default": _points((floor, 0.0), (top, at_top), (bright, IN_BODY), (1.0, 0.6)),
         SOFT: _thinned(soft, histogram, depth_voxels),
