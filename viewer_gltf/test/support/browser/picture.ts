@@ -45,12 +45,12 @@ export function difference(a: Picture, b: Picture): number {
   return differing / (a.width * a.height);
 }
 
-/** Scale bar, axes, names and announcements lie over the picture: they are no part of it. */
+/** Scale bar, axes, names, announcements and buttons lie over the picture: they are no part of it. */
 export async function withoutMarks<T>(page: Page, job: () => Promise<T>): Promise<T> {
   const show = (visibility: string) =>
     page.evaluate((value) => {
       const marks =
-        ".scale-bar, .orientation-mark, .name-mark, .said, .first-hint, .tap-area, .view-message";
+        ".scale-bar, .orientation-mark, .name-mark, .said, .first-hint, .tap-area, .view-message, .ways-in";
       for (const mark of document.querySelectorAll<HTMLElement | SVGElement>(marks)) {
         mark.style.visibility = value;
       }
