@@ -649,6 +649,64 @@ describeInChromium("the path tracer's chunks", () => {
     });
   });
 
+  describe("the light of the march that stands in", () => {
+    const alpha = 0.5;
+    /** Of a pixel, from mean colours where anything is seen; 4 traced pixels see it, 2 marched ones. */
+    const calibrated = async (
+      light: readonly number[],
+      traced: readonly number[],
+      marched: readonly number[],
+      coverage = [4, 2],
+    ) => {
+      const sums = (mean: readonly number[], met: number) =>
+        floats([1, 1], [...mean.map((v) => met * v), met]);
+      const premultiplied = [...light.map((v) => alpha * v), alpha];
+      const found = await bare.run(
+        ["calibrated_light"],
+        "",
+        `oColor = vec4(calibrated(${vec(...premultiplied)}) / ${number(alpha)}, 1.0);`,
+        { uTracedLight: sums(traced, coverage[0]), uMarchedLight: sums(marched, coverage[1]) },
+      );
+      return found.slice(0, 3);
+    };
+    const expectNear = (found: readonly number[], wanted: readonly number[]) =>
+      found.forEach((v, k) => {
+        expect(v).toBeCloseTo(wanted[k], 5);
+      });
+
+    it("is multiplied, colour by colour, to the traced mean", async () => {
+      const [traced, marched] = [
+        [0.6, 0.3, 0.15],
+        [0.2, 0.2, 0.3],
+      ];
+      expectNear(await calibrated(marched, traced, marched), traced);
+      expectNear(await calibrated([0.1, 0.4, 0.9], traced, marched), [0.3, 0.6, 0.45]);
+    });
+
+    it("gains what it has hardly any of by an addition", async () => {
+      const traced = [0.1, 0.4, 0.1];
+      const marched = [0.001, 0.2, 0.001];
+      const brightness = ([r, g, b]: readonly number[]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
+      const most = (4 * brightness(traced)) / brightness(marched);
+      expectNear(await calibrated(marched, traced, marched), traced);
+      const shine = 0.1 - 0.001 * most;
+      expectNear(await calibrated([0.01, 0.1, 0], traced, marched), [
+        0.01 * most + shine,
+        0.2,
+        shine,
+      ]);
+    });
+
+    it("stays as it is where either picture shows nothing", async () => {
+      const light = [0.1, 0.4, 0.9];
+      for (const coverage of [
+        [0, 2],
+        [4, 0],
+      ])
+        expectNear(await calibrated(light, [0.6, 0.3, 0.1], [0.2, 0.2, 0.2], coverage), light);
+    });
+  });
+
   it("find a ramp's gradient in the box's directions, over two voxels", async () => {
     const slope = [0.02, -0.05, 0.01]; // intensity per um
     const perUm = [1 / 40, -1 / 60, 1 / 24];

@@ -689,6 +689,27 @@ describeInChromium("the shader's chunks", () => {
     expect(blocks).toEqual([0, 0, 1, 1]);
   });
 
+  it("find the face by which a ray to a surface leaves the tile that is a volume", async () => {
+    // the tile is the box from -1 to 1
+    const outwards = [0, 1, 2].flatMap((axis) =>
+      [1, -1].map((side) => [0, 1, 2].map((k) => (k === axis ? side : 0))),
+    );
+    const planes = outwards.flatMap((normal) => [...normal, 1]);
+    const normalAt = async (eye: number[], p: number[], uOpen = planes) => {
+      const body = `oColor = vec4(openNormal(${vec(...eye)}, ${vec(...p)}), 0.0);`;
+      return (await run(["open_tile"], "", body, { uOpen })).slice(0, 3);
+    };
+    const eye = [0, 0, 5];
+    expect(await normalAt(eye, [0, 0, -1])).toEqual([0, 0, 1]); // in the far face itself
+    expect(await normalAt(eye, [0, 0, -3])).toEqual([0, 0, 1]);
+    expect(await normalAt(eye, [1.6, 0, -3])).toEqual([-1, 0, 0]); // out by a side
+    expect(await normalAt([0, 0, 0], [0, 3, 0])).toEqual([0, -1, 0]); // from within
+    expect(await normalAt(eye, [0, 0, 0])).toEqual([0, 0, 0]); // ends within
+    expect(await normalAt(eye, [2, 0, -1])).toEqual([0, 0, 0]); // passes beside
+    expect(await normalAt(eye, [0, 0, 2])).toEqual([0, 0, 0]); // ends before
+    expect(await normalAt(eye, [0, 0, -3], new Array<number>(24).fill(0))).toEqual([0, 0, 0]);
+  });
+
   it("have a test each", async () => {
     const tests = [
       "raymarch_chunks.test.ts",
