@@ -30,7 +30,7 @@ VARIANTS = {
     "r1_c2": ("lod", "lod3"),
 }
 MOVE_UM = (2.0, 7.0, 0.0)
-FUNCTION = "soft"
+FUNCTION = "sharp"  # other than the one that a stage of a microscope opens with
 OPACITY_POINTS = ((0.0, 0.0), (0.5, 0.0), (0.51, 0.03), (1.0, 0.03))
 
 
