@@ -63,7 +63,13 @@ function expectAlike(surface: Picture, picture: Picture, name: string, least = M
   expect.soft(colorDifference(a, b), `${name}: colour`).toBeLessThan(MAX_DELTA_E);
 }
 
-async function pictureOf(stand: Stand, mode: string, link = ""): Promise<Picture> {
+/** The function by which the volume has the bodies that its surface outlines: those of a microscope open translucent. */
+function asBodies({ manifest }: Stand): string {
+  const { id, transfer_function: name } = manifest.channels[0];
+  return name === "soft" ? `&l=${id}:tdefault` : "";
+}
+
+async function pictureOf(stand: Stand, mode: string, link = asBodies(stand)): Promise<Picture> {
   // an address that differs in its end alone opens no page anew
   const query = `&mode=${mode}&quality=high&picture=${pictures++}`;
   await stand.open(`${query}#v=1&cut=none${link}`);
