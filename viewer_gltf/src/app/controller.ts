@@ -457,6 +457,10 @@ export class Controller {
   private press(pressed: string): boolean {
     const { viewer, view } = this;
     if (!view.hasLetters && isWritten(pressed) && pressed !== "?") return false;
+    if (pressed === "Escape" && view.isHelpOpen && this.help === null) {
+      this.perform({ panel: "help" }); // the list of keys is still being loaded
+      return true;
+    }
     const name = standsFor(pressed, view.keyChanges);
     const mark = viewer.mark;
     const context: KeyContext = {
