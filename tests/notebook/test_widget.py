@@ -10,6 +10,7 @@ from IPython.core.interactiveshell import InteractiveShell
 from PIL import Image
 
 import stereocell
+from stereocell.bundle import blob_page
 from stereocell.model.errors import StereoCellError, UsageError
 from stereocell.notebook import page
 from stereocell.notebook.bundle_files import NotebookBundle
@@ -168,7 +169,7 @@ def test_what_can_t_be_shown_is_refused_in_a_line(source, more, message, tmp_pat
 
 
 def test_without_anywidget_and_without_a_page_it_says_what_to_do(bundle, monkeypatch):
-    monkeypatch.setattr(page, "viewer_dist", lambda: None)
+    monkeypatch.setattr(blob_page, "viewer_dist", lambda: None)
     with pytest.raises(UsageError, match="the viewer is not built: run `make setup`"):
         stereocell.show(bundle)
     monkeypatch.setitem(sys.modules, "anywidget", None)
