@@ -185,7 +185,7 @@ def _export_page(
     if is_staged:
         raise UsageError(
             f"--stage can't be for {PAGE}, which holds the bundle: run `stereocell bundle OUT "
-            "--stage FILE` first, and export without it"
+            "--stage edited.usda` first, and export without it"
         )
     _require_takes(PAGE, PAGE_TAKES, options)
     require_documents(out_folder, "publish")
