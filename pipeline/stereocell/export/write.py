@@ -168,7 +168,7 @@ def _export(
 
 def _put_all_in_place(file: Path, beside: Path, is_ours: Callable[[Path], bool]) -> list[Path]:
     """Move all that was written into a folder beside the file; return the final paths."""
-    # what goes with the file comes first: whoever sees the file sees it whole
+    # The parts beside the file are written first, so that a file that exists is complete.
     made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
     places = [file.parent / one.name for one in made]
     for place in places:

@@ -141,7 +141,7 @@ const mayBeEmpty = (state: ViewerState, opening: ViewerState) =>
   EMPTYING.some((key) => state[key] !== opening[key]) ||
   (state.mode === "off" && !state.channels.some(({ shown, hasSurface }) => shown && hasSurface));
 
-/** What was there before a key was pressed. */
+/** The step and the panel's view before a key was pressed; *Undo* returns to them. */
 type Before = Readonly<{ mark: Mark; view: PanelView }>;
 const HIDDEN: Readonly<Record<string, string>> = {
   true: "The panel is hidden.",
@@ -175,7 +175,7 @@ export class Controller {
   private tapped: TapPart | null = null;
   /** Counts the taps and double taps: the code may come after the second one. */
   private taps = 0;
-  /** What the picture says about itself, once it may have something to say. */
+  /** Messages over the picture; null until the first one is due and their part of the page has loaded. */
   private message: ViewMessagePart | null = null;
   /** The state in which the bundle opened. */
   private readonly opening: ViewerState;

@@ -15,7 +15,7 @@ export class OfflineLayers {
 
   constructor(private readonly viewer: Viewer) {}
 
-  /** Of the channels that are shown now. Throws BundleError where a list of files does not come. */
+  /** Returns the layers of the channels that are shown now. Throws BundleError if a list of files cannot be fetched. */
   async now(): Promise<readonly Layer[]> {
     const { state, bundle } = this.viewer;
     const layers: Layer[] = [];

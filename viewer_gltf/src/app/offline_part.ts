@@ -11,7 +11,7 @@ const LOOK_MS = 2000;
 
 export class OfflinePart {
   private readonly layers: OfflineLayers;
-  /** What there was at the last look: the number of answers, and what is shown. */
+  /** The number of answers and the layers shown at the last check; a check without a change is skipped. */
   private looked = "";
   /** Whether this visit, or one before, has announced how much is kept. */
   private hasSaid: boolean;

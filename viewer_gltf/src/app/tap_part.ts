@@ -1,4 +1,4 @@
-/** What a tap on the flat picture opens: a card beside the place, which follows the place as the view turns. */
+/** A tap on the flat picture opens a card beside the place. The card follows the place as the view turns. */
 import { Vector3 } from "three";
 import { pickTile, shownTiles } from "../math/pick";
 import { along, type Ray, type Vec3 } from "../math/vec3";

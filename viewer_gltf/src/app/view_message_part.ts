@@ -1,4 +1,4 @@
-/** What the picture says about itself: why it is empty, and why a request was refused, each with a way back. */
+/** Messages over the picture say why it is empty, or why a request was refused. Each offers a way back. */
 import type { Box } from "../math/box";
 import type { Offer } from "../panel/controls";
 import { type Content, emptyViewOf } from "../panel/empty_view";

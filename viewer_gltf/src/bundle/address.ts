@@ -1,6 +1,6 @@
 import { BundleError } from "./errors";
 
-/** What a document without a web host gives to the page in it: a notebook's frame, or a scene in one file. */
+/** A document without a web host (a notebook's frame, or a scene in one file) gives these to the page in it. */
 export type PageHost = Readonly<{
   /** Stands for the page's address, which a notebook's frame has none of: the view is behind its `#`. */
   page?: string;

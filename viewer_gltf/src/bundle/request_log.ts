@@ -18,7 +18,7 @@ export function allAsked(): readonly Asked[] {
   return [...log.values()].map(({ asked }) => asked);
 }
 
-/** Those that were answered. */
+/** Addresses of the files that the host has answered. */
 export function allCome(): readonly Asked[] {
   return [...log.values()].filter(({ hasCome }) => hasCome).map(({ asked }) => asked);
 }

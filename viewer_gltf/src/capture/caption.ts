@@ -22,7 +22,7 @@ export type Caption = Readonly<{
   labels: readonly Rect[];
 }>;
 
-/** Of the scale bar and the names, of what lies round them so that they show on anything, of other words. */
+/** Colours of a caption: `ink` for the scale bar and names, `halo` for their outline, `faint` for other words. */
 const DARK_INKS = { ink: "#fff", halo: "#000", faint: "#cfd6e4" } as const;
 const LIGHT_INKS = { ink: "#1a1f29", halo: "#fff", faint: "#3d4656" } as const;
 type Inks = Readonly<Record<keyof typeof DARK_INKS, string>>;

@@ -42,7 +42,7 @@ export function coverageOf(
   return { tiles: tiles.filter((tile) => !missing.has(tile)).length };
 }
 
-/** What a page announces of it. */
+/** The sentence that the page announces about a coverage. */
 export function coverageText({ tiles }: Coverage, of: number): string {
   if (tiles === of)
     return "Ready offline: every place opens without a network, as you have seen it.";

@@ -3,8 +3,8 @@
 uniform sampler2D uTracedLight;  // one texel: light and coverage of the traced pixels
 uniform sampler2D uMarchedLight;  // ... and of the marched ones
 
-// Largest factor to a part of the colour, in factors to the luminance. A part that the march has hardly any
-// of is added instead: a white shine on a green surface.
+// Largest factor of one colour part, relative to that of the luminance. Where the march has hardly any of
+// a part, the missing light is added and not multiplied, such as a white shine on a green surface.
 const float MAX_TINT = 4.0;
 
 float brightnessOf(vec3 c) {
