@@ -1,4 +1,4 @@
-// Starts the viewer from files that its document has or is given: no address leads anywhere from here.
+// Starts the viewer from files that its document holds or receives. This document can fetch nothing by address.
 // Each file of the page becomes an address of its own (blob:). Requests for the bundle's files are answered by
 // `read(path, range, signal)`, which resolves to the status of HTTP and the bytes.
 
@@ -51,7 +51,7 @@ async function addressesOf(files) {
     });
     addressFor(name, text);
   };
-  // the code calls itself by the name of what hands its exports on (scripts/finish_build.ts)
+  // The entry file and the main file import each other, so both addresses are made together (scripts/finish_build.ts).
   const own = [...texts.keys()].filter((name) => /^(index|viewer)-/.test(name));
   for (const name of texts.keys()) place(name, own.includes(name) ? own : [name]);
   return addresses;

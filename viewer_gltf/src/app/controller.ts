@@ -168,12 +168,12 @@ export class Controller {
     keyChanges: rememberedKeys(),
   };
   private stereo: XrSupport = { isAvailable: false, reason: "" };
-  /** Once it was asked for, as is the next one. */
+  /** The list of keys, and below it the card measure: null until each is first opened. */
   private help: Help | null = null;
   private card: CardMeasure | null = null;
   /** The card beside a tapped place, once something was tapped. */
   private tapped: TapPart | null = null;
-  /** Counts the taps and double taps: the code may come after the second one. */
+  /** Number of taps so far. If another tap has come while the card's code loaded, the first one opens no card. */
   private taps = 0;
   /** Messages over the picture; null until the first one is due and their part of the page has loaded. */
   private message: ViewMessagePart | null = null;

@@ -30,7 +30,7 @@ export class OfflinePart {
   }
 
   /**
-   * For after the first picture. The page's root has `data-offline` then: "partly" once all that was shown and can be
+   * Starts after the first picture. From then on the page's root has `data-offline`: "partly" once all that was shown and can be
    * kept is kept, "ready" once that is every place, "refused" where the browser keeps nothing, as on a full disk.
    *
    * @param also addresses of files of the bundle that the page has not asked for
@@ -92,7 +92,7 @@ export class OfflinePart {
     const { length } = this.viewer.bundle.manifest.tiles;
     const isReady = coverage?.tiles === length;
     document.documentElement.dataset.offline = isReady ? "ready" : "partly";
-    // each tile more would be news: the first words and the last are enough
+    // The first state and "Ready" are announced; an announcement for each further tile would disturb.
     if (coverage !== null && (!this.hasSaid || (isReady && !this.isReady))) {
       this.say(coverageText(coverage, length));
       this.hasSaid = true;

@@ -178,8 +178,9 @@ export class Contents {
   }
 
   /**
-   * Outermost points of all that shows and is not cut away, um, world, as far as they are known; null: none are, or nothing better than was
-   * told before. A channel without a surface may show in all of the specimen.
+   * Returns the outermost points (um, world) of all that shows and is not cut away, as far as they are known.
+   * Returns null if none are known, or if nothing has improved since the last call. A channel without a surface may
+   * show in all of the specimen.
    */
   outline(state: ViewerState): readonly Vec3[] | null {
     if (this.isOutlined) return null;

@@ -22,7 +22,7 @@ export class ViewMessagePart {
     this.message = new ViewMessage(view);
   }
 
-  /** Follow the state, and what has come. */
+  /** Brings the message to the present state and to the files that have arrived. */
   update(): void {
     const { viewer } = this;
     const { state, contents } = viewer;

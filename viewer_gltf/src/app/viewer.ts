@@ -622,9 +622,9 @@ export class Viewer {
   }
 
   /**
-   * Files are awaited. A device without a network shows what it has, and mentions it if that is not all.
+   * Shows a notice while files are awaited. A device without a network gets it only if the picture is incomplete.
    *
-   * @param files so many; one more than before, or none any more
+   * @param files number of files that wait for another try; 0 takes the notice away
    */
   noteWaiting(files: number): void {
     const text = navigator.onLine ? WAITING : OFFLINE;
@@ -838,8 +838,8 @@ export class Viewer {
   }
 
   /**
-   * In stereo: measure, or choose the tile; of one that is alone nothing is left to choose. A gaze that rested there
-   * has chosen without being asked: undoing is for what a person sets.
+   * In stereo this measures, or chooses the tile; a specimen of a single tile has nothing to choose. A choice by a
+   * resting gaze is no step that *Undo* takes back, since nobody asked for it.
    */
   private choose(ray: Ray, tile: string | null, isByGaze: boolean): void {
     const { state } = this;

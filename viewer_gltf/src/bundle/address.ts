@@ -2,11 +2,11 @@ import { BundleError } from "./errors";
 
 /** A document without a web host (a notebook's frame, or a scene in one file) gives these to the page in it. */
 export type PageHost = Readonly<{
-  /** Stands for the page's address, which a notebook's frame has none of: the view is behind its `#`. */
+  /** Replaces the page's address in a notebook's frame, which has none. The view stands behind its `#`. */
   page?: string;
   /** The bundle's folder, which the document itself answers for; absent: the bundle lies beside `page`. */
   bundle?: string;
-  /** To the notebook's widget. */
+  /** The port to the notebook's widget. */
   port?: MessagePort;
 }>;
 

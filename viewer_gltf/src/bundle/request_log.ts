@@ -3,7 +3,7 @@
 /** `range`: the Range header. */
 export type Asked = Readonly<{ url: string; range: string | null }>;
 
-/** By address and range; true: the answer has come. */
+/** The requests by address and range, and whether each has been answered. */
 const log = new Map<string, Readonly<{ asked: Asked; hasCome: boolean }>>();
 
 export const keyOf = ({ url, range }: Asked) => `${url} ${range}`;

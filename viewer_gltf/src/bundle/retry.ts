@@ -6,7 +6,7 @@ export const PAUSES_MS: readonly number[] = [300, 1200, 4000];
 /** Longest wait for a network at each pause, ms, on a device that knows that it has none. */
 const OFFLINE_MS = 30_000;
 
-/** Hears how many jobs wait for another try, when one more begins to and when none does any more. */
+/** Called with the number of jobs that wait for another try: when one more begins to wait, and when none does. */
 export type WaitListener = (jobs: number) => void;
 
 let listener: WaitListener = () => undefined;

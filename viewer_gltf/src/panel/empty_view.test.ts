@@ -99,7 +99,7 @@ describe("an empty picture", () => {
     expect(explained(alone, bare)).toContain("lies in row 1, column 1.");
     const chosen = reduce({ ...start, mode: "tile" }, { type: "select", tile: TILE });
     expect(explained(chosen, bare)).toContain("lies in row 1, column 1.");
-    // as long as nobody knows, nothing is said
+    // No message appears as long as it is unknown whether the tile has a volume.
     expect(emptyViewOf(alone, { ...bare, hasVolume: () => null })).toBeNull();
   });
 

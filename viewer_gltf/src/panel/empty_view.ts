@@ -74,7 +74,7 @@ function cutAway(
     const points = outline(channel);
     return points !== null && isOutside(points, cut);
   };
-  // an outline is of all tiles, and so says nothing of a single one
+  // An outline covers all tiles, so it can't tell whether a single tile is empty.
   if (!isGone && !(isolated === null && shown.every(hasNothing))) return null;
   const what = isolated === null ? "the specimen" : tileName(isolated);
   const remove: Action = { type: "set-clip", clip: WHOLE };

@@ -51,7 +51,7 @@ describe("the explanations", () => {
   });
 
   it("are there for each setting whose name can't say it all", () => {
-    // what these do, anyone sees: of another the table has to say it
+    // The effect of these settings is plain from their names; all others need an entry in the table.
     const plain =
       /^(color|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|sharpness|lamp|post).*|lamp-.*)$/;
     const silent = [...PARAMETERS, ...CHANNEL].filter(
@@ -77,7 +77,7 @@ describe("the explanations", () => {
 });
 
 describe("the words of the panel", () => {
-  /** Terms of the code, and what HOUSE's glossary calls otherwise, as whole words. */
+  /** Terms of the code, and words that the panel replaces by the field's own, as whole words. */
   const PRIVATE =
     /\b(switch distance|brick|mip|LOD|march\w*|stand-in|wish|rung|ladder|quad|texel|anew|once more|by turns|spoilt)\b/i;
 

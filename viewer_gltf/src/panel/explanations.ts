@@ -28,7 +28,7 @@ export const EXPLANATIONS: Readonly<Record<string, string>> = {
   letters: "Switched off, only ?, the arrows, Escape and keys with Ctrl work.",
 };
 
-/** What one will see of each choice, by the last part of the control's ID and the choice. */
+/** Explanations of each choice, by the last part of the control's ID and the choice. */
 export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>> = {
   mode: {
     disc: "Surfaces from afar. From near, a round window in the middle shows the volume.",
@@ -76,7 +76,7 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
   },
 };
 
-/** A choice that the table does not have was named by whoever made the bundle. */
+/** Explains a choice that the table lacks: the bundle's author has named it. */
 const OF_THE_BUNDLE = "A transfer function that came with this bundle.";
 
 const lastPart = (id: string) => id.slice(id.lastIndexOf("/") + 1);
@@ -85,7 +85,7 @@ export function explanationOf(id: string): string {
   return EXPLANATIONS[lastPart(id)] ?? "";
 }
 
-/** What one will see of a choice; "": nothing needs to be said. */
+/** Returns the explanation of a choice; "" if it needs none. */
 export function explanationOfChoice(id: string, value: string): string {
   const part = lastPart(id);
   return CHOICES[part]?.[value] ?? (part === "transfer-function" ? OF_THE_BUNDLE : "");

@@ -39,7 +39,7 @@ export class DenoiseAndTone {
   readonly picture = byteTarget();
   /** Pixels of the picture to one of the frame buffer. */
   scale = 1;
-  /** The same of the mean. */
+  /** Pixels of the mean light to one of the frame buffer. */
   private meanScale = 1;
   private readonly mean = floatTarget(2, HalfFloatType);
   private readonly spares = [floatTarget(1, HalfFloatType), floatTarget(1, HalfFloatType)];

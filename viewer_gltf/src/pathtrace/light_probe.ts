@@ -36,7 +36,7 @@ export class LightProbe {
     uOcclusion: { value: 0 },
   });
 
-  /** The light is another: what was found is worth nothing. */
+  /** Drops what was measured, because the light has changed. */
   forget(): void {
     this.measured = 0;
   }

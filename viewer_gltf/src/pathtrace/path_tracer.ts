@@ -134,7 +134,7 @@ export class Tracer {
     return this.texels !== null;
   }
 
-  /** What paths gather is another: its medium, its light. */
+  /** Drops the samples, because the medium or the light has changed. */
   restart(): void {
     this.probe.forget();
     this.begin();

@@ -36,7 +36,7 @@ export type TraceScene = Readonly<{
   bounds: Bounds;
 }>;
 
-/** What a picture can't be gathered on without: another one begins anew. */
+/** Settings that the gathered samples depend on: a change of one of them drops the samples. */
 export function keyOf(
   { width_px, height_px }: Eyes,
   scene: TraceScene,
@@ -46,7 +46,7 @@ export function keyOf(
   return `${width_px} ${height_px} ${scale} ${isDraft} ${matterOf(scene)}`;
 }
 
-/** What there is besides the medium: opaque things, and cuts. */
+/** The parts of the scene besides the medium: opaque things and cuts. */
 export function matterOf({ solids, clip }: TraceScene): string {
   return `${solids} ${JSON.stringify(clip)}`;
 }

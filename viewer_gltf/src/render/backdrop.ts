@@ -21,10 +21,10 @@ import { FAR, type Theme } from "./theme";
 
 /** Share of a room's height by which the ground lies under the specimen: it stands on its shadow. */
 const GAP = 0.02;
-/** Before all else that is drawn. */
+/** The backdrop is drawn before everything else. */
 const RENDER_ORDER = -2;
 
-/** sRGB: high up, and beside the specimen; share of the light that its shadow takes. */
+/** Colours (sRGB) high up and beside the specimen, and the share of the light that the shadow takes. */
 const LOOKS = {
   dark: [0x171c26, 0x1f2632, 0.7],
   light: [0xfafbfd, 0xffffff, 0.3],

@@ -82,7 +82,7 @@ export class Room {
     aim(this.fill, eye, FILL_AT);
   }
 
-  /** um, world; null: of no tile. */
+  /** Returns a tile's bounds (um, world), or null if there is no such tile. */
   boundsOf(tile: string | null): Bounds | null {
     return this.manifest.tiles.find(({ id }) => id === tile)?.bounds_um ?? null;
   }

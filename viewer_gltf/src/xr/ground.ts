@@ -11,7 +11,7 @@ const STEP_M = 0.75;
 const REACH_M = 9;
 const COLOR = new Color(0x5a6f96);
 const OPACITY = 0.55;
-/** Before all else that is drawn, which covers it. */
+/** The ground is drawn before everything else, which then covers it. */
 const RENDER_ORDER = -1;
 
 export class Ground {

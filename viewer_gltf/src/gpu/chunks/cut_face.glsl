@@ -1,6 +1,6 @@
-// Unit normal of the face by which a ray comes into what is drawn: of the box round all tiles, or of a cut;
-// 0: it begins within. Matter that is cut through is lit as a face: along it the gradient of the matter has no
-// side that faces the eye, so that light by it would be a matter of chance.
+// Unit normal of the face through which a ray enters the drawn part: a face of the box round all tiles, or of a
+// cut. It is 0 if the ray begins inside. Matter that is cut through is lit by this normal, because the gradient
+// of the matter has an arbitrary direction there.
 vec3 cutFace(vec3 start) {
   float near = 0.05 * uVoxel;
   if (abs(dot(uClipPlane.xyz, start) - uClipPlane.w) < near) return uClipPlane.xyz;

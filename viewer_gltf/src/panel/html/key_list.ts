@@ -39,7 +39,7 @@ export function sought<T extends Readonly<{ text: string }>>(rows: readonly T[],
 
 const HOW = "Press a key of this list to change it.";
 const WAITING = "press …";
-/** Keys that are held for another one. */
+/** Keys that do nothing alone; they are held while another key is pressed. */
 const HELD = ["Shift", "Control", "Alt", "AltGraph", "Meta", "CapsLock", "Dead", "Process"];
 
 /** One key of the list, by its name in the tables. */

@@ -8,7 +8,7 @@ import type { Progress } from "../../surfaces/overview_progress";
 
 /** Time for which an announcement stays, ms; a screen reader reads it at once. */
 const SAID_MS = 4000;
-/** The same with a button, which a person has to find first. */
+/** Time for which an announcement with a button stays, ms: a person has to find the button first. */
 const OFFERED_MS = 8000;
 
 /** A thin bar at the top with its count in words; hidden once complete. */

@@ -155,7 +155,7 @@ function makeSegments(first: Choice, send: Send): Widget<Choice> {
   };
 }
 
-/** Segments say what they are of where an explanation belongs to that. */
+/** Puts the label of a row of segments before it, where the label has an explanation. */
 function named(first: Choice, segments: HTMLElement): HTMLElement {
   const explainer = explainerOf(first);
   if (explainer === null) return segments;

@@ -1,5 +1,5 @@
-// How much light a small traced picture has, and the marched picture of the same view: sums over all pixels,
-// for one texel. Earlier sums count less and less.
+// Sums the light of a small traced picture, and of the marched picture of the same view, over all pixels,
+// into one texel. Earlier sums count less and less.
 precision highp float;
 
 uniform sampler2D uSums;  // as path_trace.frag.glsl writes them, of one sample
