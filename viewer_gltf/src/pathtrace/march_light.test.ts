@@ -2,6 +2,7 @@ import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import { GLOSS } from "../gpu/room_light";
 import { START_TRACE } from "../state/path_trace_settings";
+import { marchLight } from "../volumes/tile_raymarch";
 import { environmentTables } from "./environment_sampling";
 import { hemispheresOf, lightMarch } from "./march_light";
 
@@ -12,16 +13,6 @@ const roomOf = (height: number, ...rows: readonly number[]) =>
       rgb: Float32Array.from(rows.flatMap((v) => [v, v / 2, 0, v, v / 2, 0])),
     }),
   );
-
-const lightOf = () => ({
-  uLight: { value: new Vector3() },
-  uFill: { value: new Vector3() },
-  uKeyLight: { value: new Vector3() },
-  uFillLight: { value: new Vector3() },
-  uSkyLight: { value: new Vector3() },
-  uGroundLight: { value: new Vector3() },
-  uGloss: { value: 0 },
-});
 
 describe("the light of the march that stands in for paths of light", () => {
   it("has the room's mean radiance above and below", () => {
@@ -43,7 +34,7 @@ describe("the light of the march that stands in for paths of light", () => {
       { ...lamp, isOn: true, x: 0, y: 0, z: -3, strength: 4, color: [1, 0, 0] as const },
       { ...lamp, isOn: false, x: 1, y: 0, z: 0, strength: 9 },
     ];
-    const light = lightOf();
+    const light = marchLight();
     const settings = { ...START_TRACE, lamps, environmentLight: 2 };
     const toEye = new Matrix4().makeRotationY(Math.PI / 2); // -z of the specimen becomes -x of the eye
     lightMarch(light, settings, roomOf(2, 3, 1), toEye);
@@ -56,7 +47,7 @@ describe("the light of the march that stands in for paths of light", () => {
   });
 
   it("is dark where no lamp is on", () => {
-    const light = lightOf();
+    const light = marchLight();
     const lamps = START_TRACE.lamps.map((lamp) => ({ ...lamp, isOn: false }));
     lightMarch(light, { ...START_TRACE, lamps }, roomOf(2, 1, 1), new Matrix4());
     expect(light.uKeyLight.value.length() + light.uFillLight.value.length()).toBe(0);

@@ -63,7 +63,8 @@ const STEP_VOXELS = 1;
 /** The light on all tiles: see gpu/chunks/shade.glsl. The directions are in the axes of the eye. */
 export type MarchLight = ReturnType<typeof marchLight>;
 
-function marchLight() {
+/** Uniforms of a light that is still dark. */
+export function marchLight() {
   return {
     uLight: { value: new Vector3() },
     uFill: { value: new Vector3() },

@@ -9,6 +9,7 @@ import { LIGHT_NUMBERS } from "../../src/state/parameters/light";
 import { ENOUGH_SAMPLES } from "../../src/state/path_trace_settings";
 import { project } from "../support/browser/camera";
 import { addHeadset } from "../support/browser/chromium";
+import { changeContext, rememberContext } from "../support/browser/graphics_context";
 import {
   hasColor,
   isBackground,
@@ -280,14 +281,7 @@ describeInChromium("the path-traced page", () => {
   });
 
   it("is lit by a file of the user's, and survives a lost context", async () => {
-    await page().addInitScript(() => {
-      const original = HTMLCanvasElement.prototype.getContext;
-      HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, ...given) {
-        const made = (original as (...each: unknown[]) => unknown).apply(this, given);
-        if (made instanceof WebGL2RenderingContext) Object.assign(window, { drawnBy: made });
-        return made as never;
-      };
-    });
+    await rememberContext(page());
     let chosen: FilePayload = { name: "", mimeType: "", buffer: Buffer.alloc(0) };
     page().on("filechooser", (chooser) => chooser.setFiles(chosen));
     await open();
@@ -310,18 +304,9 @@ describeInChromium("the path-traced page", () => {
       picture.count((pixel) => Math.max(...pixel) > 60 && !isGreen(pixel));
     expect(others(green)).toBeLessThan(0.03 * drawn(green));
 
-    const call = (name: "loseContext" | "restoreContext") =>
-      page().evaluate((each) => {
-        const held = window as unknown as {
-          drawnBy: WebGL2RenderingContext;
-          loss?: WEBGL_lose_context | null;
-        };
-        held.loss ??= held.drawnBy.getExtension("WEBGL_lose_context");
-        held.loss?.[each]();
-      }, name);
-    await call("loseContext");
+    await changeContext(page(), "loseContext");
     await expect.poll(notices).toEqual([expect.stringContaining("dropped the picture")]);
-    await call("restoreContext");
+    await changeContext(page(), "restoreContext");
     await expect.poll(notices).toEqual([]);
     await stand.viewer.settled();
     const back = await shoot();

@@ -1,5 +1,6 @@
 /** What the graphics driver does to the page: it drops the picture, or draws smaller textures. */
 import { expect, it } from "vitest";
+import { changeContext, rememberContext } from "../support/browser/graphics_context";
 import { difference, type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -24,25 +25,9 @@ describeInChromium("the graphics driver", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 270 } });
   const notices = async () => (await stand.viewer.snapshot()).state.notices;
 
-  /** The page's graphics context can be taken away and given back from then on. */
-  const prepareLoss = () =>
-    stand.viewer.page.addInitScript(() => {
-      const original = HTMLCanvasElement.prototype.getContext;
-      HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, ...given) {
-        const made = (original as (...each: unknown[]) => unknown).apply(this, given);
-        if (made instanceof WebGL2RenderingContext) Object.assign(window, { drawnBy: made });
-        return made as never;
-      };
-    });
-  const call = (name: "loseContext" | "restoreContext") =>
-    stand.viewer.page.evaluate((each) => {
-      const held = window as unknown as {
-        drawnBy: WebGL2RenderingContext;
-        loss?: WEBGL_lose_context | null;
-      };
-      held.loss ??= held.drawnBy.getExtension("WEBGL_lose_context");
-      held.loss?.[each]();
-    }, name);
+  const prepareLoss = () => rememberContext(stand.viewer.page);
+  const call = (change: "loseContext" | "restoreContext") =>
+    changeContext(stand.viewer.page, change);
   const loseAndRestore = async () => {
     await call("loseContext");
     await expect.poll(notices).toEqual([expect.stringContaining("dropped the picture")]);
