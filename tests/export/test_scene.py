@@ -138,6 +138,16 @@ def test_the_coarsest_levels_are_those_of_the_bundle(bundle: Path, tmp_path: Pat
     assert not {name for name in left if name.endswith("lod0.glb")}
 
 
+def test_a_command_that_is_given_a_scene_names_it_and_the_way_to_go(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_scene(bundle, tmp_path / "a.html")
+    assert main(["check", str(tmp_path / "a.html")]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "a scene in one file" in line
+    assert "name the OUT that it was made from" in line
+
+
 def test_the_same_bundle_makes_the_same_bytes(bundle: Path, tmp_path: Path) -> None:
     for name in ("a", "b"):
         write_scene(bundle, tmp_path / f"{name}.html", max_mb=0.3)

@@ -14,7 +14,7 @@ from stereocell.storage.assets import viewer_dist
 
 _START = Path(__file__).with_name("blob_page.js")
 _TAKEN = {".js", ".css", ".wasm"}
-# a worker from blob: has the page's policy, and that of textures makes functions of text
+# A worker from blob: inherits the page's policy, and the one that decodes textures calls eval.
 _POLICY = (
     "default-src 'none'; script-src blob: 'unsafe-eval' 'sha256-{boot}'; style-src blob:; "
     "img-src data: blob:; connect-src data: blob:; worker-src blob:; base-uri 'none'; "
@@ -24,10 +24,10 @@ _DOCUMENT = """<!doctype html>
 <html lang="en">
   <head>
     <meta charset="utf-8" />
+    <title>StereoCell</title>
     <meta http-equiv="Content-Security-Policy" content="{policy}" />
     <meta name="viewport" content="width=device-width, initial-scale=1, viewport-fit=cover" />
     <meta name="color-scheme" content="dark light" />
-    <title>StereoCell</title>
     <link rel="icon" href="data:," />
   </head>
   <body>

@@ -68,6 +68,10 @@ _PATTERNS = (
     (rb"PK\x03\x04.{26}\[Content_Types\]", "a document of Microsoft Office"),
     (rb"PK\x03\x04.{26}[^\x00]{1,80}\.npy", f"a NumPy archive of arrays ({_TO_TIFF}, one by one)"),
     (rb"PK\x03\x04", _ZIP),
+    (
+        rb"<!doctype html>.{0,100}<title>StereoCell</title>",  # as bundle/blob_page.py begins it
+        "a scene in one file, written by `stereocell export` (name the OUT that it was made from)",
+    ),
 )
 _COMPILED = tuple((re.compile(mark, re.DOTALL), words) for mark, words in _PATTERNS)
 _JSON = re.compile(rb"\{\s*[\"}]|\[\s*([\"{\[\d\]-]|true|false|null)")
