@@ -56,7 +56,7 @@ function allHidden(shown: readonly ChannelState[], { opening }: Content): EmptyV
 function transparent(shown: readonly ChannelState[]): EmptyView | null {
   if (shown.some(({ opacity }) => opacity > 0)) return null;
   const opaque = shown.map(({ id }) => setTo(OPACITY, 1, id));
-  const text = "The channels that are shown have an opacity of 0 %, which nobody can see.";
+  const text = "All channels that are shown have an opacity of 0 %.";
   return { text, offer: offerOf("Set them to 100 %", ...opaque) };
 }
 

@@ -10,22 +10,22 @@ export const EXPLANATIONS: Readonly<Record<string, string>> = {
     "From nearer than this, the focus disc or the tile shows the volume. From farther away it shows surfaces.",
   "disc-radius":
     "Half of the angle that the round window in the middle of the view takes. Volumes show inside it. It ends where a fifth tile would begin.",
-  compositing: "What one sees of things that lie behind one another.",
+  compositing: "How things that lie behind one another appear.",
   "depth-shading":
     "Enclosed places are darker, and things that lie before others throw shadows on them.",
-  volume: "Switched off, the channel stays a surface in every mode.",
+  volume: "A channel whose volume is off stays a surface in every mode.",
   "transfer-function": "Which values of the volume are visible, and how dense they look.",
   opacity: "How dense the channel looks, as a surface and as a volume.",
   window: "The values that are darkest and brightest. A narrower window has more contrast.",
-  tool: "What a click, a tap or a resting gaze does on the specimen.",
-  "measure-kind": "What the next measurement will be.",
+  tool: "The effect of a click, a tap or a resting gaze on the specimen.",
+  "measure-kind": "The kind of the next measurement.",
   quality: "How finely volumes are drawn while the view moves.",
   dwell: "In stereo, looking at something for 1.5 s is the same as pressing a button.",
   "eye-distance":
     "The distance between your pupils, for the split screen. A headset knows its own.",
   "stereo-strength": "100 % is as your eyes see it. At 0 % both eyes see the same.",
   "specimen-size": "The length of the specimen's longest edge in stereo.",
-  letters: "Switched off, only ?, the arrows, Escape and keys with Ctrl work.",
+  letters: "If this is off, only ?, the arrows, Escape and keys with Ctrl work.",
 };
 
 /** Explanations of each choice, by the last part of the control's ID and the choice. */
@@ -39,7 +39,7 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
     off: "Surfaces alone, which draw fastest.",
   },
   compositing: {
-    over: "What lies in front veils what lies behind.",
+    over: "Things in front veil the things behind them.",
     maximum: "Only the brightest place behind each point shows, as in a maximum projection.",
     sum: "The light of all places adds up, as in an X-ray, and nothing veils.",
   },

@@ -28,7 +28,7 @@ export type ScreenStereo = (typeof SCREEN_STEREO_KINDS)[number];
 export const START_TOOLS = {
   /** The effect of a tap or a dwell on the specimen. */
   tool: "select" as Tool,
-  /** What the next measurement will be. */
+  /** The kind of the next measurement. */
   measureKind: "distance" as MeasureKind,
   /** Whether looking at something for long is as good as pressing the button. */
   isDwellOn: true,

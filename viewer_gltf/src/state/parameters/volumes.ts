@@ -37,7 +37,7 @@ type Volumes = VolumeSettings &
   Readonly<{ canTrace: boolean; tiles: readonly Readonly<{ representation: string }>[] }>;
 
 const NO_FLOATS =
-  "This device can't gather light: its graphics can't draw into textures of floats.";
+  "This device can't do path tracing: its graphics can't draw into floating-point textures.";
 /** One step of a distance, as a factor: near and far feel alike. */
 const DISTANCE_FACTOR = 1.1;
 
