@@ -87,10 +87,12 @@ export type Mark = Readonly<{
   newest: object | null;
 }>;
 
-/** While the graphics driver has its time to give the picture back. */
-export const DROPPED = "The graphics driver has dropped the picture: it is drawn again.";
-const WAITING = "The host does not answer: trying again. What has come stays on screen.";
-const OFFLINE = "This device is offline: what it has not shown before comes once it is online.";
+/** Notice that stands while the graphics driver may still give the picture back. */
+export const DROPPED = "The graphics driver has dropped the picture. The page draws it again.";
+const WAITING =
+  "The host does not answer. The page tries again, and what has loaded stays on screen.";
+const OFFLINE =
+  "This device is offline. Parts that it has not shown before appear once it is online.";
 /** A fault of a file that makes surfaces or volumes finer, where coarse ones show. */
 const FINER = /^(channels|volumes)\/\S+\.(glb|ktx2):/;
 
@@ -115,7 +117,7 @@ export class Viewer {
   onTap: (ray: Ray) => void = () => undefined;
   /** Someone has tapped the flat picture with the tool *Select* (ray in um), or pressed the key for it. */
   onSelect: (ray: Ray, isByKey: boolean) => void = () => undefined;
-  /** Two quick taps are one request, to fly there: the first was no selection. */
+  /** A second quick tap asks to fly there, so the first one was no selection. */
   onDouble: () => void = () => undefined;
   readonly contents: Contents;
   private readonly room: Room;
@@ -628,7 +630,7 @@ export class Viewer {
    */
   noteWaiting(files: number): void {
     const text = navigator.onLine ? WAITING : OFFLINE;
-    // a file that has not come, though it was awaited long enough, is reported until it does
+    // A file that was awaited in vain keeps its notice until it arrives.
     const passing = [WAITING, OFFLINE].filter((each) => !this.state.mendable.includes(each));
     if (files === 0) this.dispatch({ type: "dismiss", texts: passing });
     else if (this.state.notices.includes(text)) return;
