@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.steps.find_window import JOINT_VOXELS, SURVEY_VOXELS, measure_window
+from stereocell.building.steps.gather_evidence import measure_evidence
 from stereocell.building.survey_tasks import evidence_task, statistics_task
-from stereocell.building.tasks.evidence import measure_evidence
-from stereocell.building.tasks.window import JOINT_VOXELS, SURVEY_VOXELS, measure_window
 from stereocell.model.tiling import Box, cut
 from stereocell.transfer.joint_histogram import sample_boxes
 from support.phantoms import write_ome_zarr

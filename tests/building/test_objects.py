@@ -17,7 +17,7 @@ from stereocell.building import object_passes
 from stereocell.building.located_objects import CUT
 from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.tasks import objects as objects_maker
+from stereocell.building.steps import build_objects as objects_maker
 from stereocell.building.unit_files import load_objects
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.tasks import evidence
-from stereocell.building.tasks.evidence import evidence_from_json
+from stereocell.building.steps import gather_evidence as evidence
+from stereocell.building.steps.gather_evidence import evidence_from_json
 from stereocell.building.unit_files import load_lods
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.level_evidence import TileEvidence

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.steps import find_window as window_module
+from stereocell.building.steps.find_window import Window, measure_window
 from stereocell.building.survey_tasks import statistics_task
-from stereocell.building.tasks import window as window_module
-from stereocell.building.tasks.window import Window, measure_window
 from stereocell.cli.__main__ import main
 from stereocell.filters.background import find_background
 from stereocell.filters.min_max_bricks import mip_levels

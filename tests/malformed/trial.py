@@ -61,8 +61,13 @@ class Outcome:
 def import_all() -> None:
     """Import the package, so that forks need not."""
     import_package("stereocell")
-    from stereocell.building import stage_tasks
-    from stereocell.building.tasks import components, evidence, extents, objects, unit, window
+    from stereocell.building.steps import build_objects as objects
+    from stereocell.building.steps import build_unit as unit
+    from stereocell.building.steps import find_extents as extents
+    from stereocell.building.steps import find_window as window
+    from stereocell.building.steps import gather_evidence as evidence
+    from stereocell.building.steps import sum_components as components
+    from stereocell.building.steps import write_stage_tile as stage_tasks
     from stereocell.storage import cache_key
 
     for maker in (

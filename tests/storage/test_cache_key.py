@@ -13,8 +13,10 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from stereocell.building import stage_tasks
-from stereocell.building.tasks import evidence, unit, window
+from stereocell.building.steps import build_unit as unit
+from stereocell.building.steps import find_window as window
+from stereocell.building.steps import gather_evidence as evidence
+from stereocell.building.steps import write_stage_tile as stage_tasks
 from stereocell.bundle import write as bundle_writer
 from stereocell.read.readers import OTHER, READERS
 from stereocell.report import page
@@ -119,7 +121,7 @@ PACKAGE = "pipeline/stereocell"
         ("read/nifti.py", set()),
         ("formats/exr.py", {"stage", "bundle"}),
         ("formats/gltf.py", {"bundle"}),
-        ("building/stage_tasks.py", {"stage"}),
+        ("building/steps/write_stage_tile.py", {"stage"}),
         ("report/charts.py", {"report"}),
     ],
 )

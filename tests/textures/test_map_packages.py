@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stereocell.building import stage_tasks
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.tasks import unit
+from stereocell.building.steps import build_unit as unit
+from stereocell.building.steps import write_stage_tile as stage_tasks
 from stereocell.bundle import write as bundle_writer
 from stereocell.cli.__main__ import main
 from stereocell.report import page

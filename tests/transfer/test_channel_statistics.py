@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.tasks import window as window_task
+from stereocell.building.steps import find_window as window_task
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import OpacityPoints, SurfaceLevel
 from stereocell.model.lattice_field import LatticeField

@@ -36,6 +36,16 @@ from stereocell.building.source_tasks import (
     reader_module,
     run_on_input,
 )
+from stereocell.building.steps import find_window as window_maker
+from stereocell.building.steps import gather_evidence as evidence_maker
+from stereocell.building.steps import sum_components as components_maker
+from stereocell.building.steps.find_window import (
+    Window,
+    window_from_json,
+    write_window,
+)
+from stereocell.building.steps.gather_evidence import EvidenceFiles, EvidenceTask, write_evidence
+from stereocell.building.steps.sum_components import ComponentsTask, write_components
 from stereocell.building.survey_file import (
     AGAIN,
     COMPONENTS,
@@ -48,16 +58,6 @@ from stereocell.building.survey_file import (
     save_survey,
 )
 from stereocell.building.survey_tasks import evidence_task, statistics_task
-from stereocell.building.tasks import components as components_maker
-from stereocell.building.tasks import evidence as evidence_maker
-from stereocell.building.tasks import window as window_maker
-from stereocell.building.tasks.components import ComponentsTask, write_components
-from stereocell.building.tasks.evidence import EvidenceFiles, EvidenceTask, write_evidence
-from stereocell.building.tasks.window import (
-    Window,
-    window_from_json,
-    write_window,
-)
 from stereocell.engine.run import Engine, console
 from stereocell.filters.denoise import median_size
 from stereocell.isosurface.level import Level

@@ -21,9 +21,9 @@ from stereocell.building.level_notes import note_before_reading, note_on_found
 from stereocell.building.open_source import open_source
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
+from stereocell.building.steps.find_window import Window
+from stereocell.building.steps.gather_evidence import evidence_of
 from stereocell.building.survey_tasks import evidence_task, statistics_task
-from stereocell.building.tasks.evidence import evidence_of
-from stereocell.building.tasks.window import Window
 from stereocell.filters.background import find_background
 from stereocell.isosurface.level_evidence import (
     MAX_PADDING,

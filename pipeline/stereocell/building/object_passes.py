@@ -24,16 +24,16 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.source_tasks import box_to_json, run_on_input
-from stereocell.building.survey_file import Survey
-from stereocell.building.tasks import extents as extents_maker
-from stereocell.building.tasks import objects as objects_maker
-from stereocell.building.tasks.extents import (
+from stereocell.building.steps import build_objects as objects_maker
+from stereocell.building.steps import find_extents as extents_maker
+from stereocell.building.steps.build_objects import ImageRef, ObjectsTask, Painted
+from stereocell.building.steps.find_extents import (
     ExtentsTask,
     extents_from_json,
     find_in_tile,
     write_extents,
 )
-from stereocell.building.tasks.objects import ImageRef, ObjectsTask, Painted
+from stereocell.building.survey_file import Survey
 from stereocell.engine.run import Engine, console
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted

@@ -24,10 +24,10 @@ from stereocell.building.source_tasks import (
     reader_module,
     run_on_input,
 )
+from stereocell.building.steps import build_unit as unit_maker
+from stereocell.building.steps.build_objects import ObjectsTask, run_objects
+from stereocell.building.steps.build_unit import UnitTask, run_unit
 from stereocell.building.survey_file import Survey
-from stereocell.building.tasks import unit as unit_maker
-from stereocell.building.tasks.objects import ObjectsTask, run_objects
-from stereocell.building.tasks.unit import UnitTask, run_unit
 from stereocell.building.unit import UnitInput
 from stereocell.building.unit_files import is_whole
 from stereocell.engine.run import Engine

@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from stereocell.building import stage_tasks
 from stereocell.building.channel_colors import choose_colors, lies_at_bone
 from stereocell.building.channels import PALETTE, Channel, with_surfaces
 from stereocell.building.hounsfield import believe, settle_modality
@@ -46,10 +45,14 @@ from stereocell.building.plan_notes import (
     words_of_spacing,
 )
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
-from stereocell.building.stage_tasks import digest_of_table, run_tile, tile_task
+from stereocell.building.steps import build_unit as unit
+from stereocell.building.steps import find_window as window
+from stereocell.building.steps import gather_evidence as evidence
+from stereocell.building.steps import sum_components as components
+from stereocell.building.steps import write_stage_tile as stage_tasks
+from stereocell.building.steps.write_stage_tile import digest_of_table, run_tile, tile_task
 from stereocell.building.surface_cover import notes_on_cover
 from stereocell.building.survey_file import appearance_to_json, read_survey
-from stereocell.building.tasks import components, evidence, unit, window
 from stereocell.building.unit_files import load_objects
 from stereocell.engine.run import Engine, console
 from stereocell.meshes.alpha_wrap import find_wrapper

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
+from stereocell.building.steps.find_window import window_from_json
+from stereocell.building.steps.gather_evidence import evidence_from_json
 from stereocell.building.survey_file import EVIDENCE, WINDOW, ChannelSurvey, read_survey
-from stereocell.building.tasks.evidence import evidence_from_json
-from stereocell.building.tasks.window import window_from_json
 from stereocell.building.unit_files import cover_of, load_record
 from stereocell.isosurface.lifted_by_noise import Lifted, count_lifted
 from stereocell.model.unit import MAX_MISSING, Cover

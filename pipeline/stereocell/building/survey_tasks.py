@@ -5,8 +5,8 @@ from stereocell.building.level_choice import given_level
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.source_tasks import around
-from stereocell.building.tasks.evidence import EvidenceTask
-from stereocell.building.tasks.window import StatisticsTask, Window
+from stereocell.building.steps.find_window import StatisticsTask, Window
+from stereocell.building.steps.gather_evidence import EvidenceTask
 from stereocell.isosurface.options import CRITERIA, LADDER
 from stereocell.model.tiling import Box
 from stereocell.transfer.windows import parse_window

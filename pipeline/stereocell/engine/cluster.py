@@ -17,11 +17,11 @@ from stereocell.storage.cache_key import key_of, libraries_of
 # tasks whose code must be equal on all workers, as that of the readers; by name, since this package
 # stands below them
 _TASKS = (
-    "stereocell.building.tasks.window",
-    "stereocell.building.tasks.evidence",
-    "stereocell.building.tasks.components",
-    "stereocell.building.tasks.unit",
-    "stereocell.building.stage_tasks",
+    "stereocell.building.steps.find_window",
+    "stereocell.building.steps.gather_evidence",
+    "stereocell.building.steps.sum_components",
+    "stereocell.building.steps.build_unit",
+    "stereocell.building.steps.write_stage_tile",
 )
 T = TypeVar("T")
 R = TypeVar("R")

@@ -29,9 +29,9 @@ from stereocell.building.plan import Plan
 from stereocell.building.plan_notes import print_notes
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
+from stereocell.building.steps.find_window import Window, measure_window
+from stereocell.building.steps.gather_evidence import measure_evidence
 from stereocell.building.survey_tasks import evidence_task, statistics_task
-from stereocell.building.tasks.evidence import measure_evidence
-from stereocell.building.tasks.window import Window, measure_window
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels
 from stereocell.isosurface.options import LADDER

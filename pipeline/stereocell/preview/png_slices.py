@@ -18,8 +18,8 @@ from stereocell.building.open_source import open_source
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
+from stereocell.building.steps.find_window import measure_statistics
 from stereocell.building.survey_tasks import statistics_task
-from stereocell.building.tasks.window import measure_statistics
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.errors import UsageError
 from stereocell.model.version import GENERATOR

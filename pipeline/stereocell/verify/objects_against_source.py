@@ -21,8 +21,8 @@ from stereocell.building.object_passes import images_of, read_notes
 from stereocell.building.object_tables import make_table, table_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.tasks.extents import ExtentsTask, find_in_tile
-from stereocell.building.tasks.objects import ImageRef, read_on_labels
+from stereocell.building.steps.build_objects import ImageRef, read_on_labels
+from stereocell.building.steps.find_extents import ExtentsTask, find_in_tile
 from stereocell.building.unit_files import load_objects
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.building.open_source import open_source
-from stereocell.building.tasks.unit import UnitTask
+from stereocell.building.steps.build_unit import UnitTask
 from stereocell.building.unit import UnitInput, cut_voxels, find_measured, find_surface
 from stereocell.building.unit_files import cover_of, load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas
