@@ -23,9 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps.find_window import JOINT_VOXELS, SURVEY_VOXELS, measure_window
-from stereocell.building.steps.gather_evidence import measure_evidence
-from stereocell.building.survey_tasks import evidence_task, statistics_task
+from stereocell.building.steps.find_window import JOINT_VOXELS, SURVEY_VOXELS
+from stereocell.building.survey_steps import evidence_step, window_step
 from stereocell.model.tiling import Box, cut
 from stereocell.transfer.joint_histogram import sample_boxes
 from support.phantoms import write_ome_zarr
@@ -116,10 +115,10 @@ def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
         plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
         settled = OutFolder(out).plan()
         (channel,) = settled.channels
-        window = measure_window(statistics_task(settled, channel))
+        window = window_step(settled, channel).run()
         take(sent)
         for each in settled.tiles:
-            measure_evidence(evidence_task(settled, each.box, channel=channel, window=window))
+            evidence_step(settled, each.box, channel=channel, window=window).run()
         isos = take(sent)
     region, chunk = settled.region, chunk_of(source)
     voxel = stored(source, region) / math.prod(region.shape)
@@ -136,7 +135,7 @@ def measure_windows(folder: Path, source: Path) -> float:
         plan(f"{address}/{source.name}", out, (1, 1), REAL, "0")
         settled = OutFolder(out).plan()
         take(sent)
-        measure_window(statistics_task(settled, settled.channels[0]))
+        window_step(settled, settled.channels[0]).run()
         coarse = {Path(file) for file in sent if not file.startswith(f"{source / '0'}/")}
         read = take(sent)
     region = settled.region

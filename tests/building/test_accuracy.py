@@ -26,7 +26,7 @@ def _units(source: Path, out: Path, channel: str, **plan: object) -> tuple[OutFo
     phases.run_units(out, engine)
     out_folder = OutFolder(out)
     meshes = [
-        load_lods(out_folder.unit_dir(*unit.split("/"), key))[0].mesh
+        load_lods(out_folder.unit_dir(unit, key))[0].mesh
         for unit, key in out_folder.index().items()
         if unit.endswith(f"/{channel}")
     ]

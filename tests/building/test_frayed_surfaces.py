@@ -66,7 +66,7 @@ def test_its_tiles_make_one_sound_surface_of_no_more_triangles_than_that(
     index = folder.index()
     meshes: list[Mesh] = []
     for tile in folder.plan().tiles:
-        unit = folder.unit_dir(tile.id, channel, index[f"{tile.id}/{channel}"])
+        unit = folder.unit_dir(f"{tile.id}/{channel}", index[f"{tile.id}/{channel}"])
         meshes.append(load_lods(unit)[0].mesh)
     assert len(meshes) == 2
     for mesh in meshes:

@@ -45,7 +45,7 @@ def _voxels(out: Path) -> tuple[NDArray[np.uint8], NDArray[np.int16]]:
     folder = OutFolder(out)
     (name, key), *_ = folder.index().items()
     tile, channel = name.split("/")
-    unit = folder.unit_dir(tile, channel, key)
+    unit = folder.unit_dir(f"{tile}/{channel}", key)
     measured = load_measured(unit)
     assert measured is not None
     inner = slice(APRON, -APRON)

@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +13,14 @@ import tifffile
 import zarr
 from numpy.typing import NDArray
 
-from stereocell.building import input_files, object_passes, passes, source_tasks
+from stereocell.building import input_files, run_on_input
 from stereocell.building import tissue as tissue_module
 from stereocell.building.open_source import SourceRef, open_afresh
+from stereocell.building.steps.build_objects import BuildObjects
+from stereocell.building.steps.build_unit import BuildUnit
+from stereocell.building.steps.find_extents import FindExtents
 from stereocell.cli.__main__ import main
+from stereocell.objects.extents import Extents
 from stereocell.read import fingerprint
 from stereocell.read import tables as tables_module
 from stereocell.storage import file_states
@@ -58,14 +63,20 @@ SOURCES = {"TIFF": write_tiff, "OME-Zarr": write_zarr, "planes": write_planes}
 
 def after_the_first_unit(monkeypatch: pytest.MonkeyPatch, change: Callable[[], object]) -> None:
     """Call `change` once, between the first unit and the second."""
-    build, left = passes._run, [change]
+    left = [change]
+    for step in (BuildUnit, BuildObjects):
+        monkeypatch.setattr(step, "keep", _then(step.keep, left))
 
-    def run(task: object) -> None:
-        build(task)  # type: ignore[arg-type]
+
+def _then(
+    keep: Callable[[Any, Path], None], left: list[Callable[[], object]]
+) -> Callable[[Any, Path], None]:
+    def keep_and_change(step: Any, place: Path) -> None:
+        keep(step, place)
         if left:
             left.pop()()
 
-    monkeypatch.setattr(passes, "_run", run)
+    return keep_and_change
 
 
 def units_of(out: Path) -> dict[str, str]:
@@ -141,13 +152,14 @@ def test_a_change_while_objects_are_located_is_reported(
 ) -> None:
     source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
     assert main(["plan", str(source), "-o", str(out), "--labels", "."]) == 0
-    find = object_passes.write_extents
+    find = FindExtents.run
 
-    def write_extents(task: object) -> None:
-        find(task)  # type: ignore[arg-type]
+    def run(step: FindExtents) -> Extents:
+        found = find(step)
         write_tiff(tmp_path, (OTHER > 500).astype(np.uint16))
+        return found
 
-    monkeypatch.setattr(object_passes, "write_extents", write_extents)
+    monkeypatch.setattr(FindExtents, "run", run)
     assert main(["units", str(out), *INLINE]) == 1
     assert "changed while it was read" in last_line(capsys)
     assert not list(out.rglob("extents-*"))
@@ -234,7 +246,7 @@ def test_last_results_of_a_killed_command_are_made_again_if_the_input_was_writte
 
     with monkeypatch.context() as patch:  # a killed process cleans nothing up
         after_the_first_unit(patch, die)
-        patch.setattr(source_tasks, "_require_still", lambda *_, **__: None)
+        patch.setattr(run_on_input, "_require_still", lambda *_, **__: None)
         assert main(["units", str(out), *INLINE]) != 0
     assert len(list(out.rglob("unit.json"))) == 1
     assert (out / "running.json").is_file()

@@ -2,6 +2,7 @@
 
 import weakref
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,7 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps import gather_evidence as evidence
-from stereocell.building.steps.gather_evidence import evidence_from_json
+from stereocell.building.steps.gather_evidence import GatherEvidence, evidence_from_json
 from stereocell.building.unit_files import load_lods
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.level_evidence import TileEvidence
@@ -36,8 +36,7 @@ def _lods(out_folder: OutFolder) -> dict[str, tuple[Lod, ...]]:
     """Return what was built of each unit, by `<tile>/<channel>`."""
     built = {}
     for unit, key in out_folder.index().items():
-        tile, channel = unit.split("/")
-        built[unit] = load_lods(out_folder.unit_dir(tile, channel, key))
+        built[unit] = load_lods(out_folder.unit_dir(unit, key))
     return built
 
 
@@ -62,7 +61,7 @@ def test_command_holds_the_evidence_of_one_channel_at_a_time(
         held.append(sum(each() is not None for each in made))
         return found
 
-    monkeypatch.setattr(evidence, "evidence_from_json", count)
+    monkeypatch.setattr(GatherEvidence, "FORM", replace(GatherEvidence.FORM, from_json=count))
     _units(source, tmp_path / "out", "--tile-size", "16,32,32")
     assert len(held) >= 6 * 4
     assert max(held) <= 2 * 4

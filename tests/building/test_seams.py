@@ -98,7 +98,9 @@ def _build(folder: Path, scene: NDArray[np.uint16], settings: str) -> Built:
         assert main(["units", str(out), "--workers", "0"]) == 0
     out_folder = OutFolder(out)
     plan, index, survey = out_folder.plan(), out_folder.index(), out_folder.survey()["cells"]
-    folders = {t.id: out_folder.unit_dir(t.id, "cells", index[f"{t.id}/cells"]) for t in plan.tiles}
+    folders = {
+        t.id: out_folder.unit_dir(f"{t.id}/cells", index[f"{t.id}/cells"]) for t in plan.tiles
+    }
     records = {tile: load_record(unit) for tile, unit in folders.items()}
     return Built(
         plan,

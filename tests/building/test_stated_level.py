@@ -133,9 +133,9 @@ def test_scikit_image_finds_the_surface_where_the_stage_says(out: Path, channel:
     folder = OutFolder(out)
     ours = np.concatenate(
         [
-            load_lods(folder.unit_dir(*unit.split("/"), key))[0].mesh.positions
+            load_lods(folder.unit_dir(unit, key))[0].mesh.positions
             for unit, key in folder.index().items()
-            if unit.endswith(f"/{channel}") and load_lods(folder.unit_dir(*unit.split("/"), key))
+            if unit.endswith(f"/{channel}") and load_lods(folder.unit_dir(unit, key))
         ]
     ).astype(np.float64)
     ours = np.stack([ours[:, 2], -ours[:, 1], ours[:, 0]], axis=1) / SPACING
@@ -244,7 +244,7 @@ def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
     assert channel["appearance"]["surface"] == "clear"
     volume = 0.0
     for unit, key in OutFolder(out).index().items():
-        mesh = load_lods(OutFolder(out).unit_dir(*unit.split("/"), key))[0].mesh
+        mesh = load_lods(OutFolder(out).unit_dir(unit, key))[0].mesh
         a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
         volume += float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
     assert volume == pytest.approx(4 / 3 * np.pi * 17.0**3, rel=0.03)

@@ -103,7 +103,7 @@ def test_a_surface_that_loses_sheets_says_so_everywhere(
     deep = capsys.readouterr().out
     index = OutFolder(out).index()
     ((name, key),) = index.items()
-    cover = cover_of(load_record(OutFolder(out).unit_dir(*name.split("/"), key)))
+    cover = cover_of(load_record(OutFolder(out).unit_dir(name, key)))
     above = _voxels() > LEVEL
     assert cover is not None
     assert cover.source == above.sum()
@@ -145,7 +145,7 @@ def test_the_built_surface_of_a_thin_dome_is_whole(tmp_path: Path, slice_axis: i
     assert make_assets(source, out, "1x1", "--workers", "0", plan=settings) == 0
     index = OutFolder(out).index()
     ((name, key),) = index.items()
-    unit = OutFolder(out).unit_dir(*name.split("/"), key)
+    unit = OutFolder(out).unit_dir(name, key)
     cover = cover_of(load_record(unit))
     assert cover is not None
     assert cover.source == (voxels > level).sum()
@@ -208,7 +208,7 @@ def _cover_after(
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
     ((name, key),) = OutFolder(out).index().items()
-    cover = cover_of(load_record(OutFolder(out).unit_dir(*name.split("/"), key)))
+    cover = cover_of(load_record(OutFolder(out).unit_dir(name, key)))
     assert cover is not None
     return cover, voxels > level
 

@@ -61,7 +61,7 @@ def _surface(folder: OutFolder) -> tuple[trimesh.Trimesh, Cover]:
     """Return the surface of all tiles as one, and how it covers the source."""
     meshes, total = [], Cover(0, 0, 0)
     for name, key in folder.index().items():
-        unit = folder.unit_dir(*name.split("/"), key)
+        unit = folder.unit_dir(name, key)
         meshes.append(load_lods(unit)[0].mesh)
         cover = cover_of(load_record(unit))
         assert cover is not None

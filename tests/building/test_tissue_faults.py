@@ -1,7 +1,6 @@
 """`stereocell tissue OUT` killed, on a full disk, over damaged files: one line, and it goes on."""
 
 import hashlib
-import importlib
 import json
 import os
 import re
@@ -19,13 +18,12 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building import bundle_phase, input_unchanged, model_process
-from stereocell.building import tissue as tissue_channels
 from stereocell.building.open_source import open_source
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.steps import learn_tissue as learn_tissue_step
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import console
 from stereocell.report import phase as report
-from stereocell.storage.cache_key import key_of
 from stereocell.storage.claim import LOCK
 from stereocell.storage.documents import NOT_WRITTEN
 from stereocell.tissue.classify import TissueOptions
@@ -74,7 +72,7 @@ def without_viewer() -> Iterator[None]:
     """The viewer may be built anew meanwhile, and is most of a small bundle."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bundle_phase, "viewer_dist", lambda: None)
-        patch.setattr(tissue_channels, "learn_tissue", learn)
+        patch.setattr(learn_tissue_step, "learn_tissue", learn)
         yield
 
 
@@ -184,27 +182,13 @@ def run_until(out: str, flags: list[str], event: str, place: str) -> None:
 
     console.quiet = True
     bundle_phase.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
-    tissue_channels.learn_tissue = learn  # type: ignore[assignment]
+    learn_tissue_step.learn_tissue = learn  # type: ignore[assignment]
     sys.addaudithook(hook)
     tissue(Path(out), *flags)
 
 
 def fork_and_run() -> None:
-    """Run each line of the input in a process of its own; what takes longest is done before."""
-    for name in (
-        "tissue.classify",
-        "tissue.onnx_classifier",
-        "building.steps.find_window",
-        "building.steps.gather_evidence",
-        "building.steps.sum_components",
-        "building.steps.build_unit",
-        "building.steps.write_stage_tile",
-        "bundle.write",
-        "usd.write_usdz",
-        "read.tiff",
-        "read.ome_zarr",
-    ):
-        key_of("", importlib.import_module(f"stereocell.{name}"))  # known from now on
+    """Run each line of the input in a process of its own."""
     for line in sys.stdin:
         child = os.fork()
         if child == 0:

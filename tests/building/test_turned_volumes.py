@@ -34,7 +34,7 @@ class Built:
     def __init__(self, out: Path) -> None:
         folder = OutFolder(out)
         ((name, key),) = folder.index().items()
-        directory = folder.unit_dir(*name.split("/"), key)
+        directory = folder.unit_dir(name, key)
         self.lods: tuple[Lod, ...] = load_lods(directory)
         cover = cover_of(load_record(directory))
         assert cover is not None

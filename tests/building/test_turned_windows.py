@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.steps import find_window as window_module
-from stereocell.building.steps.find_window import Window, measure_window
-from stereocell.building.survey_tasks import statistics_task
+from stereocell.building.steps.find_window import Window
+from stereocell.building.survey_steps import window_step
 from stereocell.cli.__main__ import main
 from stereocell.filters.background import find_background
 from stereocell.filters.min_max_bricks import mip_levels
@@ -52,7 +52,7 @@ def _window(folder: Path, axis: int) -> Window:
     assert main(["plan", str(source), "-o", str(out)]) == 0
     plan = OutFolder(out).plan()
     assert plan.slice_axis == axis
-    return measure_window(statistics_task(plan, plan.channels[0]))
+    return window_step(plan, plan.channels[0]).run()
 
 
 @pytest.mark.parametrize("most", [10**9, 40_000])
@@ -147,5 +147,5 @@ def test_the_noise_of_bodies_is_measured_however_much_even_ground_is_around(
     )
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
     plan = OutFolder(tmp_path / "out").plan()
-    shift = measure_window(statistics_task(plan, plan.channels[0])).max_shift
+    shift = window_step(plan, plan.channels[0]).run().max_shift
     assert shift == pytest.approx(2 * 30, rel=0.3)

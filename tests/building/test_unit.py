@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stereocell.building.settings import Settings, VolumeOptions
-from stereocell.building.unit import UnitInput, build_unit
+from stereocell.building.settings import Settings
+from stereocell.building.unit import UnitInput, UnitOptions, build_unit
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
@@ -26,7 +26,7 @@ def _given(scale: float) -> UnitInput:
     iso = LatticeField(((9.5,), (19.5,), (19.5,)), np.full((1, 1, 1), 0.5 * scale))
     repair, step = RepairOptions(0.6, 0.9, 1.2), (1, 1, 1)
     lattice = Lattice.of_whole(BOX, SPACING)
-    return UnitInput(lattice, iso, None, repair, step, (0.0, scale), settings)
+    return UnitInput(lattice, iso, None, repair, step, (0.0, scale), UnitOptions.of(settings))
 
 
 @pytest.mark.parametrize("scale", [2.0**-100, 2.0**100])
@@ -58,8 +58,8 @@ def test_voxels_stay_as_measured_where_8_bits_lose_something_and_not_if_8_are_as
 ) -> None:
     voxels = np.random.default_rng(3).integers(0, 127, SHAPE).astype(dtype)
     given = replace(_given(1.0), iso=None, intensity_window=window)
-    settings = replace(given.settings, volume=VolumeOptions(bits))
-    unit = build_unit(Volume(voxels, SPACING), replace(given, settings=settings))
+    options = replace(given.options, bits=bits)
+    unit = build_unit(Volume(voxels, SPACING), replace(given, options=options))
     if bits == 8 or (dtype == np.uint8 and window == (0, 255)):
         assert unit.measured is None
         return
@@ -71,7 +71,7 @@ def test_voxels_stay_as_measured_where_8_bits_lose_something_and_not_if_8_are_as
 @pytest.mark.slow
 def test_texels_are_held_against_the_voxels_not_against_the_planes_that_carry_the_surface() -> None:
     given = replace(_given(1.0), step=(1, 3, 3))
-    unwrap = replace(given.settings.unwrap, maps=True, texel_um=0.02)
-    given = replace(given, settings=replace(given.settings, unwrap=unwrap.resolved(SPACING)))
+    unwrap = replace(given.options.unwrap, maps=True, texel_um=0.02)
+    given = replace(given, options=replace(given.options, unwrap=unwrap.resolved(SPACING)))
     ball = blurred_ball(SHAPE, SPACING, (2.7, 2.7, 2.7), 1.5, 0.2)
     assert build_unit(Volume(ball, SPACING), given).lods[1].mesh.uvs is not None

@@ -128,9 +128,13 @@ def test_a_cluster_that_does_not_see_out_is_refused(cluster: Joined, tmp_path: P
     ("name", "ours", "said"),
     [
         ("version", lambda _: "99", r"on .*: has StereoCell .*, expected 99"),
-        ("libraries_of", lambda *_: {"numpy": "99"}, r"on .*: has numpy .*, expected 99"),
+        ("all_libraries", lambda: {"numpy": "99"}, r"on .*: has numpy .*, expected 99"),
         ("version_of", lambda _: "99", r"on .*: has alktx2 .*, expected 99"),
-        ("key_of", lambda *_: "other", "runs other code than this command: expected the same"),
+        (
+            "_digest_of_code",
+            lambda: "other",
+            "runs other code than this command: expected the same",
+        ),
     ],
 )
 def test_workers_that_would_make_other_bytes_are_refused(

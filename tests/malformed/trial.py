@@ -61,25 +61,6 @@ class Outcome:
 def import_all() -> None:
     """Import the package, so that forks need not."""
     import_package("stereocell")
-    from stereocell.building.steps import build_objects as objects
-    from stereocell.building.steps import build_unit as unit
-    from stereocell.building.steps import find_extents as extents
-    from stereocell.building.steps import find_window as window
-    from stereocell.building.steps import gather_evidence as evidence
-    from stereocell.building.steps import sum_components as components
-    from stereocell.building.steps import write_stage_tile as stage_tasks
-    from stereocell.storage import cache_key
-
-    for maker in (
-        window,
-        evidence,
-        extents,
-        objects,
-        components,
-        unit,
-        stage_tasks,
-    ):  # looked up once a process, at the cost of seconds
-        cache_key.libraries_of(maker)
 
 
 def import_package(name: str) -> None:

@@ -12,7 +12,6 @@ LONG_FILES = [
         "objects/test_walls",
         "preview/test_iso_value",
         "report/test_page",
-        "storage/test_cache_key",
         "system/test_doctor",
         "system/test_integrity",
         "verify/test_formats",

@@ -55,7 +55,7 @@ def test_empty_channel_has_no_surface_and_says_why(built: Path) -> None:
     out_folder = OutFolder(built)
     for name, key in out_folder.index().items():
         tile, channel = name.split("/")
-        record = load_record(out_folder.unit_dir(tile, channel, key))
+        record = load_record(out_folder.unit_dir(f"{tile}/{channel}", key))
         assert bool(record["reason"]) == (channel == "empty")
     reason = out_folder.survey()["empty"]["appearance"]["surface_reason"]
     assert reason.startswith("no clear surface: nothing stands out")
@@ -160,7 +160,7 @@ def test_lost_unit_alone_is_built_again(built: Path, tmp_path: Path) -> None:
     shutil.copytree(built, out)
     out_folder = OutFolder(out)
     key = out_folder.index()["r0_c1/F_x20_body"]
-    lost, kept = (out_folder.unit_dir(tile, "F_x20_body", key_) for tile, key_ in
+    lost, kept = (out_folder.unit_dir(f"{tile}/F_x20_body", key_) for tile, key_ in
                   (("r0_c1", key), ("r0_c0", out_folder.index()["r0_c0/F_x20_body"])))  # fmt: skip
     shutil.rmtree(lost)
     stamp = (kept / "unit.json").stat().st_mtime_ns

@@ -64,7 +64,7 @@ def _go_on(out: Path) -> None:
 
 
 def _unit(out: Path) -> Path:
-    return OutFolder(out).unit_dir("r0_c0", F, OutFolder(out).index()[f"r0_c0/{F}"])
+    return OutFolder(out).unit_dir(f"r0_c0/{F}", OutFolder(out).index()[f"r0_c0/{F}"])
 
 
 def _flip(file: Path, *, silent: bool = False) -> None:

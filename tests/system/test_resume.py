@@ -53,7 +53,7 @@ def source(built: Path) -> Path:
 
 def _unit(out: Path) -> Path:
     out_folder = OutFolder(out)
-    return out_folder.unit_dir(*UNIT, out_folder.index()["/".join(UNIT)])
+    return out_folder.unit_dir("/".join(UNIT), out_folder.index()["/".join(UNIT)])
 
 
 def _cut(file: Path) -> None:

@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps import build_unit as unit
-from stereocell.building.steps import write_stage_tile as stage_tasks
-from stereocell.bundle import write as bundle_writer
 from stereocell.cli.__main__ import main
-from stereocell.report import page
-from stereocell.storage.cache_key import libraries_of
+from stereocell.engine.step_record import libraries_of
 from stereocell.textures import map_packages
 from stereocell.textures.map_packages import unwrapper_version
 from support.phantoms import blurred_ball, write_ome_tiff
@@ -53,7 +49,7 @@ def test_maps_are_refused_before_any_work_if_a_package_of_the_extra_is_missing(
 
 
 def test_no_result_imports_a_package_of_maps_by_itself() -> None:
-    named = libraries_of(unit, stage_tasks, bundle_writer, page)
+    named = libraries_of("BuildUnit", "WriteStage", "WriteBundle", "WriteReport")
     assert "numpy" in named
     assert not {"xatlas", "alktx2"} & named.keys()
 

@@ -83,7 +83,7 @@ def _sides(positions: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray[n
 def test_unit_knows_the_paint_at_vertices_and_texels(built: Path) -> None:
     out_folder = OutFolder(built)
     assert out_folder.plan().settings.paint == {"body": "marker"}
-    directory = out_folder.unit_dir("r0_c0", "body", out_folder.index()["r0_c0/body"])
+    directory = out_folder.unit_dir("r0_c0/body", out_folder.index()["r0_c0/body"])
     lods = load_lods(directory)
     assert [lod["maps"]["painted"] for lod in load_record(directory)["lods"]] == [True] * 4
     first = lods[0].baked

@@ -6,12 +6,12 @@ from pathlib import Path
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import no_layer, require_own_bundle
 from stereocell.building.phase import Phase, digest_of_bundle, phase_of, states_of
+from stereocell.building.steps.write_bundle import WriteBundle
 from stereocell.bundle import write as bundle_writer
 from stereocell.bundle.manifest import require_bundle
 from stereocell.engine.run import Engine, console
 from stereocell.read.image import printable
 from stereocell.storage.assets import viewer_dist
-from stereocell.storage.cache_key import key_of
 from stereocell.storage.overwriting import is_forced
 from stereocell.storage.workspace import is_file, objects_below, remove
 from stereocell.textures.map_packages import encoder_version, require_map_packages
@@ -28,15 +28,15 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
     with phase_of(out_folder, "bundle") as phase:
         path = _require_stage(out_folder, stage)
         viewer = viewer_dist()
-        key = _key_of(out_folder, path, viewer)
+        step = _step(out_folder, path, viewer)
         _require_kept(out_folder)
         if objects_below(path.parent) is not None and out_folder.is_begun("bundle"):
             bundle_writer.remove_half(out_folder.bundle_dir)
         if not is_forced():
             require_bundle(out_folder.bundle_dir)  # before the phase is begun
         done = partial(digest_of_bundle, out_folder)
-        if not phase.is_done(key, done, require_own=require_own_bundle):
-            _write(out_folder, path, viewer, key, engine)
+        if not phase.is_done(step.key, done, require_own=require_own_bundle):
+            step.write(out_folder, path, viewer, engine.run)
             phase.about = "" if stage is None else f"of {printable(path.name)}"
     remove(out_folder.parts_dir)
     _tell_of_page(phase, viewer)
@@ -65,34 +65,19 @@ def _require_kept(out_folder: OutFolder) -> None:
         written_files.require_kept(out_folder.stage_dir, listed, out_folder.stage_list)
 
 
-def _key_of(out_folder: OutFolder, path: Path, viewer: Path | None) -> str:
-    """Return a key of everything that the bundle is made of. Raises StageError for foreign files.
+def _step(out_folder: OutFolder, path: Path, viewer: Path | None) -> WriteBundle:
+    """Return the step that writes the bundle. Raises StageError for foreign files.
 
     path    the stage
     viewer  the folder of the page; None: it is not built
     """
     kept = objects_below(path.parent)
     files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
-    made_of = [str(path.absolute()), states_of(files)] if kept is None else kept
+    made_of = (str(path.absolute()), *states_of(files)) if kept is None else tuple(kept)
     # an image may feed a surface, and is encoded then: by this version, or not at all
     encoder = encoder_version() if any(map(may_be_image, files)) else None
-    page = [] if viewer is None else states_of(sorted(viewer.rglob("*")))
-    return key_of([made_of, page, encoder], bundle_writer)
-
-
-def _write(
-    out_folder: OutFolder, path: Path, viewer: Path | None, key: str, engine: Engine
-) -> None:
-    """Write the bundle; its finished tiles are kept until it is whole."""
-    out_folder.remove_other_folders(out_folder.parts_dir, {key})
-    bundle_writer.write_bundle(
-        path,
-        out_folder.bundle_dir,
-        viewer,
-        run=engine.run,
-        parts=out_folder.parts_dir / key,
-        report_line=_print_line,
-    )
+    page = () if viewer is None else tuple(states_of(sorted(viewer.rglob("*"))))
+    return WriteBundle(made_of, page, encoder)
 
 
 def _tell_of_page(phase: Phase, viewer: Path | None) -> None:
@@ -101,7 +86,3 @@ def _tell_of_page(phase: Phase, viewer: Path | None) -> None:
         console.print(
             "bundle: the viewer is not built, so the bundle has no page: run `make setup`"
         )
-
-
-def _print_line(line: str) -> None:
-    console.print(f"bundle: {line}", markup=False, soft_wrap=True)

@@ -7,11 +7,8 @@ level, which decides how the surface is cleaned. The result, survey.json, steers
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
-from functools import partial
-from pathlib import Path
-from types import ModuleType
-from typing import Any
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -28,62 +25,30 @@ from stereocell.building.level_choice import (
 )
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
-from stereocell.building.source_tasks import (
-    around,
-    box_to_json,
-    input_key,
-    reader_module,
-    run_on_input,
-)
-from stereocell.building.steps import find_window as window_maker
-from stereocell.building.steps import gather_evidence as evidence_maker
-from stereocell.building.steps import sum_components as components_maker
-from stereocell.building.steps.find_window import (
-    Window,
-    window_from_json,
-    write_window,
-)
-from stereocell.building.steps.gather_evidence import EvidenceFiles, EvidenceTask, write_evidence
-from stereocell.building.steps.sum_components import ComponentsTask, write_components
-from stereocell.building.survey_file import (
-    AGAIN,
-    COMPONENTS,
-    EVIDENCE,
-    WINDOW,
-    ChannelSurvey,
-    Curve,
-    Survey,
-    TileIso,
-    save_survey,
-)
-from stereocell.building.survey_tasks import evidence_task, statistics_task
+from stereocell.building.run_on_input import run_pass
+from stereocell.building.steps.find_window import Window
+from stereocell.building.steps.gather_evidence import GatherEvidence
+from stereocell.building.steps.sum_components import SumComponents, Sums
+from stereocell.building.survey_file import ChannelSurvey, Curve, Survey, TileIso, save_survey
+from stereocell.building.survey_steps import components_step, evidence_step, window_step
 from stereocell.engine.run import Engine, console
+from stereocell.engine.run_steps import Kept, ReadOnDemand
+from stereocell.engine.step import Step
 from stereocell.filters.denoise import median_size
 from stereocell.isosurface.level import Level
-from stereocell.isosurface.options import CONNECTED
+from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.lattice_field import make_iso_field
 from stereocell.model.modality import SEGMENTATION
 from stereocell.model.tiling import Tile
-from stereocell.storage.cache_key import key_of
-from stereocell.storage.json_files import find_sealed, read_sealed
 from stereocell.transfer.channel_statistics import make_appearance
 
 KEPT_OF_MASK = 0.9  # share of a mask's voxels: what loses more to smoothing is said
 
 
-@dataclass(frozen=True, slots=True)
-class _Result:
-    """What a pass leaves: a file of OUT with a schema, and its path relative to OUT."""
-
-    path: Path
-    schema: str
-    file: str
-
-    def read(self) -> Mapping[str, Any]:
-        return read_sealed(self.path, self.schema, AGAIN)
+R = TypeVar("R")
+_Results = dict[tuple[str, str], Kept[R]]  # of a pass, by tile and channel ID
 
 
 def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey:
@@ -102,9 +67,9 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             plan,
             channel,
             windows[channel.id],
-            EvidenceFiles(
+            ReadOnDemand(
                 {
-                    tile.id: evidence[tile.id, channel.id].read
+                    tile.id: evidence[tile.id, channel.id]
                     for tile in plan.tiles
                     if (tile.id, channel.id) in evidence
                 }
@@ -119,7 +84,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
     for channel in plan.channels:
         one = found[channel.id]
         of_rungs = [
-            {tile.id: rung[tile.id, channel.id].read()["components"] for tile in plan.tiles}
+            {tile.id: rung[tile.id, channel.id].read() for tile in plan.tiles}
             for rung in components[: len(one.rungs)]
         ]
         chosen = choose_by_components(plan.settings.isovalue, of_rungs)
@@ -134,7 +99,7 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
                 one,
                 chosen,
                 {
-                    what: result[tile.id, channel.id].file
+                    what: out_folder.relative(result[tile.id, channel.id].place)
                     for what, result in (
                         ("evidence", evidence),
                         ("components", components[chosen] if of_rungs else {}),
@@ -255,140 +220,58 @@ def _windows(
     out_folder: OutFolder, plan: Plan, engine: Engine
 ) -> tuple[dict[str, Window], dict[str, str]]:
     """Return each channel's window, and the file that holds it, by channel id."""
-    files: dict[str, Path] = {}
-    tasks: dict[Path, tuple[str, Any]] = {}
+    kept = {}
     for channel in plan.channels:
-        task = statistics_task(plan, channel)
-        depends = [
-            input_key(plan, channel),
-            channel.index,
-            box_to_json(plan.region),
-            asdict(plan.settings.window),
-            plan.settings.surface.smoothing_um,
-            plan.settings.surface.background_um if task.subtracts else 0,
-            task.max_shift,
-            task.finds_holder,
-            task.window,
-        ]
-        file = out_folder.statistics_file(
-            channel.voxels_id, key_of(depends, window_maker, reader_module(plan, channel))
-        )
-        files[channel.id] = file
-        if find_sealed(file, WINDOW) is None:
-            tasks[file] = (channel.base or channel.name, (task, file))
-    run = partial(engine.run, "windows", write_window, list(tasks.values()))
-    run_on_input(out_folder, plan, run, list(tasks))
-    return {
-        id_: window_from_json(read_sealed(file, WINDOW, AGAIN)) for id_, file in files.items()
-    }, {id_: file.relative_to(out_folder.out).as_posix() for id_, file in files.items()}
+        step = window_step(plan, channel)
+        place = out_folder.statistics_file(channel.voxels_id, step.key)
+        kept[channel.id] = Kept(channel.base or channel.name, step, place)
+    run_pass(out_folder, plan, engine, "windows", kept.values())
+    windows = {id_: one.read() for id_, one in kept.items()}
+    return windows, {id_: out_folder.relative(one.place) for id_, one in kept.items()}
 
 
 def _evidence(
     out_folder: OutFolder, plan: Plan, engine: Engine, windows: Mapping[str, Window]
-) -> dict[tuple[str, str], _Result]:
+) -> _Results[TileEvidence]:
     """Return the evidence of each tile of each channel that has voxels of the source."""
 
-    def task_of(tile: Tile, channel: Channel) -> tuple[EvidenceTask, list[Any]] | None:
+    def step_of(tile: Tile, channel: Channel) -> GatherEvidence | None:
         if channel.source:  # shares of tissue, whose level is known
             return None
-        task = evidence_task(plan, tile.box, channel=channel, window=windows[channel.id])
-        return task, [
-            [box_to_json(box) for box in (task.box, task.region)],
-            task.smoothing_um,
-            asdict(task.counting),
-            None if task.background is None else task.background.to_json(),
-            task.criterion,
-        ]
+        return evidence_step(plan, tile.box, channel=channel, window=windows[channel.id])
 
-    return _by_tile(
-        out_folder, plan, engine,
-        task_of=task_of, name="evidence", write=write_evidence, schema=EVIDENCE,
-        maker=evidence_maker,
-    )  # fmt: skip
+    return _run_by_tile(out_folder, plan, engine, "evidence", step_of)
 
 
 def _components(
     out_folder: OutFolder, plan: Plan, engine: Engine, found: Mapping[str, Found], rung: int
-) -> dict[tuple[str, str], _Result]:
+) -> _Results[Sums]:
     """Return the sums over the components of each tile, of the channels that have such a rung."""
 
-    def task_of(tile: Tile, channel: Channel) -> tuple[ComponentsTask, list[Any]] | None:
-        one = found[channel.id]
-        if rung >= len(one.rungs):
-            return None
-        iso = level_of_tile(plan, tile, one, rung, {}).value
-        if iso is None:
-            return None
-        compares = rung > 0 and plan.settings.isovalue.rung == CONNECTED
-        higher = level_of_tile(plan, tile, one, rung - 1, {}).value if compares else None
-        surface = plan.settings.surface
-        task = ComponentsTask(
-            source_of(plan, channel=channel),
-            plan.level_of(channel),
-            channel.index,
-            tile.box,
-            float(surface.smoothing_um),
-            iso,
-            around(one.background, tile.box),
-            float(surface.min_diagonal_um),
-            one.window.max_shift,
-            plan.step,
-            higher,
-        )
-        compared = [] if higher is None else [higher]
-        return task, [
-            box_to_json(tile.box),
-            task.smoothing_um,
-            task.max_shift,
-            task.min_diagonal_um,
-            task.step,
-            iso,
-            None if task.background is None else task.background.to_json(),
-            *compared,
-        ]
+    def step_of(tile: Tile, channel: Channel) -> SumComponents | None:
+        return components_step(plan, tile, channel, found[channel.id], rung)
 
-    return _by_tile(
-        out_folder, plan, engine,
-        task_of=task_of, name="components", write=write_components, schema=COMPONENTS,
-        maker=components_maker,
-    )  # fmt: skip
+    return _run_by_tile(out_folder, plan, engine, "components", step_of)
 
 
-def _by_tile(
+def _run_by_tile(
     out_folder: OutFolder,
     plan: Plan,
     engine: Engine,
-    *,
-    task_of: Callable[[Tile, Channel], tuple[Any, list[Any]] | None],
     name: str,
-    write: Callable[[tuple[Any, Path]], None],
-    schema: str,
-    maker: ModuleType,
-) -> dict[tuple[str, str], _Result]:
+    step_of: Callable[[Tile, Channel], Step[R] | None],
+) -> _Results[R]:
     """Run a pass over the tiles; return each one's result, by tile and channel ID.
 
-    task_of  returns a task and what its result depends on besides the voxels; None: there is none
+    step_of  returns the step of a tile of a channel; None: there is none
     """
-    files: dict[tuple[str, str], Path] = {}
-    tasks: dict[Path, tuple[str, Any]] = {}
+    kept = {}
     for tile in plan.tiles:
         for channel in plan.channels:
-            made = task_of(tile, channel)
-            if made is None:
-                continue
-            task, depends = made
-            key = key_of(
-                [input_key(plan, channel), channel.index, *depends],
-                maker,
-                reader_module(plan, channel),
-            )
-            file = out_folder.tile_result(name, tile.id, channel.voxels_id, key)
-            files[tile.id, channel.id] = file
-            if find_sealed(file, schema) is None:
-                tasks[file] = (f"{tile.id}/{channel.base or channel.name}", (task, file))
-    run = partial(engine.run, name, write, list(tasks.values()))
-    run_on_input(out_folder, plan, run, list(tasks))
-    return {
-        unit: _Result(file, schema, file.relative_to(out_folder.out).as_posix())
-        for unit, file in files.items()
-    }
+            step = step_of(tile, channel)
+            if step is not None:
+                place = out_folder.tile_result(name, tile.id, channel.voxels_id, step.key)
+                title = f"{tile.id}/{channel.base or channel.name}"
+                kept[tile.id, channel.id] = Kept(title, step, place)
+    run_pass(out_folder, plan, engine, name, kept.values())
+    return kept

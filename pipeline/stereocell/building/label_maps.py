@@ -14,6 +14,7 @@ from stereocell.building.label_grids import (
 )
 from stereocell.building.open_source import SourceRef, as_asked, open_source
 from stereocell.building.settings import PlanOptions, Settings
+from stereocell.engine.step import content_of
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
 from stereocell.read.dataset import Dataset
@@ -27,6 +28,23 @@ _COLOURS = "colour pixels"  # how a reader's remark on them begins
 _AVERAGED = ("resampled", "interpolated")  # in what a reader says of voxels between others
 
 Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class LabelVoxels:
+    """The voxels of a label map.
+
+    channel     index in the source
+    background  number of the voxels that are no object, beside 0; 0: there is no other
+    """
+
+    ref: SourceRef
+    channel: int
+    background: int
+
+    def open(self) -> LabelMap:
+        """Return the label map. Raises SourceError."""
+        return LabelMap(open_source(self.ref), self.channel, self.background)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +74,18 @@ class Labels:
         """The name as an identifier, for paths and prims."""
         return to_identifier(self.name)
 
+    @property
+    def voxels(self) -> LabelVoxels:
+        """The voxels, which lie nowhere by themselves."""
+        return LabelVoxels(self.ref, self.channel, self.background)
+
+    def key_content(self) -> list[object]:
+        """Return what counts in a key: the voxels and their place, neither name nor colour."""
+        return [content_of(self.voxels), self.spacing_um, self.origin_um]
+
     def open(self) -> LabelMap:
         """Return the label map. Raises SourceError."""
-        return LabelMap(open_source(self.ref), self.channel, self.background)
+        return self.voxels.open()
 
     def position_um(self, index_zyx: Sequence[float]) -> Triple:
         """Return the place of a voxel's centre, (z, y, x) in um, as a plan's `position_um`."""

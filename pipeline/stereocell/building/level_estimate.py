@@ -23,7 +23,7 @@ from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.steps.find_window import Window
 from stereocell.building.steps.gather_evidence import evidence_of
-from stereocell.building.survey_tasks import evidence_task, statistics_task
+from stereocell.building.survey_steps import evidence_step, window_step
 from stereocell.filters.background import find_background
 from stereocell.isosurface.level_evidence import (
     MAX_PADDING,
@@ -91,8 +91,8 @@ def estimate_level(plan: Plan, channel: Channel, boxes: Sequence[Box]) -> Found:
     window = _window(plan, channel, boxes, volumes)
     evidence = {}
     for place, (box, volume) in enumerate(zip(boxes, volumes, strict=True)):
-        task = evidence_task(plan, box, channel=channel, window=window)
-        found = evidence_of(task, volume, box)  # without a halo, which would be most of a block
+        step = evidence_step(plan, box, channel=channel, window=window)
+        found = evidence_of(step, volume, box)  # without a halo, which would be most of a block
         evidence[str(place)] = found if is_whole else replace(found, profiles=None)
     return find_level(plan, channel, window, evidence)
 
@@ -105,29 +105,27 @@ def _window(
     Side by side the boxes stand for the region as a coarser level does. So the background is found
     on them, too.
     """
-    task = statistics_task(plan, channel)
+    step = window_step(plan, channel)
     spacing, axis = volumes[0].spacing_um, volumes[0].slice_axis
     voxels = _side_by_side(boxes, volumes)
-    surface, least, most = task.settings.surface, float(voxels.min()), float(voxels.max())
+    least, most = float(voxels.min()), float(voxels.max())
     is_mask = least < most and bool(((voxels == least) | (voxels == most)).all())
     darkest = None if is_mask else least
-    reach = first_of_three(denoising_reach(float(surface.smoothing_um), spacing, axis), axis)
+    reach = first_of_three(denoising_reach(step.smoothing_um, spacing, axis), axis)
     padding = slices_back(find_padding(slices_first(voxels, axis), darkest, reach), axis)
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, background = Scale.of(voxels, padding), None
-    if task.subtracts and not is_mask:
+    if step.background_um > 0 and not is_mask:
         background = find_background(
             voxels,
-            task.region,
+            step.region,
             spacing_um=spacing,
-            block_um=float(surface.background_um),
+            block_um=step.background_um,
             padding=padding if padding.any() else None,
             passes=PASSES,
         )
-    statistics = find_statistics(
-        voxels, task.settings.window, background=background, window=task.window
-    )
+    statistics = find_statistics(voxels, step.options, background=background, window=step.window)
     counting = Counting(
         scale,
         None if background is None else scale.above(background),

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, replace
-from functools import cache, partial
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from stereocell.building.channels import Channel
 from stereocell.building.label_maps import Labels
 from stereocell.building.label_numbers import notes_on_numbers
 from stereocell.building.located_objects import (
@@ -22,31 +22,24 @@ from stereocell.building.located_objects import (
 )
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
-from stereocell.building.source_tasks import box_to_json, run_on_input
-from stereocell.building.steps import build_objects as objects_maker
-from stereocell.building.steps import find_extents as extents_maker
-from stereocell.building.steps.build_objects import ImageRef, ObjectsTask, Painted
-from stereocell.building.steps.find_extents import (
-    ExtentsTask,
-    extents_from_json,
-    find_in_tile,
-    write_extents,
-)
+from stereocell.building.plan_source import voxels_of
+from stereocell.building.run_on_input import run_pass
+from stereocell.building.steps.build_objects import BuildObjects, Image, Painted
+from stereocell.building.steps.find_extents import FindExtents
 from stereocell.building.survey_file import Survey
+from stereocell.building.units_again import AGAIN
 from stereocell.engine.run import Engine, console
+from stereocell.engine.run_steps import Kept
 from stereocell.formats.gltf import choose_step
 from stereocell.model.counted import counted
 from stereocell.model.object_notes import ObjectNotes
+from stereocell.model.tiling import Tile
 from stereocell.objects.options import ObjectOptions
-from stereocell.read.readers import reader_of
-from stereocell.storage.cache_key import key_of
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 from stereocell.storage.location import Location
 
 NOTES = "units.schema.json#Notes"
-EXTENTS = "units.schema.json#Extents"
-_AGAIN = "run `stereocell units OUT` again"
+_NO_EDGES = (np.zeros(0, np.int64),) * 3  # of tiles, where nothing is cut
 _UM = 1e6  # um a metre
 _COUNTED_AT_ONCE = 1 << 25  # voxels of a label map that `plan` counts: half a second
 
@@ -56,19 +49,13 @@ def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: En
 
     Raises SourceError where a label map can't be read.
     """
-    boxes = tile_boxes(TileGrid.of(plan, labels))
-    files, tasks = {}, []
-    for tile, box in boxes.items():
-        depends = [*_key_of(labels), box_to_json(box)]
-        key = key_of(depends, extents_maker, reader_of(labels.ref.source))
-        files[tile] = out_folder.tile_result("extents", tile, labels.id, key)
-        if find_sealed(files[tile], EXTENTS) is None:
-            tasks.append((f"{tile}/{labels.name}", (ExtentsTask(labels, box), files[tile])))
-    run = partial(engine.run, "objects", write_extents, tasks)
-    run_on_input(out_folder, plan, run, [file for _, (_, file) in tasks])
-    parts = {
-        tile: extents_from_json(read_sealed(file, EXTENTS, _AGAIN)) for tile, file in files.items()
-    }
+    kept = {}
+    for tile, box in tile_boxes(TileGrid.of(plan, labels)).items():
+        step = FindExtents(labels.voxels, box)
+        place = out_folder.tile_result("extents", tile, labels.id, step.key)
+        kept[tile] = Kept(f"{tile}/{labels.name}", step, place)
+    run_pass(out_folder, plan, engine, "objects", kept.values())
+    parts = {tile: one.read() for tile, one in kept.items()}
     return locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
 
 
@@ -93,7 +80,7 @@ def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
 def read_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> ObjectNotes:
     """Return what `save_notes` kept. Raises OutputError."""
     file = _notes_file(out_folder, plan, labels)
-    return _notes().validate_python(read_sealed(file, NOTES, _AGAIN)["notes"])
+    return _notes().validate_python(read_sealed(file, NOTES, AGAIN)["notes"])
 
 
 def _notes_file(out_folder: OutFolder, plan: Plan, labels: Labels) -> Path:
@@ -144,7 +131,7 @@ def told_before(plan: Plan) -> Iterator[str]:
     for labels in plan.labels:
         boxes = tile_boxes(TileGrid.of(plan, labels))
         if not _is_large(labels):
-            parts = {tile: find_in_tile(ExtentsTask(labels, box)) for tile, box in boxes.items()}
+            parts = {tile: FindExtents(labels.voxels, box).run() for tile, box in boxes.items()}
             found = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
             yield told_of(labels, found)
             yield from notes_on_numbers(labels, found)
@@ -157,72 +144,52 @@ def told_before(plan: Plan) -> Iterator[str]:
             )
 
 
-def object_tasks(
-    out_folder: OutFolder, plan: Plan, located: Mapping[str, Located], survey: Survey
-) -> Iterator[tuple[str, ObjectsTask, str]]:
-    """Yield `<tile>/<labels>`, task and key of the unit of each tile and label map."""
+def object_steps(
+    plan: Plan, located: Mapping[str, Located], survey: Survey
+) -> dict[str, BuildObjects]:
+    """Return the step of the unit of each tile and label map, by `<tile>/<labels>`."""
     images = images_of(plan)
     step_um = lattice_step_um(plan, located)
+    steps = {}
     for labels in plan.labels:
-        painted = _painted(plan, labels, survey)
-        found = located[labels.id]
+        found, painted = located[labels.id], _painted(plan, labels, survey)
         boxes = tile_boxes(found.grid)
         for tile in plan.tiles:
-            window = found.window(tile.id)
-            numbers = found.owned(tile.id)
-            near = np.zeros(0, np.int64) if window is None else found.near(window)
-            is_cut = found.owners == CUT
-            others = np.setdiff1d(near, numbers)
-            names = found.extents.labels
-            parts = {
-                "whole": names[numbers[~is_cut[numbers]]],
-                "cut": names[numbers[is_cut[numbers]]],
-                "others": names[others],
-                "others_cut": names[others[is_cut[others]]],
-            }
-            depends = [
-                *_key_of(labels),
-                [labels.spacing_um, labels.origin_um],
-                window and box_to_json(window),
-                box_to_json(boxes[tile.id]),
-                {name: part.tolist() for name, part in parts.items()},
-                [edges.tolist() for edges in found.grid.edges] if is_cut.any() else [],
-                step_um,
-                [_image_key(image) for image in images],
-                painted and [_image_key(painted.image), painted.window, painted.depth_um],
-                _options_key(plan.settings.objects),
-            ]
-            readers = {reader_of(ref.source) for ref in (labels.ref, *(i.ref for i in images))}
-            key = key_of(depends, objects_maker, *sorted(readers))
-            directory = out_folder.unit_dir(tile.id, labels.id, key)
-            task = ObjectsTask(
+            parts = _parts(found, tile)
+            is_cut = len(parts["cut"]) or len(parts["others_cut"])
+            steps[f"{tile.id}/{labels.id}"] = BuildObjects(
                 labels,
-                window,
+                found.window(tile.id),
                 boxes[tile.id],
                 **parts,
-                edges=found.grid.edges,
+                edges=found.grid.edges if is_cut else _NO_EDGES,
                 step_um=step_um,
                 images=images,
                 painted=painted,
-                options=plan.settings.objects,
-                directory=directory,
+                options=_of_units(plan.settings.objects),
             )
-            yield f"{tile.id}/{labels.id}", task, key
+    return steps
 
 
-def _key_of(labels: Labels) -> list[object]:
-    """Return the source of a label map's voxels as a part of a key."""
-    background = [labels.background] if labels.background else []
-    return [labels.ref.fingerprint, labels.channel, *background]
+def _parts(found: Located, tile: Tile) -> dict[str, NDArray[np.uint64]]:
+    """Return the labels in a tile's window by how they are built; see `BuildObjects`."""
+    window, numbers = found.window(tile.id), found.owned(tile.id)
+    near = np.zeros(0, np.int64) if window is None else found.near(window)
+    is_cut, names = found.owners == CUT, found.extents.labels
+    others = np.setdiff1d(near, numbers)
+    return {
+        "whole": names[numbers[~is_cut[numbers]]],
+        "cut": names[numbers[is_cut[numbers]]],
+        "others": names[others],
+        "others_cut": names[others[is_cut[others]]],
+    }
 
 
-def _options_key(options: ObjectOptions) -> dict[str, object]:
-    """Return the options that units depend on; the labels' background is in their own key."""
-    content = asdict(options) | dict.fromkeys(
-        ("table", "table_key", "columns", "color_by", "segment_labels")
-    )
-    del content["background"]
-    return content
+def _of_units(options: ObjectOptions) -> ObjectOptions:
+    """Return the options that units depend on; those of tables and names have their defaults."""
+    plain = ObjectOptions()
+    names = ("table", "table_key", "columns", "color_by", "segment_labels", "background")
+    return replace(options, **{name: getattr(plain, name) for name in names})
 
 
 def lattice_step_um(plan: Plan, located: Mapping[str, Located]) -> float:
@@ -245,20 +212,15 @@ def lattice_step_um(plan: Plan, located: Mapping[str, Located]) -> float:
     return choose_step(longest) * _UM
 
 
-def images_of(plan: Plan) -> tuple[ImageRef, ...]:
+def images_of(plan: Plan) -> tuple[Image, ...]:
     """Return the image's channels, as they are built."""
     seen, found = set(), []
     for channel in plan.channels:
         if channel.voxels_id in seen:
             continue
         seen.add(channel.voxels_id)
-        found.append(_image(plan, channel))
+        found.append(Image(voxels_of(plan, channel), plan.region))
     return tuple(found)
-
-
-def _image(plan: Plan, channel: Channel) -> ImageRef:
-    ref, level = source_of(plan, channel=channel), plan.level_of(channel)
-    return ImageRef(ref, channel.index, level, plan.region, plan.spacing_um, plan.origin_um)
 
 
 def _painted(plan: Plan, labels: Labels, survey: Survey) -> Painted | None:
@@ -267,9 +229,5 @@ def _painted(plan: Plan, labels: Labels, survey: Survey) -> Painted | None:
     if painter is None:
         return None
     window = survey[painter.id].statistics.window
-    return Painted(_image(plan, painter), window, float(plan.settings.unwrap.paint_um))
-
-
-def _image_key(image: ImageRef) -> list[object]:
-    place = [image.spacing_um, image.origin_um, box_to_json(image.region)]
-    return [image.ref.fingerprint, image.channel, image.level, *place]
+    image = Image(voxels_of(plan, painter), plan.region)
+    return Painted(image, window, float(plan.settings.unwrap.paint_um))

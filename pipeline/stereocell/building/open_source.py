@@ -1,11 +1,15 @@
 """Open the source in a worker again: by its address, once per process."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 
 from stereocell import read
 from stereocell.building.settings import PlanOptions
+from stereocell.model.spacing import Point, Spacing
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+from stereocell.read.readers import reader_version
 from stereocell.storage.workspace import fetch
 
 
@@ -29,6 +33,30 @@ class SourceRef:
     pattern: str = ""
     axes: str = ""
     dark: bool = False
+
+    def key_content(self) -> list[object]:
+        """Return what counts in a key: the volume and its reader, never the address."""
+        own = [getattr(self, one.name) for one in fields(self) if one.name != "source"]
+        return [*own, *reader_version(self.source)]
+
+
+@dataclass(frozen=True, slots=True)
+class Voxels:
+    """One channel of a source, at one level of its pyramid.
+
+    spacing_um  (z, y, x), um, between voxels of that level, as the plan says
+    origin_um   (z, y, x), um: centre of that level's voxel (0, 0, 0)
+    """
+
+    ref: SourceRef
+    channel: int
+    level: int
+    spacing_um: Spacing
+    origin_um: Point
+
+    def read(self, box: Box) -> Volume:
+        """Return the voxels of a box. Raises SourceError."""
+        return open_source(self.ref).read(self.channel, box, self.level)
 
 
 @lru_cache(maxsize=2)

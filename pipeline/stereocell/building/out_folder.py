@@ -14,12 +14,11 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from stereocell.building import plan as plan_module
 from stereocell.building.plan import Plan
 from stereocell.building.plan_file import from_json, to_json
 from stereocell.building.settings import load
+from stereocell.engine.step import key_of
 from stereocell.model.errors import OutputError, UsageError
-from stereocell.storage.cache_key import key_of
 from stereocell.storage.contents import contents_of
 from stereocell.storage.documents import NOT_WRITTEN, SETTINGS, parse
 from stereocell.storage.json_files import find_sealed, read_json, read_sealed, sealed, write_sealed
@@ -182,6 +181,10 @@ class OutFolder:
         """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
+    def relative(self, path: Path) -> str:
+        """Return a path below OUT as it stands in documents: from OUT, with forward slashes."""
+        return path.relative_to(self.out).as_posix()
+
     def notes_file(self, labels_id: str, fingerprint: str) -> Path:
         """Return the path of what a label map's own file says of its objects."""
         return self.out / "units" / f"notes-{labels_id}-{fingerprint[:12]}.json"
@@ -190,9 +193,9 @@ class OutFolder:
         """Return the path of what the pass `what` before the units found of one tile."""
         return self.out / "units" / tile_id / channel_id / f"{what}-{key}.json"
 
-    def unit_dir(self, tile_id: str, channel_id: str, key: str) -> Path:
-        """Return the folder of one unit's meshes and volume."""
-        return self.out / "units" / tile_id / channel_id / key
+    def unit_dir(self, name: str, key: str) -> Path:
+        """Return the folder of one unit's meshes and volume; `name`: `<tile>/<channel>`."""
+        return self.out / "units" / name / key
 
     def tile_file(self, tile_id: str) -> Path:
         """Return the path of the record of one tile of the stage."""
@@ -216,7 +219,7 @@ class OutFolder:
         write_sealed(self.units_plan_file, {"key": self._key(plan)})
 
     def _key(self, plan: Plan) -> str:
-        return key_of(to_json(replace(self._without_place(plan), notes=())), plan_module)
+        return key_of(to_json(replace(self._without_place(plan), notes=())))
 
     def require_units_of(self, plan: Plan) -> None:
         """Raise OutputError unless all units of the plan are listed as built."""

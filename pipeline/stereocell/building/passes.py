@@ -4,44 +4,28 @@ The survey finds each channel's window and level, dataset-wide (channel_survey.p
 volumes are built. Every result lies under a name that says what it depends on.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict
-from functools import partial
-from itertools import chain, product
+from itertools import product
 
 from stereocell.building.channel_survey import survey_channels
 from stereocell.building.channels import Channel
 from stereocell.building.label_maps import Labels
-from stereocell.building.object_passes import locate_objects, object_tasks, save_notes, tell_objects
+from stereocell.building.object_passes import locate_objects, object_steps, save_notes, tell_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
+from stereocell.building.plan_source import voxels_of
+from stereocell.building.run_on_input import run_pass
 from stereocell.building.running_pass import remove_mixed
-from stereocell.building.source_tasks import (
-    around,
-    box_to_json,
-    input_key,
-    reader_module,
-    run_on_input,
-)
-from stereocell.building.steps import build_unit as unit_maker
-from stereocell.building.steps.build_objects import ObjectsTask, run_objects
-from stereocell.building.steps.build_unit import UnitTask, run_unit
+from stereocell.building.steps.build_unit import BuildUnit
 from stereocell.building.survey_file import Survey
-from stereocell.building.unit import UnitInput
-from stereocell.building.unit_files import is_whole
+from stereocell.building.survey_steps import around
+from stereocell.building.unit import UnitInput, UnitOptions
 from stereocell.engine.run import Engine
-from stereocell.isosurface.holder import Holder
-from stereocell.isosurface.repair import RepairOptions
-from stereocell.meshes.alpha_wrap import find_wrapper
-from stereocell.model.channel import SurfaceLevel
+from stereocell.engine.run_steps import Kept
+from stereocell.engine.step import Step
 from stereocell.model.errors import UsageError
 from stereocell.model.lattice import Lattice
-from stereocell.storage.cache_key import key_of
-from stereocell.textures.map_packages import unwrapper_version
-from stereocell.transfer.channel_statistics import (
-    ChannelStatistics,
-)
+from stereocell.model.tiling import Tile
+from stereocell.model.unit import Unit
 
 
 def run_passes(
@@ -60,61 +44,34 @@ def run_passes(
     for labels in plan.labels:
         save_notes(out_folder, plan, labels)
     located = {one.id: locate_objects(out_folder, plan, one, engine) for one in plan.labels}
-    tasks: list[tuple[str, UnitTask | ObjectsTask]] = []
-    keys, others = {}, 0
-    every: list[Iterable[tuple[str, UnitTask | ObjectsTask, str]]] = [
-        unit_tasks(out_folder, plan, survey),
-        object_tasks(out_folder, plan, located, survey),
-    ]
-    for name, task, key in chain(*every):
-        keys[name] = key
-        if is_whole(task.directory):
+    steps: dict[str, Step[Unit]] = {
+        **unit_steps(plan, survey),
+        **object_steps(plan, located, survey),
+    }
+    missing, others = [], 0
+    for name, step in steps.items():
+        place = out_folder.unit_dir(name, step.key)
+        if step.is_kept(place):
             continue
         if name in wanted:
-            tasks.append((f"{name.split('/')[0]}/{wanted[name].name}", task))
+            missing.append(Kept(f"{name.split('/')[0]}/{wanted[name].name}", step, place))
         else:
             others += 1
-    if tasks:
+    if missing:
         for labels in plan.labels:
             tell_objects(labels, located[labels.id])
-    run = partial(engine.run, "units", _run, tasks)
-    results = [task.directory for _, task in tasks]
-    run_on_input(out_folder, plan, run, results, is_last=True)
+    run_pass(out_folder, plan, engine, "units", missing, is_last=True)
     if not others:  # all there: the stage may be made of them
-        out_folder.save_units(plan, keys)
-    return len(tasks), others
+        out_folder.save_units(plan, {name: step.key for name, step in steps.items()})
+    return len(missing), others
 
 
-def unit_tasks(
-    out_folder: OutFolder, plan: Plan, survey: Survey
-) -> Iterator[tuple[str, UnitTask, str]]:
-    """Yield `<tile>/<channel>`, task and key of every unit."""
-    for tile_id, channel in product((tile.id for tile in plan.tiles), plan.channels):
-        statistics = survey[channel.id].statistics
-        painter = plan.painter(channel)
-        painted = None if painter is None else (painter.index, survey[painter.id].statistics.window)
-        level = survey[channel.id].appearance.level
-        repair = survey[channel.id].repair
-        holder = survey[channel.id].holder
-        task, key = _unit_task(
-            out_folder,
-            plan.with_grid(survey[channel.id].grid_um),
-            tile_id,
-            channel=channel,
-            level=level,
-            repair=repair,
-            statistics=statistics,
-            painted=painted,
-            holder=holder,
-        )
-        yield f"{tile_id}/{channel.id}", task, key
-
-
-def _run(task: UnitTask | ObjectsTask) -> None:
-    if isinstance(task, ObjectsTask):
-        run_objects(task)
-    else:
-        run_unit(task)
+def unit_steps(plan: Plan, survey: Survey) -> dict[str, BuildUnit]:
+    """Return the step of every unit, by `<tile>/<channel>`."""
+    return {
+        f"{tile.id}/{channel.id}": _unit_step(plan, tile, channel, survey)
+        for tile, channel in product(plan.tiles, plan.channels)
+    }
 
 
 def _select(plan: Plan, only: str | None) -> list[tuple[str, Channel | Labels]]:
@@ -138,52 +95,22 @@ def _names(channel: Channel | Labels) -> tuple[str | int, ...]:
     return (channel.name, channel.id) + (() if channel.source else (channel.index,))
 
 
-def _unit_task(
-    out_folder: OutFolder,
-    plan: Plan,
-    tile_id: str,
-    *,
-    channel: Channel,
-    level: SurfaceLevel | None,
-    repair: RepairOptions,
-    statistics: ChannelStatistics,
-    painted: tuple[int, tuple[float, float]] | None,
-    holder: Holder | None,
-) -> tuple[UnitTask, str]:
-    tile = plan.tile(tile_id)
+def _unit_step(plan: Plan, tile: Tile, channel: Channel, survey: Survey) -> BuildUnit:
+    found = survey[channel.id]
+    painter, level = plan.painter(channel), found.appearance.level
     own = tile.lattice(plan.region)
     window = own.grown(plan.halo, plan.region)
     given = UnitInput(
         lattice=Lattice(window, own, plan.region, plan.spacing_um, plan.origin_um),
         iso=None if level is None else around(level.field, window),
-        background=around(statistics.background, window),
-        repair=repair,
-        step=plan.step,
-        intensity_window=statistics.window,
-        settings=plan.settings,
-        painted=painted and painted[1],
-        holder=holder and holder.around(window),
+        background=around(found.statistics.background, window),
+        repair=found.repair,
+        step=plan.with_grid(found.grid_um).step,
+        intensity_window=found.statistics.window,
+        options=UnitOptions.of(plan.settings),
+        painted=None if painter is None else survey[painter.id].statistics.window,
+        holder=found.holder and found.holder.around(window),
         max_shift=None if level is None else level.max_shift,
     )
-    depends = [
-        input_key(plan, channel),
-        channel.index,
-        [box_to_json(box) for box in (window, own, plan.region)],
-        [None if f is None else f.to_json() for f in (given.iso, given.background)],
-        given.intensity_window,
-        plan.settings.surface.smoothing_um,
-        find_wrapper() if plan.settings.surface.wrap == "alpha-wrap" else None,
-        unwrapper_version() if plan.settings.unwrap.maps else None,
-        plan.settings.surface.closed_tiles,
-        [asdict(options) for options in (given.repair, plan.settings.lod)],
-        given.step,
-        asdict(plan.settings.unwrap),
-        plan.settings.volume.bits,
-        painted,
-        given.holder and given.holder.to_json(),
-        given.max_shift,
-    ]
-    key = key_of(depends, unit_maker, reader_module(plan, channel))
-    directory = out_folder.unit_dir(tile_id, channel.id, key)
-    ref, index = source_of(plan, channel=channel), painted and painted[0]
-    return UnitTask(ref, plan.level_of(channel), channel.index, given, directory, index), key
+    painted = None if painter is None else voxels_of(plan, painter)
+    return BuildUnit(voxels_of(plan, channel), given, painted)

@@ -45,16 +45,18 @@ from stereocell.building.plan_notes import (
     words_of_spacing,
 )
 from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
-from stereocell.building.steps import build_unit as unit
-from stereocell.building.steps import find_window as window
-from stereocell.building.steps import gather_evidence as evidence
-from stereocell.building.steps import sum_components as components
-from stereocell.building.steps import write_stage_tile as stage_tasks
-from stereocell.building.steps.write_stage_tile import digest_of_table, run_tile, tile_task
+from stereocell.building.steps.build_unit import BuildUnit
+from stereocell.building.steps.find_window import FindWindow
+from stereocell.building.steps.gather_evidence import GatherEvidence
+from stereocell.building.steps.sum_components import SumComponents
+from stereocell.building.steps.write_stage import Tables, WriteStage
+from stereocell.building.steps.write_stage_tile import WriteStageTile, stage_tile_step
 from stereocell.building.surface_cover import notes_on_cover
-from stereocell.building.survey_file import appearance_to_json, read_survey
+from stereocell.building.survey_file import read_survey
 from stereocell.building.unit_files import load_objects
 from stereocell.engine.run import Engine, console
+from stereocell.engine.run_steps import Kept, run_missing
+from stereocell.engine.step_record import libraries_of
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.counted import counted
 from stereocell.model.errors import UsageError
@@ -62,9 +64,8 @@ from stereocell.model.extra_packages import version_of
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
-from stereocell.read.readers import format_of, module_of, reader_of
+from stereocell.read.readers import format_of
 from stereocell.read.remarks import CAST
-from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.location import Location, require_apart
@@ -74,10 +75,11 @@ from stereocell.textures.map_packages import (
     UNWRAPPER,
     require_map_packages,
 )
-from stereocell.usd import write_stage as stage_writer
-from stereocell.usd import write_usdz as usdz_writer
-from stereocell.usd import written_files
-from stereocell.usd.written_files import AsWritten
+
+# the steps whose libraries stand in the provenance of a stage
+_STEPS = tuple(
+    step.__name__ for step in (FindWindow, GatherEvidence, SumComponents, BuildUnit, WriteStageTile)
+)
 
 
 def make(
@@ -228,10 +230,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
     settings = _without_places(to_dict(plan.settings))
     # by the plan's formats, since the sources may be gone when a stage is written; an added
     # channel's source lies in OUT
-    readers = {
-        *map(module_of, plan.formats),
-        *(reader_of(c.source) for c in plan.channels if c.source),
-    }
+    formats = {*plan.formats, *(format_of(c.source) for c in plan.channels if c.source)}
     return {
         "generator": GENERATOR,
         "fingerprint": plan.fingerprint,
@@ -239,7 +238,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
         "libraries": {
-            **libraries_of(window, evidence, components, unit, stage_tasks, *sorted(readers)),
+            **libraries_of(*_STEPS, *sorted(formats)),
             **({UNWRAPPER: version_of(UNWRAPPER)} if plan.settings.unwrap.maps else {}),
         },
         **_added(plan),
@@ -312,61 +311,36 @@ def run_stage(out: Path, engine: Engine) -> None:
             labels.id: _table(out_folder, plan, labels, index, engine) for labels in plan.labels
         }
         tiles = [
-            (tile.id, tile_task(out_folder, plan, index=index, tile=tile, tables=tables))
+            stage_tile_step(out_folder, plan, index=index, tile=tile, tables=tables)
             for tile in plan.tiles
         ]
-        about = provenance(plan)
-        names = [plan.name, plan.modality]
-        depends = [
-            index,
-            [appearance_to_json(appearance) for appearance in appearances],
-            about,
-            names,
-            list(plan.placement),
+        places = {tile.id: out_folder.tile_file(tile.id) for tile in plan.tiles}
+        stage = WriteStage(
+            plan.name,
+            tuple(tiles),
+            plan.spacing_um,
+            tuple(appearances),
+            provenance(plan),
+            plan.modality,
+            plan.placement,
             plan.has_sides,
             opens_cut,
-            {id_: digest_of_table(table) for id_, table in tables.items()},
-        ]
-        key = key_of(depends, stage_tasks, usdz_writer)
+            Tables(tables),
+        )
         done = partial(digest_of_stage, out_folder)
-        if phase.is_done(key, done, require_own=require_own_stage):
+        if phase.is_done(stage.key, done, require_own=require_own_stage):
             return
         remove(out_folder.stage_list)  # the list of the earlier stage
-        engine.run("stage", run_tile, [(id_, tile) for id_, tile in tiles if not tile.is_done()])
-        extents = [
-            stage_writer.TileExtent(
-                t.content.id, t.content.first_um, t.content.last_um, plan.spacing_um
-            )
-            for _, t in tiles
-        ]
-        stage_writer.write_stage(
-            out_folder.stage_dir,
-            plan.name,
-            appearances=appearances,
-            tiles=extents,
-            provenance=about,
-            modality=plan.modality,
-            placement=plan.placement,
-            has_sides=plan.has_sides,
-            opens_cut=opens_cut,
-            tables=tables,
-        )
+        kept = zip(places.items(), tiles, strict=True)
+        run_missing(engine, "stage", [Kept(id_, step, place) for (id_, place), step in kept])
+        stage.write(out_folder.stage_dir)
         out_folder.remove_other_folders(
             out_folder.stage_dir / "tiles", {tile.id for tile in plan.tiles}
         )
-        lists = [tile.listed() for _, tile in tiles]
+        lists = [tile.listed(places[tile.content.id]) for tile in tiles]
         files = {path: entry for listed, _ in lists for path, entry in listed.items()}
         _tell_size(files, sum(measured for _, measured in lists))
-        small = out_folder.stage_dir / usdz_writer.USDZ_NAME
-        usdz_writer.write_usdz(
-            out_folder.stage_file,
-            small,
-            as_written=AsWritten({out_folder.stage_dir.resolve(): files}),
-        )
-        looks_dir = out_folder.stage_dir / "looks"
-        written_files.write_list(
-            out_folder.stage_dir, files, looks_dir, out_folder.stage_file, small
-        )
+        stage.write_list(out_folder.stage_dir, files)
 
 
 def _table(
@@ -375,8 +349,7 @@ def _table(
     """Return the table of a label map's objects, and print what did not fit it."""
     names = {tile.id: f"{tile.id}/{labels.id}" for tile in plan.tiles}
     facts = {
-        tile: load_objects(out_folder.unit_dir(tile, labels.id, index[name]))
-        for tile, name in names.items()
+        tile: load_objects(out_folder.unit_dir(name, index[name])) for tile, name in names.items()
     }
     located = locate_objects(out_folder, plan, labels, engine)
     notes = read_notes(out_folder, plan, labels)

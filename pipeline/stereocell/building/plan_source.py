@@ -1,7 +1,7 @@
 """How a plan's source is opened, and those of its channels that have one of their own."""
 
 from stereocell.building.channels import Channel
-from stereocell.building.open_source import SourceRef, as_asked
+from stereocell.building.open_source import SourceRef, Voxels, as_asked
 from stereocell.building.plan import Plan
 
 
@@ -10,3 +10,9 @@ def source_of(plan: Plan, *, channel: Channel | None = None) -> SourceRef:
     if channel is not None and channel.source:
         return SourceRef(channel.source, 0, (), fingerprint=channel.fingerprint)
     return as_asked(plan.source, plan.settings.plan, fingerprint=plan.fingerprint)
+
+
+def voxels_of(plan: Plan, channel: Channel) -> Voxels:
+    """Return the voxels of a channel, at the level that is built."""
+    ref = source_of(plan, channel=channel)
+    return Voxels(ref, channel.index, plan.level_of(channel), plan.spacing_um, plan.origin_um)

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.steps.find_window import window_from_json
-from stereocell.building.steps.gather_evidence import evidence_from_json
-from stereocell.building.survey_file import EVIDENCE, WINDOW, ChannelSurvey, read_survey
+from stereocell.building.steps.find_window import FindWindow
+from stereocell.building.steps.gather_evidence import GatherEvidence
+from stereocell.building.survey_file import ChannelSurvey, read_survey
 from stereocell.building.unit_files import cover_of, load_record
 from stereocell.isosurface.lifted_by_noise import Lifted, count_lifted
 from stereocell.model.unit import MAX_MISSING, Cover
-from stereocell.storage.json_files import find_sealed
 
 # Both were tried on a CT of a trunk in voxels of 3 mm, at 300 HU: from 59 % left out to 17 and 5 %.
 REMEDY = (
@@ -74,8 +73,8 @@ def notes_on_cover(out_folder: OutFolder, plan: Plan) -> list[str]:
     for channel in plan.channels:
         total = Cover(0, 0, 0)
         for tile in plan.tiles:
-            key = index[f"{tile.id}/{channel.id}"]
-            cover = cover_of(load_record(out_folder.unit_dir(tile.id, channel.id, key)))
+            name = f"{tile.id}/{channel.id}"
+            cover = cover_of(load_record(out_folder.unit_dir(name, index[name])))
             total += cover or Cover(0, 0, 0)
         if total.missing <= MAX_MISSING:
             continue
@@ -99,8 +98,8 @@ def lifted_by_tile(out_folder: OutFolder, plan: Plan, survey: ChannelSurvey) -> 
     Without a bound on smoothing no noise was measured, and a file of evidence may be gone since:
     such tiles are left out.
     """
-    content = find_sealed(out_folder.out / survey.statistics_file, WINDOW)
-    window, deviations = content and window_from_json(content), plan.settings.surface.max_shift
+    window = FindWindow.FORM.find(out_folder.out / survey.statistics_file)
+    deviations = plan.settings.surface.max_shift
     if not window or not window.max_shift or not deviations or window.counting.mask is not None:
         return {}
     is_above, noise = survey.statistics.background is not None, window.max_shift / deviations
@@ -109,10 +108,9 @@ def lifted_by_tile(out_folder: OutFolder, plan: Plan, survey: ChannelSurvey) -> 
     found = {}
     for tile_id, iso in survey.iso.items():
         file = iso.files.get("evidence")
-        content = None if file is None else find_sealed(out_folder.out / file, EVIDENCE)
-        if content is None or iso.value is None or edges is None:
+        evidence = None if file is None else GatherEvidence.FORM.find(out_folder.out / file)
+        if evidence is None or iso.value is None or edges is None:
             continue
-        evidence = evidence_from_json(content)
         sums = evidence.above if is_above else evidence.plain
         if sums is not None:
             found[tile_id] = count_lifted(sums.counts, edges, level=iso.value, noise=noise)

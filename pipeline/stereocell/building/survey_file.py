@@ -20,13 +20,9 @@ from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
-# The files that the first pass leaves beside survey.json, and the remedy for a damaged one
-WINDOW = "units.schema.json#Window"
-EVIDENCE, COMPONENTS = "units.schema.json#Evidence", "units.schema.json#Components"
 # Least share of the voxels above the level in a body that opens cut. Two trees of vessels had 1 and
 # 1.7 percent, three heads and a brain 19 to 38.
 BODY_SHARE = 0.05
-AGAIN = "run `stereocell units OUT` again"
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,9 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_places, require_own_tissue
 from stereocell.building.phases import provenance_record
 from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
+from stereocell.building.plan_source import voxels_of
 from stereocell.building.sealed_documents import require_documents
+from stereocell.building.steps.learn_tissue import LearnTissue
 from stereocell.building.tissue_files import (
     FOLDER,
     RECORD,
@@ -32,18 +33,15 @@ from stereocell.building.tissue_files import (
     read_whole,
 )
 from stereocell.engine.run import console
+from stereocell.engine.step_record import libraries_of
 from stereocell.formats.ome_zarr_write import write_probabilities
 from stereocell.model.errors import OutputError, SourceError, UsageError
 from stereocell.model.version import GENERATOR
-from stereocell.read.readers import reader_of
 from stereocell.storage.atomic_write import replacing_folder
-from stereocell.storage.cache_key import key_of, libraries_of
 from stereocell.storage.json_files import write_json, write_sealed
 from stereocell.storage.shell_commands import fill_in
-from stereocell.tissue import classify as tissue_module
-from stereocell.tissue import onnx_classifier as network_module
-from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions, learn_tissue
-from stereocell.tissue.onnx_classifier import Network, apply_network
+from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions
+from stereocell.tissue.onnx_classifier import Network
 
 LEVEL = 127.5  # iso-value, 0..255: probability 1/2
 MAX_VOXELS = 250_000_000  # largest region to learn in, voxels; about 40 bytes each
@@ -134,13 +132,10 @@ def _add(
     is_brain = plan.modality == "MR" and not request.everywhere
     options = TissueOptions(classes=request.classes or "auto", brain=is_brain)
     settings = asdict(options) if network is None else network.settings()
-    source = [plan.fingerprint, plan.level, plan.spacing_um, plan.settings.plan.time]
-    region = [plan.region.start, plan.region.stop]
-    depends = [source, region, channel.index, channel.name, settings]
-    key = key_of(depends, tissue_module, network_module, reader_of(plan.source))
-    record = _find_learned(out / FOLDER, key)
+    step = LearnTissue(voxels_of(plan, channel), plan.region, channel.name, settings)
+    record = _find_learned(out / FOLDER, step.key)
     if record is None:
-        record = _learn(out_folder, plan, channel, options, network, settings, key)
+        record = _learn(out_folder, plan, step, options, network)
     plan = with_tissue(plan, out, record)
     require_own_places(out_folder, is_same_plan=out_folder.plan() == plan)
     out_folder.save_plan(plan)
@@ -196,31 +191,18 @@ def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
 def _learn(
     out_folder: OutFolder,
     plan: Plan,
-    channel: Channel,
+    step: LearnTissue,
     options: TissueOptions,
     network: Network | None,
-    settings: dict[str, Any],
-    key: str,
 ) -> dict[str, Any]:
     require_input(plan)
-    dataset = open_source(source_of(plan))
-    volume = dataset.read(channel.index, plan.region, plan.level)
+    learned = step.learn(options, network)
     require_still(plan, again="stereocell tissue OUT")
-    if network is None:
-        learned = learn_tissue(volume.voxels, plan.spacing_um, options=options)
-        names = _names(plan, len(learned.means), options.brain)
-        bic = {str(count): value for count, value in learned.bic.items()}
-        intensities: Sequence[float | None] = [float(mean) for mean in learned.means[:, 0]]
-        found = learned.probabilities
-    else:
-        shown = apply_network(network, volume.voxels)
-        names = [name for name in network.classes if name]
-        found = shown[[k for k, name in enumerate(network.classes) if name]]
-        bic, intensities = {}, [None] * len(names)
+    names = learned.names or _names(plan, len(learned.intensities), options.brain)
     classes = [
         _Class(name, color, intensity, np.rint(255 * part).astype(np.uint8))
         for (name, color), intensity, part in zip(
-            _colored(names, plan), intensities, found, strict=True
+            _colored(names, plan), learned.intensities, learned.probabilities, strict=True
         )
     ]
     _require_free([one.name for one in classes], plan)
@@ -229,11 +211,11 @@ def _learn(
         "format": "stereocell-tissue",
         "version": 1,
         "generator": GENERATOR,
-        "key": key,
+        "key": step.key,
         "fingerprint": plan.fingerprint,
-        "channel": channel.name,
-        "settings": settings,
-        "bic": bic,
+        "channel": step.channel,
+        "settings": dict(step.settings),
+        "bic": dict(learned.bic),
         "classes": [
             {
                 "name": one.name,
@@ -243,9 +225,9 @@ def _learn(
             }
             for one in classes
         ],
-        "libraries": libraries_of(tissue_module, network_module),
+        "libraries": libraries_of(LearnTissue.__name__),
     }
-    shape = dataset.levels[plan.level].shape
+    shape = open_source(step.voxels.ref).levels[plan.level].shape
     # Checks the plan before anything is written. Its fingerprint is a placeholder of equal length.
     out_folder.require_readable(_with_classes(plan, _source_in(out_folder.out), "0" * 64, record))
     with replacing_folder(out_folder.out / FOLDER) as folder:

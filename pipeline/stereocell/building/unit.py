@@ -14,7 +14,8 @@ from stereocell.isosurface.distance_field import to_distance
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.repair import Repaired, RepairOptions, repair
-from stereocell.meshes.alpha_wrap import alpha_wrap
+from stereocell.meshes.alpha_wrap import alpha_wrap, find_wrapper
+from stereocell.meshes.options import LodOptions
 from stereocell.meshes.rims import thin_rims
 from stereocell.model.lattice import Lattice, Step
 from stereocell.model.lattice_field import LatticeField
@@ -27,12 +28,48 @@ from stereocell.model.volume import Volume
 from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels
+from stereocell.textures.map_packages import unwrapper_version
+from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.sample_channel import sample_channel
 from stereocell.textures.texture_lod import Texturer, VertexValues
 from stereocell.transfer.joint_histogram import to_eight_bits
 
 RIM_ERROR = 0.3  # finest spacings; largest error of a surface's curve where tiles meet
 PAST = 3  # voxels beyond a cut that maps are baked from; the halo is larger, texels smaller
+
+
+@dataclass(frozen=True, slots=True)
+class UnitOptions:
+    """The settings that a unit depends on by itself.
+
+    smoothing_um  standard deviation of the smoothing before the surface is found
+    closed_tiles  whether the tile's solid is kept as well, as a closed mesh
+    bits          EIGHT_BITS, or those of the source
+    wrapper       version of the package that wraps triangles; empty: none does
+    unwrapper     version of the package that lays out maps; empty: there are none
+    """
+
+    smoothing_um: float
+    closed_tiles: bool
+    bits: int
+    lod: LodOptions
+    unwrap: UnwrapOptions
+    wrapper: str = ""
+    unwrapper: str = ""
+
+    @classmethod
+    def of(cls, settings: Settings) -> "UnitOptions":
+        """Return the unit's part of settings. Raises UsageError where a package is missing."""
+        surface = settings.surface
+        return cls(
+            float(surface.smoothing_um),
+            surface.closed_tiles,
+            settings.volume.bits,
+            settings.lod,
+            settings.unwrap,
+            find_wrapper() if surface.wrap == "alpha-wrap" else "",
+            unwrapper_version() if settings.unwrap.maps else "",
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +93,7 @@ class UnitInput:
     repair: RepairOptions
     step: Step
     intensity_window: tuple[float, float]
-    settings: Settings
+    options: UnitOptions
     painted: tuple[float, float] | None = None
     holder: Holder | None = None
     max_shift: float | None = None
@@ -91,9 +128,9 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
             (), None, eight_bit, reason, dropped, filled, clock.seconds, measured, None, cover
         )
     closed = None
-    if given.settings.surface.closed_tiles:
+    if given.options.closed_tiles:
         with clock("close"):
-            error = given.settings.lod.errors[0] * min(volume.spacing_um)
+            error = given.options.lod.errors[0] * min(volume.spacing_um)
             closed = close_tile(repaired.distance, lattice, max_error_um=error)
     shading = _Shading(repaired.distance, given, lattice, painted, clock)
     del repaired
@@ -101,7 +138,7 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
         fine,
         lattice.cut_planes(),
         spacing_um=volume.spacing_um,
-        lod=given.settings.lod,
+        lod=given.options.lod,
         clock=clock,
         box=lattice.own_box(),
         get_texturer=shading.texturer,
@@ -147,9 +184,9 @@ def _repaired(
     A function of its own, so that its float32 copies of the window are freed before levels are
     made.
     """
-    surface, spacing = given.settings.surface, lattice.spacing_um
+    options, spacing = given.options, lattice.spacing_um
     with clock("distance"):
-        field = denoise(volume, float(surface.smoothing_um), given.max_shift)
+        field = denoise(volume, options.smoothing_um, given.max_shift)
         if given.background is not None:
             field -= given.background.at(given.lattice.window)
         field -= iso.at(given.lattice.window)
@@ -161,11 +198,9 @@ def _repaired(
             field = np.ascontiguousarray(field[given.lattice.slices_of_thinned(given.step)])
         to_distance(field, spacing_um=spacing, value_range=value_range)
     with clock("repair"):
-        by_triangles = surface.wrap == "alpha-wrap" and given.repair.alpha_um > 0
-        options = (
-            replace(given.repair, alpha_um=0.0, offset_um=0.0) if by_triangles else given.repair
-        )
-        return repair(field, spacing, options=options), by_triangles
+        by_triangles = bool(options.wrapper) and given.repair.alpha_um > 0
+        plain = replace(given.repair, alpha_um=0.0, offset_um=0.0) if by_triangles else given.repair
+        return repair(field, spacing, options=plain), by_triangles
 
 
 def _extract(
@@ -196,7 +231,7 @@ class _Shading:
         clock: Clock,
     ) -> None:
         self._given, self._lattice, self._painted, self._clock = given, lattice, painted, clock
-        self._options = given.settings.unwrap.resolved(given.lattice.spacing_um)
+        self._options = given.options.unwrap.resolved(given.lattice.spacing_um)
         # slightly smaller, so that rays start outside of it
         self._solid = distance > 0.25 * max(lattice.spacing_um)
         self._distance = distance if self._options.maps else None
@@ -260,7 +295,7 @@ def find_measured(kept: NDArray[Any], given: UnitInput) -> NDArray[Any] | None:
 
     kept  as `cut_voxels` returns them
     """
-    if given.settings.volume.bits == EIGHT_BITS:
+    if given.options.bits == EIGHT_BITS:
         return None
     is_same = kept.dtype == np.uint8 and given.intensity_window == (0, 255)
     return None if is_same else kept

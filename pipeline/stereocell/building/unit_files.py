@@ -87,6 +87,21 @@ def is_whole(directory: Path) -> bool:
     return not find_faults(directory, record["files"], since=directory / _RECORD)
 
 
+class UnitFolder:
+    """The form of a unit's result in OUT: see `save_unit`."""
+
+    def is_whole(self, place: Path) -> bool:
+        """Return whether the folder holds all files of its record, as written."""
+        return is_whole(place)
+
+    def write(self, place: Path, result: Unit) -> None:
+        """Write the folder, whole or not at all. Raises OutputError."""
+        save_unit(place, result)
+
+
+UNIT_FOLDER = UnitFolder()
+
+
 def find_damage(directory: Path) -> dict[str, str]:
     """Return the fault of each damaged file of a unit, by name; all are hashed."""
     if not is_file(directory / _RECORD):

@@ -1,28 +1,20 @@
 """Join a running Dask cluster, and check that it can do the work."""
 
+import hashlib
 import json
 import re
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from stereocell.engine.step_record import all_libraries
 from stereocell.model.errors import StereoCellError
 from stereocell.model.extra_packages import MAKERS, version_of
-from stereocell.read.readers import OTHER, READERS
-from stereocell.storage.cache_key import key_of, libraries_of
 
-# tasks whose code must be equal on all workers, as that of the readers; by name, since this package
-# stands below them
-_TASKS = (
-    "stereocell.building.steps.find_window",
-    "stereocell.building.steps.gather_evidence",
-    "stereocell.building.steps.sum_components",
-    "stereocell.building.steps.build_unit",
-    "stereocell.building.steps.write_stage_tile",
-)
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -174,7 +166,15 @@ def _look_at(shared: str) -> _Sight:
 
 
 def _look() -> _Sight:
-    makers = (*_TASKS, *(reader.module for reader in (*READERS.values(), OTHER)))
-    versions = {"StereoCell": version("stereocell"), **libraries_of(*makers)}
+    versions = {"StereoCell": version("stereocell"), **all_libraries()}
     extras = tuple((name, version_of(name)) for name in MAKERS)
-    return _Sight(socket.gethostname(), tuple(versions.items()), extras, key_of("", *makers))
+    return _Sight(socket.gethostname(), tuple(versions.items()), extras, _digest_of_code())
+
+
+@cache
+def _digest_of_code() -> str:
+    """Return a digest of this installation's own code."""
+    digest, package = hashlib.sha256(), Path(__file__).parents[1]
+    for file in sorted(package.rglob("*.py")):
+        digest.update(f"{file.relative_to(package).as_posix()}\n".encode() + file.read_bytes())
+    return digest.hexdigest()

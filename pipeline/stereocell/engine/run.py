@@ -74,9 +74,16 @@ class Engine:
                 console.print(_OPEN_CLUSTER, markup=False)
 
     def run(
-        self, label: str, function: Callable[[T], R], tasks: Sequence[tuple[str, T]]
+        self,
+        label: str,
+        function: Callable[[T], R],
+        tasks: Sequence[tuple[str, T]],
+        *,
+        needs: Sequence[str] = (),
     ) -> list[R]:
         """Return a result for each (name, argument), in their order, with a progress bar.
+
+        needs  names of modules that all workers need, besides the function's own
 
         A task that fails doesn't stop the others. Raises TasksFailedError at the end where some
         failed, ClusterError where the workers can't be started or joined.
@@ -87,7 +94,9 @@ class Engine:
         failures: dict[int, str] = {}
         try:
             with _progress(label, len(tasks)) as advance:
-                for place, result, error in self._outcomes(function, [task for _, task in tasks]):
+                for place, result, error in self._outcomes(
+                    function, [task for _, task in tasks], needs
+                ):
                     if error is None:
                         results[place] = result
                     else:
@@ -106,7 +115,9 @@ class Engine:
             raise TasksFailedError("\n".join(lines))
         return [results[place] for place in range(len(tasks))]
 
-    def _outcomes(self, function: Callable[[T], R], tasks: Sequence[T]) -> Iterator[Outcome]:
+    def _outcomes(
+        self, function: Callable[[T], R], tasks: Sequence[T], needs: Sequence[str]
+    ) -> Iterator[Outcome]:
         if not self._scheduler and (self.workers == 0 or len(tasks) < 2):
             for place, task in enumerate(tasks):
                 try:
@@ -117,11 +128,15 @@ class Engine:
                     yield place, result, None
             return
         work, settle = carried(function)
-        for place, answer, failure in self._outcomes_of_workers(function, work, tasks):
+        for place, answer, failure in self._outcomes_of_workers(function, work, tasks, needs):
             yield place, None if failure else settle(answer), failure
 
     def _outcomes_of_workers(
-        self, function: Callable[[T], R], work: Callable[[T], Any], tasks: Sequence[T]
+        self,
+        function: Callable[[T], R],
+        work: Callable[[T], Any],
+        tasks: Sequence[T],
+        needs: Sequence[str],
     ) -> Iterator[Outcome]:
         """Run the tasks on the cluster, or on processes of this machine.
 
@@ -136,7 +151,7 @@ class Engine:
                 console.print("compiling loops, once on this machine", markup=False)
                 compile_in_process()
             plain = function.func if isinstance(function, partial) else function
-            self._pool = WorkerPool(self.workers, plain.__module__)
+            self._pool = WorkerPool(self.workers, plain.__module__, *needs)
         return self._pool.run(work, tasks)
 
     def close(self) -> None:

@@ -58,15 +58,15 @@ class _Worker:
 class WorkerPool:
     """Worker processes, which the first tasks start and which stay until `close`.
 
-    count   number of processes
-    module  name of a module that all workers need: the server imports it once
+    count    number of processes
+    modules  names of modules that all workers need: the server imports them once
     """
 
-    def __init__(self, count: int, module: str) -> None:
+    def __init__(self, count: int, *modules: str) -> None:
         leave_if_importing_main()
         self._count = min(count, _MOST_PIPES) if sys.platform == "win32" else count
         with children_ignore_interrupts():
-            self._context = _choose_context(module)
+            self._context = _choose_context(modules)
         self._workers: list[_Worker] = []
 
     def run(self, function: Callable[[T], Any], tasks: Sequence[T]) -> Iterator[Outcome]:
@@ -216,7 +216,7 @@ def _main_from_a_file() -> Iterator[None]:
         main["__file__"] = name
 
 
-def _choose_context(module: str) -> Any:
+def _choose_context(modules: Sequence[str]) -> Any:
     """Return multiprocessing's context of a fork server, or the one that starts from nothing.
 
     Workers start from nothing in three cases. The system has no such server (Windows), or its
@@ -226,18 +226,18 @@ def _choose_context(module: str) -> Any:
     (CVE-2022-42919).
     """
     is_safe = sys.platform == "linux" and sys.version_info >= (3, 11, 1)
-    method = "forkserver" if is_safe and _has_server(module) else "spawn"
+    method = "forkserver" if is_safe and _has_server(modules) else "spawn"
     return multiprocessing.get_context(method)
 
 
-def _has_server(module: str) -> bool:
+def _has_server(modules: Sequence[str]) -> bool:
     """Return whether workers can be forked from a server; start it where there is none."""
     from multiprocessing import forkserver  # Windows lacks it
 
     if _server_environment:
         return _server_environment == dict(os.environ)
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([serve.__module__, module])
+    context.set_forkserver_preload([serve.__module__, *modules])
     try:
         forkserver.ensure_running()
     except OSError:

@@ -29,9 +29,8 @@ from stereocell.building.plan import Plan
 from stereocell.building.plan_notes import print_notes
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
-from stereocell.building.steps.find_window import Window, measure_window
-from stereocell.building.steps.gather_evidence import measure_evidence
-from stereocell.building.survey_tasks import evidence_task, statistics_task
+from stereocell.building.steps.find_window import Window
+from stereocell.building.survey_steps import evidence_step, window_step
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels
 from stereocell.isosurface.options import LADDER
@@ -117,11 +116,10 @@ def preview(
     path = out or Path(f"iso_{channel.id}_{tile.id}.png")
     require_picture_or_nothing(path)
     require_free(path, expected=_EXPECTED, is_ours=_source_of_picture(path) == plan.fingerprint)
-    window = measure_window(statistics_task(plan, channel))
+    window = window_step(plan, channel).run()
     tiles = _spread(plan, tile)
     evidence = {
-        one.id: measure_evidence(evidence_task(plan, one.box, channel=channel, window=window))
-        for one in tiles
+        one.id: evidence_step(plan, one.box, channel=channel, window=window).run() for one in tiles
     }
     found = check_histogram(find_level(plan, channel, window, evidence))
     volume = open_source(source_of(plan, channel=channel)).read(channel.index, tile.box, plan.level)

@@ -18,8 +18,7 @@ from stereocell.building.open_source import open_source
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
-from stereocell.building.steps.find_window import measure_statistics
-from stereocell.building.survey_tasks import statistics_task
+from stereocell.building.survey_steps import window_step
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.errors import UsageError
 from stereocell.model.version import GENERATOR
@@ -76,7 +75,7 @@ def write_slices(plan: Plan, folder: Path, *, plane: str = ACQUIRED) -> Written:
         raise UsageError(f"slices are of one channel: found {found}, expected --channels with one")
     _require_own(folder, plan)
     cut = cut_planes(dataset, plan, channel.index, plane)
-    window = measure_statistics(statistics_task(plan, channel)).window
+    window = window_step(plan, channel).run().statistics.window
     count = len(cut.first_um)
     names = [f"{k:0{len(str(count))}d}.png" for k in range(count)]
     with replacing_folder(folder) as new:

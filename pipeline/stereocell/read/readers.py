@@ -1,7 +1,4 @@
-"""The formats that are read, and which one a source has.
-
-No key of a result follows this module: the reader that is found here is named in the key.
-"""
+"""The formats that are read, and which one a source has."""
 
 import os
 import zipfile
@@ -47,6 +44,8 @@ class Reader:
     has_pattern names of files tell what they hold: `read_image(location, pattern="a_z{z}.tif")`
     has_axes    a source may not name its axes: `read_image(location, axes="czyx")`
     is_remote   it is read from an address, too
+    version     is raised when the same file gives other voxels or another place: a part of the key
+                of each result
     """
 
     module: str
@@ -56,6 +55,7 @@ class Reader:
     has_pattern: bool = False
     has_axes: bool = False
     is_remote: bool = False
+    version: int = 1
 
     @property
     def name(self) -> str:
@@ -123,6 +123,12 @@ def reader_of(source: str | Path) -> str:
 def module_of(format: str) -> str:
     """Return the dotted name of the module that reads a format, as `format_of` gives it."""
     return READERS.get(format, OTHER).module
+
+
+def reader_version(source: str | Path) -> tuple[str, int]:
+    """Return the format of a source, as `format_of` does, and the version of its reader."""
+    format = format_of(source)
+    return format, READERS.get(format, OTHER).version
 
 
 def find_reader(source: str | Path) -> tuple[Location, Reader]:

@@ -169,7 +169,7 @@ def gather(out_folder: OutFolder) -> Facts:
 def _unit(
     out_folder: OutFolder, tile: Tile, channel: Channel, key: str, found: TileIso
 ) -> UnitFacts:
-    directory = out_folder.unit_dir(tile.id, channel.id, key)
+    directory = out_folder.unit_dir(f"{tile.id}/{channel.id}", key)
     record = load_record(directory)
     bundle = out_folder.bundle_dir
     lods = []

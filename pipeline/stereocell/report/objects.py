@@ -51,8 +51,9 @@ def gather_labels(out_folder: OutFolder, plan: Plan) -> tuple[LabelFacts, ...]:
     found = []
     for labels in plan.labels:
         folders = {
-            tile.id: out_folder.unit_dir(tile.id, labels.id, index[f"{tile.id}/{labels.id}"])
+            tile.id: out_folder.unit_dir(name, index[name])
             for tile in plan.tiles
+            for name in [f"{tile.id}/{labels.id}"]
         }
         facts = {tile: load_objects(folder) for tile, folder in folders.items()}
         records = {tile: load_record(folder)["lods"] for tile, folder in folders.items()}

@@ -1,15 +1,31 @@
 """The report as a phase of a build: it is written anew where its content has changed."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any, ClassVar
 
 from stereocell.building.made_of import FIELD
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_report
 from stereocell.building.phase import digest_of_file, phase_of
 from stereocell.building.phases import provenance_record
-from stereocell.report import page
-from stereocell.storage.cache_key import key_of
+from stereocell.engine.step import Step
+from stereocell.report.page import TEMPLATE, write_report
+
+
+@dataclass(frozen=True, slots=True)
+class WriteReport(Step[None]):
+    """Write the report; the fields are the documents of OUT that it shows, and its template."""
+
+    VERSION: ClassVar[int] = 1
+
+    index: Mapping[str, str]
+    survey: Mapping[str, Any]
+    provenance: Mapping[str, Any]
+    phases: Mapping[str, Any]
+    template: str
 
 
 def run_report(out: Path) -> None:
@@ -26,8 +42,13 @@ def run_report(out: Path) -> None:
             for name, entry in out_folder.phases().items()
             if name != "report"
         }
-        content = [out_folder.index(), out_folder.survey(), provenance_record(plan), others]
-        key = key_of([content, page.TEMPLATE.read_text("utf-8")], page)
+        step = WriteReport(
+            out_folder.index(),
+            out_folder.survey(),
+            provenance_record(plan),
+            others,
+            TEMPLATE.read_text("utf-8"),
+        )
         done = partial(digest_of_file, out_folder.report_file)
-        if not phase.is_done(key, done, require_own=require_own_report):
-            page.write_report(out)
+        if not phase.is_done(step.key, done, require_own=require_own_report):
+            write_report(out)

@@ -10,12 +10,12 @@ from stereocell.building.sealed_documents import (
     checks_of,
     find_document_faults,
 )
-from stereocell.building.survey_file import COMPONENTS, EVIDENCE, WINDOW
 from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.formats.exr import check_exr
 from stereocell.formats.stl import check_stl
 from stereocell.formats.vdb import check_vdb
 from stereocell.model.errors import CheckError, StereoCellError
+from stereocell.storage.documents import schema_of
 from stereocell.storage.file_list import DAMAGED, MISSING
 from stereocell.storage.json_files import find_sealed, read_json
 from stereocell.storage.location import Location, require_own
@@ -40,11 +40,10 @@ def check_units(out_folder: OutFolder) -> str:
     """Check the units' files against the hashes in unit.json, and the survey behind them."""
     told = find_document_faults(out_folder, "units")
     lists = [fault.removesuffix(f": {UNITS_AGAIN}") for fault in told]
-    problems, files = _spoilt_survey(out_folder), 0
+    problems, files = _damaged_survey(out_folder), 0
     index = find_sealed(out_folder.index_file, INDEX) or {}
     for name, key in index.items():
-        tile_id, channel_id = name.split("/")
-        folder = out_folder.unit_dir(tile_id, channel_id, key)
+        folder = out_folder.unit_dir(name, key)
         files += len(sizes_below(folder))
         problems += [
             f"{(folder / file).relative_to(out_folder.out).as_posix()}: {fault}"
@@ -55,17 +54,21 @@ def check_units(out_folder: OutFolder) -> str:
     return f"{files} files of {len(index)} units"
 
 
-def _spoilt_survey(out_folder: OutFolder) -> list[str]:
+def _damaged_survey(out_folder: OutFolder) -> list[str]:
     """Return the faults of the files of windows and levels that the survey names."""
     survey = find_sealed(out_folder.survey_file, SURVEY) or {"channels": {}}
     channels = survey["channels"].values()
-    files = {channel["statistics_file"]: WINDOW for channel in channels}
-    schemas = {"evidence": EVIDENCE, "components": COMPONENTS}
+    names = dict.fromkeys(channel["statistics_file"] for channel in channels)
     for channel in channels:
         for tile in channel["iso"].values():
-            files |= {file: schemas[what] for what, file in tile["files"].items()}
-    spoilt = [name for name in files if find_sealed(out_folder.out / name, files[name]) is None]
-    return [_fault_of(out_folder, out_folder.out / name) for name in spoilt]
+            names |= dict.fromkeys(tile["files"].values())
+    files = [out_folder.out / name for name in names]
+    return [_fault_of(out_folder, file) for file in files if not _is_whole(file)]
+
+
+def _is_whole(file: Path) -> bool:
+    schema = schema_of(file.name)
+    return schema is not None and find_sealed(file, schema) is not None
 
 
 def _fault_of(out_folder: OutFolder, file: Path) -> str:

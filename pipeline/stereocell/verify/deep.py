@@ -1,14 +1,13 @@
 """`stereocell check OUT --deep`: compare stage with source and bundle with stage, as a table."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from stereocell.building.channels import Channel
 from stereocell.building.input_unchanged import require_added, require_input, require_labels
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.passes import unit_tasks
+from stereocell.building.passes import unit_steps
 from stereocell.building.plan import Plan
 from stereocell.building.surface_cover import SurfaceCover, lifted_by_tile, sum_lifted
 from stereocell.building.survey_file import read_survey
@@ -127,17 +126,16 @@ def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
 def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
     there = set(_tiles_in(out_folder.stage_file))
     index = out_folder.index()
-    for name, task, _ in unit_tasks(out_folder, plan, read_survey(out_folder)):
+    for name, unit in unit_steps(plan, read_survey(out_folder)).items():
         tile_id, channel_id = name.split("/")
         if tile_id not in there:
             continue  # reported before
-        # the unit as built, possibly by an earlier version
-        unit = replace(task, directory=out_folder.unit_dir(tile_id, channel_id, index[name]))
         tile = plan.tile(tile_id)
         yield (
             name,
             SourceTask(
                 unit,
+                out_folder.unit_dir(name, index[name]),  # as built, possibly by an earlier version
                 out_folder.stage_file,
                 tile_id,
                 channel_id,

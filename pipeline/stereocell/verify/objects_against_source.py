@@ -21,8 +21,8 @@ from stereocell.building.object_passes import images_of, read_notes
 from stereocell.building.object_tables import make_table, table_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.steps.build_objects import ImageRef, read_on_labels
-from stereocell.building.steps.find_extents import ExtentsTask, find_in_tile
+from stereocell.building.steps.build_objects import Image, read_on_labels
+from stereocell.building.steps.find_extents import FindExtents
 from stereocell.building.unit_files import load_objects
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh
@@ -59,7 +59,7 @@ class _TileTask:
 class _SumsTask:
     labels: Labels
     box: Box
-    images: tuple[ImageRef, ...]
+    images: tuple[Image, ...]
     names: NDArray[np.uint64]  # of whole objects, ascending
     p95s: NDArray[np.float64]  # (n, images), which are held against their voxels
 
@@ -67,16 +67,17 @@ class _SumsTask:
 def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> str:
     """Return what was compared of a label map. Raises CheckError where something differs."""
     boxes = tile_boxes(TileGrid.of(plan, labels))
-    names = [(f"{tile}/{labels.name}", ExtentsTask(labels, box)) for tile, box in boxes.items()]
-    counted = engine.run("objects", find_in_tile, names)
+    steps = [
+        (f"{tile}/{labels.name}", FindExtents(labels.voxels, box)) for tile, box in boxes.items()
+    ]
+    counted = engine.run("objects", FindExtents.run, steps)
     parts = dict(zip(boxes, counted, strict=True))
     located = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
     index = out_folder.index()
     facts = {
-        tile.id: load_objects(
-            out_folder.unit_dir(tile.id, labels.id, index[f"{tile.id}/{labels.id}"])
-        )
+        tile.id: load_objects(out_folder.unit_dir(name, index[name]))
         for tile in plan.tiles
+        for name in [f"{tile.id}/{labels.id}"]
     }
     notes = read_notes(out_folder, plan, labels)
     table, _ = make_table(plan, labels, located, facts, notes, table_of(plan, labels))

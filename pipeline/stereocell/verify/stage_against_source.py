@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.building.open_source import open_source
-from stereocell.building.steps.build_unit import UnitTask
+from stereocell.building.steps.build_unit import BuildUnit
 from stereocell.building.unit import UnitInput, cut_voxels, find_measured, find_surface
 from stereocell.building.unit_files import cover_of, load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas
@@ -55,7 +54,8 @@ class SourceTask:
     shares_volume  whether its volume is another channel's
     """
 
-    unit: UnitTask
+    unit: BuildUnit
+    directory: Path
     stage_file: Path
     tile_id: str
     channel_id: str
@@ -83,21 +83,20 @@ class UnitFinding:
 def compare_unit(task: SourceTask) -> UnitFinding:
     """Compare a unit's part of the stage with its voxels. Raises StereoCellError if unreadable."""
     given = task.unit.given
-    dataset = open_source(task.unit.ref)
-    volume = dataset.read(task.unit.channel, given.lattice.window, task.unit.level)
+    volume = task.unit.voxels.read(given.lattice.window)
     fine, cover = find_surface(volume, given)
     problems = []
     stage = open_stage(task.stage_file)
-    with cached(task.unit.directory), loaded(stage, task.tile_id) as (tile, _):
+    with cached(task.directory), loaded(stage, task.tile_id) as (tile, _):
         lods = list(read_lods(tile, task.channel_id))
         composed = read_volume(tile, task.channel_id)
-        record = load_record(task.unit.directory)
+        record = load_record(task.directory)
         if cover_of(record) != cover:
             problems.append("the share of the source's voxels that it covers is not as recorded")
         surfaces = _Surfaces(fine, given, task.placement, task.samples)
         levels, faults = _compare_lods(surfaces, lods, record)
         problems += faults
-        problems += _compare_shading(lods, load_lods(task.unit.directory), task.placement)
+        problems += _compare_shading(lods, load_lods(task.directory), task.placement)
         if composed is None and not task.shares_volume:
             problems.append("no volume in the stage")
         elif composed is not None:
@@ -119,7 +118,7 @@ class _Surfaces:
     def __init__(self, fine: Mesh, given: UnitInput, placement: Matrix, samples: int) -> None:
         self.samples = samples
         self.triangles = fine.triangles
-        self._errors = given.settings.lod.errors
+        self._errors = given.options.lod.errors
         self._spacing = min(given.lattice.spacing_um)
         self._bodies = SmallBodies(fine)
         self._placed = _placed(fine, placement)

@@ -1,20 +1,19 @@
-"""Build the objects of one tile of a label map, on a worker. Picklable."""
+"""The step that builds the objects of one tile of a label map."""
 
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.building.label_maps import Labels
-from stereocell.building.open_source import SourceRef, open_source
-from stereocell.building.unit_files import save_unit
+from stereocell.building.open_source import Voxels
+from stereocell.building.unit_files import UNIT_FOLDER, UnitFolder
+from stereocell.engine.step import Step
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Lod
-from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.model.unit import ObjectFacts, Unit
@@ -27,19 +26,11 @@ from stereocell.textures.sample_channel import sample_channel
 
 
 @dataclass(frozen=True, slots=True)
-class ImageRef:
-    """An image channel that is measured over objects.
+class Image:
+    """An image channel that is measured over objects; `region`: its voxels that are built."""
 
-    region                 voxels (z, y, x) of the level that are built
-    spacing_um, origin_um  (z, y, x), um, of that level's voxels and of the centre of its first one
-    """
-
-    ref: SourceRef
-    channel: int
-    level: int
+    voxels: Voxels
     region: Box
-    spacing_um: Spacing
-    origin_um: Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,14 +41,14 @@ class Painted:
     depth_um  below the surface, within which the largest counts
     """
 
-    image: ImageRef
+    image: Image
     window: tuple[float, float]
     depth_um: float
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectsTask:
-    """One tile of a label map.
+class BuildObjects(Step[Unit]):
+    """Build the objects of one tile of a label map.
 
     window   voxels of the label map
     tile     those of the tile itself
@@ -70,6 +61,9 @@ class ObjectsTask:
     painted  on the objects; None: nothing
     """
 
+    VERSION: ClassVar[int] = 1
+    FORM: ClassVar[UnitFolder] = UNIT_FOLDER
+
     labels: Labels
     window: Box | None
     tile: Box
@@ -79,18 +73,19 @@ class ObjectsTask:
     others_cut: NDArray[np.uint64]
     edges: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
     step_um: float
-    images: tuple[ImageRef, ...]
+    images: tuple[Image, ...]
     painted: Painted | None
     options: ObjectOptions
-    directory: Path
+
+    def run(self) -> Unit:
+        """Return the objects as a unit. Raises SourceError."""
+        return _build(self)
 
 
-def run_objects(task: ObjectsTask) -> None:
-    """Build the objects of a tile and write their folder. Raises SourceError, OutputError."""
+def _build(task: BuildObjects) -> Unit:
     clock = Clock()
     if task.window is None:
-        save_unit(task.directory, Unit((), None, None, "no object", 0, 0, {}, objects=_none(task)))
-        return
+        return Unit((), None, None, "no object", 0, 0, {}, objects=_none(task))
     start = time.perf_counter()
     voxels = task.labels.open().read(task.window)
     compact, names = _numbered(task, voxels)
@@ -124,8 +119,7 @@ def run_objects(task: ObjectsTask) -> None:
     if task.painted is not None:
         with clock("paint"):
             lods = _paint(lods, task.painted)
-    unit = Unit(lods, None, None, reason, 0, 0, clock.seconds, objects=facts)
-    save_unit(task.directory, unit)
+    return Unit(lods, None, None, reason, 0, 0, clock.seconds, objects=facts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +137,7 @@ class _Names:
 
 
 def _numbered(
-    task: ObjectsTask, voxels: NDArray[np.unsignedinteger]
+    task: BuildObjects, voxels: NDArray[np.unsignedinteger]
 ) -> tuple[NDArray[np.int32], _Names]:
     """Return the window with numbers from 1 in place of labels, pieces each their own."""
     assert task.window is not None
@@ -184,19 +178,18 @@ def _numbered(
     )
 
 
-def read_on_labels(labels: Labels, window: Box, image: ImageRef) -> NDArray[Any]:
+def read_on_labels(labels: Labels, window: Box, image: Image) -> NDArray[Any]:
     """Return a channel's nearest voxel at each voxel of a window of a label map, (z, y, x)."""
     indices = []
     for axis in range(3):
-        first = labels.origin_um[axis] - image.origin_um[axis]
+        first = labels.origin_um[axis] - image.voxels.origin_um[axis]
         at = np.arange(window.start[axis], window.stop[axis])
-        nearest = np.rint((first + at * labels.spacing_um[axis]) / image.spacing_um[axis])
+        nearest = np.rint((first + at * labels.spacing_um[axis]) / image.voxels.spacing_um[axis])
         first_voxel, last_voxel = image.region.start[axis], image.region.stop[axis] - 1
         indices.append(nearest.astype(np.int64).clip(first_voxel, last_voxel))
     z0, y0, x0 = (int(part.min()) for part in indices)
     z1, y1, x1 = (int(part.max()) + 1 for part in indices)
-    read = open_source(image.ref).read(image.channel, Box((z0, y0, x0), (z1, y1, x1)), image.level)
-    voxels = read.voxels
+    voxels = image.voxels.read(Box((z0, y0, x0), (z1, y1, x1))).voxels
     for axis, (part, start) in enumerate(zip(indices, (z0, y0, x0), strict=True)):
         if len(part) != voxels.shape[axis] or (np.diff(part) != 1).any():
             voxels = np.take(voxels, part - start, axis)
@@ -207,8 +200,8 @@ def _paint(lods: Sequence[Lod], painted: Painted) -> tuple[Lod, ...]:
     """Return levels with the intensity of a channel at their vertices."""
     if not lods:
         return ()
-    image = painted.image
-    spacing, origin = np.array(image.spacing_um), np.array(image.origin_um)
+    image, own = painted.image, painted.image.voxels
+    spacing, origin = np.array(own.spacing_um), np.array(own.origin_um)
     corners = [xyz_to_zyx(lod.mesh.positions.astype(np.float64)) for lod in lods]
     low = np.min([at.min(axis=0) for at in corners], axis=0) - painted.depth_um
     high = np.max([at.max(axis=0) for at in corners], axis=0) + painted.depth_um
@@ -217,8 +210,8 @@ def _paint(lods: Sequence[Lod], painted: Painted) -> tuple[Lod, ...]:
     stop = np.ceil((high - origin) / spacing).astype(np.int64).clip(first, last) + 1
     (z0, y0, x0), (z1, y1, x1) = start.tolist(), stop.tolist()
     box = Box((z0, y0, x0), (z1, y1, x1))
-    volume = open_source(image.ref).read(image.channel, box, image.level)
-    lattice = Lattice.of_whole(box, image.spacing_um, origin_um=image.origin_um)
+    volume = own.read(box)
+    lattice = Lattice.of_whole(box, own.spacing_um, origin_um=own.origin_um)
     return tuple(
         replace(
             lod,
@@ -279,7 +272,7 @@ def _facts(
     )
 
 
-def _none(task: ObjectsTask) -> ObjectFacts:
+def _none(task: BuildObjects) -> ObjectFacts:
     nothing = np.zeros(0)
     by_channel = np.zeros((0, len(task.images)))
     return ObjectFacts(

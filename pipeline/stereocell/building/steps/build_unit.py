@@ -1,30 +1,36 @@
-"""Build one unit, the surface and volume of one (tile, channel), on a worker. Picklable."""
+"""The step that builds one unit: the surface and the volume of one (tile, channel)."""
 
 import time
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import ClassVar
 
-from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.open_source import Voxels
 from stereocell.building.unit import UnitInput, build_unit
-from stereocell.building.unit_files import save_unit
+from stereocell.building.unit_files import UNIT_FOLDER, UnitFolder
+from stereocell.engine.step import Step
+from stereocell.model.unit import Unit
 
 
 @dataclass(frozen=True, slots=True)
-class UnitTask:
-    ref: SourceRef
-    level: int
-    channel: int
+class BuildUnit(Step[Unit]):
+    """Build one unit.
+
+    painted  the channel that is sampled onto the surface; None: none is
+    """
+
+    VERSION: ClassVar[int] = 1
+    FORM: ClassVar[UnitFolder] = UNIT_FOLDER
+
+    voxels: Voxels
     given: UnitInput
-    directory: Path
-    painted: int | None = None  # index of the channel that is sampled onto the surface
+    painted: Voxels | None = None
 
-
-def run_unit(task: UnitTask) -> None:
-    """Build one unit and write its folder. Raises SourceError, OutputError."""
-    start = time.perf_counter()
-    source, window = open_source(task.ref), task.given.lattice.window
-    volume = source.read(task.channel, window, task.level)
-    painted = None if task.painted is None else source.read(task.painted, window, task.level)
-    seconds = time.perf_counter() - start
-    built = build_unit(volume, task.given, painted=painted)
-    save_unit(task.directory, replace(built, seconds={"read": seconds, **built.seconds}))
+    def run(self) -> Unit:
+        """Return the unit, with the seconds that each part took. Raises SourceError."""
+        start = time.perf_counter()
+        window = self.given.lattice.window
+        volume = self.voxels.read(window)
+        painted = None if self.painted is None else self.painted.read(window)
+        seconds = time.perf_counter() - start
+        built = build_unit(volume, self.given, painted=painted)
+        return replace(built, seconds={"read": seconds, **built.seconds})

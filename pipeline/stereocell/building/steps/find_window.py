@@ -1,17 +1,17 @@
-"""Find a channel's window, histogram and suggested 2D function, on a worker. Picklable."""
+"""The step that finds a channel's window, histogram and suggested 2D function."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from stereocell.building.open_source import SourceRef, open_source
-from stereocell.building.settings import Settings
+from stereocell.building.open_source import Voxels, open_source
+from stereocell.building.units_again import AGAIN
+from stereocell.engine.step import Document, Step
 from stereocell.filters.background import find_background
 from stereocell.filters.noise import NoiseSample, find_max_shift
 from stereocell.isosurface.find_holder import find_holder
@@ -26,7 +26,6 @@ from stereocell.isosurface.level_histogram import Scale
 from stereocell.model.image_plane import back_of_three, first_of_three, slices_back, slices_first
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
-from stereocell.storage.json_files import write_sealed
 from stereocell.transfer.adaptive_threshold import Histogram, make_histogram
 from stereocell.transfer.boundaries import SuggestedShapes, suggest
 from stereocell.transfer.channel_statistics import ChannelStatistics, find_statistics
@@ -39,6 +38,7 @@ from stereocell.transfer.joint_histogram import (
     sample_boxes,
     to_eight_bits,
 )
+from stereocell.transfer.options import WindowOptions
 
 SURVEY_VOXELS = 16_000_000  # about the largest number of voxels that a channel's window is found on
 # Voxels counted for the histogram. Their number decides whether a peak exceeds chance: in a head of
@@ -47,19 +47,6 @@ SURVEY_VOXELS = 16_000_000  # about the largest number of voxels that a channel'
 COUNTED_VOXELS = 64_000_000
 COUNTED_PLANES = 16  # planes read at once
 JOINT_VOXELS = 8_000_000  # voxels at full resolution for the channel's boundaries
-
-
-@dataclass(frozen=True, slots=True)
-class StatisticsTask:
-    ref: SourceRef
-    level: int
-    channel: int
-    region: Box
-    settings: Settings
-    subtracts: bool  # whether a background is looked for
-    max_shift: float  # deviations of the noise that smoothing may move a value by; 0: by any
-    finds_holder: bool = False  # whether it is a CT whose table is looked for
-    window: tuple[float, float] | None = None  # voxel values; None: to be found
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,16 +81,40 @@ def window_from_json(content: Mapping[str, Any]) -> Window:
     )
 
 
-def write_window(task_and_file: tuple[StatisticsTask, Path]) -> None:
-    """Find a channel's window and write it."""
-    task, file = task_and_file
-    write_sealed(file, window_to_json(measure_window(task)))
+WINDOW = Document("units.schema.json#Window", window_to_json, window_from_json, AGAIN)
 
 
-def measure_window(task: StatisticsTask) -> Window:
-    """Return a channel's window and histogram, from a coarse level or from some of the planes."""
-    dataset = open_source(task.ref)
-    level = task.level
+@dataclass(frozen=True, slots=True)
+class FindWindow(Step[Window]):
+    """Find a channel's window and histogram, from a coarse level or from some of the planes.
+
+    smoothing_um   standard deviation of the surface's smoothing
+    background_um  size of the structures that a background lies around; 0: none is looked for
+    max_shift      deviations of the noise that smoothing may move a value by; 0: by any
+    finds_holder   whether it is a CT whose table is looked for
+    window         voxel values that are given; None: they are found
+    """
+
+    VERSION: ClassVar[int] = 1
+    FORM: ClassVar[Document[Window]] = WINDOW
+
+    voxels: Voxels
+    region: Box
+    options: WindowOptions
+    smoothing_um: float
+    background_um: float
+    max_shift: float
+    finds_holder: bool = False
+    window: tuple[float, float] | None = None
+
+    def run(self) -> Window:
+        """Return the window. Raises SourceError."""
+        return _measure(self)
+
+
+def _measure(task: FindWindow) -> Window:
+    dataset = open_source(task.voxels.ref)
+    level = task.voxels.level
     # the finest level that is small enough; a source without one gives every k-th plane
     while level + 1 < len(dataset.levels) and _voxels(task, dataset, level) > SURVEY_VOXELS:
         level += 1
@@ -116,28 +127,25 @@ def measure_window(task: StatisticsTask) -> Window:
         else [box]
     )
     voxels = np.concatenate(
-        [dataset.read(task.channel, each, level).voxels for each in slices], axis
+        [dataset.read(task.voxels.channel, each, level).voxels for each in slices], axis
     )
-    surface = task.settings.surface
-    mask = _mask_of([voxels] if level == task.level else _blocks(task, dataset))
+    mask = _mask_of([voxels] if level == task.voxels.level else _blocks(task, dataset))
     # a mask's ground is even, and no padding
     least = darkest = float(voxels.min()) if mask is None else None
-    across, rows, columns = first_of_three(
-        denoising_reach(float(surface.smoothing_um), spacing, axis), axis
-    )
+    across, rows, columns = first_of_three(denoising_reach(task.smoothing_um, spacing, axis), axis)
     reach = (0 if step > 1 else across, rows, columns)
     padding = slices_back(find_padding(slices_first(voxels, axis), darkest, reach), axis)
     if padding.mean() > MAX_PADDING:
         padding[...], darkest = False, None
     scale, background = Scale.of(voxels, padding), None
-    if task.subtracts and mask is None:
+    if task.background_um > 0 and mask is None:
         # sharp hot voxels and noise don't reach a percentile of whole blocks, so planes are not
         # denoised: a median before it changed the mean Dice over 48 tiles of known solids by .0006
         background = find_background(
             voxels,
             task.region,
-            spacing_um=dataset.levels[task.level].spacing_um,
-            block_um=float(surface.background_um),
+            spacing_um=dataset.levels[task.voxels.level].spacing_um,
+            block_um=task.background_um,
             padding=padding if padding.any() else None,
         )
     holder = None
@@ -147,35 +155,31 @@ def measure_window(task: StatisticsTask) -> Window:
         holder = find_holder(voxels, apart, task.region)
     scale_above = None if background is None else scale.above(background)
     del padding
-    statistics = find_statistics(
-        voxels, task.settings.window, background=background, window=task.window
-    )
-    if voxels.shape != task.region.shape and _voxels(task, dataset, task.level) <= COUNTED_VOXELS:
-        statistics = replace(statistics, values=_count_values(task, dataset, statistics.window))
+    statistics = find_statistics(voxels, task.options, background=background, window=task.window)
+    if (
+        voxels.shape != task.region.shape
+        and _voxels(task, dataset, task.voxels.level) <= COUNTED_VOXELS
+    ):
+        statistics = replace(statistics, values=_count_values(task, statistics.window))
     suggested, noise = _look_closely(task, dataset, statistics.window, least)
     statistics = replace(statistics, suggested=suggested)
     shift = find_max_shift(noise, task.max_shift, mask) if task.max_shift > 0 else None
     return Window(statistics, Counting(scale, scale_above, darkest, mask), holder, shift)
 
 
-def measure_statistics(task: StatisticsTask) -> ChannelStatistics:
-    """Return a channel's window and histogram alone."""
-    return measure_window(task).statistics
-
-
-def _count_values(task: StatisticsTask, dataset: Dataset, window: tuple[float, float]) -> Histogram:
+def _count_values(task: FindWindow, window: tuple[float, float]) -> Histogram:
     """Return the histogram of all voxels of the region within the window (voxel values)."""
     (z0, *start), (z1, *stop) = task.region.start, task.region.stop
     counts: list[NDArray[np.int64]] = []
     for z in range(z0, z1, COUNTED_PLANES):
         box = Box((z, start[0], start[1]), (min(z + COUNTED_PLANES, z1), stop[0], stop[1]))
-        part = make_histogram(dataset.read(task.channel, box, task.level).voxels, window)
+        part = make_histogram(task.voxels.read(box).voxels, window)
         counts.append(np.array(part.counts))
     return replace(part, counts=tuple(int(n) for n in np.sum(counts, axis=0)))
 
 
 def _look_closely(
-    task: StatisticsTask, dataset: Dataset, window: tuple[float, float], darkest: float | None
+    task: FindWindow, dataset: Dataset, window: tuple[float, float], darkest: float | None
 ) -> tuple[SuggestedShapes, float]:
     """Return a 2D function and the noise's deviation, from blocks of the level that is built.
 
@@ -183,8 +187,8 @@ def _look_closely(
 
     darkest  the least value, whose even runs have no noise to measure; None: nothing is left out
     """
-    axis = dataset.slice_axis(task.level)
-    spacing = first_of_three(dataset.levels[task.level].spacing_um, axis)
+    axis = dataset.slice_axis(task.voxels.level)
+    spacing = first_of_three(dataset.levels[task.voxels.level].spacing_um, axis)
     fine, noise = np.zeros((FINE_ROWS, COLUMNS), np.int64), NoiseSample()
     for voxels in _blocks(task, dataset):
         turned = np.ascontiguousarray(slices_first(voxels, axis))
@@ -198,12 +202,12 @@ def _look_closely(
     return suggest(fine, spacing_um=spacing), noise.deviation()
 
 
-def _blocks(task: StatisticsTask, dataset: Dataset) -> Iterator[NDArray[Any]]:
+def _blocks(task: FindWindow, dataset: Dataset) -> Iterator[NDArray[Any]]:
     """Yield blocks (z, y, x) spread over the region, of the level that is built."""
-    largest = back_of_three(SAMPLE_EDGE, dataset.slice_axis(task.level))
+    largest = back_of_three(SAMPLE_EDGE, dataset.slice_axis(task.voxels.level))
     for box in sample_boxes(task.region, JOINT_VOXELS, largest):
         around = box.grown((1, 1, 1), task.region)
-        yield dataset.read(task.channel, around, task.level).voxels
+        yield task.voxels.read(around).voxels
 
 
 def _mask_of(blocks: Iterable[NDArray[Any]]) -> tuple[float, float] | None:
@@ -220,13 +224,13 @@ def _mask_of(blocks: Iterable[NDArray[Any]]) -> tuple[float, float] | None:
     return (low, high) if low < high else None
 
 
-def _voxels(task: StatisticsTask, dataset: Dataset, level: int) -> int:
+def _voxels(task: FindWindow, dataset: Dataset, level: int) -> int:
     return int(np.prod(_region_at(task, dataset, level).shape, dtype=np.int64))
 
 
-def _region_at(task: StatisticsTask, dataset: Dataset, level: int) -> Box:
+def _region_at(task: FindWindow, dataset: Dataset, level: int) -> Box:
     """Return the region in voxels of a coarser level."""
-    fine, coarse = dataset.levels[task.level].shape, dataset.levels[level].shape
+    fine, coarse = dataset.levels[task.voxels.level].shape, dataset.levels[level].shape
     start = [a * n // m for a, n, m in zip(task.region.start, coarse, fine, strict=True)]
     stop = [-(-b * n // m) for b, n, m in zip(task.region.stop, coarse, fine, strict=True)]
     z0, y0, x0 = start

@@ -1,16 +1,17 @@
-"""Gather what one (tile, channel) tells about its channel's level, on a worker. Picklable."""
+"""The step that gathers what one (tile, channel) shows of its channel's level."""
 
 import base64
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.open_source import Voxels, open_source
+from stereocell.building.units_again import AGAIN
+from stereocell.engine.step import Document, Step
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.axis_profiles import Profiles
 from stereocell.isosurface.edge_criteria import EdgeSums
@@ -29,40 +30,9 @@ from stereocell.model.image_plane import back_of_three, first_of_three, slices_f
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
-from stereocell.storage.json_files import write_sealed
 
 
-@dataclass(frozen=True, slots=True)
-class EvidenceTask:
-    """One tile of a channel.
-
-    box, region  voxels of the level: the tile, and what is built
-    background   near the tile, voxel values; None: none is tried
-    criterion    the name of one that scores edges; empty: none does
-    """
-
-    ref: SourceRef
-    level: int
-    channel: int
-    box: Box
-    region: Box
-    smoothing_um: float
-    counting: Counting
-    background: LatticeField | None
-    criterion: str
-
-
-def measure_evidence(task: EvidenceTask) -> TileEvidence:
-    """Read a tile with its halo, and return its evidence."""
-    dataset = open_source(task.ref)
-    spacing, axis = dataset.levels[task.level].spacing_um, dataset.slice_axis(task.level)
-    reach = denoising_reach(task.smoothing_um, spacing, axis)
-    z, y, x = (r + h for r, h in zip(reach, back_of_three(HALO, axis), strict=True))
-    window = task.box.grown((z, y, x), task.region)
-    return evidence_of(task, dataset.read(task.channel, window, task.level), window)
-
-
-def evidence_of(task: EvidenceTask, volume: Volume, window: Box) -> TileEvidence:
+def evidence_of(task: "GatherEvidence", volume: Volume, window: Box) -> TileEvidence:
     """Return a tile's evidence, of the volume that was read in a window around it."""
     spacing, axis = volume.spacing_um, volume.slice_axis
     reach = denoising_reach(task.smoothing_um, spacing, axis)
@@ -82,12 +52,6 @@ def evidence_of(task: EvidenceTask, volume: Volume, window: Box) -> TileEvidence
         background=background,
         criterion=CRITERIA.get(task.criterion),
     )
-
-
-def write_evidence(task_and_file: tuple[EvidenceTask, Path]) -> None:
-    """Measure a tile's evidence and write it."""
-    task, file = task_and_file
-    write_sealed(file, evidence_to_json(measure_evidence(task)))
 
 
 def evidence_to_json(evidence: TileEvidence) -> dict[str, Any]:
@@ -142,26 +106,6 @@ def evidence_from_json(content: Mapping[str, Any]) -> TileEvidence:
     )
 
 
-class EvidenceFiles(Mapping[str, TileEvidence]):
-    """The evidence of a channel's tiles, by tile ID, from its file each time that it is asked for.
-
-    It takes .3 MB unpacked and .1 MB as it lies there: that of thousands of units fills memory.
-    """
-
-    def __init__(self, contents: Mapping[str, Callable[[], Mapping[str, Any]]]) -> None:
-        """`contents`: what reads a tile's file."""
-        self._contents = contents
-
-    def __getitem__(self, tile: str) -> TileEvidence:
-        return evidence_from_json(self._contents[tile]())
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._contents)
-
-    def __len__(self) -> int:
-        return len(self._contents)
-
-
 def _profiles_from_json(content: Mapping[str, Any] | None) -> Profiles | None:
     if content is None:
         return None
@@ -194,3 +138,35 @@ def _pack(values: NDArray[Any]) -> str:
 
 def _unpack(text: str) -> NDArray[np.float64]:
     return np.frombuffer(zlib.decompress(base64.b64decode(text)), "<f8").astype(np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class GatherEvidence(Step[TileEvidence]):
+    """Gather the evidence of one tile, or of another box of the region.
+
+    box, region  voxels of the level: the tile, and what is built
+    background   near the tile, voxel values; None: none is tried
+    criterion    the name of one that scores edges; empty: none does
+    """
+
+    VERSION: ClassVar[int] = 1
+    FORM: ClassVar[Document[TileEvidence]] = Document(
+        "units.schema.json#Evidence", evidence_to_json, evidence_from_json, AGAIN
+    )
+
+    voxels: Voxels
+    box: Box
+    region: Box
+    smoothing_um: float
+    counting: Counting
+    background: LatticeField | None
+    criterion: str
+
+    def run(self) -> TileEvidence:
+        """Read the tile with its halo, and return its evidence. Raises SourceError."""
+        level, dataset = self.voxels.level, open_source(self.voxels.ref)
+        spacing, axis = dataset.levels[level].spacing_um, dataset.slice_axis(level)
+        reach = denoising_reach(self.smoothing_um, spacing, axis)
+        z, y, x = (r + h for r, h in zip(reach, back_of_three(HALO, axis), strict=True))
+        window = self.box.grown((z, y, x), self.region)
+        return evidence_of(self, self.voxels.read(window), window)

@@ -1,22 +1,26 @@
-"""Sum up the components of one (tile, channel) at its level, on a worker. Picklable."""
+"""The step that sums up the connected components of one (tile, channel) at its level."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
-from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.open_source import Voxels
+from stereocell.building.units_again import AGAIN
+from stereocell.engine.step import Document, Step
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.repair_rules import sum_components
-from stereocell.model.lattice import Step
+from stereocell.model.lattice import Step as PlaneStep
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
-from stereocell.storage.json_files import write_sealed
+
+Sums = Mapping[str, Any]  # the fields of `ComponentSums`
 
 
 @dataclass(frozen=True, slots=True)
-class ComponentsTask:
-    """One tile of a channel.
+class SumComponents(Step[Sums]):
+    """Sum up the components of one tile of a channel.
 
     iso              the tile's level, above the background, voxel values
     background       near the tile, voxel values; None: none is subtracted
@@ -26,29 +30,33 @@ class ComponentsTask:
     higher           a higher level that `iso` is compared with, in the same values; None: none
     """
 
-    ref: SourceRef
-    level: int
-    channel: int
+    VERSION: ClassVar[int] = 1
+    FORM: ClassVar[Document[Sums]] = Document(
+        "units.schema.json#Components",
+        lambda sums: {"components": sums},
+        lambda content: content["components"],
+        AGAIN,
+    )
+
+    voxels: Voxels
     box: Box
     smoothing_um: float
     iso: float
     background: LatticeField | None
     min_diagonal_um: float
     max_shift: float | None
-    step: Step = (1, 1, 1)
+    step: PlaneStep = (1, 1, 1)
     higher: float | None = None
 
-
-def write_components(task_and_file: tuple[ComponentsTask, Path]) -> None:
-    """Sum up a tile's components and write the sums."""
-    task, file = task_and_file
-    volume = open_source(task.ref).read(task.channel, task.box, task.level)
-    field = denoise(volume, task.smoothing_um, task.max_shift)
-    if task.background is not None:
-        field -= task.background.at(task.box)
-    inside = field > np.float32(task.iso)
-    higher = None if task.higher is None else field > np.float32(task.higher)
-    found = sum_components(
-        inside, volume.spacing_um, task.min_diagonal_um, task.step, higher=higher
-    )
-    write_sealed(file, {"components": asdict(found)})
+    def run(self) -> Sums:
+        """Return the sums. Raises SourceError."""
+        volume = self.voxels.read(self.box)
+        field = denoise(volume, self.smoothing_um, self.max_shift)
+        if self.background is not None:
+            field -= self.background.at(self.box)
+        inside = field > np.float32(self.iso)
+        higher = None if self.higher is None else field > np.float32(self.higher)
+        found = sum_components(
+            inside, volume.spacing_um, self.min_diagonal_um, self.step, higher=higher
+        )
+        return asdict(found)

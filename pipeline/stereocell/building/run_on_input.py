@@ -1,10 +1,10 @@
-"""Tasks that read a plan's source: how they run, and the source's part of their results' keys."""
+"""Run steps that read a plan's inputs: these are compared before and after."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from stereocell.building.channels import Channel
 from stereocell.building.input_unchanged import (
     InputChangedError,
     require_added,
@@ -15,9 +15,8 @@ from stereocell.building.input_unchanged import (
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.running_pass import begin, end
-from stereocell.model.lattice_field import LatticeField
-from stereocell.model.tiling import Box
-from stereocell.read.readers import reader_of
+from stereocell.engine.run import Engine
+from stereocell.engine.run_steps import Kept, run_missing
 from stereocell.storage.workspace import remove
 
 
@@ -29,11 +28,13 @@ def run_on_input(
     *,
     is_last: bool = False,
 ) -> None:
-    """Run tasks that read the inputs and write results; an empty list of results runs nothing.
+    """Call a function that reads the inputs and writes results; without results, do nothing.
 
+    run      runs the steps of one pass
+    results  the places of their results
     is_last  whether no other pass follows
 
-    Raises SourceError where an input changed since the plan or while the tasks ran. In the second
+    Raises SourceError where an input changed since the plan or while the steps ran. In the second
     case their results are removed. If the fingerprint did not change, results of the old and the
     new input have the same names, so all results are removed.
     """
@@ -51,6 +52,26 @@ def run_on_input(
     _require_still(out_folder, plan, results, is_last=is_last)
 
 
+def run_pass(
+    out_folder: OutFolder,
+    plan: Plan,
+    engine: Engine,
+    label: str,
+    wanted: Iterable[Kept[Any]],
+    *,
+    is_last: bool = False,
+) -> int:
+    """Run the steps of one pass whose results are missing; return their number.
+
+    label    the pass, for progress and errors
+    is_last  whether no other pass follows
+
+    Raises SourceError as `run_on_input` does, TasksFailedError where steps fail.
+    """
+    guard = partial(run_on_input, out_folder, plan, is_last=is_last)
+    return run_missing(engine, label, wanted, guard)
+
+
 def _require_still(
     out_folder: OutFolder, plan: Plan, results: Sequence[Path], *, is_last: bool
 ) -> None:
@@ -62,25 +83,3 @@ def _require_still(
         raise
     finally:
         end(out_folder)
-
-
-def around(field: LatticeField | None, box: Box) -> LatticeField | None:
-    """Return the knots of a field near a box; None where there is no field."""
-    return None if field is None else field.around(box)
-
-
-def input_key(plan: Plan, channel: Channel) -> list[Any]:
-    """Return the source's part of the key of a channel's result."""
-    if channel.source:
-        return [channel.fingerprint, 0, plan.spacing_um, plan.origin_um, 0]
-    return [plan.fingerprint, plan.level, plan.spacing_um, plan.origin_um, plan.settings.plan.time]
-
-
-def reader_module(plan: Plan, channel: Channel) -> str:
-    """Return the module that reads a channel: other formats' readers don't affect its results."""
-    return reader_of(channel.source or plan.source)
-
-
-def box_to_json(box: Box) -> list[list[int]]:
-    """Return a box as [start, stop], voxels (z, y, x)."""
-    return [list(box.start), list(box.stop)]

@@ -1,0 +1,3 @@
+"""The remedy for a damaged result of the units' phase."""
+
+AGAIN = "run `stereocell units OUT` again"

@@ -1,0 +1,52 @@
+"""The libraries that steps and readers use, from the record that ships with the package.
+
+step_record.json is written by `make record-steps`. It holds a digest of the code that each step and
+each reader reaches, with its VERSION, and the libraries that this code imports. No key of a result
+depends on it: the digests are for `make lint`, the libraries for the provenance of results.
+"""
+
+import json
+from collections.abc import Mapping
+from fnmatch import fnmatch
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distributions, version
+from pathlib import Path
+from typing import Any
+
+RECORD = Path(__file__).with_name("step_record.json")
+
+
+def libraries_of(*names: str) -> dict[str, str]:
+    """Return the version of each installed library that steps or readers use.
+
+    names  of steps' classes, and of formats (keys of `read.readers.READERS`, or `other`)
+    """
+    found: dict[str, str] = {}
+    for name in names:
+        for library in _record()[name]["libraries"].split():
+            found |= _versions(library)
+    return found
+
+
+def all_libraries() -> dict[str, str]:
+    """Return the version of each installed library that any step or reader uses."""
+    return libraries_of(*_record())
+
+
+@cache
+def _versions(library: str) -> Mapping[str, str]:
+    """Return the versions of a library; of a pattern as `bioio_*`, those of all that fit."""
+    if "*" in library:
+        names = {one.metadata["Name"] for one in distributions()}
+        fitting = sorted(one for one in names if fnmatch(one.replace("-", "_"), library))
+        return {one: version(one) for one in fitting}
+    try:
+        return {library: version(library)}
+    except PackageNotFoundError:
+        return {}
+
+
+@cache
+def _record() -> Mapping[str, Any]:
+    steps: Mapping[str, Any] = json.loads(RECORD.read_bytes())["steps"]
+    return steps
