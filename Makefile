@@ -74,7 +74,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture careless bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture careless bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -183,14 +183,18 @@ view: setup ## Serve OUT's bundle on localhost and open a browser
 serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
 	$(WITH_ARGS) $(RUN) serve ARGS -- "$$OUT"
 
-lint: $(READY) $(VIEWER_READY) ## ruff, mypy, layers of imports, biome, tsc
+lint: $(READY) $(VIEWER_READY) ## ruff, mypy, layers of imports, code of steps, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
 	@# text without an encoding is read by that of the system, on Windows none of ours
 	$(BIN)/ruff check --quiet --preview --select PLW1514 pipeline
 	$(BIN)/ruff format --check pipeline tests docs
 	$(BIN)/mypy
 	PYTHONPATH=pipeline $(BIN)/lint-imports --no-cache --no-logo
+	$(SUPPORT).step_record
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
+
+record-steps: $(READY) ## Record the code that each step reaches, once you know that its VERSION is right
+	$(SUPPORT).step_record --write
 
 # a process for each core, and of each one thread: others would wait for one another, busily
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"

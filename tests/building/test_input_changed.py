@@ -14,11 +14,11 @@ import zarr
 from numpy.typing import NDArray
 
 from stereocell.building import input_files, run_on_input
-from stereocell.building import tissue as tissue_module
 from stereocell.building.open_source import SourceRef, open_afresh
 from stereocell.building.steps.build_objects import BuildObjects
 from stereocell.building.steps.build_unit import BuildUnit
 from stereocell.building.steps.find_extents import FindExtents
+from stereocell.building.steps.learn_tissue import Learned, LearnTissue
 from stereocell.cli.__main__ import main
 from stereocell.objects.extents import Extents
 from stereocell.read import fingerprint
@@ -339,14 +339,14 @@ def test_a_model_or_its_image_that_changes_while_it_is_read_is_reported(
 
         monkeypatch.setattr(Path, "read_bytes", read_bytes)
     else:
-        opened = tissue_module.open_source
+        learn = LearnTissue.learn
 
-        def open_and_change(ref: SourceRef) -> object:
-            found = opened(ref)
+        def learn_and_change(*given: Any) -> Learned:
+            found = learn(*given)
             write_tiff(tmp_path, OTHER)
             return found
 
-        monkeypatch.setattr(tissue_module, "open_source", open_and_change)
+        monkeypatch.setattr(LearnTissue, "learn", learn_and_change)
     assert main(["tissue", str(out), "--model", str(model)]) == 1
     line = last_line(capsys)
     assert "changed while it was read" in line

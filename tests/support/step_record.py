@@ -91,7 +91,13 @@ def find_steps() -> list[type[Step[Any]]]:
     for name, file in _modules().items():
         if _STEP.search(file.read_text("utf-8")):
             importlib.import_module(name)
-    return sorted(Step.__subclasses__(), key=lambda step: step.__name__)
+    # a dataclass with slots is another class than the one that it was made from
+    steps = {
+        (one.__module__, one.__name__): getattr(sys.modules[one.__module__], one.__name__, None)
+        for one in Step.__subclasses__()
+        if one.__module__.startswith(f"{PACKAGE.name}.")
+    }
+    return sorted(filter(None, steps.values()), key=lambda step: step.__name__)
 
 
 def compare(found: Mapping[str, Any], recorded: Mapping[str, Any]) -> list[str]:
