@@ -37,10 +37,15 @@ def _light(rng: np.random.Generator) -> NDArray[np.float64]:
     return np.concatenate([rng.poisson(100, 90_000), rng.normal(900, 120, 10_000)])
 
 
+def _uptake(rng: np.random.Generator) -> NDArray[np.float64]:
+    return np.concatenate([rng.gamma(1.2, 150, 90_000), rng.normal(4000, 500, 5_000)])
+
+
 # voxels, the level of their surface where a preset states none, and that of their background
 CASES: dict[str, tuple[Callable[[np.random.Generator], NDArray[np.float64]], float, float]] = {
     "CT": (_body_in_hounsfield_units, -300.0, -1000.0),
     "MR": (_magnitudes, 90.0, 15.0),
+    "PT": (_uptake, 1500.0, 200.0),
     "": (_light, 450.0, 100.0),
 }
 MOST_BELOW_HU = 60.0  # that a CT's opacity begins below its surface
@@ -86,7 +91,8 @@ def test_a_preset_opens_with_a_function_whose_foot_lies_at_the_surface(preset: s
     lowest = (background + appearance.iso_value) / 2
     if preset.startswith("ct"):
         lowest = appearance.iso_value - MOST_BELOW_HU
-    assert lowest <= _foot(appearance) <= appearance.iso_value
+    step = (appearance.window[1] - appearance.window[0]) / 4095  # of the table that is searched
+    assert lowest <= _foot(appearance) <= appearance.iso_value + step
 
 
 def test_a_surface_of_bone_opens_with_the_function_of_bone() -> None:
@@ -112,6 +118,11 @@ def test_tissues_of_a_ct_have_colours_of_their_own_and_an_edge_to_air_is_skin() 
     assert fat[2] < 0.7
     assert muscle[0] > 2 * max(muscle[1:])  # red
     assert min(bone) > 0.95  # the channel's own, pale
+    # bile, liver, muscle and contrast medium part from each other on a cut
+    steps = [_color_at(appearance, hu, 0.0) for hu in (0, 35, 65, 120)]
+    assert (np.diff([color @ (0.2126, 0.7152, 0.0722) for color, _ in steps]) > 0.04).all()
+    opacities = [opacity for _, opacity in steps]
+    assert max(opacities) - min(opacities) < 0.12 * max(opacities)
     skin = [_color_at(appearance, hu, 900.0)[0] for hu in (-290, -100, 50)]
     assert all(min(color) > 0.8 for color in skin)
     assert _color_at(appearance, -600, 900.0)[1] == 0
