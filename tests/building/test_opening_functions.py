@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building.channels import Channel, has_brain, opens
+from stereocell.building.channels import MR_GREY, Channel, has_brain, opens
 from stereocell.building.settings import load, preset_names
 from stereocell.building.survey_file import ChannelSurvey
+from stereocell.building.vessel_color import VESSEL_RED, color_vessels
 from stereocell.isosurface.options import parse_level
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance, SurfaceLevel
@@ -177,7 +178,7 @@ def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
 
 
 @pytest.mark.parametrize(("enclosed", "is_body"), [(0.01, False), (0.2, True)])
-def test_only_a_body_is_cut_open_and_vessels_are_shown_whole(
+def test_only_a_body_is_cut_open_and_vessels_are_shown_whole_and_red(
     enclosed: float, is_body: bool
 ) -> None:
     rng = np.random.default_rng(0)
@@ -186,7 +187,7 @@ def test_only_a_body_is_cut_open_and_vessels_are_shown_whole(
     statistics = find_statistics(voxels, load("mri", None, flags={}).window)
     look = make_appearance(
         "MR",
-        (1, 1, 1),
+        MR_GREY,
         statistics=statistics,
         level=SurfaceLevel(90.0, None, 1.0),
         confidence=1.0,
@@ -196,6 +197,11 @@ def test_only_a_body_is_cut_open_and_vessels_are_shown_whole(
     repair = RepairOptions(0, 0, 0, 0, 0, 0)
     survey = ChannelSurvey(statistics, "", {}, repair, look, (), None)
     assert survey.is_body is is_body
+    colored = color_vessels(survey, modality="MR").appearance.color
+    assert colored == (MR_GREY if is_body else VESSEL_RED)
+    assert color_vessels(survey, modality="CT") == survey
+    stated = replace(survey, appearance=replace(look, color=(0.0, 0.0, 1.0)))
+    assert color_vessels(stated, modality="MR") == stated
 
 
 def test_autofluorescence_is_off_at_first_beside_other_channels() -> None:

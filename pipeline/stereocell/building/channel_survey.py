@@ -58,6 +58,7 @@ from stereocell.building.tasks.window import (
     window_from_json,
     write_window,
 )
+from stereocell.building.vessel_color import color_vessels
 from stereocell.engine.run import Engine, console
 from stereocell.filters.denoise import median_size
 from stereocell.isosurface.level import Level
@@ -144,9 +145,10 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             )
             for tile in plan.tiles
         }
-        survey[channel.id] = _of_channel(
+        measured = _of_channel(
             plan, channel, one, chosen, iso, of_rungs[chosen] if of_rungs else {}, files[channel.id]
         )
+        survey[channel.id] = color_vessels(measured, modality=plan.modality)
     save_survey(out_folder, survey)
     for channel in plan.channels:
         look, mask = survey[channel.id].appearance, windows[channel.id].counting.mask
