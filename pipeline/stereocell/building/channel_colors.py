@@ -1,8 +1,8 @@
 """The colours of a build's channels: as the file states them, else by what is recognised.
 
 Scans of bodies are warm, a CT as skin or as bone, radiotracers amber, a channel that is named after
-a dye has the colour of its light. The only channel of a volume is green as GFP where its voxels are
-those of stained cells, and a warm grey otherwise. All others have PALETTE's colours. Stated colours
+a dye has the colour of its light. The only channel of a volume is cyan where its voxels are those
+of stained cells, and a warm grey otherwise. All others have PALETTE's colours. Stated colours
 are given to all channels first, then recognised ones, then PALETTE's. No two channels have nearly
 the same colour: the later one takes the next of PALETTE.
 """
@@ -21,7 +21,10 @@ from stereocell.transfer.ct_tissues import BONE_LEVEL_HU
 Color = tuple[float, float, float]
 AMBER = (1.0, 0.6, 0.24)  # linear RGB of tracers of PET and SPECT: the lightest part of a heat map
 WARM_GREY = (0.62, 0.58, 0.52)  # linear RGB of the only channel of a volume that shows no stain
-STAIN = color_of_light(510.0)  # linear RGB of the only channel of stained cells: that of GFP
+# Linear RGB of the only channel of stained cells. Cyan was chosen by eye, on a Golgi apparatus and an
+# ovule: it shows more shading on a dark ground than green does, and looks less like a material than
+# orange does.
+STAIN = color_of_light(490.0)
 # um: finest voxel spacing up to which a volume of a microscope is taken for stained cells. Wider
 # voxels are those of organs, as a brain of a mouse, which are mostly seen by their own light.
 _STAINED_UM = 10.0
