@@ -21,9 +21,9 @@ from stereocell.transfer.ct_tissues import BONE_LEVEL_HU
 Color = tuple[float, float, float]
 AMBER = (1.0, 0.6, 0.24)  # linear RGB of tracers of PET and SPECT: the lightest part of a heat map
 WARM_GREY = (0.62, 0.58, 0.52)  # linear RGB of the only channel of a volume that shows no stain
-# Linear RGB of the only channel of stained cells. Cyan was chosen by eye, on a Golgi apparatus and an
-# ovule: it shows more shading on a dark ground than green does, and looks less like a material than
-# orange does.
+# Linear RGB of the only channel of stained cells. Cyan was chosen by eye, on a Golgi apparatus and
+# an ovule: it shows more shading on a dark ground than green does, and looks less like a material
+# than orange does.
 STAIN = color_of_light(490.0)
 # um: finest voxel spacing up to which a volume of a microscope is taken for stained cells. Wider
 # voxels are those of organs, as a brain of a mouse, which are mostly seen by their own light.
