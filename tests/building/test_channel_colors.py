@@ -11,6 +11,7 @@ from stereocell.building.channel_colors import (
     STAIN,
     WARM_GREY,
     choose_colors,
+    is_lone,
     lies_at_bone,
     shows_stain,
 )
@@ -160,6 +161,23 @@ def test_the_only_channel_of_stained_cells_has_the_colour_of_a_stain(
     assert named == [color_of_light(461)]
     stated = choose_colors([("a", PALETTE[2])], modality="", is_alone=True, is_stained=True)
     assert stated == [PALETTE[2]]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["signal", "background"], [STAIN, PALETTE[1]]),
+        (["AF", "signal"], [PALETTE[0], STAIN]),
+        (["background"], [STAIN]),
+        (["a", "b"], list(PALETTE[:2])),
+        (["a", "b", "autofluorescence"], list(PALETTE[:3])),
+    ],
+)
+def test_a_stain_beside_autofluorescence_has_the_colour_of_a_lone_one(
+    names: list[str], expected: list[Color]
+) -> None:
+    wanted = [(name, None) for name in names]
+    assert expected == choose_colors(wanted, modality="", is_alone=is_lone(names), is_stained=True)
 
 
 @pytest.mark.parametrize(("preset", "is_bone"), [("ct", False), ("ct-bone", True)])

@@ -11,7 +11,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stereocell.building.channels import ALL, BODY_MODALITIES, FLESH, MR_GREY, PALETTE, SKIN
+from stereocell.building.channels import (
+    ALL,
+    BODY_MODALITIES,
+    FLESH,
+    MR_GREY,
+    PALETTE,
+    SKIN,
+    shows_own_light,
+)
 from stereocell.isosurface.options import parse_level
 from stereocell.model.color import lab_of_linear
 from stereocell.model.emission_color import color_of_light, color_of_name
@@ -44,18 +52,19 @@ def choose_colors(
 
     channels  each one's name, and the colour that the file states
     modality  DICOM's code; empty: not known
-    is_alone  whether the source has one channel only
+    is_alone  whether the source has one channel only, beside those of autofluorescence
     is_bone   whether the surface of a CT lies at its bones
     is_stained  whether the voxels are those of stained cells; see `shows_stain`
     """
     places = range(len(channels))
     modal = [_of_modality(place, modality, is_bone=is_bone) for place in places]
-    lone = (STAIN if is_stained else WARM_GREY) if is_alone and not modality else None
+    color = (STAIN if is_stained else WARM_GREY) if is_alone and not modality else None
+    lone = [None if shows_own_light(name) and len(channels) > 1 else color for name, _ in channels]
     chosen: dict[int, Color] = {}
     # No later round takes a colour of an earlier one: DAPI is blue behind a channel "CD31" too.
     for wishes in (
         [[stated] for _, stated in channels],
-        [[modal[place], color_of_name(channels[place][0]), lone] for place in places],
+        [[modal[place], color_of_name(channels[place][0]), lone[place]] for place in places],
         [PALETTE[place % len(PALETTE) :] + PALETTE[: place % len(PALETTE)] for place in places],
     ):
         for place in places:
@@ -64,6 +73,11 @@ def choose_colors(
                 chosen.update({} if free is None else {place: free})
     # More channels than the palette has colours: the others repeat it.
     return [chosen.get(place, PALETTE[place % len(PALETTE)]) for place in places]
+
+
+def is_lone(names: Sequence[str]) -> bool:
+    """Return whether channels of these names are one, beside those of autofluorescence."""
+    return len(names) == 1 or sum(not shows_own_light(name) for name in names) == 1
 
 
 def shows_stain(spacing_um: Sequence[float], *, is_dark: bool) -> bool:
