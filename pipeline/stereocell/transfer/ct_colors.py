@@ -18,12 +18,12 @@ _FAT = (1.0, 0.92, 0.58)
 # Soft tissue by its upper end in Hounsfield units: fluid, organs, muscle and blood, and tissue that
 # takes up contrast medium
 _SOFT_TISSUE = (
-    (10.0, (0.5, 0.21, 0.16)),
-    (45.0, (0.63, 0.29, 0.23)),
-    (80.0, (0.78, 0.38, 0.31)),
-    (TISSUES["soft_tissue"][1], (0.92, 0.5, 0.42)),
+    (10.0, (0.5, 0.2, 0.2)),
+    (45.0, (0.63, 0.28, 0.29)),
+    (80.0, (0.78, 0.36, 0.38)),
+    (TISSUES["soft_tissue"][1], (0.92, 0.48, 0.5)),
 )
-_CONTRAST = (0.95, 0.42, 0.3)
+_CONTRAST = (0.97, 0.5, 0.48)
 _BONE = (1.0, 1.0, 1.0)
 _SOFT_HU = 40.0
 _AIR_STEP_HU = 220.0  # step over two voxels from which on an edge is one to air
