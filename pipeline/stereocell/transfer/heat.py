@@ -18,8 +18,8 @@ _COLORS = (
 )
 _OPACITIES = (0.08, 0.2, 0.35, 0.45, 0.6)
 # The body around the organs: a factor to amber that makes it grey, and what one voxel absorbs. 60
-# voxels take a third of the light, so that one sees where organs lie in the body.
-_BODY_COLOR, _BODY_OPACITY = (0.3, 0.42, 0.9), 0.007
+# voxels take a fifth of the light, so that one sees where organs lie in the body.
+_BODY_COLOR, _BODY_OPACITY = (0.3, 0.42, 0.9), 0.0045
 _BODY_BELOW = 0.8  # of the organs' level: a threshold above it parts no body from the air
 
 
