@@ -57,5 +57,5 @@ def _veil(values: tuple[float, float]) -> Shape:
         tip=0.5,
         color=_BODY_COLOR,
         opacity=_BODY_OPACITY,
-        softness=0.2,
+        softness=0.05,
     )
