@@ -38,7 +38,7 @@ def build(
 
     source     a path, or an address (http(s)://, s3://)
     out        a folder, or an s3:// address; finished work there is not repeated
-    preset     cycif, em, lightsheet, mri, ct, ct-bone, vessels, or a TOML file
+    preset     cycif, em, lightsheet, mri, ct, ct-bone, pet, vessels, or a TOML file
     config     a TOML file; its values override the preset's
     settings   sections and keys that override both, as in the TOML
     workers    processes; 0: this one. A script with more needs `if __name__ == "__main__":`

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from skimage.color import deltaE_ciede2000, rgb2hsv, rgb2lab
 
-from stereocell.building.channel_colors import AMBER, WARM_GREY, choose_colors, lies_at_bone
+from stereocell.building.channel_colors import (
+    AMBER,
+    STAIN,
+    WARM_GREY,
+    choose_colors,
+    is_lone,
+    lies_at_bone,
+    shows_stain,
+)
 from stereocell.building.channels import FLESH, MR_GREY, PALETTE, SKIN
 from stereocell.building.settings import load
 from stereocell.model.color import lab_of_linear, linear_color_of_lab, to_srgb8
@@ -127,6 +135,49 @@ def test_scans_are_no_blue_nuclei() -> None:
     assert _chosen(["PT"], modality="PT") == [AMBER]
     assert _chosen(["Channel0"], alone=True) == [WARM_GREY]
     assert _chosen(["DAPI"], alone=True) == [color_of_light(461)]
+
+
+@pytest.mark.parametrize(
+    ("spacing_um", "is_dark", "is_stained"),
+    [
+        ((0.5, 0.2, 0.2), False, True),
+        ((5.0, 2.0, 2.0), False, True),
+        ((25.0, 25.0, 25.0), False, False),  # a brain of a mouse, by its own light
+        ((0.03, 0.004, 0.004), True, False),  # electron microscopy
+    ],
+)
+def test_the_only_channel_of_stained_cells_has_the_colour_of_a_stain(
+    spacing_um: tuple[float, float, float], is_dark: bool, is_stained: bool
+) -> None:
+    assert shows_stain(spacing_um, is_dark=is_dark) == is_stained
+    wanted = [("Channel0", None)]
+    (color,) = choose_colors(wanted, modality="", is_alone=True, is_stained=is_stained)
+    assert color == (STAIN if is_stained else WARM_GREY)
+    light, least = max(color), min(color)
+    assert ((light - least) / light > 0.5) == is_stained  # a hue that reads as one
+    # a scanner's volume, a name and a stated colour go first
+    assert choose_colors(wanted, modality="MR", is_alone=True, is_stained=True) == [MR_GREY]
+    named = choose_colors([("DAPI", None)], modality="", is_alone=True, is_stained=True)
+    assert named == [color_of_light(461)]
+    stated = choose_colors([("a", PALETTE[2])], modality="", is_alone=True, is_stained=True)
+    assert stated == [PALETTE[2]]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["signal", "background"], [STAIN, PALETTE[1]]),
+        (["AF", "signal"], [PALETTE[0], STAIN]),
+        (["background"], [STAIN]),
+        (["a", "b"], list(PALETTE[:2])),
+        (["a", "b", "autofluorescence"], list(PALETTE[:3])),
+    ],
+)
+def test_a_stain_beside_autofluorescence_has_the_colour_of_a_lone_one(
+    names: list[str], expected: list[Color]
+) -> None:
+    wanted = [(name, None) for name in names]
+    assert expected == choose_colors(wanted, modality="", is_alone=is_lone(names), is_stained=True)
 
 
 @pytest.mark.parametrize(("preset", "is_bone"), [("ct", False), ("ct-bone", True)])

@@ -53,11 +53,12 @@ def test_the_first_rung_of_many_else_that_of_many_that_touch_else_the_outer(
 
 
 def _surveyed(tmp_path: Path, voxels: np.ndarray, *flags: str) -> Survey:
-    """Return what a build finds of one channel."""
+    """Return what a build finds of one channel, by the defaults where no flags are given."""
     source = phantoms.write_ome_zarr(
         tmp_path / "one.ome.zarr", [voxels], scales=[dict(zip("zyx", (5.0, 2.0, 2.0), strict=True))]
     )
     out = tmp_path / "out"
+    flags = flags or ("--preset", "none")
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
     return read_survey(OutFolder(out))

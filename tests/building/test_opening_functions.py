@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building.channels import Channel, has_brain, opens
+from stereocell.building.channels import MR_GREY, Channel, has_brain, opens
 from stereocell.building.settings import load, preset_names
 from stereocell.building.survey_file import ChannelSurvey
+from stereocell.building.vessel_color import VESSEL_RED, color_vessels
 from stereocell.isosurface.options import parse_level
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance, SurfaceLevel
@@ -37,10 +38,15 @@ def _light(rng: np.random.Generator) -> NDArray[np.float64]:
     return np.concatenate([rng.poisson(100, 90_000), rng.normal(900, 120, 10_000)])
 
 
+def _uptake(rng: np.random.Generator) -> NDArray[np.float64]:
+    return np.concatenate([rng.gamma(1.2, 150, 90_000), rng.normal(4000, 500, 5_000)])
+
+
 # voxels, the level of their surface where a preset states none, and that of their background
 CASES: dict[str, tuple[Callable[[np.random.Generator], NDArray[np.float64]], float, float]] = {
     "CT": (_body_in_hounsfield_units, -300.0, -1000.0),
     "MR": (_magnitudes, 90.0, 15.0),
+    "PT": (_uptake, 1500.0, 200.0),
     "": (_light, 450.0, 100.0),
 }
 MOST_BELOW_HU = 60.0  # that a CT's opacity begins below its surface
@@ -86,7 +92,8 @@ def test_a_preset_opens_with_a_function_whose_foot_lies_at_the_surface(preset: s
     lowest = (background + appearance.iso_value) / 2
     if preset.startswith("ct"):
         lowest = appearance.iso_value - MOST_BELOW_HU
-    assert lowest <= _foot(appearance) <= appearance.iso_value
+    step = (appearance.window[1] - appearance.window[0]) / 4095  # of the table that is searched
+    assert lowest <= _foot(appearance) <= appearance.iso_value + step
 
 
 def test_a_surface_of_bone_opens_with_the_function_of_bone() -> None:
@@ -112,6 +119,11 @@ def test_tissues_of_a_ct_have_colours_of_their_own_and_an_edge_to_air_is_skin() 
     assert fat[2] < 0.7
     assert muscle[0] > 2 * max(muscle[1:])  # red
     assert min(bone) > 0.95  # the channel's own, pale
+    # bile, liver, muscle and contrast medium part from each other on a cut
+    steps = [_color_at(appearance, hu, 0.0) for hu in (0, 35, 65, 120)]
+    assert (np.diff([color @ (0.2126, 0.7152, 0.0722) for color, _ in steps]) > 0.04).all()
+    opacities = [opacity for _, opacity in steps]
+    assert max(opacities) - min(opacities) < 0.12 * max(opacities)
     skin = [_color_at(appearance, hu, 900.0)[0] for hu in (-290, -100, 50)]
     assert all(min(color) > 0.8 for color in skin)
     assert _color_at(appearance, -600, 900.0)[1] == 0
@@ -166,7 +178,7 @@ def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
 
 
 @pytest.mark.parametrize(("enclosed", "is_body"), [(0.01, False), (0.2, True)])
-def test_only_a_body_is_cut_open_and_vessels_are_shown_whole(
+def test_only_a_body_is_cut_open_and_vessels_are_shown_whole_and_red(
     enclosed: float, is_body: bool
 ) -> None:
     rng = np.random.default_rng(0)
@@ -175,7 +187,7 @@ def test_only_a_body_is_cut_open_and_vessels_are_shown_whole(
     statistics = find_statistics(voxels, load("mri", None, flags={}).window)
     look = make_appearance(
         "MR",
-        (1, 1, 1),
+        MR_GREY,
         statistics=statistics,
         level=SurfaceLevel(90.0, None, 1.0),
         confidence=1.0,
@@ -185,6 +197,11 @@ def test_only_a_body_is_cut_open_and_vessels_are_shown_whole(
     repair = RepairOptions(0, 0, 0, 0, 0, 0)
     survey = ChannelSurvey(statistics, "", {}, repair, look, (), None)
     assert survey.is_body is is_body
+    colored = color_vessels(survey, modality="MR").appearance.color
+    assert colored == (MR_GREY if is_body else VESSEL_RED)
+    assert color_vessels(survey, modality="CT") == survey
+    stated = replace(survey, appearance=replace(look, color=(0.0, 0.0, 1.0)))
+    assert color_vessels(stated, modality="MR") == stated
 
 
 def test_autofluorescence_is_off_at_first_beside_other_channels() -> None:

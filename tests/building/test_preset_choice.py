@@ -27,8 +27,8 @@ def _body(air: float, tissue: float) -> NDArray[np.int16]:
     return (np.where(away < 9, tissue, air) + noise).round().astype(np.int16)
 
 
-def _nifti(path: Path, voxels: NDArray[np.generic]) -> Path:
-    image = nibabel.Nifti1Image(voxels, np.diag([1.0, 1.0, 1.0, 1.0]))
+def _nifti(path: Path, voxels: NDArray[np.generic], spacing_mm: float = 1.0) -> Path:
+    image = nibabel.Nifti1Image(voxels, np.diag([*(spacing_mm,) * 3, 1.0]))
     image.header.set_xyzt_units("mm")
     nibabel.save(image, path)
     return path
@@ -201,15 +201,13 @@ def test_a_level_above_the_background_is_refused_of_ct(
 def test_what_the_input_says_goes_first(tmp_path: Path) -> None:
     dataset = open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400)))
     assert choose_preset(dataset, modality="CT")[0] == "ct"
-    assert choose_preset(dataset, modality="PT")[0] is None
+    assert choose_preset(dataset, modality="PT")[0] == "pet"
+    assert choose_preset(dataset, modality="US")[0] is None
 
 
 def test_what_is_too_small_for_a_patient_follows_the_spacing(tmp_path: Path) -> None:
     """As an embryo in a small scanner: the presets would drop all of it."""
-    image = nibabel.Nifti1Image(_body(20, 400), np.diag([0.2, 0.2, 0.2, 1.0]))
-    image.header.set_xyzt_units("mm")
-    nibabel.save(image, tmp_path / "a.nii")
-    dataset = open_dataset(tmp_path / "a.nii")
+    dataset = open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400), 0.2))
     for modality in ("", "MR"):
         chosen, reason = choose_preset(dataset, modality=modality)
         assert chosen is None
@@ -217,10 +215,72 @@ def test_what_is_too_small_for_a_patient_follows_the_spacing(tmp_path: Path) -> 
     assert main(["plan", str(tmp_path / "a.nii"), "-o", str(tmp_path / "o")]) == 0
 
 
+@pytest.mark.parametrize(
+    ("name", "chosen"),
+    [
+        ("pet.nii.gz", "pet"),
+        ("sub-01_ses-2_trc-18FFDG_pet.nii", "pet"),
+        ("SUV_scan.nii", "pet"),
+        ("spect 3.nii", "pet"),
+        ("pet_ct.nii", "mri"),  # the name of a study, and not of one image
+        ("t1w_in_pet_space.nii", "mri"),
+        ("petra.nii", "mri"),  # a sequence of MR
+        ("carpet.nii", "mri"),
+        ("scan.nii", "mri"),
+    ],
+)
+def test_a_name_states_pet_where_the_file_states_no_modality(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, chosen: str
+) -> None:
+    source = _nifti(tmp_path / name, _body(20, 400))
+    assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr().err.replace("\n", " ")
+    assert f"plan: preset {chosen}: " in printed
+    assert ("in the source's name: PET is assumed, as heat" in printed) == (chosen == "pet")
+    plan = OutFolder(tmp_path / "out").plan()
+    assert plan.modality == ("PT" if chosen == "pet" else "MR")
+    assert not any("18FFDG" in note for note in plan.notes)  # names may identify a patient
+
+
+def test_what_is_assumed_to_be_mr_names_the_preset_that_shows_heat(tmp_path: Path) -> None:
+    _, notes = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400))))
+    assert "for a PET or SPECT --preset pet, which shows heat" in notes[-1]
+
+
+def test_hounsfield_units_are_a_ct_whatever_the_name_says(tmp_path: Path) -> None:
+    source = _nifti(tmp_path / "pet.nii", _body(-1000, 40))
+    assert load_for(source, None, None, flags={})[0].plan.modality == "CT"
+
+
+@pytest.mark.parametrize(("spacing_mm", "chosen"), [(0.25, None), (0.35, "mri")])
+def test_voxels_finer_than_those_of_patients_are_not_assumed_to_be_mr(
+    tmp_path: Path, spacing_mm: float, chosen: str | None
+) -> None:
+    """Micro-CT and scanners of small animals have such voxels, and a body that is seen whole."""
+    voxels = np.repeat(np.repeat(_body(20, 180).astype(np.uint8), 4, 1), 4, 2)
+    preset, notes = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", voxels, spacing_mm)))
+    assert preset == chosen
+    assert "no modality is stated" in notes[0]
+    assert "for a CT --preset ct --iso-value 0=" in notes[1]
+
+
 def test_micrometres_follow_the_spacing(tmp_path: Path) -> None:
     source = tmp_path / "a.ome.tif"
     phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=(1.0, 0.5, 0.5))
     assert choose_preset(open_dataset(source))[0] is None
+
+
+@pytest.mark.parametrize(("finest_um", "chosen"), [(0.9, None), (2.0, "lightsheet"), (25.0, None)])
+def test_cells_are_looked_for_in_voxels_of_a_few_micrometres(
+    tmp_path: Path, finest_um: float, chosen: str | None
+) -> None:
+    """Cells have surfaces of their own in finer voxels, and wider voxels show their tissue."""
+    source = tmp_path / "a.ome.tif"
+    spacing = (2.5 * finest_um, finest_um, finest_um)
+    phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=spacing)
+    preset, reason = choose_preset(open_dataset(source))
+    assert preset == chosen
+    assert ("cells are looked for" in reason[0]) == (chosen is not None)
 
 
 def test_the_plan_of_a_microscope_s_voxels_says_so(

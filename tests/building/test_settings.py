@@ -129,7 +129,7 @@ def test_wrong_settings_are_one_clear_line(tmp_path: Path, text: str, message: s
 def test_unknown_preset_lists_the_known() -> None:
     with pytest.raises(
         UsageError,
-        match=r"one of ct, ct-bone, cycif, em, lightsheet, mri, vessels or a \.toml file",
+        match=r"one of ct, ct-bone, cycif, em, lightsheet, mri, pet, vessels or a \.toml file",
     ):
         settings_module.load("confocal", None, flags={})
 

@@ -22,6 +22,19 @@ def test_more_of_a_tracer_is_lighter_and_denser_at_every_gradient() -> None:
     np.testing.assert_allclose(inside[0], inside[-1])
 
 
+def test_a_veil_shows_the_body_round_the_organs_and_changes_their_heat_little() -> None:
+    bare, veiled = (evaluate2d(heat_shapes(0.2, body)).astype(int) for body in (None, 0.05))
+    body = veiled[:, int(0.07 * 255) : int(0.19 * 255), 3]
+    assert (body > 0).all()
+    passed = (1 - body.max() / 255) ** 60  # of the light, by a body of 60 voxels
+    assert 0.5 < passed < 0.8
+    assert (veiled[:, : int(0.05 * 255) - 1, 3] == 0).all()  # air
+    organs = slice(int(0.28 * 255), None)
+    assert np.abs(veiled[:, organs] - bare[:, organs]).max() <= 12
+    # a threshold within the organs parts no body from the air
+    assert heat_shapes(0.2, 0.19) == heat_shapes(0.2) == heat_shapes(0.2, 0.3)
+
+
 def test_a_pet_opens_with_its_heat_map_at_the_level_of_its_organs() -> None:
     rng = np.random.default_rng(0)
     voxels = np.concatenate([rng.gamma(1.2, 150, 90_000), rng.normal(4000, 500, 5_000)])

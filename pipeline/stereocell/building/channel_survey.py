@@ -31,6 +31,7 @@ from stereocell.building.steps.gather_evidence import GatherEvidence
 from stereocell.building.steps.sum_components import SumComponents, Sums
 from stereocell.building.survey_file import ChannelSurvey, Curve, Survey, TileIso, save_survey
 from stereocell.building.survey_steps import components_step, evidence_step, window_step
+from stereocell.building.vessel_color import color_vessels
 from stereocell.engine.run import Engine, console
 from stereocell.engine.run_steps import Kept, ReadOnDemand
 from stereocell.engine.step import Step
@@ -109,9 +110,10 @@ def survey_channels(out_folder: OutFolder, plan: Plan, engine: Engine) -> Survey
             )
             for tile in plan.tiles
         }
-        survey[channel.id] = _of_channel(
+        measured = _of_channel(
             plan, channel, one, chosen, iso, of_rungs[chosen] if of_rungs else {}, files[channel.id]
         )
+        survey[channel.id] = color_vessels(measured, modality=plan.modality)
     save_survey(out_folder, survey)
     for channel in plan.channels:
         look, mask = survey[channel.id].appearance, windows[channel.id].counting.mask

@@ -78,12 +78,12 @@ def opens(channel: Channel, channels: Sequence[Channel]) -> bool:
     """
     if has_brain(channels):
         return channel.name in BRAIN
-    return not _shows_tissue(channel) or all(_shows_tissue(one) for one in channels)
+    names = [one.base or one.name for one in channels]
+    return not shows_own_light(channel.base or channel.name) or all(map(shows_own_light, names))
 
 
-def _shows_tissue(channel: Channel) -> bool:
-    """Return whether a channel's name says that it holds the tissue's own light."""
-    name = channel.base or channel.name
+def shows_own_light(name: str) -> bool:
+    """Return whether a channel's name says that it holds the tissue's own light, and no stain's."""
     return re.search(r"auto.?fluo|^background$|^af$", name.strip(), re.IGNORECASE) is not None
 
 

@@ -1,8 +1,8 @@
 """Whether voxels look like CT: in Hounsfield units, or with the offset of 1024 that scanners store.
 
-A file that states no modality is taken for CT where its values are Hounsfield units, and for MR
-otherwise. A CT whose values were shifted, or mapped to 8 bits, is taken for MR then, so the plan
-names the flags by which it is built as a CT.
+A file that states no modality is taken for CT where its values are Hounsfield units, and for MR or
+PET otherwise. A CT whose values were shifted, or mapped to 8 bits, is taken for MR then, so the
+plan names the flags by which it is built as a CT.
 """
 
 from dataclasses import dataclass

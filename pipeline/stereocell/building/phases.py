@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from stereocell.building.channel_colors import choose_colors, lies_at_bone
+from stereocell.building.channel_colors import choose_colors, is_lone, lies_at_bone, shows_stain
 from stereocell.building.channels import PALETTE, Channel, with_surfaces
 from stereocell.building.hounsfield import believe, settle_modality
 from stereocell.building.input_files import open_anew, require_table, watch_table
@@ -152,8 +152,9 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
     colors = choose_colors(
         [(one.name, one.color) for one in wanted],
         modality=modality.code,
-        is_alone=len(dataset.channels) == 1,
+        is_alone=is_lone([one.name for one in dataset.channels]),
         is_bone=lies_at_bone(settings.iso_values, is_hounsfield=modality.is_hounsfield),
+        is_stained=shows_stain(dataset.levels[0].spacing_um, is_dark=options.dark),
     )
     channels = [
         Channel(index, one.name, color)

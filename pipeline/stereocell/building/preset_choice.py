@@ -14,13 +14,20 @@ from stereocell.building.ct_evidence import (
 )
 from stereocell.building.open_source import as_asked, open_source
 from stereocell.building.settings import HOUNSFIELD, NO_PRESET, Settings, load
+from stereocell.building.tracer_name import tracer_word
 from stereocell.engine.run import console
 from stereocell.model.errors import StereoCellError
+from stereocell.model.modality import TRACER_MODALITIES
 from stereocell.read import Dataset
 from stereocell.storage.location import Location
 
-_BY_MODALITY = {"MR": "mri", "CT": "ct"}
+_BY_MODALITY = {"MR": "mri", "CT": "ct", **dict.fromkeys(TRACER_MODALITIES, "pet")}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
+# um: finest spacings above the first, up to the second, are those of light sheets and confocal
+# overviews of thick tissue. Cells are a few voxels wide there, and tissue fills the field.
+_OVERVIEW_UM = (1.0, 10.0)
+_PATIENT_UM = 300.0  # um: an MR of a patient has no finer voxels; micro-CT and small animals do
+_AS_HEAT = "for a PET or SPECT --preset pet, which shows heat"
 _PART_UM = 20_000.0  # um: of what is smaller across, presets of patients drop pieces half as large
 
 
@@ -54,7 +61,8 @@ def load_for(
         ):
             text = f"the values are taken for Hounsfield units (--as {HOUNSFIELD})"
             return load("ct", None, flags=flags, where=where), _describe("ct", text)
-        chosen, notes = choose_preset(dataset, modality=options.modality)
+        word = tracer_word(location)
+        chosen, notes = choose_preset(dataset, modality=options.modality, tracer=word)
     except StereoCellError:
         return settings, ()
     return (load(chosen, None, flags=flags, where=where) if chosen else settings), notes
@@ -99,16 +107,19 @@ def print_choice(choice: Sequence[str]) -> None:
         console.print(f"plan: {note}", markup=False)
 
 
-def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, tuple[str, ...]]:
+def choose_preset(
+    dataset: Dataset, *, modality: str = "", tracer: str = ""
+) -> tuple[str | None, tuple[str, ...]]:
     """Return the name of a preset, or None for the defaults, and the reasons, a sentence each.
 
     modality  the settings', where the input says none
+    tracer    the word in the source's name that states PET or SPECT; empty: there is none
     """
     known = dataset.modality or modality
     level = dataset.levels[0]
     finest = min(level.spacing_um)
     if not known and finest < _BODY_UM:
-        return None, _describe(None, f"voxels of {finest:.3g} um, as of a microscope")
+        return _of_microscope(finest)
     across = max(n * h for n, h in zip(level.shape, level.spacing_um, strict=True))
     if across < _PART_UM:
         return None, _describe(None, f"{across / 1000:.3g} mm across, too small for a patient")
@@ -121,14 +132,39 @@ def choose_preset(dataset: Dataset, *, modality: str = "") -> tuple[str | None, 
         doubt = _doubt(dataset, "ct") if is_unsigned_ct else ""
         reasons = _describe(by_kind, f"the input is {known}")
         return by_kind, (*reasons, f"preset {by_kind}: {doubt}") if doubt else reasons
-    evidence = find_ct_evidence(dataset)
-    chosen = "ct" if evidence.is_hounsfield else "mri"
-    size = f"voxels of {finest / 1000:.3g} mm"
-    if evidence.flags:
-        known = f"{size}, {evidence.words}" if evidence.basis else size
-        assumed = f"{known}, and no modality is stated: MR is assumed"
-        return chosen, (*_describe(chosen, assumed), _advice(evidence))
-    return chosen, _describe(chosen, f"{size} and {evidence.words}")
+    return _by_values(find_ct_evidence(dataset), finest, tracer)
+
+
+def _of_microscope(finest_um: float) -> tuple[str | None, tuple[str, ...]]:
+    """Return the preset of a volume that a microscope took, and the reasons."""
+    over, up_to = _OVERVIEW_UM
+    voxels = f"voxels of {finest_um:.3g} um, as of a"
+    if over < finest_um <= up_to:
+        return "lightsheet", _describe(
+            "lightsheet", f"{voxels} light sheet in tissue: cells are looked for"
+        )
+    return None, _describe(None, f"{voxels} microscope")
+
+
+def _by_values(
+    evidence: CtEvidence, finest_um: float, tracer: str
+) -> tuple[str | None, tuple[str, ...]]:
+    """Return the preset of a body whose modality is not stated, and the reasons.
+
+    tracer  the word in the source's name that states PET or SPECT; empty: there is none
+    """
+    size = f"voxels of {finest_um / 1000:.3g} mm"
+    if evidence.is_hounsfield:
+        return "ct", _describe("ct", f"{size} and {evidence.words}")
+    if tracer:
+        text = f"{size}, and {tracer!r} in the source's name: PET is assumed, as heat"
+        return "pet", _describe("pet", text)
+    known = f"{size}, {evidence.words}" if evidence.basis else size
+    if finest_um < _PATIENT_UM:
+        text = f"{known}, and no modality is stated: finer than an MR of a patient"
+        return None, (*_describe(None, text), _advice(evidence))
+    assumed = f"{known}, and no modality is stated: MR is assumed"
+    return "mri", (*_describe("mri", assumed), f"{_advice(evidence)}; {_AS_HEAT}")
 
 
 def _advice(evidence: CtEvidence) -> str:

@@ -167,7 +167,7 @@ class PlanOptions:
     )
     modality: str = setting(
         "",
-        "where the input says none: a term of DICOM's Modality; MR and CT open path-traced",
+        "where the input states none: DICOM's Modality; MR and CT open path-traced, PT as heat",
         flag=Flag(
             "--modality",
             "what took a volume that does not say so: MR, CT, PT, ..., GM for a microscope",

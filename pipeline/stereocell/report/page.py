@@ -154,7 +154,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
         rows.append(
             {
                 "name": channel.name,
-                "color": css_color(channel.color),
+                "color": css_color(appearance.color),
                 "window": appearance.window,
                 "iso_value": appearance.iso_value,
                 "level": None if appearance.level is None else appearance.level.words,
@@ -201,7 +201,7 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
         rows.append(
             {
                 "name": unit.channel.name,
-                "color": css_color(unit.channel.color),
+                "color": css_color(found.appearance.color),
                 "figure": figure,
                 "tile": unit.tile.id,
                 "picture": picture,
@@ -275,7 +275,7 @@ def _card(facts: Facts, unit: UnitFacts) -> dict[str, Any]:
     """Return what the page shows of one unit: its slices."""
     return {
         "unit": unit,
-        "color": css_color(unit.channel.color),
+        "color": css_color(facts.survey[unit.channel.id].appearance.color),
         "slices": _inline(Picture(*draw_slices(_cut(facts, unit)))),
     }
 
@@ -334,7 +334,7 @@ def _scene(facts: Facts, tile: Tile | None, labels: Sequence[LabelFacts] = ()) -
         surfaces=tuple(
             Surface(
                 str(lod_file(u.directory, min(level, len(u.lods) - 1)).absolute()),
-                u.channel.color,
+                facts.survey[u.channel.id].appearance.color,
             )
             for u in (units[i] for i in thin_out(len(units), every))
         )

@@ -191,7 +191,7 @@ def _coloured_function(
         organs = level
         if organs is None:
             organs = next(x for x, absorbed in opacity if absorbed > 0)
-        return heat.NAME, heat.heat_shapes(organs)
+        return heat.NAME, heat.heat_shapes(organs, appearance.threshold_normalized)
     if level is None or appearance.iso_value is None:
         return None
     if modality == "CT" and appearance.iso_value < BONE_LEVEL_HU:

@@ -1,9 +1,10 @@
 """The tissues of a CT in their colours, as a physician knows them from an atlas.
 
-A 2D function of bands of Hounsfield units: fat is yellow, muscle red, bone has the channel's own
-light colour, and vessels with contrast medium are light red. An edge to air is skin, whatever its
-values are: half-way from air to muscle lies the value of fat. So the bands of fat and muscle lie at
-small steps alone, and skin, which has the channel's colour as the surface has, at large ones.
+A 2D function of bands of Hounsfield units. Fat is yellow. Soft tissue is red, and the denser the
+lighter, so that organs part from each other on a cut. Bone has the channel's own light colour, and
+vessels with contrast medium are light red. An edge to air is skin, whatever its values are:
+half-way from air to muscle lies the value of fat. So the bands of fat and soft tissue lie at small
+steps alone, and skin, which has the channel's colour as the surface has, at large ones.
 """
 
 from stereocell.model.channel import Shape, Shapes
@@ -14,8 +15,15 @@ NAME = "tissues"
 # which SOFT_HU blurs
 _SKIN = (1.0, 1.0, 1.0)
 _FAT = (1.0, 0.92, 0.58)
-_MUSCLE = (0.7, 0.27, 0.2)
-_CONTRAST = (0.95, 0.42, 0.3)
+# Soft tissue by its upper end in Hounsfield units: fluid, organs, muscle and blood, and tissue that
+# takes up contrast medium
+_SOFT_TISSUE = (
+    (10.0, (0.5, 0.2, 0.2)),
+    (45.0, (0.63, 0.28, 0.29)),
+    (80.0, (0.78, 0.36, 0.38)),
+    (TISSUES["soft_tissue"][1], (0.92, 0.48, 0.5)),
+)
+_CONTRAST = (0.97, 0.5, 0.48)
 _BONE = (1.0, 1.0, 1.0)
 _SOFT_HU = 40.0
 _AIR_STEP_HU = 220.0  # step over two voxels from which on an edge is one to air
@@ -38,10 +46,14 @@ def tissue_shapes(level: float, window: tuple[float, float], gradient_max: float
     fat, muscle, bone = (TISSUES[name] for name in ("fat", "soft_tissue", "bone"))
     first = level - _FOOT_HU
     step = min(_AIR_STEP_HU / (window[1] - window[0]) / gradient_max, 0.9)
+    starts = (fat[1], *(end for end, _ in _SOFT_TISSUE[:-1]))
     bands = (
         (first, _FAT_FROM_HU, (0.0, 1.0), _SKIN, _SKIN_OPACITY),
         (_FAT_FROM_HU, fat[1], (0.0, step), _FAT, _OPACITY),
-        (fat[1], muscle[1], (0.0, step), _MUSCLE, _OPACITY),
+        *(
+            (start, end, (0.0, step), color, _OPACITY)
+            for start, (end, color) in zip(starts, _SOFT_TISSUE, strict=True)
+        ),
         (_FAT_FROM_HU, muscle[1], (step, 1.0), _SKIN, _SKIN_OPACITY),
         (muscle[1], bone[0], (0.0, 1.0), _CONTRAST, _OPACITY),
         (bone[0], bone[1], (0.0, 1.0), _BONE, _BONE_OPACITY),

@@ -12,6 +12,8 @@ import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 export const VOLUME_TILES_AT_START = 16;
 /** DICOM's terms for scans of whole bodies, which are best seen as light passes through them. */
 const TRACED_MODALITIES: readonly string[] = ["MR", "CT"];
+/** Terms for PET and SPECT, whose volume shows heat. A surface has one colour, and would hide it. */
+const TRACER_MODALITIES: readonly string[] = ["PT", "NM"];
 
 /** The tiles, by the distance of their centres from the specimen's, nearest first. */
 function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number][] {
@@ -94,8 +96,9 @@ function openingPlane({ specimen: { cut } }: Manifest): ClipPlane | null {
   return { normal: [x, y, z], offset_um: cut.offset_um };
 }
 
-/** Scans of bodies open by paths of light; an artist's choice goes before the disc. */
+/** Scans of bodies open by paths of light, tracers as volumes; an artist's choice goes before the disc. */
 function startMode({ specimen }: Manifest, canTrace: boolean, isStaged: boolean): Mode {
   if (TRACED_MODALITIES.includes(specimen.modality)) return canTrace ? "traced" : "all";
-  return isStaged ? "stage" : "disc";
+  if (isStaged) return "stage";
+  return TRACER_MODALITIES.includes(specimen.modality) ? "all" : "disc";
 }
