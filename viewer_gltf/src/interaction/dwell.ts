@@ -38,7 +38,7 @@ export type Dwell = Readonly<{
   /** The sample of the previous frame; null: there was none. */
   sample: RaySample | null;
   elapsed_s: number;
-  /** Direction of the gaze when the time began; null: no time counts. */
+  /** Direction of the gaze when its time last began; null: the dwell is spent, or nothing was seen yet. */
   began: Vec3 | null;
   /** null: the time counts. */
   spent: Spent | null;
