@@ -11,7 +11,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from stereocell.bundle import blob_page
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
@@ -20,6 +19,7 @@ from stereocell.formats.tiles3d import TileLod, make_tilesets
 from stereocell.formats.tiles3d_levels import inlined, surfaces, without_finer
 from stereocell.model.errors import OutputError, UsageError
 from support.bundles import load, write_tiles
+from support.small_viewer import use_small_viewer
 
 LINK = "https://host.example/page/?quality=low#v=1&c=CD31&eye=0,0,1.8,0,0,0"
 
@@ -35,18 +35,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def built_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A viewer of a few files, for a checkout whose viewer is not built."""
-    folder = tmp_path / "dist"
-    for name, content in {
-        "index.html": b"",
-        "assets/index-1.css": b"style",
-        "assets/viewer-1.js": b"plain",
-        "assets/viewer-1.js.gz": gzip.compress(b"plain"),
-        "environments/sky.hdr": b"light",
-    }.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    monkeypatch.setattr(blob_page, "viewer_dist", lambda: folder)
-    blob_page.files.cache_clear()
+    use_small_viewer(tmp_path / "dist", monkeypatch)
 
 
 class Page(HTMLParser):
@@ -94,7 +83,7 @@ def test_everything_fits_and_is_as_in_the_bundle(bundle: Path, tmp_path: Path) -
     found = Page(tmp_path / "s.html").blocks
     assert "surfaces at lod0 and volumes at mip level 0 (" in about
     assert "finer" not in about
-    assert found["page"]["viewer-1.js"] == gzip.compress(b"plain")
+    assert found["page"]["viewer-1.js"] == gzip.compress(b"plain", mtime=0)
     assert found["file"].pop("environments/sky.hdr") == b"light"
     changed = {"manifest.json", "files.json"}
     for name, content in found["file"].items():
@@ -142,7 +131,7 @@ def test_a_command_that_is_given_a_scene_names_it_and_the_way_to_go(
     bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_scene(bundle, tmp_path / "a.html")
-    assert main(["check", str(tmp_path / "a.html")]) == 1
+    assert main(["publish", str(tmp_path / "a.html"), str(tmp_path / "site")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "a scene in one file" in line
     assert "name the OUT that it was made from" in line

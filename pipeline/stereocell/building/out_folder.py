@@ -49,7 +49,7 @@ def require_build_or_nothing(out: Path, source: str | Path) -> None:
     a name.
     """
     found = contents_of(out)
-    if found.kind is Kind.FILE:
+    if found.kind in (Kind.FILE, Kind.SCENE):
         raise OutputError(f"{out}: found {found.words}, expected a folder")
     beside = {Path(source).name} if Path(source).parent.resolve() == out.resolve() else set()
     others = {name for name in names_in(out) if not name.startswith(".")} - beside

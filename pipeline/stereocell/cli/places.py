@@ -37,7 +37,7 @@ PLACES = {
     "tissue": Places(_BUILD, writes="out"),
     "export": Places(_BUILD, writes="file"),
     "publish": Places(_BUNDLE, writes="target"),
-    "check": Places(_BUNDLE),
+    "check": Places(_BUNDLE | {Kind.SCENE}),
     "view": Places(_BUNDLE),
     "serve": Places(_BUNDLE),
     "sample": Places(writes="out"),

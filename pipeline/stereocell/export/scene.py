@@ -5,16 +5,14 @@ is a block of base64 in the document, by gzip where that is shorter; `scene.js` 
 requests from these blocks.
 """
 
-import base64
-import html
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from math import ceil
 from pathlib import Path
 
 from stereocell.bundle import blob_page
-from stereocell.export.scene_files import Levels, Packed, SceneFiles
+from stereocell.bundle.scene_blocks import FILE, PAGE, VIEW, block, view_block
+from stereocell.export.scene_files import Levels, SceneFiles
 from stereocell.model.errors import UsageError
 from stereocell.storage.atomic_write import write_bytes
 
@@ -22,8 +20,6 @@ MAX_MB = 25.0
 MB_BYTES = 1_000_000
 _SCRIPT = Path(__file__).with_name("scene.js")
 _LONGEST_VIEW = 16_000  # characters; the viewer's longest link has 8000
-# the end of a link, as the viewer writes it (viewer_gltf/src/share/permalink.ts)
-_VIEW = re.compile(r"#v=\d+(&[\w.~:;,=!*'()%+/@$?-]*)*", re.ASCII)
 
 
 def write_scene(
@@ -42,12 +38,14 @@ def write_scene(
 
     Raises UsageError where the coarsest levels take more, OutputError for a damaged bundle.
     """
-    opening = _view_of(view)
+    opening = view_block(_view_of(view))
     files = SceneFiles(bundle, channels)
-    page = [_block("page", name, Packed(data, False)) for name, data in blob_page.files().items()]
+    page = [block(PAGE, name, data, False) for name, data in blob_page.files().items()]
 
     def render(levels: Levels) -> bytes:
-        blocks = [_block("file", path, packed) for path, packed in files.at(levels).items()]
+        blocks = [
+            block(FILE, path, one.data, one.is_packed) for path, one in files.at(levels).items()
+        ]
         return blob_page.document(_SCRIPT, "".join([opening, *page, *blocks])).encode()
 
     document, levels = _finest_that_fits(files, render, round(max_mb * MB_BYTES))
@@ -107,20 +105,12 @@ def _finer(count: int, of: str) -> list[str]:
 
 
 def _view_of(link: str) -> str:
-    """Return the block that holds the end of a link. Raises UsageError for another text."""
+    """Return the end of a link, from `#` on. Raises UsageError for another text."""
     if not link:
         return ""
     view = link[link.find("#") :]
-    if len(view) > _LONGEST_VIEW or not _VIEW.fullmatch(view):
+    if len(view) > _LONGEST_VIEW or not VIEW.fullmatch(view):
         raise UsageError(
             f"--view is {link[:80]!r}, expected a link that the viewer has made, with #v=1 in it"
         )
-    return f'    <script type="text/plain" data-view>{view}</script>\n'
-
-
-def _block(kind: str, name: str, packed: Packed) -> str:
-    text = base64.b64encode(packed.data).decode()
-    attributes = f'data-{kind}="{html.escape(name)}" data-bytes="{len(packed.data)}"'
-    if packed.is_packed:
-        attributes += " data-packed"
-    return f'    <script type="application/octet-stream" {attributes}>{text}</script>\n'
+    return view

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.model.errors import OutputError
-from stereocell.storage.first_bytes import identify
+from stereocell.storage.first_bytes import SCENE, identify
 from stereocell.storage.kinds import Kind
 from stereocell.storage.location import first_bytes
 from stereocell.storage.sealed_text import is_sealed_text
@@ -77,7 +77,8 @@ def contents_of(path: Path) -> Contents:
     if os.path.islink(path) and not path.exists():
         return Contents(Kind.FILE, "a link to nothing")
     if path.is_file():
-        return Contents(Kind.FILE, _file_words(path))
+        words = _file_words(path)
+        return Contents(Kind.SCENE if words == SCENE else Kind.FILE, words)
     names = {name for name in names_in(path) if not is_ignored(name)}
     if not names:
         return Contents(Kind.NOTHING, "nothing")

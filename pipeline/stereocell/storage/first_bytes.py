@@ -19,6 +19,8 @@ _OLE, _XML, _TEXT = (
 _ZIP = "a zip archive (unzip it, and name the file or folder in it)"
 _GUNZIP = "a gzip file (gunzip it)"
 SHARED = (_OLE, _XML, _TEXT, _ZIP, _GUNZIP)  # containers of many formats, which names tell apart
+# words for a page that holds a bundle, which `stereocell check` takes
+SCENE = "a scene in one file, written by `stereocell export` (name the OUT that it was made from)"
 _FRAMES = "extract its frames as PNG, as `ffmpeg -i FILE %05d.png` does"
 _TO_TIFF = "tifffile.imwrite makes a TIFF of the array"
 _CDF = (b"\x01", b"\x02", b"\x05")  # versions of netCDF-3
@@ -70,7 +72,7 @@ _PATTERNS = (
     (rb"PK\x03\x04", _ZIP),
     (
         rb"<!doctype html>.{0,100}<title>StereoCell</title>",  # as bundle/blob_page.py begins it
-        "a scene in one file, written by `stereocell export` (name the OUT that it was made from)",
+        SCENE,
     ),
 )
 _COMPILED = tuple((re.compile(mark, re.DOTALL), words) for mark, words in _PATTERNS)

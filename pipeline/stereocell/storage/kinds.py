@@ -11,6 +11,7 @@ class Kind(StrEnum):
     STAGE = "a stage"
     BUNDLE = "a bundle"
     SITE = "a published page"
+    SCENE = "a scene in one file"
     SLICES = "slices"
     PART = "another part of a build"
     FOLDER = "another folder"

@@ -41,6 +41,11 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
             f"{out}: a bundle by itself, expected OUT, with its plan.json: there is the stage that "
             "the bundle is held against"
         )
+    if out.is_file():
+        raise OutputError(
+            f"{out}: a scene in one file, expected OUT, with its plan.json: --deep compares a "
+            "bundle with the stage that it was exported from"
+        )
     plan = out_folder.plan()
     exported, bundle = stage or out_folder.stage_file, out_folder.bundle_dir
     try:

@@ -36,17 +36,21 @@ from stereocell.verify.bundle_documents import (
 from stereocell.verify.bundle_hashes import check_hashes, check_tilesets
 from stereocell.verify.check_line import CheckLine
 from stereocell.verify.node_validators import check_meshes, check_textures
+from stereocell.verify.scene_file import check_scene
 
 _Check = tuple[str, Callable[[], str]]
 
 
 def check(out: Path) -> Iterator[CheckLine]:
     """Yield a line for each check of a build's folder (plan, stage and bundle), or of a bundle by
-    itself, as on a web host.
+    itself, as on a web host, or of a scene in one file.
 
     Raises OutputError, before any line, where there is neither.
     """
-    found = require_kind(out, (Kind.BUILD, Kind.BUNDLE, Kind.SITE))
+    found = require_kind(out, (Kind.BUILD, Kind.BUNDLE, Kind.SITE, Kind.SCENE))
+    if found.kind is Kind.SCENE:
+        yield from check_scene(out, lambda bundle: _checks_of_bundle(bundle, None))
+        return
     if found.kind is Kind.BUILD:
         checks = [*_checks_of_build(out), *_checks_of_bundle(out / "bundle", OutFolder(out))]
     elif found.kind is not Kind.NOTHING:

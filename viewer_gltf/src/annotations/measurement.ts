@@ -22,7 +22,7 @@ const UP = new Vector3(0, 1, 0);
 /** Colour of points and labels, as hex. */
 const COLOR = "#ffd24a";
 
-/** One measurement: what is drawn of it is made when it is needed, and stays. */
+/** The marks of one measurement: as many as it has points now. */
 class Strand {
   readonly group = new Object3D();
   readonly label = new Label("above", COLOR);
@@ -47,13 +47,13 @@ class Strand {
       this.stretches.push(line);
       this.group.add(line);
     }
+    removeMarks(this.points.splice(places.length));
+    removeMarks(this.stretches.splice(Math.max(0, places.length - 1)));
     this.points.forEach((mesh, i) => {
-      mesh.visible = i < places.length;
-      if (mesh.visible) mesh.position.set(...places[i]);
+      mesh.position.set(...places[i]);
     });
     this.stretches.forEach((mesh, i) => {
-      mesh.visible = i < places.length - 1;
-      if (mesh.visible) stretch(mesh, places[i], places[i + 1]);
+      stretch(mesh, places[i], places[i + 1]);
     });
     this.label.write(places.length > 1 ? text : "");
     if (places.length < 2) return;
@@ -78,10 +78,9 @@ class Strand {
 
   update(sight: Sight): void {
     for (const mesh of this.points) {
-      if (mesh.visible) mesh.scale.setScalar(lengthAt(mesh.position, sight, 2 * POINT_RADIUS));
+      mesh.scale.setScalar(lengthAt(mesh.position, sight, 2 * POINT_RADIUS));
     }
     for (const mesh of this.stretches) {
-      if (!mesh.visible) continue;
       const width = lengthAt(mesh.position, sight, 2 * LINE_RADIUS);
       mesh.scale.setX(width).setZ(width);
     }
@@ -92,6 +91,14 @@ class Strand {
     this.group.removeFromParent();
     this.label.dispose();
     disposeMarks(this.group);
+  }
+}
+
+/** Remove marks from their group, and free what they hold. */
+function removeMarks(marks: readonly MarkMesh[]): void {
+  for (const mark of marks) {
+    mark.removeFromParent();
+    disposeMarks(mark);
   }
 }
 
@@ -141,10 +148,10 @@ export class MeasureMark {
       this.kept.push(strand);
       this.group.add(strand.group);
     }
+    for (const strand of this.kept.splice(measurements.length)) strand.dispose();
     this.kept.forEach((strand, i) => {
-      const each = measurements[i];
-      if (each === undefined) strand.show([], "");
-      else strand.show(each.points, `${each.name}\n${measurementText(each.kind, each.points)}`);
+      const { name, kind, points } = measurements[i];
+      strand.show(points, `${name}\n${measurementText(kind, points)}`);
     });
   }
 
@@ -158,9 +165,7 @@ export class MeasureMark {
       this.values.push(label);
       this.group.add(label.sprite);
     }
-    this.values.forEach((label, i) => {
-      if (i >= points.length) label.write("");
-    });
+    for (const label of this.values.splice(points.length)) label.dispose();
     const next = `${points.join(" ")} ${key}`;
     if (next === this.key) return;
     this.key = next;

@@ -83,8 +83,8 @@ export class OfflinePart {
     if (missed.length > 0) return null;
     const { manifest, bricks } = viewer.bundle;
     // a host that sends bricks by view is needed for each view
-    const isStreamed = bricks !== undefined && showsVolumes(viewer.state);
-    const tiles = isStreamed ? [] : manifest.tiles.map(({ id }) => id);
+    if (bricks !== undefined && showsVolumes(viewer.state)) return { tiles: 0, isByView: true };
+    const tiles = manifest.tiles.map(({ id }) => id);
     return coverageOf(tiles, layers, come, kept);
   }
 

@@ -51,6 +51,17 @@ describe("gaze that lasts", () => {
     expect(watch([["a", DWELL_S]]).fired).toEqual(["a"]);
   });
 
+  it("fires nowhere while it wanders over a large target, and once it rests there", () => {
+    const wander = Array.from({ length: 40 }, (_, i) => [seen("far", {}, 2.4 * i), 0.2] as const);
+    expect(watch(wander).fired).toEqual([]);
+    expect(watch([...wander, [seen("far", {}, 97), DWELL_S]]).fired).toEqual(["far"]);
+    const tremble = Array.from(
+      { length: 40 },
+      (_, i) => [seen("far", {}, 2 * (i % 2)), 0.1] as const,
+    );
+    expect(watch(tremble).fired).toEqual(["far"]);
+  });
+
   it("fires once, however long it lasts, and again after the target was left", () => {
     expect(watch([["a", 10]]).fired).toEqual(["a"]);
     const gazes = [

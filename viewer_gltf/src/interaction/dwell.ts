@@ -5,6 +5,8 @@
  * A dwell fires once and is spent. It is spent as well when the layout under a resting gaze changes:
  * the user did not look for a control that slides or opens under the gaze. A spent dwell fires nothing
  * until the gaze moves on. The tremble of a resting head is no such move.
+ *
+ * A gaze that wanders over a large target, as over a tile or a long row, does not rest: its time begins again.
  */
 import { dot, type Vec3 } from "../math/vec3";
 
@@ -36,6 +38,8 @@ export type Dwell = Readonly<{
   /** The sample of the previous frame; null: there was none. */
   sample: RaySample | null;
   elapsed_s: number;
+  /** Direction of the gaze when its time last began; null: the dwell is spent, or nothing was seen yet. */
+  began: Vec3 | null;
   /** null: the time counts. */
   spent: Spent | null;
 }>;
@@ -47,10 +51,12 @@ export const RING_S = 0.4;
 const LONGEST_FRAME_S = 0.1;
 /** Largest turn of a resting head, radians, from one of its directions to another. */
 export const TREMBLE_RAD = (1 * Math.PI) / 180;
+/** Largest turn of a gaze that rests, radians, from where its rest began: the height of a large button. */
+const REST_RAD = (5 * Math.PI) / 180;
 /** Turn that is a move of its own, also within one control, radians. */
 const MOVE_RAD = (1.5 * Math.PI) / 180;
 
-export const NO_DWELL: Dwell = { sample: null, elapsed_s: 0, spent: null };
+export const NO_DWELL: Dwell = { sample: null, elapsed_s: 0, began: null, spent: null };
 
 /** The next state, and whether this frame is the one on which the dwell fires. */
 export function advanceDwell(
@@ -64,13 +70,20 @@ export function advanceDwell(
     const hasFired = spent?.hasFired === true && spent.target === sample.target;
     const direction = spent?.direction ?? sample.direction;
     const { target } = sample;
-    return [{ sample, elapsed_s: 0, spent: { direction, target, hasFired } }, false];
+    const news = { direction, target, hasFired };
+    return [{ sample, elapsed_s: 0, began: null, spent: news }, false];
   }
-  if (spent !== null && !hasLeft(spent, sample)) return [{ sample, elapsed_s: 0, spent }, false];
+  if (spent !== null && !hasLeft(spent, sample)) {
+    return [{ sample, elapsed_s: 0, began: null, spent }, false];
+  }
   const isCounting = spent === null && isOn && sample.target === dwell.sample?.target;
-  if (!isCounting || sample.target === null) return [{ sample, elapsed_s: 0, spent: null }, false];
+  const began = dwell.began ?? sample.direction;
+  const isResting = angleBetween(began, sample.direction) <= REST_RAD;
+  if (!isCounting || sample.target === null || !isResting) {
+    return [{ sample, elapsed_s: 0, began: sample.direction, spent: null }, false];
+  }
   const elapsed_s = dwell.elapsed_s + Math.min(Math.max(dt_s, 0), LONGEST_FRAME_S);
-  const next = { sample, elapsed_s, spent: null };
+  const next = { sample, elapsed_s, began, spent: null };
   return elapsed_s < DWELL_S ? [next, false] : [spend(next), true];
 }
 
@@ -79,7 +92,7 @@ export function spend(dwell: Dwell): Dwell {
   const { sample } = dwell;
   if (sample === null) return dwell;
   const { direction, target } = sample;
-  return { sample, elapsed_s: 0, spent: { direction, target, hasFired: true } };
+  return { sample, elapsed_s: 0, began: null, spent: { direction, target, hasFired: true } };
 }
 
 /** Share of the ring that is filled, 0..1; 0 before the ring shows, and while the dwell is spent. */

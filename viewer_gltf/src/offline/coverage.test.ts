@@ -42,8 +42,14 @@ it("wants nothing of a layer that nobody has seen", () => {
   expect(coverageOf(["a", "b"], [LAYER], [], new Set()).tiles).toBe(2);
 });
 
-it("promises every place, or names what is kept", () => {
+it("promises every place, or names what is kept and why not more", () => {
   expect(coverageText({ tiles: 10 }, 10)).toMatch(/^Ready offline: /);
-  expect(coverageText({ tiles: 3 }, 10)).toBe("Kept for offline: the overview and 3 of 10 tiles.");
-  expect(coverageText({ tiles: 0 }, 10)).toBe("Kept for offline: the overview.");
+  const more = "Each tile that you look at from near is kept, too.";
+  expect(coverageText({ tiles: 3 }, 10)).toBe(
+    `Kept for offline: the overview and 3 of 10 tiles. ${more}`,
+  );
+  expect(coverageText({ tiles: 0 }, 10)).toBe(`Kept for offline: the overview. ${more}`);
+  expect(coverageText({ tiles: 0, isByView: true }, 10)).toBe(
+    "Kept for offline: the overview. This host sends volumes for each view, so volumes need the network.",
+  );
 });

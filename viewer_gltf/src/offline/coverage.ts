@@ -12,6 +12,8 @@ export type Layer = readonly Levels[];
 export type Coverage = Readonly<{
   /** Number of tiles that are kept, at the finest level that was shown. */
   tiles: number;
+  /** Whether the host makes the shown volumes for each view, so that none of them can be kept. */
+  isByView?: boolean;
 }>;
 
 /**
@@ -42,10 +44,13 @@ export function coverageOf(
   return { tiles: tiles.filter((tile) => !missing.has(tile)).length };
 }
 
-/** The sentence that the page announces about a coverage. */
-export function coverageText({ tiles }: Coverage, of: number): string {
+const MORE = "Each tile that you look at from near is kept, too.";
+const BY_VIEW = "This host sends volumes for each view, so volumes need the network.";
+
+/** The sentences that the page announces about a coverage: what is kept, and why not more. */
+export function coverageText({ tiles, isByView = false }: Coverage, of: number): string {
   if (tiles === of)
     return "Ready offline: every place opens without a network, as you have seen it.";
   const places = tiles === 0 ? "" : ` and ${tiles} of ${of} tiles`;
-  return `Kept for offline: the overview${places}.`;
+  return `Kept for offline: the overview${places}. ${isByView ? BY_VIEW : MORE}`;
 }

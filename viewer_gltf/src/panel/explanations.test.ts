@@ -13,6 +13,7 @@ import { EXPLAINED, isExplained } from "./explained";
 import { CHOICES, EXPLANATIONS, explanationOf, explanationOfChoice } from "./explanations";
 import { KEYS } from "./keys";
 import { layOut } from "./layout";
+import { titleOf } from "./transfer_titles";
 
 const start = initialState(sampleManifest(3));
 const STATES: readonly ViewerState[] = (["disc", "tile", "all", "traced", "off"] as const).map(
@@ -69,7 +70,13 @@ describe("the explanations", () => {
     }
     const names = functionsOfPipeline();
     expect(names.length).toBeGreaterThan(10);
-    for (const name of names) expect(Object.keys(CHOICES["transfer-function"])).toContain(name);
+    for (const name of names) {
+      expect(Object.keys(CHOICES["transfer-function"])).toContain(name);
+      expect(titleOf(name), name).toMatch(/^[A-Z]/);
+      expect(explanationOfChoice("c0/transfer-function", name)).toContain(`"${name}"`);
+    }
+    expect(new Set(names.map(titleOf)).size).toBe(names.length);
+    expect(titleOf("my own")).toBe("my own");
     expect(explanationOfChoice("c0/transfer-function", "my own")).toContain(
       "came with this bundle",
     );

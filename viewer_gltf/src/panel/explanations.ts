@@ -2,6 +2,7 @@
  * What each setting does, and what one will see of each choice, in plain words. A part of the code by itself, loaded
  * when somebody first asks. Pure.
  */
+import { OWN } from "../state/transfer_functions_2d";
 
 /** By the last part of a control's ID. */
 export const EXPLANATIONS: Readonly<Record<string, string>> = {
@@ -88,5 +89,8 @@ export function explanationOf(id: string): string {
 /** Returns the explanation of a choice; "" if it needs none. */
 export function explanationOfChoice(id: string, value: string): string {
   const part = lastPart(id);
-  return CHOICES[part]?.[value] ?? (part === "transfer-function" ? OF_THE_BUNDLE : "");
+  if (part !== "transfer-function") return CHOICES[part]?.[value] ?? "";
+  const text = CHOICES[part][value];
+  if (text === undefined) return OF_THE_BUNDLE;
+  return value === OWN ? text : `${text} Its name in the stage is "${value}".`;
 }

@@ -14,6 +14,7 @@ import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
 import { type Ranges, windowTexts } from "./sections/channels";
 import { measuredText } from "./sections/measure";
 import { LENS_NAMES } from "./sections/stereo";
+import { transferTitle } from "./transfer_titles";
 
 /** @param state after the wish was granted; "" where the picture shows it all */
 export function spokenFeedback(
@@ -128,6 +129,6 @@ function spokenChannel(
     case "set-shapes":
     case "objects":
     case "learn-transfer-2d":
-      return `${name}: ${channel.transferFunction}`;
+      return `${name}: ${transferTitle(channel)}`;
   }
 }

@@ -225,7 +225,7 @@ export class Picture {
       this.stoodIn = "";
       return true;
     }
-    const stoodIn = isMoving ? "" : JSON.stringify([volumes.status(), clip, solids]);
+    const stoodIn = isMoving ? "" : JSON.stringify([volumes.marchKey, clip, solids]);
     const isSame = stoodIn !== "" && stoodIn === this.stoodIn;
     this.stoodIn = stoodIn;
     return isSame;

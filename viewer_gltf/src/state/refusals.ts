@@ -14,6 +14,7 @@ export const REFUSED = {
   marched: `This mode draws no translucent volumes: choose “Volumes everywhere” ${MODES}.`,
   shaded: `Volumes beside surfaces have no depth shading: choose “Volumes everywhere” ${MODES}.`,
   opacity: "Depth shading needs Opacity: choose it above, where rays are set.",
+  tracing: `Path tracing is on: choose another form ${MODES} to end it.`,
   transfer: "This channel is drawn as a surface: switch its volume on for transfer functions.",
   transferless: "This channel has no transfer function.",
   slices: "No slices are shown: switch pictures or planes on under Slices.",

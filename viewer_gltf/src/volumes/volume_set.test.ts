@@ -112,6 +112,33 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
     expect(levelsNow()).toEqual(new Set([level + 1]));
   });
 
+  it("makes another march necessary in each step of a fade, and none once all has faded in", async () => {
+    makeSet(FADING * (TILES + KEPT_TILES) * bytesOf(1, 4));
+    const state = opened("all");
+    const [tile] = all();
+    set.follow(
+      state,
+      wantedTiles(state, { ...NO_FOCUS, focusTile: tile, near: new Set([tile]) }),
+      true,
+    );
+    const keys: string[] = [];
+    await vi.waitFor(
+      () => {
+        const before = [tile, ...all()].map((id) => set.presence(id, "A")).join();
+        const isFading = set.advance(0.05);
+        const after = [tile, ...all()].map((id) => set.presence(id, "A")).join();
+        if (after !== before) keys.push(set.marchKey);
+        expect(set.isLoading || isFading).toBe(false);
+      },
+      { timeout: 60_000, interval: 1 },
+    );
+    expect(keys.length).toBeGreaterThan(3);
+    expect(new Set(keys).size).toBe(keys.length);
+    const atRest = set.marchKey;
+    set.advance(0.05);
+    expect(set.marchKey).toBe(atRest);
+  });
+
   it("is not needed to know where a volume comes from", async () => {
     makeSet(0);
     set.follow(opened("off"), [], true);

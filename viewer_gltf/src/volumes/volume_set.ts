@@ -139,6 +139,14 @@ export class VolumeSet {
     );
   }
 
+  /** A text that changes with what a march would draw: with the levels that have come, and in each step of a fade. */
+  get marchKey(): string {
+    const drawn = this.drawn().map(({ march, packed, resident: { texture, presence } }) => [
+      ...[march.volume.tile, packed.channels, packed.level, texture.fresh, presence],
+    ]);
+    return JSON.stringify([this.status(), drawn]);
+  }
+
   /** How far the volume of a channel in a tile has faded in, 0..1. */
   presence(tile: string, channel: string): number {
     return this.residents.presence(tile, channel);

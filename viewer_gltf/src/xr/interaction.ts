@@ -249,7 +249,7 @@ export class Hands {
     this.panel.canUndo = this.lastChoice.advance(dt_s, now, isGoingOn, isAsked);
     this.panel.isCarrying = this.isCarryingInScene;
     const isRepainted = this.panel.update(dt_s, head, state);
-    const isNoticeNew = this.notice.update(read_s, head);
+    const isNoticeNew = this.notice.update(read_s, head, this.panel.upperEdge);
     const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
     if (fired?.key === GAZE_SWITCH && state.isDwellOn) this.announce(KEEPS_GAZE);

@@ -169,6 +169,35 @@ describeInChromium("marks", () => {
     await shoot("angle-and-line");
   });
 
+  it("hold nothing on the GPU of measurements that were removed", async () => {
+    await look([0.1, 0.1, 1.5]);
+    const clear = () =>
+      page.evaluate(() => {
+        window.bench?.dispatch({ type: "measure", points: [] });
+        window.bench?.dispatch({ type: "set-measurements", measurements: [] });
+        return window.bench?.held;
+      });
+    const measure = (lines: number, points: number) =>
+      page.evaluate(
+        ([count, length]) => {
+          window.bench?.dispatch({ type: "set", id: "measure-kind", value: "line" });
+          for (let line = 0; line < count; line++) {
+            for (let i = 0; i < length; i++) {
+              window.bench?.dispatch({ type: "add-point", point: [100 + 90 * i, -40 * line, 190] });
+            }
+            if (line < count - 1) window.bench?.dispatch({ type: "finish-measuring" });
+          }
+          return window.bench?.held;
+        },
+        [lines, points] as const,
+      );
+    await measure(1, 2);
+    const before = await clear();
+    const shown = await measure(4, 5);
+    expect(shown?.geometries).toBeGreaterThan((before?.geometries ?? 0) + 20);
+    expect(await clear()).toEqual(before);
+  });
+
   it("have labels that lie beside one another, though what they name crosses", async () => {
     await look([0.1, 0.1, 1.5]);
     await page.evaluate(() => {

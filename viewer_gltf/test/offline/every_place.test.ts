@@ -75,7 +75,7 @@ describeInChromium("the words about a visit without a network", () => {
 
   it("promise every place once each has been seen, and each shows without a network", async () => {
     const all = await tiles();
-    const first = `Kept for offline: the overview and 1 of ${all.length} tiles.`;
+    const first = `Kept for offline: the overview and 1 of ${all.length} tiles. Each tile that you look at from near is kept, too.`;
     await expect.poll(said).toEqual([first]);
     expect(await offline()).toBe("partly");
     const seen = new Map<string, Picture>();

@@ -1,5 +1,6 @@
 /** Phones: nothing lies under a notch, and the way back from a tile is in reach of the thumb. */
 import { expect, it } from "vitest";
+import { project } from "../support/browser/camera";
 import { openAllSections } from "../support/browser/open_sections";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -90,6 +91,30 @@ describeInChromium("a phone", () => {
       await page().keyboard.press("Escape");
       await page().locator(dialog).waitFor({ state: "hidden" });
     }
+  });
+
+  it.each([
+    ["lying", LYING],
+    ["upright", UPRIGHT],
+  ])("marks the tapped place itself, however far the covered edges reach: %s", async (_, size) => {
+    await page().setViewportSize(size);
+    await coverEdges();
+    await stand.open("&mode=off");
+    await stand.viewer.settled();
+    const stage = await page().locator(".stage").boundingBox();
+    if (stage === null) throw new Error("no stage");
+    const { min, max } = stand.manifest.tiles[0].bounds_um;
+    const front = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, max[2]] as const;
+    const { bounds_um } = stand.manifest.specimen;
+    const at = project(front, bounds_um, stage.width, stage.height);
+    await stand.viewer.clickOnce(stage.x + at.x, stage.y + at.y);
+    await page().locator("[data-tap-card]").waitFor();
+    const mark = await page().locator(".tap-mark").boundingBox();
+    if (mark === null) throw new Error("no mark");
+    expect(Math.abs(mark.x + mark.width / 2 - stage.x - at.x)).toBeLessThan(1.5);
+    expect(Math.abs(mark.y + mark.height / 2 - stage.y - at.y)).toBeLessThan(1.5);
+    const card = await page().locator("[data-tap-card]").boundingBox();
+    expect(card?.x).toBeGreaterThanOrEqual(INSETS.left);
   });
 
   it.each([

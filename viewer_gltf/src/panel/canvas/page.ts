@@ -26,7 +26,8 @@ export const MAX_TARGETS = 6;
 
 const MARGIN = 16;
 const HEADER = 92;
-const CONTENT: Rect = {
+/** The place of the rows, below the title. */
+export const CONTENT: Rect = {
   x: MARGIN,
   y: HEADER,
   width: WIDTH - 2 * MARGIN,

@@ -9,12 +9,12 @@ import { valueText } from "../../annotations/measure";
 import { toHex } from "../../math/color";
 import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel";
 import { REFUSED } from "../../state/refusals";
-import { isTwoD } from "../../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
 import type { Histogram } from "../../volumes/transfer_functions_loader";
 import { colourOf, controlOf, paletteOf } from "../control_templates";
 import type { Colour, Control, Group, PanelView, Section } from "../controls";
 import { freeColours } from "../palettes";
+import { transferTitle } from "../transfer_titles";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
 /** Largest number of channels that all have a card. */
@@ -115,7 +115,7 @@ function cardOf(
         value: channel.transferFunction,
         options: channel.transferFunctions.map((each) => ({
           value: each,
-          label: isTwoD(channel, each) ? `${each} (2D)` : each,
+          label: transferTitle(channel, each),
         })),
         isInline: false,
         refusal: channel.volume ? "" : REFUSED.transfer,

@@ -28,11 +28,24 @@ function granted(state: ViewerState, wish: Wish): ViewerState {
 }
 
 describe("the panel's light", () => {
-  it("is one button until paths of light are traced", () => {
-    const [button, ...others] = itemsOf(CLOSED);
-    expect(others).toEqual([]);
-    if (button.kind !== "button") throw new Error("no button");
-    expect(granted(CLOSED, button.to()).mode).toBe("traced");
+  it("begins path tracing by its first button, which alone is there in stereo before", () => {
+    for (const isStereo of [false, true]) {
+      const [button, ...others] = itemsOf(CLOSED, isStereo);
+      expect(others.length > 0).toBe(!isStereo);
+      if (button.kind !== "button") throw new Error("no button");
+      expect(granted(CLOSED, button.to()).mode).toBe("traced");
+    }
+  });
+
+  it("has the same rows on a flat screen before and after path tracing begins, and says which do nothing", () => {
+    const rows = (state: ViewerState) => controlsOf(state).map(({ id }) => id);
+    expect(rows(CLOSED)).toEqual(rows(TRACED));
+    const [begin, ...settings] = controlsOf(CLOSED);
+    expect(begin.refusal).toBe("");
+    expect(settings.filter(({ refusal }) => !refusal)).toEqual([]);
+    const [begun, ...set] = controlsOf(TRACED);
+    expect(begun.refusal).toContain("Path tracing is on");
+    expect(set.filter(({ refusal }) => refusal)).toEqual([]);
   });
 
   it("gives every control an id of its own, and a name", () => {
@@ -84,7 +97,7 @@ describe("the panel's light", () => {
   it("has the same in the room, but for the file", () => {
     const ids = (isStereo: boolean) => controlsOf(TRACED, isStereo).map(({ id }) => id);
     const [onScreen, inRoom] = [ids(false), ids(true)];
-    expect(onScreen.filter((id) => !inRoom.includes(id))).toHaveLength(1);
+    expect(onScreen.filter((id) => !inRoom.includes(id))).toEqual(["trace", "own-light"]);
     expect(inRoom).toContain("trace/lamps");
   });
 });

@@ -7,11 +7,13 @@ import {
   type LampParameters,
   MEDIUM,
   ROOM,
+  TRACED_ALONE,
 } from "../../state/parameters/light";
 import { isTraced, MODE } from "../../state/parameters/volumes";
+import { REFUSED } from "../../state/refusals";
 import type { ViewerState } from "../../state/viewer_state";
 import { command, controlOf, controlsOf, paletteOf } from "../control_templates";
-import type { Group, PanelView, Section } from "../controls";
+import type { Button, Group, PanelView, Section } from "../controls";
 
 function lampGroup(lamp: LampParameters, state: ViewerState, { picked }: PanelView): Group {
   const { id, name, color, isOn, numbers } = lamp;
@@ -30,25 +32,39 @@ function lampGroup(lamp: LampParameters, state: ViewerState, { picked }: PanelVi
   };
 }
 
-/** @param isStereo then no file can be chosen */
+/**
+ * A flat screen always has the same rows, so that none moves when path tracing begins. In stereo a page of controls
+ * that are refused would lead nowhere, and no file can be chosen.
+ */
 export function lightItems(
   state: ViewerState,
   view: PanelView,
   isStereo: boolean,
 ): Section["items"] {
-  if (!isTraced(state)) {
-    return [
-      {
-        kind: "button",
-        id: "trace",
-        label: "Path tracing",
-        to: () => setTo(MODE, "traced"),
-      },
-    ];
-  }
+  const isOn = isTraced(state);
+  const begin: Button = {
+    kind: "button",
+    id: "trace",
+    label: "Path tracing",
+    refusal: isOn ? REFUSED.tracing : "",
+    to: () => setTo(MODE, "traced"),
+  };
+  if (isStereo) return isOn ? settingsOf(state, view) : [begin];
+  const ownLight: Button = {
+    ...command("own-light", "Light of a .hdr or .exr file"),
+    refusal: isOn ? "" : TRACED_ALONE,
+  };
+  return [begin, ...settingsOf(state, view, ownLight)];
+}
+
+function settingsOf(
+  state: ViewerState,
+  view: PanelView,
+  ...ownLight: readonly Button[]
+): Section["items"] {
   return [
     ...controlsOf(MEDIUM, state),
-    ...(isStereo ? [] : [command("own-light", "Light of a .hdr or .exr file")]),
+    ...ownLight,
     ...controlsOf(ROOM, state),
     controlOf(LAMPS_SHOWN, state),
     ...LAMP.map((lamp) => lampGroup(lamp, state, view)),

@@ -13,8 +13,16 @@ import {
   NOTICE_PX_PER_M,
   NOTICE_WIDTH,
   noticeMarks,
+  textsHeight,
 } from "./notice_queue";
-import { headBearing, noticeBearing, pointAt } from "./placement";
+import {
+  type Bearing,
+  bearingOf,
+  headBearing,
+  noticeAbove,
+  noticeBearing,
+  pointAt,
+} from "./placement";
 
 /** Distance from the head, m: mostly before the specimen, and not so near that eyes cross. */
 const DISTANCE_M = 0.9;
@@ -55,17 +63,27 @@ export class RoomNotice {
     this.mesh.visible = false;
   }
 
-  /** Once a frame; whether it looks otherwise than before. */
-  update(dt_s: number, head: Matrix4): boolean {
+  /**
+   * Once a frame; whether it looks otherwise than before.
+   *
+   * @param rows the middle of the upper edge of the open menu's rows, which a notice must not cover; null: it is closed
+   */
+  update(dt_s: number, head: Matrix4, rows: Vector3 | null = null): boolean {
     const wasShown = this.mesh.visible;
     if (this.wantsPlace) {
       this.wantsPlace = false;
       const eye = new Vector3().setFromMatrixPosition(head);
-      this.quad.place(pointAt(noticeBearing(headBearing(head)), eye, DISTANCE_M), eye);
+      const at = rows === null ? noticeBearing(headBearing(head)) : this.above(rows.sub(eye));
+      this.quad.place(pointAt(at, eye, DISTANCE_M), eye);
     } else this.announcements = advanceAnnouncements(this.announcements, dt_s);
     this.mesh.visible = this.texts.length > 0;
     if (!this.mesh.visible) return wasShown;
     return this.quad.show(noticeMarks(this.texts)) || !wasShown;
+  }
+
+  private above(rows: Vector3): Bearing {
+    const end_px = NOTICE_HEIGHT / 2 - textsHeight(this.texts);
+    return noticeAbove(bearingOf(rows), Math.atan(end_px / NOTICE_PX_PER_M / DISTANCE_M));
   }
 
   dispose(): void {

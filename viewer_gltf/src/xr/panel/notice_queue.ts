@@ -59,6 +59,12 @@ function sizeFor(texts: readonly string[]): number {
   return SIZES.find(fits) ?? SMALLEST;
 }
 
+/** Height of the texts from the upper edge, px. */
+export function textsHeight(texts: readonly string[]): number {
+  const rects = noticeMarks(texts).map(({ rect }) => rect.y + rect.height);
+  return Math.max(0, ...rects);
+}
+
 /** From the top of the plane; what is not covered stays clear. */
 export function noticeMarks(texts: readonly string[]): readonly Mark[] {
   const size = sizeFor(texts);

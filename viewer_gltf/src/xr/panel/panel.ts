@@ -8,6 +8,7 @@ import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../../panel/canvas/bar";
 import { type CanvasWish, holds, type Mark, type Region } from "../../panel/canvas/draw_list";
 import {
   type CanvasView,
+  CONTENT,
   HEIGHT,
   type Page,
   pageOf,
@@ -197,6 +198,11 @@ export class RoomPanel {
 
   get isOpen(): boolean {
     return this.quad.mesh.visible;
+  }
+
+  /** The middle of the upper edge of the open menu's rows in the room; null: the menu is closed. */
+  get upperEdge(): Vector3 | null {
+    return this.isOpen ? this.quad.pointOf(CONTENT, 0.5, 0) : null;
   }
 
   /** The regions of the menu to point at now, for tests and for a program that reads them aloud. */

@@ -61,8 +61,20 @@ const NOTICE_BELOW = 20 * DEG;
 /** Lowest pitch of a notice, radians: a user who looks at the floor reads it there. */
 const NOTICE_LOWEST = -60 * DEG;
 
+/** Between a notice and the menu's rows below it, radians. */
+const NOTICE_GAP = 0.5 * DEG;
+
 export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
   return { yaw, pitch: Math.max(pitch - NOTICE_BELOW, Math.min(pitch, NOTICE_LOWEST)) };
+}
+
+/**
+ * Where the middle of a notice goes that must cover nothing from a place on down: the texts end just above it.
+ *
+ * @param end from the notice's middle up to the lower end of its texts, radians
+ */
+export function noticeAbove({ yaw, pitch }: Bearing, end: number): Bearing {
+  return { yaw, pitch: pitch + NOTICE_GAP - end };
 }
 
 export function barPitch(setting: Setting, isOpen: boolean): number {

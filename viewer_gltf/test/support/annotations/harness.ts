@@ -180,6 +180,12 @@ class Bench {
     canvas.addEventListener("pointerdown", () => this.leaked++);
   }
 
+  /** Objects on the GPU. */
+  get held(): Readonly<{ geometries: number; textures: number }> {
+    const { geometries, textures } = this.renderer.info.memory;
+    return { geometries, textures };
+  }
+
   dispatch(action: Action): void {
     this.state = reduce(this.state, action);
     this.marks.follow(this.state);

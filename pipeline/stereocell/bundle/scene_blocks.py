@@ -1,0 +1,104 @@
+"""The blocks of a scene in one file: how `export` writes them, and how `check` reads them.
+
+A block is an element of HTML that no browser runs. It holds a file as base64, with the SHA-256 of
+the bytes that the base64 stands for. The rest of the document is its page: a policy and a script.
+"""
+
+import base64
+import binascii
+import hashlib
+import html
+import re
+import zlib
+from dataclasses import dataclass, field
+
+from stereocell.model.errors import OutputError
+
+PAGE, FILE = "page", "file"  # kinds of blocks: a file of the viewer, a file of the bundle
+REMEDY = "copy the file again, or write it anew with `stereocell export OUT scene.html`"
+# the end of a link, as the viewer writes it (viewer_gltf/src/share/permalink.ts)
+VIEW = re.compile(r"#v=\d+(&[\w.~:;,=!*'()%+/@$?-]*)*", re.ASCII)
+_VIEW_BLOCK = re.compile(r' *<script type="text/plain" data-view>([^<]*)</script>\n')
+_BLOCK = re.compile(
+    r' *<script type="application/octet-stream" data-(page|file)="([^"<>]*)"'
+    r' data-bytes="(\d+)" data-sha256="([0-9a-f]{64})"( data-packed)?>([^<]*)</script>\n'
+)
+# Most bytes that the files take unpacked, for each byte of the document. Tables of objects, which
+# shrink the most, take 20.
+_MAX_GROWTH = 50
+
+
+@dataclass(frozen=True, slots=True)
+class SceneBlocks:
+    """The content of a scene in one file.
+
+    page   the viewer's files by name, as they are in the document
+    files  the bundle's files by path, unpacked
+    view   the end of a link; empty: the bundle's own opening
+    rest   the document without its blocks
+    """
+
+    page: dict[str, bytes] = field(default_factory=dict)
+    files: dict[str, bytes] = field(default_factory=dict)
+    view: str = ""
+    rest: str = ""
+
+
+def block(kind: str, name: str, data: bytes, is_packed: bool) -> str:
+    """Return a file's block.
+
+    is_packed  the data are gzip, and the reader gets the file that they unpack to
+    """
+    attributes = f'data-{kind}="{html.escape(name)}" data-bytes="{len(data)}"'
+    attributes += f' data-sha256="{hashlib.sha256(data).hexdigest()}"'
+    packed = " data-packed" if is_packed else ""
+    text = base64.b64encode(data).decode()
+    return f'    <script type="application/octet-stream" {attributes}{packed}>{text}</script>\n'
+
+
+def view_block(view: str) -> str:
+    """Return the block of the view that the scene opens with; nothing for an empty view."""
+    return f'    <script type="text/plain" data-view>{view}</script>\n' if view else ""
+
+
+def read_blocks(document: str) -> SceneBlocks:
+    """Return the content of a document. Raises OutputError for a block that is damaged."""
+    found = SceneBlocks(view="".join(_VIEW_BLOCK.findall(document)))
+    room = _MAX_GROWTH * len(document)
+    for kind, escaped, size, digest, packed, text in _BLOCK.findall(document):
+        name = html.unescape(escaped)
+        kept = found.page if kind == PAGE else found.files
+        if name in kept:
+            raise OutputError(f"{name}: is there twice, expected one block: {REMEDY}")
+        data = _decoded(name, text, int(size), digest)
+        kept[name] = _unpacked(name, data, room) if packed else data
+        room -= len(kept[name])
+    rest = _VIEW_BLOCK.sub("", _BLOCK.sub("", document))
+    return SceneBlocks(found.page, found.files, found.view, rest)
+
+
+def _decoded(name: str, text: str, size: int, digest: str) -> bytes:
+    try:
+        data = base64.b64decode(text, validate=True)
+    except binascii.Error:
+        raise OutputError(f"{name}: its block is no base64, so it is damaged: {REMEDY}") from None
+    if len(data) != size:
+        raise OutputError(f"{name}: has {len(data)} bytes, expected {size}: {REMEDY}")
+    found = hashlib.sha256(data).hexdigest()
+    if found != digest:
+        raise OutputError(f"{name}: has SHA-256 {found}, expected {digest}: {REMEDY}")
+    return data
+
+
+def _unpacked(name: str, data: bytes, most: int) -> bytes:
+    """Return what gzip data unpack to. Raises OutputError where that is more than `most` bytes."""
+    unpacker = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
+    try:
+        content = unpacker.decompress(data, max(1, most))
+    except zlib.error:
+        raise OutputError(f"{name}: is no gzip, expected data that unpack: {REMEDY}") from None
+    if not unpacker.eof:
+        raise OutputError(
+            f"{name}: does not unpack within {_MAX_GROWTH} times the document's size: {REMEDY}"
+        )
+    return content

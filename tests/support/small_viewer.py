@@ -1,0 +1,25 @@
+"""A viewer of a few files that stands in for the built one."""
+
+import gzip
+from pathlib import Path
+
+import pytest
+
+from stereocell.bundle import blob_page
+
+_FILES = {
+    "index.html": b"",
+    "assets/index-1.css": b"style",
+    "assets/viewer-1.js": b"plain",
+    "assets/viewer-1.js.gz": gzip.compress(b"plain", mtime=0),
+    "environments/sky.hdr": b"light",
+}
+
+
+def use_small_viewer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write the viewer's files into a folder, and let pages in one file be made of them."""
+    for name, content in _FILES.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    monkeypatch.setattr(blob_page, "viewer_dist", lambda: folder)
+    blob_page.files.cache_clear()

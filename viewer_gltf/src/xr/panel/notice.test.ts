@@ -1,0 +1,51 @@
+import { Matrix4, Vector3 } from "three";
+import { describe, expect, it } from "vitest";
+import { RoomNotice } from "./notice";
+import { NOTICE_HEIGHT, NOTICE_PX_PER_M, NOTICE_WIDTH, textsHeight } from "./notice_queue";
+import { bearingOf, PANEL_DISTANCE_M, pointAt } from "./placement";
+
+const DEG = Math.PI / 180;
+const EYE = new Vector3(0.1, 1.6, 0.2);
+const LONG = "This mode shows volumes at every distance, or none: choose one with near volumes.";
+
+/** A head at the eye that looks so far up. */
+const headAt = (pitch_deg: number) => new Matrix4().makeRotationX(pitch_deg * DEG).setPosition(EYE);
+
+/** Pitch of the lower end of a notice's texts at the left, in the middle and at the right, degrees. */
+function lowerEnd({ mesh, texts }: RoomNotice): readonly number[] {
+  const y = NOTICE_HEIGHT / 2 - textsHeight(texts);
+  return [-0.5, 0, 0.5].map((across) => {
+    const end = new Vector3(across * NOTICE_WIDTH, y, 0).divideScalar(NOTICE_PX_PER_M);
+    return bearingOf(mesh.localToWorld(end).sub(EYE)).pitch / DEG;
+  });
+}
+
+describe("a notice while the menu is open", () => {
+  it.each([["Saved."], [LONG], ["Saved.", LONG]])(
+    "covers none of the menu's rows: %s",
+    (...texts) => {
+      for (const top_deg of [-12, 31]) {
+        const rows = pointAt({ yaw: 0, pitch: top_deg * DEG }, EYE, PANEL_DISTANCE_M);
+        for (const gaze_deg of [-20, -45]) {
+          const notice = new RoomNotice(false);
+          for (const text of texts) notice.announce(text);
+          notice.update(0.1, headAt(gaze_deg), rows.clone());
+          expect(notice.texts).toEqual(texts);
+          const ends = lowerEnd(notice);
+          expect(ends[1]).toBeGreaterThan(top_deg);
+          // high up both edges, of the notice and of the menu, are lower beside the middle
+          if (top_deg < 0) expect(Math.min(...ends)).toBeGreaterThan(top_deg);
+          expect(ends[1]).toBeLessThan(top_deg + 1);
+          expect(notice.mesh.visible).toBe(true);
+        }
+      }
+    },
+  );
+
+  it("lies under the gaze where no menu is open", () => {
+    const notice = new RoomNotice(false);
+    notice.announce("Saved.");
+    notice.update(0.1, headAt(-10));
+    expect(bearingOf(notice.mesh.position.clone().sub(EYE)).pitch / DEG).toBeCloseTo(-30);
+  });
+});
