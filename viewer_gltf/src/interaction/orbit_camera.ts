@@ -65,7 +65,7 @@ export class Navigation {
   private flight: Readonly<{ from: Look; to: Look; elapsed_s: number }> | null = null;
   private readonly reach: Vector3;
   /** Outermost points of what is there of the specimen, room: the opening is framed on them. */
-  occupied: readonly Vec3[];
+  private occupied: readonly Vec3[];
   /** The opening is framed on what is free of the picture. */
   private covered: Covered = { top: 0, bottom: 0 };
 
@@ -125,14 +125,15 @@ export class Navigation {
 
   /** Outermost points of what is there of the specimen, um: the opening is framed on them. */
   surround(points: readonly Vec3[]): void {
+    this.occupied = this.inRoom(points);
+    if (this.stand !== null) this.standAt(this.stand);
+  }
+
+  /** Points of the specimen (um) in the room (m), as a flat screen shows it. */
+  inRoom(points: readonly Vec3[]): readonly Vec3[] {
     const { center, scale } = this.placement;
     const [cx, cy, cz] = center;
-    this.occupied = points.map(([x, y, z]) => [
-      (x - cx) * scale,
-      (y - cy) * scale,
-      (z - cz) * scale,
-    ]);
-    if (this.stand !== null) this.standAt(this.stand);
+    return points.map(([x, y, z]) => [(x - cx) * scale, (y - cy) * scale, (z - cz) * scale]);
   }
 
   /** Turn slowly to and fro, as long as nobody moves and the opening holds. */
