@@ -17,7 +17,7 @@ import {
 import { headBearing, noticeBearing, pointAt } from "./placement";
 
 /** Distance from the head, m: mostly before the specimen, and not so near that eyes cross. */
-const DISTANCE_M = 0.9;
+export const NOTICE_DISTANCE_M = 0.9;
 /** Render order: over volumes, marks and a specimen that is held closer; under the ring. */
 const RENDER_ORDER = 1900;
 
@@ -61,7 +61,7 @@ export class RoomNotice {
     if (this.wantsPlace) {
       this.wantsPlace = false;
       const eye = new Vector3().setFromMatrixPosition(head);
-      this.quad.place(pointAt(noticeBearing(headBearing(head)), eye, DISTANCE_M), eye);
+      this.quad.place(pointAt(noticeBearing(headBearing(head)), eye, NOTICE_DISTANCE_M), eye);
     } else this.announcements = advanceAnnouncements(this.announcements, dt_s);
     this.mesh.visible = this.texts.length > 0;
     if (!this.mesh.visible) return wasShown;
