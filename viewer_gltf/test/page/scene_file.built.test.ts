@@ -140,6 +140,18 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     expect(errors).toEqual([]);
   });
 
+  it("is path-traced in its room, whose light lies in the file", async () => {
+    const errors: string[] = []; // the policy refuses a light that is sought elsewhere
+    viewer.page.on("console", (message) => {
+      if (message.type() === "error") errors.push(message.text());
+    });
+    await open("whole", "?mode=traced&quality=low");
+    const samples = async () => (await viewer.snapshot()).traced.samples;
+    await expect.poll(samples, { timeout: 60_000 }).toBeGreaterThan(0);
+    expect((await viewer.snapshot()).state.notices).toEqual([]);
+    expect(errors).toEqual([]);
+  });
+
   it("draws the coarse levels alone that fit, without a notice", async () => {
     const refusal = await write("none", "0.1").catch((error: Error) => error.message);
     const [, least] = /takes ([\d.]+) MB: expected as much/.exec(refusal) ?? [];
