@@ -53,6 +53,9 @@ export function isSameLook(look: Look, { lookNow }: Pick<Navigation, "lookNow">)
   return was.every((v, i) => Math.abs(v - is[i]) < SAME_M);
 }
 
+/** Most that is left out of the picture's height when the opening is framed. */
+const MOST_COVERED = 0.6;
+
 export class Navigation {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
   readonly controls: OrbitControls;
@@ -105,7 +108,9 @@ export class Navigation {
 
   /** The window has this shape now. */
   fit(aspect: number, covered: Covered = { top: 0, bottom: 0 }): void {
-    this.covered = covered;
+    // buttons and words may be higher than a very low picture
+    const share = Math.min(1, MOST_COVERED / (covered.top + covered.bottom || 1));
+    this.covered = { top: share * covered.top, bottom: share * covered.bottom };
     this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
     if (this.stand !== null) this.standAt(this.stand);
