@@ -18,11 +18,19 @@ async function startViewer(files, read, host) {
   answerFetches(read);
   const addresses = await addressesOf(files);
   const named = (ending) => [...addresses].find(([name]) => ending.test(name))?.[1];
-  await linkStyle(named(/^index-.*\.css$/));
+  await Promise.all(stylesOf(addresses).map(linkStyle));
   globalThis.stereocellBase = `${HOST}assets/`;
   globalThis.stereocellHost = host;
   globalThis.stereocellCode = import(named(/^viewer-.*\.js$/));
   await globalThis.stereocellCode;
+}
+
+// All styles, the page's own first. The code takes only an address that ends in .css for a style, so that a part which
+// is loaded later would not find its own.
+function stylesOf(addresses) {
+  const names = [...addresses.keys()].filter((name) => name.endsWith(".css"));
+  const isOwn = (name) => name.startsWith("index-");
+  return [...names.filter(isOwn), ...names.filter((name) => !isOwn(name))].map((name) => addresses.get(name));
 }
 
 // Code names other files by theirs, so the addresses of those are made first.

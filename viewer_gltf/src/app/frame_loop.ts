@@ -284,10 +284,9 @@ export class FrameLoop {
   private poseMono(dt_s: number): Camera {
     const { navigation, contents, state } = this.options.shown();
     const outline = contents.outline(state);
-    if (outline !== null) {
-      navigation.surround(outline);
-      this.options.room.standUnder(navigation.occupied);
-    }
+    if (outline !== null) navigation.surround(outline);
+    const shown = contents.shownPoints(state);
+    if (shown !== null) this.options.room.standUnder(navigation.inRoom(shown));
     navigation.update(dt_s);
     this.followScreen();
     return navigation.camera;

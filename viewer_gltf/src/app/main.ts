@@ -118,13 +118,13 @@ async function open(parent: HTMLElement): Promise<Viewer> {
   );
   const waysIn = new WaysIn();
   const isTouch = matchMedia("(pointer: coarse)").matches;
-  const hint = new FirstHint(isTouch);
+  const isFramed = window.parent !== window;
+  const hint = new FirstHint(isTouch, isFramed);
   const wayBack = new WayBack(() => viewer.run("back"));
   const over = [hint.root, progress.root, said.root, notices.root, waysIn.root, wayBack.root];
   parent.replaceChildren(element("main", { className: "view" }, {}, stage, ...over));
   let controller: Controller | null = null;
   let notebook: NotebookPart | null = null;
-  const isFramed = window.parent !== window;
   if (isFramed) leaveWheelToHolder(stage);
   const { search, hash } = new URL(page);
   document.documentElement.dataset.panel = panelOf(search);

@@ -1,12 +1,14 @@
 /** The visible parts of a bundle: its surfaces, its volumes, and the marks on them. */
 import { type Camera, Matrix4, Vector3, type WebGLRenderer } from "three";
 import { Marks, type MarksView } from "../annotations/annotations";
+import type { Manifest } from "../bundle/generated/bundle";
 import type { Bundle } from "../bundle/load";
 import { ValuesHost } from "../bundle/values_host";
 import { memoryBudget } from "../gpu/memory_budget";
 import { type Box, cornersOf } from "../math/box";
-import { behindPlane } from "../math/clip";
+import { behindPlane, keptPoints } from "../math/clip";
 import { extremePoints } from "../math/extreme_points";
+import { shownBox } from "../math/pick";
 import type { Vec3 } from "../math/vec3";
 import { TracedVolume } from "../pathtrace/traced_volume";
 import type { Picture } from "../render/frame_renderer";
@@ -62,7 +64,9 @@ export class Contents {
   hasOverview = false;
   /** Whether it is known for good where all lies that shows at the opening. */
   private isOutlined = false;
-  private readonly bounds: Box;
+  /** The parts of the state that `shownPoints` has answered for. */
+  private asked: readonly unknown[] = [];
+  private readonly manifest: Manifest;
 
   constructor(options: ContentsOptions) {
     const { bundle, renderer, picture, onChange, onError } = options;
@@ -118,7 +122,7 @@ export class Contents {
       onError,
     };
     const { manifest, base } = bundle;
-    this.bounds = manifest.specimen.bounds_um;
+    this.manifest = manifest;
     const { sourceOf } = reading;
     const { view, dispatch } = options;
     this.slices = new SlicesPart({
@@ -184,20 +188,41 @@ export class Contents {
    */
   outline(state: ViewerState): readonly Vec3[] | null {
     if (this.isOutlined) return null;
+    const points = this.pointsOf(state);
+    if (points === null) return null;
+    this.isOutlined = this.hasOverview;
+    if (points.length === 0) return null;
+    const { plane } = state.clip;
+    return extremePoints(plane === null ? points : behindPlane(points, plane));
+  }
+
+  /**
+   * Returns points (um, world) whose box holds what is shown now; no points if nothing is. Returns null if they are not
+   * known yet, or if nothing has changed since the last call.
+   */
+  shownPoints(state: ViewerState): readonly Vec3[] | null {
+    const { channels, mode, isolated, clip } = state;
+    const asked = [channels, mode, isolated, clip, this.hasOverview];
+    if (asked.every((each, i) => each === this.asked[i])) return null;
+    const points = this.pointsOf(state);
+    if (points === null) return null;
+    this.asked = asked;
+    return keptPoints(points, clip, shownBox(this.manifest, isolated));
+  }
+
+  /** Outermost points (um, world) of all channels that are shown, uncut; null: not known yet. */
+  private pointsOf(state: ViewerState): readonly Vec3[] | null {
     const points: Vec3[] = [];
     for (const channel of state.channels.filter(({ shown }) => shown)) {
       const outline = !channel.hasSurface
-        ? cornersOf(this.bounds)
+        ? cornersOf(this.manifest.specimen.bounds_um)
         : wantsSurface(state, channel)
           ? this.surfaces.outline(channel.id)
           : this.volumes.outline(channel.id);
       if (outline === null) return null;
       points.push(...outline);
     }
-    this.isOutlined = this.hasOverview;
-    if (points.length === 0) return null;
-    const { plane } = state.clip;
-    return extremePoints(plane === null ? points : behindPlane(points, plane));
+    return points;
   }
 
   /** True once, when the overview has come: then `follow` again. */

@@ -15,7 +15,7 @@ export type Moment = Readonly<{
 }>;
 
 /** The name of a step of the camera. */
-const LOOK = "where it is seen from";
+const LOOK = "viewpoint";
 /** Largest difference of two numbers of a place that is the same, m. */
 const SAME_M = 1e-4;
 

@@ -70,6 +70,7 @@ const NEAREST_OBJECT_M = 0.08;
 const ASIDE = [1, 0, -1].flatMap((z) =>
   [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
 );
+const NOTHING_THERE = "Nothing lies there to fly to.";
 const BEHIND_OTHERS = "Other objects hide it from all sides: its card shows it alone.";
 /** How long one is at least that is brought before the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
@@ -799,10 +800,14 @@ export class Viewer {
     this.loop.change();
   }
 
-  /** To what a ray (um) meets; where it meets nothing the view stays. */
+  /** Flies to what a ray (um) meets. Where it meets nothing the view stays, and the page says so. */
   private async flyAlong(ray: Ray): Promise<void> {
     const met = await this.contents.marks.probe(ray);
-    if (met === null || this.disposed.signal.aborted) return;
+    if (this.disposed.signal.aborted) return;
+    if (met === null) {
+      this.onAnnounce(NOTHING_THERE);
+      return;
+    }
     this.steps.note();
     this.navigation.flyTowards(new Vector3(...met.point).applyMatrix4(this.specimen));
     this.loop.change();

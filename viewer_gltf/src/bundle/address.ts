@@ -24,6 +24,11 @@ export function pageAddress(): string {
   return globalThis.stereocellHost?.page ?? location.href;
 }
 
+/** The address beside which the viewer's own files lie. A document that brings the bundle along brings those, too. */
+export function viewerAddress(): string {
+  return globalThis.stereocellHost?.bundle ?? pageAddress();
+}
+
 /**
  * The folder that holds the bundle, with a closing slash. `?bundle=` names the folder or its
  * manifest.json, relative to the page or absolute; without it the bundle lies beside the page. A document that

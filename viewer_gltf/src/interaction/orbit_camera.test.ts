@@ -77,6 +77,21 @@ describe("the opening", () => {
     }
   });
 
+  it("stands somewhere in a picture that is lower than what lies over it", () => {
+    for (const covered of [
+      { top: 0.7, bottom: 0.3 },
+      { top: 2, bottom: 1 },
+    ]) {
+      const navigation = start();
+      navigation.fit(8, covered);
+      navigation.reset();
+      const { position, target } = navigation.lookNow;
+      const away_m = Math.hypot(...position.map((v, i) => v - target[i]));
+      expect(away_m).toBeGreaterThan(0.1);
+      expect(away_m).toBeLessThan(20);
+    }
+  });
+
   it("turns slowly to and fro until someone moves, and stays where it is then", () => {
     const navigation = start();
     const still = azimuth(navigation);

@@ -53,6 +53,9 @@ export function isSameLook(look: Look, { lookNow }: Pick<Navigation, "lookNow">)
   return was.every((v, i) => Math.abs(v - is[i]) < SAME_M);
 }
 
+/** Most that is left out of the picture's height when the opening is framed. */
+const MOST_COVERED = 0.6;
+
 export class Navigation {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
   readonly controls: OrbitControls;
@@ -65,7 +68,7 @@ export class Navigation {
   private flight: Readonly<{ from: Look; to: Look; elapsed_s: number }> | null = null;
   private readonly reach: Vector3;
   /** Outermost points of what is there of the specimen, room: the opening is framed on them. */
-  occupied: readonly Vec3[];
+  private occupied: readonly Vec3[];
   /** The opening is framed on what is free of the picture. */
   private covered: Covered = { top: 0, bottom: 0 };
 
@@ -105,7 +108,9 @@ export class Navigation {
 
   /** The window has this shape now. */
   fit(aspect: number, covered: Covered = { top: 0, bottom: 0 }): void {
-    this.covered = covered;
+    // buttons and words may be higher than a very low picture
+    const share = Math.min(1, MOST_COVERED / (covered.top + covered.bottom || 1));
+    this.covered = { top: share * covered.top, bottom: share * covered.bottom };
     this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
     if (this.stand !== null) this.standAt(this.stand);
@@ -125,14 +130,15 @@ export class Navigation {
 
   /** Outermost points of what is there of the specimen, um: the opening is framed on them. */
   surround(points: readonly Vec3[]): void {
+    this.occupied = this.inRoom(points);
+    if (this.stand !== null) this.standAt(this.stand);
+  }
+
+  /** Points of the specimen (um) in the room (m), as a flat screen shows it. */
+  inRoom(points: readonly Vec3[]): readonly Vec3[] {
     const { center, scale } = this.placement;
     const [cx, cy, cz] = center;
-    this.occupied = points.map(([x, y, z]) => [
-      (x - cx) * scale,
-      (y - cy) * scale,
-      (z - cz) * scale,
-    ]);
-    if (this.stand !== null) this.standAt(this.stand);
+    return points.map(([x, y, z]) => [(x - cx) * scale, (y - cy) * scale, (z - cz) * scale]);
   }
 
   /** Turn slowly to and fro, as long as nobody moves and the opening holds. */

@@ -10,9 +10,11 @@ import {
   dragBox,
   isCutAway,
   isKept,
+  keptPoints,
   planeHandles,
   slidePlane,
   turnPlane,
+  WHOLE,
 } from "./clip";
 import type { Ray, Vec3 } from "./vec3";
 
@@ -292,5 +294,31 @@ describe("the plane's handles", () => {
       isSound &&= current.offset_um <= Math.max(...found) + 1e-9;
     }
     expect(isSound).toBe(true);
+  });
+});
+
+describe("the points of what is kept", () => {
+  const within: Box = { min: [0, 0, 0], max: [4, 4, 4] };
+  const points = [
+    [-1, 1, 9],
+    [3, 2, 1],
+  ] as const;
+
+  it("are inside a tile that is shown alone", () => {
+    const kept = keptPoints(points, WHOLE, within);
+    expect(kept).toEqual([
+      [0, 1, 4],
+      [3, 2, 1],
+    ]);
+  });
+
+  it("are inside the cut's box and behind its plane, too", () => {
+    const box: Box = { min: [1, 0, 0], max: [9, 9, 3] };
+    const plane = { normal: [1, 0, 0], offset_um: 2 } as const;
+    const kept = keptPoints(points, { box, plane }, within);
+    expect(kept).toEqual([
+      [1, 1, 3],
+      [2, 2, 1],
+    ]);
   });
 });

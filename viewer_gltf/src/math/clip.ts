@@ -79,6 +79,26 @@ export function behindPlane(points: readonly Vec3[], plane: ClipPlane): readonly
   });
 }
 
+/** The points as a cut and a box leave them: points outside move to the nearest place of what is kept. */
+export function keptPoints(
+  points: readonly Vec3[],
+  { box, plane }: Clip,
+  within: Box,
+): readonly Vec3[] {
+  const boxes = box === null ? [within] : [within, box];
+  const inside = points.map((point) =>
+    boxes.reduce(
+      (at, { min, max }): Vec3 => [
+        Math.min(Math.max(at[0], min[0]), max[0]),
+        Math.min(Math.max(at[1], min[1]), max[1]),
+        Math.min(Math.max(at[2], min[2]), max[2]),
+      ],
+      point,
+    ),
+  );
+  return plane === null ? inside : behindPlane(inside, plane);
+}
+
 /** Whether nothing is left of a box. */
 export function isCutAway(of: Box, { box, plane }: Clip): boolean {
   const min = AXES.map((i) => (box === null ? of.min[i] : Math.max(of.min[i], box.min[i])));

@@ -10,7 +10,7 @@ export const EXPLANATIONS: Readonly<Record<string, string>> = {
   "switch-distance":
     "From nearer than this, the focus disc or the tile shows the volume. From farther away it shows surfaces.",
   "disc-radius":
-    "Half of the angle that the round window in the middle of the view takes. Volumes show inside it. It ends where a fifth tile would begin.",
+    "Half of the angle that the round window in the middle of the view takes. Volumes show inside it. At most twelve tiles show as volumes in it.",
   compositing: "How things that lie behind one another appear.",
   "depth-shading":
     "Enclosed places are darker, and things that lie before others throw shadows on them.",
@@ -36,7 +36,8 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
     tile: "Surfaces from afar. From near, the tile that you chose or look at shows its volume.",
     all: "Translucent volumes in every tile, from any distance.",
     stage: "Each tile as an artist has set it: surface, volume or both.",
-    traced: "Volumes with soft shadows, as in a photograph. The picture clears up at rest.",
+    traced:
+      "Path tracing: volumes with soft shadows, as in a photograph. The picture clears up at rest.",
     off: "Surfaces alone, which draw fastest.",
   },
   compositing: {

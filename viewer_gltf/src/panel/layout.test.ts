@@ -217,10 +217,19 @@ describe("the panel's layout", () => {
     expect(now(reduce(start(), { type: "set", id: "mode", value: "all" }), 3.2)).toBe(set);
   });
 
+  it("has no section of tiles where there is a single one", () => {
+    const names = (state: ViewerState) => laid(state).sections.map(({ id }) => id);
+    const { tiles, ...rest } = start();
+    const all = names({ tiles, ...rest });
+    const single = names({ tiles: tiles.slice(0, 1), ...rest });
+    expect(all.filter((id) => !single.includes(id))).toEqual(["tiles"]);
+  });
+
   it("lists the tiles where their names are no rows and columns", () => {
-    const state = { ...start(), tiles: [{ id: "left", representation: "mesh" }] } as const;
+    const tiles = ["left", "right"].map((id) => ({ id, representation: "mesh" }) as const);
+    const state = { ...start(), tiles };
     const list = find(laid(state), "choice", "tile-choice");
-    expect(list.options.map(({ value }) => value)).toEqual(["", "left"]);
+    expect(list.options.map(({ value }) => value)).toEqual(["", "left", "right"]);
     expect(granted(state, list.to("left")).selected).toBe("left");
   });
 

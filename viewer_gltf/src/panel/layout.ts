@@ -151,7 +151,8 @@ function firstSections(
       return section(objectsSection(id, length), label, ofMap ?? (isStereo ? [] : LOADING));
     }),
     section("volumes", "Surfaces and volumes", hasAny ? [controlOf(MODE, state)] : []),
-    section("tiles", "Tiles", tileItems(state, facts.focusTile)),
+    // of a single tile there is nothing to choose
+    section("tiles", "Tiles", state.tiles.length < 2 ? [] : tileItems(state, facts.focusTile)),
     section("cut", "Cut open", cutItems(state, facts.shown)),
     ...(isPatient && !isStereo ? [] : [slices]),
     section("save", "Pictures and video", saveItems(state, facts.isFilming)),

@@ -1,6 +1,6 @@
 /** The path-traced picture's subject: follows the state, loads what is missing, and is drawn. */
 import { Group, type Matrix4, type Texture, type WebGLRenderer } from "three";
-import { pageAddress } from "../bundle/address";
+import { viewerAddress } from "../bundle/address";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import { LAST, Overlay } from "../gpu/composite_pass";
 import type { Eyes } from "../gpu/eyes";
@@ -358,7 +358,7 @@ export class TracedVolume {
     this.hasLightFailed = false;
     this.isLightComing = true;
     try {
-      const tables = await loadEnvironment(pageAddress(), name);
+      const tables = await loadEnvironment(viewerAddress(), name);
       if (this.environment === name) this.tracer?.lightBy(tables);
     } catch (error) {
       if (!(error instanceof BundleError)) throw error;

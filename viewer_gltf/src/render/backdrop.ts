@@ -51,6 +51,11 @@ export class Backdrop {
     }),
   );
 
+  /** Share of the light that a shadow takes. */
+  private shade = 0;
+  /** Whether nothing is shown. */
+  private isEmpty = false;
+
   constructor() {
     const corners = new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]);
     this.mesh.geometry.setAttribute("position", new BufferAttribute(corners, 3));
@@ -64,12 +69,15 @@ export class Backdrop {
     uFar.value.copy(srgb(FAR[theme]));
     uHigh.value.copy(srgb(high));
     uPool.value.copy(srgb(pool));
-    uShade.value = shade;
+    this.shade = shade;
+    uShade.value = this.isEmpty ? 0 : shade;
   }
 
-  /** @param points outermost ones of what is shown, in the room, m */
+  /** @param points outermost ones of what is shown, in the room, m; none: nothing throws a shadow */
   standUnder(points: readonly Vec3[]): void {
-    if (points.length === 0) return;
+    this.isEmpty = points.length === 0;
+    this.uniforms.uShade.value = this.isEmpty ? 0 : this.shade;
+    if (this.isEmpty) return;
     const { min, max } = around(points);
     this.uniforms.uFoot.value.set(min[0], min[2], max[0], max[2]);
     this.uniforms.uGround.value = min[1] - GAP;

@@ -61,4 +61,18 @@ describe("the room of a light page", () => {
       expect(uGround.value).toBeGreaterThan(-0.3);
     }
   });
+
+  it("has no shadow while nothing is shown, in any theme", () => {
+    const shades = () => {
+      const { uShade } = (room.scene.children.at(-1) as Backdrop["mesh"]).material.uniforms;
+      return uShade.value;
+    };
+    expect(shades()).toBeGreaterThan(0);
+    room.standUnder([]);
+    expect(shades()).toBe(0);
+    room.dress("light", new Backdrop());
+    expect(shades()).toBe(0);
+    room.standUnder([[0, 0, 0]]);
+    expect(shades()).toBeGreaterThan(0);
+  });
 });

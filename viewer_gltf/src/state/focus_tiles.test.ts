@@ -12,8 +12,8 @@ import {
   REST_S,
 } from "./focus_tiles";
 
-/** Two rows of five tiles, 10 um each and 5 um deep, as seen from the front. */
-const TILES = Array.from({ length: 10 }, (_, i) => {
+/** Four rows of five tiles, 10 um each and 5 um deep, as seen from the front. */
+const TILES = Array.from({ length: 20 }, (_, i) => {
   const [x, y] = [10 * (i % 5), -10 * Math.floor(i / 5)];
   return {
     id: `r${Math.floor(i / 5)}_c${i % 5}`,
@@ -94,7 +94,21 @@ describe("the disc", () => {
     expect([...corner].sort()).toEqual(["r0_c0", "r0_c1", "r1_c0", "r1_c1"]);
   });
 
-  it("wants no more than four, and none that is far", () => {
+  it("is twelve degrees wide at the opening of two rows of five tiles, wherever one looks", () => {
+    const tiles = TILES.slice(0, 10);
+    const radius = (12 * Math.PI) / 180;
+    for (const [x, y] of [
+      [25, -10.1],
+      [21, -9],
+      [30, -4],
+      [5, -15],
+    ] as const) {
+      const opening = { ...input(x, y, 75), tiles, switchDistance_um: 90, discRadius_rad: radius };
+      expect(discLimit(advanceFocus(FAR_AWAY, opening), radius)).toBeNull();
+    }
+  });
+
+  it("wants no more than its limit, and none that is far", () => {
     const wide = { ...input(25, -10.1, 10), discRadius_rad: 1.2 };
     expect(advanceFocus(FAR_AWAY, wide).disc).toHaveLength(MAX_DISC_TILES);
     expect(advanceFocus(FAR_AWAY, input(9, -9, 25)).disc).toEqual([]);

@@ -14,8 +14,11 @@ import type { FocusTiles } from "./representation";
 export const HYSTERESIS = 1.1;
 /** Time that the gaze rests on another tile before the focus moves there, s. */
 export const REST_S = 0.12;
-/** Most tiles that are volumes in the disc: a corner has four. */
-export const MAX_DISC_TILES = 4;
+/**
+ * Most tiles that are volumes in the disc. An opening view of 5 x 2 tiles needs all ten for a disc of 12 degrees. A disc
+ * near by covers one to four.
+ */
+export const MAX_DISC_TILES = 12;
 /** Rays that feel where the disc reaches: so many rings of so many. */
 const RINGS = 20;
 const SPOKES = 16;

@@ -1,5 +1,9 @@
-/** How many gazes each task of the first paper's figure 3 takes by gaze alone, from the specimen before the eyes. */
-import { describe, expect, it } from "vitest";
+/**
+ * How many gazes each task of the first paper's figure 3 takes by gaze alone, from the specimen before the eyes.
+ * STEREOCELL_GAZES_TABLE names a file for the table of gazes.
+ */
+import { afterAll, describe, expect, it } from "vitest";
+import { writeTable } from "../../test/support/table";
 import { LookingPerson } from "../../test/support/xr/looking_person";
 
 /** Looks from a level gaze, each until its ring is full; a last one, if any, only for a moment. */
@@ -42,7 +46,12 @@ const TASKS: Readonly<Record<string, Task>> = {
 };
 
 describe("a task by gaze alone", () => {
-  it.each(Object.entries(TASKS))("takes at most two gazes: %s", (_, { gazes, glance, isDone }) => {
+  const rows: string[][] = [];
+
+  afterAll(() => writeTable("STEREOCELL_GAZES_TABLE", ["task", "gazes", "looked at"], rows));
+
+  it.each(Object.entries(TASKS))("takes at most two gazes: %s", (task, steps) => {
+    const { gazes, glance, isDone } = steps;
     const person = new LookingPerson(4);
     const before = person.state;
     expect(isDone(person, before)).toBe(false);
@@ -59,6 +68,8 @@ describe("a task by gaze alone", () => {
     });
     expect(isDone(person, before)).toBe(true);
     expect(gazes.length).toBeLessThanOrEqual(2);
+    const glanced = glance === undefined ? "" : ` (a glance at ${glance} on the way)`;
+    rows.push([task, String(gazes.length), `${gazes.join(", ")}${glanced}`]);
   });
 });
 

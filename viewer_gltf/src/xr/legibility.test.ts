@@ -1,7 +1,11 @@
-/** Whether the panel can be read in a Cardboard: the pixels of its letters and the angles of its targets. */
-import { describe, expect, it } from "vitest";
+/**
+ * Whether the panel can be read in a Cardboard: the pixels of its letters and the angles of its targets.
+ * STEREOCELL_LEGIBILITY_TABLE names a file for the figures.
+ */
+import { afterAll, describe, expect, it } from "vitest";
 import { STEREO_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
+import { writeTable } from "../../test/support/table";
 import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../panel/canvas/bar";
 import type { Mark, Rect } from "../panel/canvas/draw_list";
 import {
@@ -19,6 +23,8 @@ import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import { type Screen, toScreen } from "./cardboard/lens";
 import { BUILT_IN, type Profile } from "./cardboard/viewer_profile";
+import { NOTICE_DISTANCE_M } from "./panel/notice";
+import { NOTICE_PX_PER_M, noticeMarks } from "./panel/notice_queue";
 import { PANEL_DISTANCE_M } from "./panel/placement";
 
 /** Height of an x as a share of a letter's size: the least of the fonts that phones have (Roboto 0.53, San Francisco 0.53, Segoe UI 0.50). */
@@ -106,6 +112,13 @@ const degrees = (px: number) =>
 const isField = (id: string) => /^tile-map=|\/(palette|color)=|-choice/.test(id);
 
 describe("the panel in a Cardboard", () => {
+  const rows: string[][] = [];
+  const note = (figure: string, found: number, bound: number) => {
+    rows.push([figure, found.toFixed(1), String(bound)]);
+  };
+
+  afterAll(() => writeTable("STEREOCELL_LEGIBILITY_TABLE", ["figure", "least", "at least"], rows));
+
   it("is seen as 55 x 40 degrees", () => {
     expect(degrees(WIDTH)).toBeCloseTo(55, 0);
     expect(degrees(HEIGHT)).toBeCloseTo(40, 0);
@@ -114,7 +127,18 @@ describe("the panel in a Cardboard", () => {
   it("has letters of at least 24 mm at 1 m", () => {
     expect(texts.length).toBeGreaterThan(300);
     const sizes_mm = texts.map(({ mark }) => (1000 * mark.size) / PX_PER_M / PANEL_DISTANCE_M);
+    note("size of a letter, mm at 1 m", Math.min(...sizes_mm), 24);
     expect(Math.min(...sizes_mm)).toBeGreaterThanOrEqual(24);
+  });
+
+  it("has notices of at least 24 mm at 1 m, also where three long ones come together", () => {
+    const long = "A sentence that takes many words to say what is missing and what could be done.";
+    const letters = noticeMarks([1, 2, 3].map((each) => `${each}. ${long}`)).filter(isText);
+    expect(letters).toHaveLength(3);
+    const least = Math.min(...letters.map(({ size }) => size));
+    const size_mm = (1000 * least) / NOTICE_PX_PER_M / NOTICE_DISTANCE_M;
+    note("size of a notice's letter, mm at 1 m", size_mm, 24);
+    expect(size_mm).toBeGreaterThanOrEqual(24);
   });
 
   for (const [name, phone] of Object.entries(PHONES)) {
@@ -126,6 +150,7 @@ describe("the panel in a Cardboard", () => {
           const at = [rect.x + rect.width / 2, middle - half, middle + half] as const;
           return pixelsBetween(phone, profile, at, quad);
         });
+        note(`x-height, px: ${name}, Cardboard ${lenses}`, Math.min(...heights), 6);
         expect(Math.min(...heights)).toBeGreaterThanOrEqual(6);
       });
     }
@@ -137,6 +162,10 @@ describe("the panel in a Cardboard", () => {
         .filter(({ rect: { width, height } }) => degrees(width) < 4.5 || degrees(height) < 3)
         .map(({ id }) => `${name}: ${id}`),
     );
+    const rects = ALL.flatMap(({ regions }) => regions.map(({ rect }) => rect));
+    const [widths, heights] = [rects.map(({ width }) => width), rects.map(({ height }) => height)];
+    note("width of a target, degrees", degrees(Math.min(...widths)), 4.5);
+    note("height of a target, degrees", degrees(Math.min(...heights)), 3);
     expect(small).toEqual([]);
   });
 

@@ -87,6 +87,7 @@ describeInChromium("the viewer in another page", () => {
     await page.evaluate(() => {
       document.body.style.minHeight = "3000px";
     });
+    expect(await inner?.locator('[data-overlay="hint"]').textContent()).toContain("Ctrl and wheel");
     const before = await distance();
     const scrolled = () => page.evaluate(() => scrollY);
     await page.mouse.move(300, 300);

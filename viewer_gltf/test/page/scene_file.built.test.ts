@@ -114,6 +114,44 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     expect(await eye()).toEqual(["0.50", "0.40", "1.20"]);
   });
 
+  it("dresses the parts that come later as the served page does, without an error", async () => {
+    const errors: string[] = [];
+    viewer.page.on("console", (message) => {
+      if (message.type() === "error") errors.push(message.text());
+    });
+    await open("whole", `?view=front${VIEW}`);
+    await stand.open(VIEW);
+    const looks = async (page: ViewerPage["page"]) => {
+      await page.keyboard.press("Enter"); // the card of the middle
+      const card = page.locator(".tap-card");
+      await card.waitFor();
+      const ofCard = await card.evaluate((each) => {
+        const { position, borderRadius, padding } = getComputedStyle(each);
+        return [position, borderRadius, padding];
+      });
+      await page.keyboard.press("?");
+      const keys = page.locator("dialog[data-help] kbd").first();
+      await keys.waitFor();
+      return [...ofCard, await keys.evaluate((each) => getComputedStyle(each).borderWidth)];
+    };
+    const served = await looks(stand.viewer.page);
+    expect(await looks(viewer.page)).toEqual(served);
+    expect(served[0]).toBe("absolute");
+    expect(errors).toEqual([]);
+  });
+
+  it("is path-traced in its room, whose light lies in the file", async () => {
+    const errors: string[] = []; // the policy refuses a light that is sought elsewhere
+    viewer.page.on("console", (message) => {
+      if (message.type() === "error") errors.push(message.text());
+    });
+    await open("whole", "?mode=traced&quality=low");
+    const samples = async () => (await viewer.snapshot()).traced.samples;
+    await expect.poll(samples, { timeout: 60_000 }).toBeGreaterThan(0);
+    expect((await viewer.snapshot()).state.notices).toEqual([]);
+    expect(errors).toEqual([]);
+  });
+
   it("draws the coarse levels alone that fit, without a notice", async () => {
     const refusal = await write("none", "0.1").catch((error: Error) => error.message);
     const [, least] = /takes ([\d.]+) MB: expected as much/.exec(refusal) ?? [];

@@ -43,6 +43,19 @@ function missedThumb(size_px: number): string[] {
   });
 }
 
+/** Runs in the page: lists that are narrower than their longest choice. */
+function narrowLists(): string[] {
+  const lists = [...document.querySelectorAll("select")].filter((each) => each.checkVisibility());
+  return lists.flatMap((list) => {
+    const roomy = list.cloneNode(true) as HTMLSelectElement;
+    roomy.style.cssText = "position: absolute; width: max-content; max-width: none";
+    list.after(roomy);
+    const [wide_px, there_px] = [roomy.offsetWidth, list.offsetWidth];
+    roomy.remove();
+    return wide_px > there_px + 1 ? [`${list.dataset.control}: ${wide_px} in ${there_px}`] : [];
+  });
+}
+
 type Text = Readonly<{ text: string; font_px: number; isCut: boolean }>;
 type Texts = Readonly<{ texts: readonly Text[]; overlaps: readonly string[] }>;
 
@@ -122,6 +135,13 @@ describeInChromium("sizes", () => {
         await page().keyboard.press("Escape");
         await page().locator(dialog).waitFor({ state: "hidden" });
       }
+    });
+
+    it("of lists leave room for their longest choice", async () => {
+      await page().setViewportSize({ width, height });
+      await stand.open("&mode=disc");
+      await openAllSections(stand.viewer);
+      expect(await page().evaluate(narrowLists)).toEqual([]);
     });
 
     it("of texts grow with the reader's font size, and no text is cut or covered", async () => {

@@ -38,6 +38,33 @@ describeInChromium("the background of the flat picture", () => {
     }
   });
 
+  it("has the shadow of what is shown, and none under nothing", async () => {
+    const { viewer, manifest } = stand;
+    const whole = await pictureIn("light");
+    const sky = light(whole, 1, 1);
+    const shaded = (picture: Picture) =>
+      picture.where((pixel) => {
+        const [least, most] = [Math.min(...pixel), Math.max(...pixel)];
+        return most - least < 24 && pixel.reduce((sum, v) => sum + v, 0) < sky - 90;
+      });
+    const places = shaded(whole);
+    expect(places.length).toBeGreaterThan(100);
+    const lightThere = (picture: Picture) => {
+      const lights = places.map(([x, y]) => light(picture, x, y)).sort((a, b) => a - b);
+      return lights[Math.floor(lights.length / 2)];
+    };
+
+    await viewer.chooseTile(manifest.tiles[0].id);
+    await viewer.page.keyboard.press("i");
+    await viewer.settled();
+    expect((await viewer.snapshot()).state.isolated).not.toBe(null);
+    expect(shaded(await takePicture(viewer.page)).length).toBeLessThan(places.length / 2);
+
+    await viewer.page.keyboard.press("i");
+    for (const { id } of manifest.channels) await viewer.show(id, false);
+    expect(lightThere(await takePicture(viewer.page))).toBeGreaterThan(lightThere(whole) + 45);
+  });
+
   it("leaves the specimen's colours as they are", async () => {
     const pictures = [
       await pictureIn("dark"),

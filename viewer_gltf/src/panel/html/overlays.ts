@@ -88,9 +88,10 @@ export class FirstHint {
   private readonly outcome = element("span");
   readonly root: HTMLElement;
 
-  /** @param isTouch whether fingers do it */
-  constructor(isTouch: boolean) {
-    const words = `drag to turn, ${isTouch ? "pinch" : "wheel"} to zoom`;
+  /** @param isFramed whether the wheel alone scrolls the page that holds this one */
+  constructor(isTouch: boolean, isFramed: boolean) {
+    const zoom = isTouch ? "pinch" : isFramed ? "Ctrl and wheel" : "wheel";
+    const words = `drag to turn, ${zoom} to zoom`;
     this.root = element("p", { className: "first-hint" }, { overlay: "hint" }, words, this.outcome);
   }
 

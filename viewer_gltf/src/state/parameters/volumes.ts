@@ -54,7 +54,7 @@ const MODE_NAMES: Readonly<Record<Mode, string>> = {
   tile: "One tile as volume",
   all: "Volumes everywhere",
   stage: "As set in the stage",
-  traced: "Volumes in natural light (path tracing)",
+  traced: "Volumes in natural light",
   off: "Surfaces only",
 };
 

@@ -25,7 +25,7 @@ import {
 } from "./placement";
 
 /** Distance from the head, m: mostly before the specimen, and not so near that eyes cross. */
-const DISTANCE_M = 0.9;
+export const NOTICE_DISTANCE_M = 0.9;
 /** Render order: over volumes, marks and a specimen that is held closer; under the ring. */
 const RENDER_ORDER = 1900;
 
@@ -74,7 +74,7 @@ export class RoomNotice {
       this.wantsPlace = false;
       const eye = new Vector3().setFromMatrixPosition(head);
       const at = rows === null ? noticeBearing(headBearing(head)) : this.above(rows.sub(eye));
-      this.quad.place(pointAt(at, eye, DISTANCE_M), eye);
+      this.quad.place(pointAt(at, eye, NOTICE_DISTANCE_M), eye);
     } else this.announcements = advanceAnnouncements(this.announcements, dt_s);
     this.mesh.visible = this.texts.length > 0;
     if (!this.mesh.visible) return wasShown;
@@ -83,7 +83,7 @@ export class RoomNotice {
 
   private above(rows: Vector3): Bearing {
     const end_px = NOTICE_HEIGHT / 2 - textsHeight(this.texts);
-    return noticeAbove(bearingOf(rows), Math.atan(end_px / NOTICE_PX_PER_M / DISTANCE_M));
+    return noticeAbove(bearingOf(rows), Math.atan(end_px / NOTICE_PX_PER_M / NOTICE_DISTANCE_M));
   }
 
   dispose(): void {
