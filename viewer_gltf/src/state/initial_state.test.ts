@@ -8,7 +8,7 @@ function opening(modality: string, canTrace = true, representation: "mesh" | "vo
     {
       ...manifest,
       specimen: { ...manifest.specimen, modality },
-      tiles: manifest.tiles.map((tile) => ({ ...tile, representation })),
+      tiles: [{ ...manifest.tiles[0], representation }],
     },
     canTrace,
   ).mode;
