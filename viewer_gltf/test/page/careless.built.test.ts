@@ -34,6 +34,11 @@ const ACTS_IN_STEREO = 3;
 const ROUNDS = IS_EXHAUSTIVE ? 200 : 6;
 /** After so many rounds each part has come, and is kept; after the more ones all steps are there that can be undone. */
 const WARM_ROUNDS = IS_EXHAUSTIVE ? 20 : 3;
+/**
+ * Objects of each kind that may be there later than at first: on a busy machine a part of the picture comes in a later
+ * round. A leak takes one in each round, or in each of a few.
+ */
+const LATE_OBJECTS = Math.max(2, Math.floor((ROUNDS - WARM_ROUNDS) / 10));
 /** Of the JavaScript heap: the steps that can be undone, and compiled code. */
 const HEAP_SLACK_BYTES = 3 * 1024 * 1024;
 
@@ -194,7 +199,7 @@ describeInChromium("careless use", () => {
     ).toEqual([]);
     const { heap_bytes, ...held } = after;
     for (const [name, value] of Object.entries(held)) {
-      expect(value, name).toBeLessThanOrEqual(before[name as keyof Figures] + 2);
+      expect(value, name).toBeLessThanOrEqual(before[name as keyof Figures] + LATE_OBJECTS);
     }
     expect(heap_bytes).toBeLessThan(before.heap_bytes + HEAP_SLACK_BYTES);
     await page.evaluate(() => addEventListener("leak", () => undefined));
