@@ -4,14 +4,9 @@ import { initialState } from "./initial_state";
 
 function opening(modality: string, canTrace = true, representation: "mesh" | "volume" = "mesh") {
   const manifest = sampleManifest(1);
-  return initialState(
-    {
-      ...manifest,
-      specimen: { ...manifest.specimen, modality },
-      tiles: manifest.tiles.map((tile) => ({ ...tile, representation })),
-    },
-    canTrace,
-  ).mode;
+  const [first, ...others] = manifest.tiles.map((tile) => ({ ...tile, representation }));
+  const specimen = { ...manifest.specimen, modality };
+  return initialState({ ...manifest, specimen, tiles: [first, ...others] }, canTrace).mode;
 }
 
 it("opens scans of bodies in natural light, and as volumes on devices that cannot trace paths", () => {
