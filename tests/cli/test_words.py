@@ -109,7 +109,7 @@ def test_an_unknown_preset_shows_no_file_of_ours(capsys: pytest.CaptureFixture[s
     for name in ("x" * 300, "../presets/cycif", "a\nb"):
         line = refusal(capsys, ["settings", "--preset", name])
         assert line.startswith("preset ")
-        known = "ct, ct-bone, cycif, em, lightsheet, mri, vessels"
+        known = "ct, ct-bone, cycif, em, lightsheet, mri, pet, vessels"
         assert line.endswith(f"is unknown, expected one of {known} or a .toml file")
 
 
