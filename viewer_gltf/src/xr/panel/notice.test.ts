@@ -26,7 +26,7 @@ describe("a notice while the menu is open", () => {
     (...texts) => {
       for (const top_deg of [-12, 31]) {
         const rows = pointAt({ yaw: 0, pitch: top_deg * DEG }, EYE, PANEL_DISTANCE_M);
-        for (const gaze_deg of [-20, -45]) {
+        for (const gaze_deg of [top_deg - 8, top_deg - 24]) {
           const notice = new RoomNotice(false);
           for (const text of texts) notice.announce(text);
           notice.update(0.1, headAt(gaze_deg), rows.clone());
@@ -41,6 +41,14 @@ describe("a notice while the menu is open", () => {
       }
     },
   );
+
+  it("lies under the gaze where the menu's rows end far above it", () => {
+    const notice = new RoomNotice(false);
+    notice.announce("Saved.");
+    const rows = pointAt({ yaw: 0, pitch: 31 * DEG }, EYE, PANEL_DISTANCE_M);
+    notice.update(0.1, headAt(-10), rows);
+    expect(bearingOf(notice.mesh.position.clone().sub(EYE)).pitch / DEG).toBeCloseTo(-30);
+  });
 
   it("lies under the gaze where no menu is open", () => {
     const notice = new RoomNotice(false);

@@ -19,6 +19,7 @@ import {
   type Bearing,
   bearingOf,
   headBearing,
+  isNear,
   noticeAbove,
   noticeBearing,
   pointAt,
@@ -66,22 +67,26 @@ export class RoomNotice {
   /**
    * Once a frame; whether it looks otherwise than before.
    *
-   * @param rows the middle of the upper edge of the open menu's rows, which a notice must not cover; null: it is closed
+   * @param rows the middle of the upper edge of the open menu's rows, over which a notice is laid if the gaze is not
+   *   far below it; null: the menu is closed
    */
   update(dt_s: number, head: Matrix4, rows: Vector3 | null = null): boolean {
     const wasShown = this.mesh.visible;
     if (this.wantsPlace) {
       this.wantsPlace = false;
       const eye = new Vector3().setFromMatrixPosition(head);
-      const at = rows === null ? noticeBearing(headBearing(head)) : this.above(rows.sub(eye));
-      this.quad.place(pointAt(at, eye, NOTICE_DISTANCE_M), eye);
+      this.quad.place(
+        pointAt(this.bearing(headBearing(head), rows?.sub(eye)), eye, NOTICE_DISTANCE_M),
+        eye,
+      );
     } else this.announcements = advanceAnnouncements(this.announcements, dt_s);
     this.mesh.visible = this.texts.length > 0;
     if (!this.mesh.visible) return wasShown;
     return this.quad.show(noticeMarks(this.texts)) || !wasShown;
   }
 
-  private above(rows: Vector3): Bearing {
+  private bearing(gaze: Bearing, rows?: Vector3): Bearing {
+    if (rows === undefined || !isNear(bearingOf(rows), gaze)) return noticeBearing(gaze);
     const end_px = NOTICE_HEIGHT / 2 - textsHeight(this.texts);
     return noticeAbove(bearingOf(rows), Math.atan(end_px / NOTICE_PX_PER_M / NOTICE_DISTANCE_M));
   }

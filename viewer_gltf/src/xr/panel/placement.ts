@@ -63,6 +63,8 @@ const NOTICE_LOWEST = -60 * DEG;
 
 /** Between a notice and the menu's rows below it, radians. */
 const NOTICE_GAP = 0.5 * DEG;
+/** Most that a notice lies above the gaze, radians: farther up, lenses of a Cardboard show text unsharp. */
+const MOST_ABOVE = 25 * DEG;
 
 export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
   return { yaw, pitch: Math.max(pitch - NOTICE_BELOW, Math.min(pitch, NOTICE_LOWEST)) };
@@ -75,6 +77,11 @@ export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
  */
 export function noticeAbove({ yaw, pitch }: Bearing, end: number): Bearing {
   return { yaw, pitch: pitch + NOTICE_GAP - end };
+}
+
+/** Whether a notice at the upper edge of the menu's rows is seen without a turn of the head. */
+export function isNear(edge: Bearing, gaze: Bearing): boolean {
+  return edge.pitch - gaze.pitch < MOST_ABOVE;
 }
 
 export function barPitch(setting: Setting, isOpen: boolean): number {
