@@ -12,9 +12,9 @@ import pytest
 import zarr
 from numpy.typing import NDArray
 
-from stereocell.building import tissue as tissue_channels
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan_file import from_json, to_json
+from stereocell.building.steps import learn_tissue as learn_tissue_step
 from stereocell.cli.__main__ import main
 from stereocell.samples.head import make_head
 from stereocell.samples.head_dicom import PATIENT, write_dicom
@@ -42,7 +42,7 @@ max_texture = 64
 def learned_once() -> Iterator[None]:
     """What is learned of the same voxels is the same, and takes seconds: tissue/test_classify.py"""
     found: dict[tuple[bytes, str], Any] = {}
-    learn = tissue_channels.learn_tissue
+    learn = learn_tissue_step.learn_tissue
 
     def learn_once(voxels: NDArray[Any], spacing_um: Any, *, options: TissueOptions) -> Any:
         given = (np.ascontiguousarray(voxels).tobytes(), f"{voxels.dtype} {spacing_um} {options}")
@@ -51,7 +51,7 @@ def learned_once() -> Iterator[None]:
         return found[given]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tissue_channels, "learn_tissue", learn_once)
+        patch.setattr(learn_tissue_step, "learn_tissue", learn_once)
         yield
 
 

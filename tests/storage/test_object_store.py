@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from stereocell.building import passes
+from stereocell.building.steps.build_unit import BuildUnit
 from stereocell.building.tissue import TissueRequest, add_tissue
 from stereocell.cli.__main__ import main
 from stereocell.engine import object_store_tasks
@@ -101,15 +101,15 @@ def test_an_input_written_during_a_build_is_reported_if_its_bytes_differ(
     fs.put(str(tmp_path / "a"), source, recursive=True)
     chunk = "0/c/0/1/0"
     new = (tmp_path / ("b" if is_other else "a") / chunk).read_bytes()
-    build, left = passes._run, [1]
+    keep, left = BuildUnit.keep, [1]
 
-    def run(task: Any) -> None:
-        build(task)
+    def keep_and_change(step: BuildUnit, place: Path) -> None:
+        keep(step, place)
         if left:
             left.pop()
             fs.pipe_file(f"{source}/{chunk}", new)
 
-    monkeypatch.setattr(passes, "_run", run)
+    monkeypatch.setattr(BuildUnit, "keep", keep_and_change)
     out = tmp_path / "out"
     assert main(["plan", f"s3://{source}", "-o", str(out), "--grid", GRID]) == 0
     assert main(["units", str(out), "--workers", "0"]) == int(is_other)

@@ -126,10 +126,10 @@ def test_the_same_input_in_any_order_gives_the_same_bytes(
     in_order = Engine._outcomes
     asked = []
 
-    def backwards(self, function, tasks):
+    def backwards(self, function, tasks, needs):
         asked.append(len(tasks))
         last = len(tasks) - 1
-        for place, result, error in in_order(self, function, tasks[::-1]):
+        for place, result, error in in_order(self, function, tasks[::-1], needs):
             yield last - place, result, error
 
     monkeypatch.setattr(Engine, "_outcomes", backwards)
