@@ -45,8 +45,12 @@ class Step(Generic[R]):
     FORM: ClassVar[Form[Any]]
 
     def run(self) -> R:
-        """Compute the result."""
-        raise NotImplementedError
+        """Compute the result.
+
+        Steps that a phase carries out as a whole have a method of their own instead, as `write` of
+        `WriteStage` and `learn` of `LearnTissue`: they need more than one task of a worker.
+        """
+        raise NotImplementedError(f"{type(self).__name__} is carried out by its phase")
 
     @property
     def key(self) -> str:

@@ -79,7 +79,10 @@ def _read(file: Path) -> SceneBlocks:
 
 
 class _Page(HTMLParser):
-    """What a document without its blocks can run and reach."""
+    """A parser that lists the scripts that a document runs and the addresses that it asks for.
+
+    The document comes without its blocks of data.
+    """
 
     def __init__(self, text: str) -> None:
         super().__init__()

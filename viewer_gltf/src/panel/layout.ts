@@ -151,7 +151,7 @@ function firstSections(
       return section(objectsSection(id, length), label, ofMap ?? (isStereo ? [] : LOADING));
     }),
     section("volumes", "Surfaces and volumes", hasAny ? [controlOf(MODE, state)] : []),
-    // of a single tile there is nothing to choose
+    // a specimen of one tile leaves nothing to choose, and has an empty section
     section("tiles", "Tiles", state.tiles.length < 2 ? [] : tileItems(state, facts.focusTile)),
     section("cut", "Cut open", cutItems(state, facts.shown)),
     ...(isPatient && !isStereo ? [] : [slices]),

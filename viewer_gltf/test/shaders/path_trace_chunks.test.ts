@@ -651,7 +651,7 @@ describeInChromium("the path tracer's chunks", () => {
 
   describe("the light of the march that stands in", () => {
     const alpha = 0.5;
-    /** Of a pixel, from mean colours where anything is seen; 4 traced pixels see it, 2 marched ones. */
+    /** Returns a calibrated pixel. The mean colours are those of 4 traced and 2 marched pixels that see the specimen. */
     const calibrated = async (
       light: readonly number[],
       traced: readonly number[],
