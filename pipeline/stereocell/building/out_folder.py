@@ -1,8 +1,8 @@
 """OUT: the paths of all results, and the files that list them.
 
 A result's name is the key of its step: a hash of everything that it depends on, such as the input
-and the step's settings and VERSION. It is written under a temporary name and renamed, so a killed run resumes and a finished one does
-nothing.
+and the step's settings and VERSION. It is written under a temporary name and renamed, so a killed
+run resumes and a finished one does nothing.
 """
 
 import json

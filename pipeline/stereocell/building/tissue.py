@@ -93,7 +93,9 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     """Learn the classes, write OUT/tissue, and replace earlier ones in the plan.
 
     Classes are not learned again where OUT/tissue is whole and made from the same voxels and
-    options, by the same VERSION of `LearnTissue`. Raises StereoCellError; plan and OUT/tissue are unchanged then.
+    options, by the same VERSION of `LearnTissue`.
+
+    Raises StereoCellError; plan and OUT/tissue are unchanged then.
     """
     out_folder = OutFolder(out)
     require_documents(out_folder, "tissue")
