@@ -20,6 +20,8 @@ export const LAYERS: readonly string[] = [
   "pathtrace",
   "render",
   "interaction",
+  "probe",
+  "marks",
   "annotations",
   "slices",
   "objects",

@@ -3,14 +3,6 @@
  * measured points, scale bar, orientation, names. And what a ray means among them.
  */
 import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
-import type { Box } from "../math/box";
-import type { Clip } from "../math/clip";
-import { shownBox } from "../math/pick";
-import type { Ray } from "../math/vec3";
-import type { Action } from "../state/actions";
-import { tileName } from "../state/tile_name";
-import type { ViewerState } from "../state/viewer_state";
-import { ClipMark } from "./clip_gizmo";
 import {
   dragHandle,
   type HandleId,
@@ -19,18 +11,27 @@ import {
   type Pointing,
   pickHandle,
   TOLERANCE_RAD,
-} from "./clip_handles";
+} from "../marks/clip_handles";
+import { dragLamp, isLampHandle, lampHandles } from "../marks/lamp_handles";
+import { type Sight, STEREO_TEXT, screenZoom } from "../marks/style";
+import { umPerPixelAt } from "../marks/um_per_pixel";
+import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
+import { shownBox } from "../math/pick";
+import type { Ray } from "../math/vec3";
+import type { Cone, Probed } from "../probe/probe";
+import { Reading, type ReadingOptions } from "../probe/probe_reader";
+import type { Action } from "../state/actions";
+import { tileName } from "../state/tile_name";
+import type { ViewerState } from "../state/viewer_state";
+import { ClipMark } from "./clip_gizmo";
 import { HandleTarget } from "./handle_target";
 import { type Named, NameMark } from "./hover_name";
 import { LampMark } from "./lamp_gizmo";
-import { dragLamp, isLampHandle, lampHandles } from "./lamp_handles";
 import { MeasureMark } from "./measurement";
 import { Axes, OrientationMark } from "./orientation_axes";
-import type { Cone, Probed } from "./probe";
-import { Reading, type ReadingOptions } from "./probe_reader";
 import { Ruler } from "./ruler";
-import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
-import { type Sight, STEREO_TEXT, screenZoom } from "./style";
+import { ScaleBarMark } from "./scale_bar";
 
 /** Why no point is set. */
 const NOTHING_MET = "There is nothing to measure there: no surface, no volume and no slice.";

@@ -1,6 +1,6 @@
 /** Handles under a mouse or a finger: they are dragged, and the camera stays where it is. */
 import { Vector2 } from "three";
-import type { HandleId, Pointing } from "./clip_handles";
+import type { HandleId, Pointing } from "../marks/clip_handles";
 
 export type HandleTarget = Readonly<{
   /** Place in -1..1 of the picture, y up. */

@@ -1,7 +1,5 @@
 /** Pictures larger than the screen, and videos: drawn apart from the frames of the page, which wait. */
 import type { Matrix4, Object3D, WebGLRenderer } from "three";
-import { axesOf } from "../annotations/orientation_axes";
-import { umPerPixelAt } from "../annotations/scale_bar";
 import type { Manifest } from "../bundle/generated/bundle";
 import { pathThrough, turntable } from "../capture/camera_path";
 import { type Caption, drawCaption } from "../capture/caption";
@@ -10,6 +8,8 @@ import { labelBoxes } from "../capture/label_boxes";
 import { legendOf } from "../capture/legend";
 import { element } from "../dom/element";
 import type { Navigation } from "../interaction/orbit_camera";
+import { axesOf } from "../marks/axes";
+import { umPerPixelAt } from "../marks/um_per_pixel";
 import type { KeptView } from "../state/kept_views";
 import { isTraced } from "../state/parameters/volumes";
 import type { ViewerState } from "../state/viewer_state";

@@ -4,7 +4,6 @@
  * `layOut` and hands its wishes to `perform`.
  */
 
-import { unitOf } from "../annotations/measure";
 import { hasAddress, pageAddress } from "../bundle/address";
 import { chooseFile } from "../dom/choose_file";
 import { copyText } from "../dom/clipboard";
@@ -35,6 +34,7 @@ import { type KeyChanges, labelOf, standsFor, wishOf, withKeys } from "../panel/
 import { type Facts, layOut, MORE } from "../panel/layout";
 import { keepPlaces, type Ranges } from "../panel/sections/channels";
 import { spokenFeedback } from "../panel/spoken_feedback";
+import { unitOf } from "../probe/measure";
 import { isPassingStep, withTyped, writeAddress } from "../share/address";
 import { SETTINGS, settingsOf, standOf } from "../share/page_parameters";
 import { readLink, writeLink } from "../share/permalink";

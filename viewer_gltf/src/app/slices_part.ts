@@ -1,7 +1,7 @@
 /** The slices, whose code comes when they are first shown. */
 import { Object3D } from "three";
-import type { Sight } from "../annotations/style";
 import { TemporaryError } from "../bundle/errors";
+import type { Sight } from "../marks/style";
 import type { ClipPlane } from "../math/clip";
 import type { Vec3 } from "../math/vec3";
 import type { Slices, SlicesOptions } from "../slices/slices";

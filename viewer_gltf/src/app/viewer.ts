@@ -1,13 +1,13 @@
 /** Ties the state to the GPU: one scene, drawn only when something has changed. */
 import { type Matrix4, Quaternion, type Vector2, Vector3, WebGLRenderer } from "three";
-import type { HandleId } from "../annotations/clip_handles";
 import { listenForHandles } from "../annotations/handle_pointer";
-import { type LampHandle, lampHandles } from "../annotations/lamp_handles";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
 import type { FilmedFile } from "../capture/encode_video";
 import { isSameLook, type Look, Navigation, type Stand } from "../interaction/orbit_camera";
 import { listenForClicks, rayAhead, rayUnder } from "../interaction/rays";
+import type { HandleId } from "../marks/clip_handles";
+import { type LampHandle, lampHandles } from "../marks/lamp_handles";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";
 import { pickTile, shownBox, shownTiles } from "../math/pick";

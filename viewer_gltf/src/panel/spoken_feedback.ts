@@ -1,6 +1,6 @@
 /** The effect of a key, in words: the user may not see the control that it stands for. Pure. */
 
-import { measurementText } from "../annotations/measure";
+import { measurementText } from "../probe/measure";
 import type { Action } from "../state/actions";
 import type { SetAction } from "../state/parameters/kinds";
 import { channelParameterOf, parameterOf } from "../state/parameters/table";

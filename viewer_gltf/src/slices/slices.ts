@@ -1,6 +1,6 @@
 /** All of the slices: their pictures, in the page and as planes in the scene. A part of the code by itself. */
 import "./slices.css";
-import type { Sight } from "../annotations/style";
+import type { Sight } from "../marks/style";
 import { sharesOf, turnedBy } from "../math/slice_frame";
 import type { Action } from "../state/actions";
 import type { ViewerState } from "../state/viewer_state";

@@ -5,8 +5,8 @@
  * row would slide under the pointer or the gaze. Pure.
  */
 
-import { valueText } from "../../annotations/measure";
 import { toHex } from "../../math/color";
+import { valueText } from "../../probe/measure";
 import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel";
 import { REFUSED } from "../../state/refusals";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";

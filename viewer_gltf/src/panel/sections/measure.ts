@@ -1,5 +1,5 @@
 /** The panel's section of measuring: what a tap does, the newest measurement, and the list. Pure. */
-import { measurementText } from "../../annotations/measure";
+import { measurementText } from "../../probe/measure";
 import type { Action } from "../../state/actions";
 import { type Measurement, missing } from "../../state/measurements";
 import { MEASURE_PARAMETERS } from "../../state/parameters/tools";

@@ -17,12 +17,12 @@ import {
 } from "three";
 import { Marks } from "../../../src/annotations/annotations";
 import { listenForHandles } from "../../../src/annotations/handle_pointer";
-import type { Label } from "../../../src/annotations/label";
 import type { DecodeAnswer, DecodeRequest } from "../../../src/bundle/decode";
 import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { labelBoxes } from "../../../src/capture/label_boxes";
 import { gazeOf, type Hit } from "../../../src/interaction/ray_pointer";
 import { rayAhead, rayUnder } from "../../../src/interaction/rays";
+import type { Label } from "../../../src/marks/label";
 import type { Vec3 } from "../../../src/math/vec3";
 import { Specimen } from "../../../src/render/specimen_pose";
 import type { Action } from "../../../src/state/actions";

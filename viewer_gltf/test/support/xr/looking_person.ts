@@ -1,13 +1,13 @@
 /** A person in stereo who looks, rests and presses, without a browser: the hands as they are, nothing painted. */
 import { Euler, Matrix4, Quaternion, Scene, Vector3 } from "three";
+import { HandleTarget } from "../../../src/annotations/handle_target";
 import {
   dragHandle,
   type HandleId,
   handlesOf,
   TOLERANCE_RAD,
-} from "../../../src/annotations/clip_handles";
-import { HandleTarget } from "../../../src/annotations/handle_target";
-import { dragLamp, isLampHandle, lampHandles } from "../../../src/annotations/lamp_handles";
+} from "../../../src/marks/clip_handles";
+import { dragLamp, isLampHandle, lampHandles } from "../../../src/marks/lamp_handles";
 import type { Box } from "../../../src/math/box";
 import type { Ray } from "../../../src/math/vec3";
 import type { Region } from "../../../src/panel/canvas/draw_list";
