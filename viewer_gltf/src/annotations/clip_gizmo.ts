@@ -96,7 +96,7 @@ export class ClipMark {
   }
 
   /** Which handle is pointed at, or held; whether it is another than before. */
-  mean(id: HandleId | null): boolean {
+  highlight(id: HandleId | null): boolean {
     if (id === this.meant) return false;
     this.meant = id;
     this.sheet.visible = this.isSheetShown;

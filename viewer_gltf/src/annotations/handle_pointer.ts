@@ -7,7 +7,7 @@ export type HandleTarget = Readonly<{
   pick: (point: Vector2, pointing: Pointing) => HandleId | null;
   drag: (id: HandleId, point: Vector2) => void;
   /** The handle that is pointed at or held. */
-  mean: (id: HandleId | null) => void;
+  highlight: (id: HandleId | null) => void;
 }>;
 
 /**
@@ -17,7 +17,7 @@ export type HandleTarget = Readonly<{
 export function listenForHandles(
   stage: HTMLElement,
   canvas: HTMLCanvasElement,
-  { pick, drag, mean }: HandleTarget,
+  { pick, drag, highlight }: HandleTarget,
   signal: AbortSignal,
 ): void {
   let held: { id: HandleId; pointer: number } | null = null;
@@ -43,7 +43,7 @@ export function listenForHandles(
     event.stopPropagation();
     if (event.pointerId !== held.pointer) return;
     held = null;
-    mean(null);
+    highlight(null);
   };
 
   listen("pointerdown", (event) => {
@@ -57,11 +57,11 @@ export function listenForHandles(
     event.stopPropagation();
     canvas.setPointerCapture(event.pointerId);
     held = { id, pointer: event.pointerId };
-    mean(id);
+    highlight(id);
   });
   listen("pointermove", (event) => {
     if (held === null) {
-      if (event.buttons === 0) mean(pick(pointAt(event), pointingOf(event)));
+      if (event.buttons === 0) highlight(pick(pointAt(event), pointingOf(event)));
       return;
     }
     event.stopPropagation();

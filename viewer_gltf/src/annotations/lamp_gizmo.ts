@@ -56,7 +56,7 @@ export class LampMark {
   }
 
   /** Which handle is pointed at, or held: seen as that from the next `show` on. */
-  mean(id: HandleId | null): void {
+  highlight(id: HandleId | null): void {
     this.meant = id;
   }
 

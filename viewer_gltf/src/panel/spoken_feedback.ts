@@ -11,8 +11,8 @@ import type { ViewerState } from "../state/viewer_state";
 import { clipPartName, cutText } from "./clip_by_key";
 import type { Wish } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
+import { measuredText } from "./measured";
 import { type Ranges, windowTexts } from "./sections/channels";
-import { measuredText } from "./sections/measure";
 import { LENS_NAMES } from "./sections/stereo";
 import { transferTitle } from "./transfer_titles";
 

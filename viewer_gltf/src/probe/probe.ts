@@ -6,7 +6,8 @@
  * there, whether the volume is a wall or a haze.
  */
 
-import { type Intersection, Matrix4, type Mesh, Raycaster, Vector3 } from "three";
+import { Box3, type Intersection, Matrix4, type Mesh, Raycaster, Vector3 } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import { AHEAD, boxSpan, type Span } from "../math/box";
 import { type Clip, clipSpan, isKept } from "../math/clip";
@@ -36,6 +37,15 @@ const SEEN = 0.1;
 const BYTES = [0, 255] as const;
 /** Farthest place of a surface outside its volume, in voxels. */
 const OUTSIDE_VOXELS = 2;
+
+/** The nearest tile: a point of a surface can lie a little outside all of them. */
+export function tileAt({ tiles }: Pick<Manifest, "tiles">, point: Vec3): string {
+  const place = new Vector3(...point);
+  const distances = tiles.map(({ bounds_um: { min, max } }) =>
+    new Box3(new Vector3(...min), new Vector3(...max)).distanceToPoint(place),
+  );
+  return tiles[distances.indexOf(Math.min(...distances))].id;
+}
 
 /** The same ray, its direction of unit length. */
 export function unitRay({ origin, direction }: Ray): Ray {

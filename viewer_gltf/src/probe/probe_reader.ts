@@ -1,13 +1,11 @@
 /** The specimen where a ray meets it: surface, volume or tile, and the channels' values. */
 
-import { Box3, type Matrix4, Vector3 } from "three";
+import type { Matrix4 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { ValuesHost } from "../bundle/values_host";
-import type { Box } from "../math/box";
 import type { Clip, ClipPlane } from "../math/clip";
 import { pickTile, shownTiles } from "../math/pick";
-import { meetSlices, type SliceFrame } from "../math/slice_frame";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
 import type { ViewerState } from "../state/viewer_state";
@@ -21,6 +19,7 @@ import {
   probeBoxes,
   probeSurfaces,
   probeVolumes,
+  tileAt,
   unitRay,
 } from "./probe";
 import { levelAtHand, TexelCache } from "./texel_cache";
@@ -41,9 +40,9 @@ export type ReadingOptions = Readonly<{
   sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
   /** Voxels as they were measured; null: the host has none. */
   values: ValuesHost | null;
-  /** The planes that cut through the specimen; null or absent: none show. */
-  slices?: () => Readonly<{ frames: readonly SliceFrame[] | null; box: Box }> | null;
-  /** What is gone before them for an eye. */
+  /** The nearest place where a ray meets something else that shows; null: none. */
+  pick?: (ray: Ray) => Probed | null;
+  /** Planes before which the specimen is cut away for an eye. */
   corner?: (eye: Vec3) => readonly ClipPlane[] | undefined;
   onError: (error: unknown) => void;
 }>;
@@ -73,7 +72,8 @@ export class Reading {
     const { mode } = this.state;
     const disc = mode === "disc" ? this.disc : null;
     const volume = probeVolumes(along, await this.volumesAlong(along), clip, disc);
-    const met = [surface, volume, this.probeSlices(along)].filter((each) => each !== null);
+    const other = this.options.pick?.(along) ?? null;
+    const met = [surface, volume, other].filter((each) => each !== null);
     if (met.length === 0) return null;
     return met.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
   }
@@ -125,19 +125,6 @@ export class Reading {
     return known.join();
   }
 
-  private probeSlices(along: Ray): Probed | null {
-    const slices = this.options.slices?.() ?? null;
-    if (slices?.frames == null) return null;
-    const met = meetSlices(along, slices.frames, slices.box);
-    if (met === null) return null;
-    return {
-      point: met.point,
-      tile: this.tileAt(met.point),
-      channel: null,
-      distance_um: met.distance,
-    };
-  }
-
   /** What is cut away, also by slices: the corner before them, as seen from where the ray begins. */
   private clipFor({ origin }: Ray): Clip {
     return { ...this.state.clip, corner: this.options.corner?.(origin) };
@@ -165,13 +152,8 @@ export class Reading {
     return found;
   }
 
-  /** The nearest tile: a point of a surface can lie a little outside all of them. */
   private tileAt(point: Vec3): string {
-    const place = new Vector3(...point);
-    const distances = this.options.manifest.tiles.map(({ bounds_um: { min, max } }) =>
-      new Box3(new Vector3(...min), new Vector3(...max)).distanceToPoint(place),
-    );
-    return this.options.manifest.tiles[distances.indexOf(Math.min(...distances))].id;
+    return tileAt(this.options.manifest, point);
   }
 
   private get shownChannels() {

@@ -103,7 +103,7 @@ export class Hands {
   private barHold: HeadHold | null = null;
   private state: ViewerState | null = null;
   constructor(private readonly options: HandsOptions) {
-    const { scene, specimen, handles = [], layOut, onLeave } = options;
+    const { scene, specimen, handles = () => [], layOut, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
     this.mover = new SpecimenMover(specimen, options.tiles);
     this.notice = new RoomNotice(isPainted);
@@ -122,7 +122,7 @@ export class Hands {
     });
     this.tiles = new TileTarget(specimen.group, options.onChoose);
     if (options.objectAlong !== undefined) this.tiles.objectAlong = options.objectAlong;
-    this.targets = [...this.panel.targets, ...handles, this.tiles];
+    this.targets = [...this.panel.targets, ...handles(), this.tiles];
     scene.add(...this.overlays);
   }
 

@@ -12,7 +12,7 @@ import type { Box } from "../../../src/math/box";
 import type { Ray } from "../../../src/math/vec3";
 import type { Region } from "../../../src/panel/canvas/draw_list";
 import { type PanelView, START_VIEW } from "../../../src/panel/controls";
-import { chosenTile, type Facts, layOut } from "../../../src/panel/layout";
+import { chosenTile } from "../../../src/panel/layout";
 import { XR_DISTANCE_M } from "../../../src/render/placement";
 import { Specimen } from "../../../src/render/specimen_pose";
 import { initialState } from "../../../src/state/initial_state";
@@ -21,6 +21,7 @@ import type { ViewerState } from "../../../src/state/viewer_state";
 import { Hands } from "../../../src/xr/interaction";
 import { STEREO_FACTS } from "../fixture/facts";
 import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
+import { type Facts, layOut } from "../panel/whole_panel";
 import { tremble } from "./tremble";
 
 /** Longest time that a frame counts, s. */
@@ -90,7 +91,7 @@ export class LookingPerson {
       scene: new Scene(),
       specimen,
       tiles: manifest.tiles,
-      handles: [this.handles],
+      handles: () => [this.handles],
       isPainted: false,
       now_ms: () => this.now_ms,
       layOut: (view) => layOut(this.state, FACTS, view),
