@@ -182,11 +182,11 @@ async function offerWaysIn(host: Host, waysIn: WaysIn, page: Page): Promise<XrSu
 async function addHolder(host: Host, search: string, isFramed: boolean): Promise<void> {
   const port = globalThis.stereocellHost?.port;
   if (port !== undefined) {
-    const { NotebookPart } = await import("../notebook/part");
+    const { NotebookPart } = await import("../notebook/notebook_part");
     host.add(new NotebookPart(host, port));
   } else if (isFramed && new URLSearchParams(search).has("embed")) {
     const [{ NotebookPart }, way] = await Promise.all([
-      import("../notebook/part"),
+      import("../notebook/notebook_part"),
       import("../notebook/frame_port"),
     ]);
     const port = way.portToHolder(search, host.bundle.manifest);
@@ -203,7 +203,7 @@ async function offerBench(
 ): Promise<void> {
   const [{ benchCard }, { subjectOf }] = await Promise.all([
     import("../bench/bench_card"),
-    import("../bench/subject"),
+    import("../bench/bench_subject"),
   ]);
   const { stereo } = host.display;
   const card = benchCard(flight_s, {

@@ -5,7 +5,7 @@ import type { PosterMaker } from "../host/services";
 import { isSameLook } from "../interaction/orbit_camera";
 import type { PartSection } from "../panel/controls";
 import { REFUSED } from "../state/refusals";
-import type { Scene } from "./save";
+import type { Scene } from "./save_picture";
 import { SAVE_KEYS, saveSections } from "./section";
 
 const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
@@ -17,7 +17,7 @@ type Made = Readonly<{ suffix: string; content: Blob }> | null;
 
 /** Loads the code that draws and writes files. Rejects with a DOMException. */
 function loadSaving() {
-  return import("./save").catch((cause) => {
+  return import("./save_picture").catch((cause) => {
     throw new DOMException(
       `the part of the page for it could not be loaded (${cause})`,
       "NetworkError",

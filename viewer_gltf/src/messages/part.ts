@@ -2,7 +2,7 @@
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { MessageButtons } from "../host/services";
 import type { ViewerState } from "../state/viewer_state";
-import type { PictureMessage } from "./message";
+import type { PictureMessage } from "./picture_message";
 
 /** Parts of the state that can leave the picture empty. */
 const EMPTYING = ["channels", "clip", "isolated", "selected", "objects"] as const;
@@ -31,7 +31,7 @@ class MessagesPart implements Part, MessageButtons {
 
   private async load(): Promise<PictureMessage | null> {
     if (this.message !== null) return this.message;
-    const part = await import("./message").catch(() => null);
+    const part = await import("./picture_message").catch(() => null);
     if (part === null || this.message !== null) return this.message;
     this.message = new part.PictureMessage(this.host, this.opening);
     this.message.update();

@@ -3,7 +3,7 @@
  * origin that the address names (`?embed=https://lab.example`). What it sends is checked before anything is done.
  */
 import type { Manifest } from "../bundle/generated/bundle";
-import type { Asked } from "./part";
+import type { Asked } from "./notebook_part";
 
 /** A name in every message, both ways: a page may hear others, too. */
 const NAME = "stereocell";

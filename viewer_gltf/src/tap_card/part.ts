@@ -2,7 +2,7 @@
 
 import { NOT_LOADED } from "../host/later";
 import type { Part, PartDefinition, PartHost, Tap } from "../host/part";
-import type { PlacedCard } from "./card";
+import type { PlacedCard } from "./placed_card";
 
 class TapCardPart implements Part {
   readonly id = "tap-card";
@@ -26,7 +26,7 @@ class TapCardPart implements Part {
   private async open(tap: Tap): Promise<void> {
     const { host } = this;
     const number = ++this.taps;
-    const part = await import("./card").catch(() => null);
+    const part = await import("./placed_card").catch(() => null);
     if (number !== this.taps) return;
     if (part === null) {
       host.announce(NOT_LOADED);

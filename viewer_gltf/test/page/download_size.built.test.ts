@@ -24,7 +24,7 @@ const OPTIONAL = new RegExp(
     "backdrop",
     "basis",
     "bench",
-    "capture",
+    "save_picture",
     "card_measure",
     "client_worker",
     "explanations",
@@ -44,9 +44,9 @@ const OPTIONAL = new RegExp(
     "shading",
     "slices",
     "split_session",
-    "tap_part",
+    "placed_card",
     "unclipped",
-    "view_message_part",
+    "picture_message",
   ].join("|"),
 );
 const CODE = /\.(js|css|wasm|html)$/;

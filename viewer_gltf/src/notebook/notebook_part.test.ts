@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { ChannelState } from "../state/viewer_state";
-import { channelActions, sharedChannel } from "./part";
+import { channelActions, sharedChannel } from "./notebook_part";
 
 const CHANNEL = {
   id: "CD31",
