@@ -85,7 +85,7 @@ export class Contents {
       picture.surfaceFrame,
       budget,
       (tile, channel) => this.volumes.presence(tile, channel),
-      () => this.volumes.isInDisc,
+      () => this.volumes.marches.isInDisc,
       onChange,
       onError,
     );

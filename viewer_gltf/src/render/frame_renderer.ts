@@ -149,7 +149,7 @@ export class Picture {
     this.cuts.follow(clip, specimen);
     this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
-    this.marchFrame.uIsCrossing.value = volumes.isInDisc;
+    this.marchFrame.uIsCrossing.value = volumes.marches.isInDisc;
     this.march.hide();
     this.marchWithin.hide();
     traced.hide();
@@ -160,9 +160,11 @@ export class Picture {
         ...blended.map(({ scene }) => scene),
       ]);
     const isTraced = traced.isShown;
-    if (isTraced || !volumes.isEmpty) opaque();
-    const isMarched = !volumes.isEmpty && !(isTraced && this.needsNoMarch(drawn, clip, isMoving));
-    const isMixed = isMarched && !isTraced && hybrid.outer_rad > 0 && volumes.isPartlyInDisc;
+    if (isTraced || !volumes.marches.isEmpty) opaque();
+    const isMarched =
+      !volumes.marches.isEmpty && !(isTraced && this.needsNoMarch(drawn, clip, isMoving));
+    const isMixed =
+      isMarched && !isTraced && hybrid.outer_rad > 0 && volumes.marches.isPartlyInDisc;
     if (isMarched) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
@@ -181,11 +183,11 @@ export class Picture {
       };
       if (isMixed) {
         this.marchFrame.uDisc.value.set(...EVERYWHERE);
-        volumes.endAtDisc(true);
+        volumes.marches.endAtDisc(true);
         marchBy(this.marchWithin);
         renderer.setRenderTarget(this.drawInto(this.within));
         this.marchWithin.hide();
-        volumes.endAtDisc(false);
+        volumes.marches.endAtDisc(false);
         this.marchFrame.uDisc.value.set(...NOWHERE);
         const translucent = panes.filter(({ isSolid }) => !isSolid);
         opaque(translucent); // beyond the disc the others are whole

@@ -34,6 +34,8 @@ export type SlicesOptions = Readonly<{
   /** The pictures differ now. */
   onChange: () => void;
   onError: (error: unknown) => void;
+  /** Called with every new picture. */
+  onPaint: () => void;
 }>;
 
 export type SliceImage = Readonly<{ canvas: HTMLCanvasElement; size: Size }>;
@@ -48,8 +50,6 @@ export class SliceImages {
   /** What they are cut from: the specimen, or the only tile. */
   box: Box;
   readonly canvases = AXES.map(() => document.createElement("canvas"));
-  /** Called with every new picture. */
-  onPaint: () => void = () => undefined;
   /** Changes with every picture. */
   version = 0;
   isLoading = false;
@@ -203,7 +203,7 @@ export class SliceImages {
       paint(canvas, sizes[i], shown);
     });
     this.version++;
-    this.onPaint();
+    this.options.onPaint();
     this.options.onChange();
   }
 

@@ -60,6 +60,8 @@ export class LookingPerson {
   readonly wishes: unknown[] = [];
   /** How often anything has changed, the panel's own pages too; what follows in the next frame is the same change. */
   changes = 0;
+  /** The object that every ray meets; null: none. */
+  objectAlong: () => Readonly<{ id: string; distance: number }> | null = () => null;
   readonly hands: Hands;
   /** The handles of the cut and of the lamps. */
   readonly handles = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
@@ -92,6 +94,7 @@ export class LookingPerson {
       specimen,
       tiles: manifest.tiles,
       handles: () => [this.handles],
+      objectAlong: () => this.objectAlong(),
       isPainted: false,
       now_ms: () => this.now_ms,
       layOut: (view) => layOut(this.state, FACTS, view),
