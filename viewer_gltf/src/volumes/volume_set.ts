@@ -1,23 +1,26 @@
 /** All volumes on screen: shows and hides them, loads missing ones, drops unused ones. */
-import { type Matrix4, Scene, type Vector3 } from "three";
+import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
-import type { MarchClip } from "../gpu/clip_uniforms";
 import type { Vec3 } from "../math/vec3";
 import type { ShownVolume } from "../state/on_screen";
 import { isTraced } from "../state/parameters/volumes";
 import type { WantedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
-import { Appearances } from "./appearances";
 import type { BrickService } from "./bricks/brick_service";
+import { ChannelAppearances } from "./channel_appearances";
 import { ChannelLists } from "./channel_volumes";
-import { LazyShading } from "./light/lazy_shading";
-import { MarchSet } from "./march_set";
-import { MarchedBox } from "./marched_box";
-import type { VolumeLimits } from "./mip_levels";
+import { LoadQueue } from "./load_queue";
+import type { MarchFrame } from "./march_frame";
+import { Marches, type MarchView } from "./marches";
+import { levelsToFetch, type VolumeLimits } from "./mip_levels";
 import { Residency, type Resident } from "./residency";
-import { TileLoads, type VolumeRequest } from "./tile_loads";
-import type { MarchFrame } from "./tile_raymarch";
+import { TileTexture } from "./tile_texture";
 import type { VolumeSource } from "./volume_source";
+import { stride } from "./volume_texture";
+
+const PARALLEL_LOADS = 4;
+/** Most bytes of a channel in a tile, where the march only stands in for paths of light. */
+const STAND_IN_BYTES = 2 ** 21;
 
 export type VolumeStatus = Readonly<{
   tile: string;
@@ -27,55 +30,39 @@ export type VolumeStatus = Readonly<{
 }>;
 
 export class VolumeSet {
-  readonly scene = new Scene();
-  /** How each channel looks. */
-  readonly appearances: Appearances;
+  private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
-  private readonly loads: TileLoads;
-  private readonly shading: LazyShading;
-  readonly marches: MarchSet;
-  /** null until the first one. */
-  private request: VolumeRequest | null = null;
+  /** What is drawn. */
+  readonly marches: Marches;
+  readonly appearances: ChannelAppearances;
+  private state: ViewerState | null = null;
+  private wanted: readonly WantedTile[] = [];
+  private mayRefine = true;
+  private hasReportedLimit = false;
 
-  /** @param bricks a host that sends bricks by view; null: volumes come as files */
   constructor(
     bundle: Bundle,
-    private readonly frame: MarchFrame,
-    limits: VolumeLimits,
+    frame: MarchFrame,
+    private limits: VolumeLimits,
     private readonly onChange: () => void,
-    onError: (error: unknown) => void,
+    private readonly onError: (error: unknown) => void,
+    /** From a host that sends bricks by view; null: volumes come as files. */
     private readonly bricks: BrickService | null = null,
   ) {
     this.residents = new Residency(limits.bytes);
     const onList = () => {
-      this.followAgain();
+      if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
       this.onChange();
     };
     this.channels = new ChannelLists(bundle, onList, onError);
-    this.appearances = new Appearances(this.channels);
-    const { channels, residents } = this;
-    this.loads = new TileLoads(limits, {
-      ...{ channels, residents, bricks, onError },
-      onTexels: (tile) => {
-        const resident = this.residents.get(tile);
-        if (resident !== undefined) this.dress(resident);
-        this.onChange();
-      },
-      onReplace: (tile) => this.replace(tile),
-    });
-    this.shading = new LazyShading(frame, onChange, onError);
-    this.marches = new MarchSet({
-      ...{ frame, residents, appearances: this.appearances, onChange },
-      onBelow: (tile) => this.replace(tile),
-    });
-    this.scene.add(this.marches.group);
+    this.appearances = new ChannelAppearances(this.channels);
+    this.marches = new Marches(this.residents, this.appearances, frame, onChange, onError);
   }
 
   get isLoading(): boolean {
     return (
       this.marches.isLoading ||
-      this.shading.isLoading ||
       this.channels.isLoading ||
       this.residents.all.some(({ texture }) => texture.isLoading)
     );
@@ -88,6 +75,16 @@ export class VolumeSet {
       const isThere = (id: string) => this.channels.get(id)?.sources.has(tile) ?? true;
       return channels.some((id) => !shown.includes(id) && isThere(id));
     });
+  }
+
+  /** Whether all that is marched shows in the disc alone. */
+  get isInDisc(): boolean {
+    return this.marches.isInDisc;
+  }
+
+  /** Before every frame: where all is seen from. See `Marches`. */
+  aim(view: MarchView): void {
+    this.marches.aim(this.state, view);
   }
 
   /** Bytes on the GPU. */
@@ -107,10 +104,7 @@ export class VolumeSet {
 
   /** A text that changes with what a march would draw: with the levels that have come, and in each step of a fade. */
   get marchKey(): string {
-    const drawn = this.marches.drawn.map(({ march, packed, resident: { texture, presence } }) => [
-      ...[march.volume.tile, packed.channels, packed.level, texture.fresh, presence],
-    ]);
-    return JSON.stringify([this.status(), drawn]);
+    return JSON.stringify([this.status(), this.marches.key]);
   }
 
   /** How far the volume of a channel in a tile has faded in, 0..1. */
@@ -137,16 +131,7 @@ export class VolumeSet {
 
   /** The channels of the tiles that are on screen. */
   shown(): readonly ShownVolume[] {
-    const { state } = this;
-    return this.residents.byTile.flatMap(([tile, { march, packed, texture }]) => {
-      if (state === null || packed === null || !march?.mesh.visible) return [];
-      return packed.channels.flatMap((channel) => {
-        const source = texture.kept.get(channel);
-        if (source === undefined) return [];
-        const { table, isInDisc } = this.appearances.of(state, channel);
-        return [{ tile, channel, source, table, isInDisc }];
-      });
-    });
+    return this.state === null ? [] : this.marches.shown(this.state);
   }
 
   /** Outermost points, um, world, of what a channel shows as volumes; null: not all has come. */
@@ -168,38 +153,14 @@ export class VolumeSet {
     const shown = resident?.texture.shown;
     if (resident?.wanted == null || shown == null) return false;
     return resident.wanted.channels.every(
-      (id) => shown.channels.includes(id) || !this.loads.canCome(id, tile),
+      (id) => shown.channels.includes(id) || !this.canCome(id, tile),
     );
-  }
-
-  /** Places the volumes: they lie in the specimen's world. `specimen` is its pose in the room. */
-  placeAs(specimen: Matrix4): void {
-    const { group } = this.marches;
-    group.matrix.copy(specimen);
-    group.matrixWorldNeedsUpdate = true;
-  }
-
-  /** Before every frame. `eye` and the disc's cone in um, world; `lamp`: the direction towards it. */
-  aim(eye: Vector3, apex: Vector3, axis: Vector3, clip: MarchClip, lamp: Vector3): void {
-    const boxes = new MarchedBox();
-    const drawn = this.marches.drawn;
-    for (const { march } of drawn) boxes.add(march);
-    const { state } = this;
-    this.shading.follow(state, drawn, clip, lamp);
-    this.frame.uDensity.value = state !== null && isTraced(state) ? state.trace.density : 1;
-    for (const { march } of drawn) {
-      this.shading.place(march);
-      march.sortBy(eye);
-      march.aim(apex, axis);
-      march.clip(clip);
-      march.shareWith(boxes.min, boxes.max, boxes.count);
-    }
   }
 
   /** Go on with all fades; whether any is still under way. */
   advance(dt_s: number): boolean {
     const isFading = this.residents.advance(dt_s);
-    this.marches.showAll();
+    this.marches.show();
     return isFading;
   }
 
@@ -212,18 +173,19 @@ export class VolumeSet {
     if (this.bricks !== null && this.state !== null && isTraced(this.state) !== isTraced(state)) {
       this.residents.dropAll();
     }
-    const request = { state, tiles: wanted, mayRefine };
-    this.request = request;
+    this.state = state;
+    this.wanted = wanted;
+    this.mayRefine = mayRefine;
     this.residents.unwantAll();
-    for (const each of wanted) this.loads.want(each, request);
+    for (const each of wanted) this.want(each);
     this.channels.forgetFailed(wanted.flatMap(({ channels }) => channels));
     this.residents.evict();
-    for (const resident of this.residents.all) this.dress(resident);
+    for (const [tile] of this.residents.byTile) this.march(tile);
   }
 
   /** From the next `follow` on. */
   limitEdge(edge: number): void {
-    this.loads.limitEdge(edge);
+    this.limits = { ...this.limits, edge };
   }
 
   /** With the next `follow`, what has failed is loaded anew. */
@@ -232,41 +194,92 @@ export class VolumeSet {
     for (const { texture } of this.residents.all) texture.retryFailed();
   }
 
+  private want(wanted: WantedTile): void {
+    const sources = new Map<string, VolumeSource>();
+    for (const id of wanted.channels) {
+      void this.channels.load(id);
+      const source = this.source(wanted.tile, id);
+      if (source !== null) sources.set(id, source);
+    }
+    let resident = this.residents.get(wanted.tile);
+    if (resident === undefined) {
+      if (sources.size === 0) return;
+      resident = this.addTile(wanted.tile);
+    }
+    this.residents.want(resident, wanted);
+    const [first] = sources.values();
+    if (first === undefined) return;
+    this.reportLimit(first);
+    const isStandIn = this.state !== null && isTraced(this.state);
+    const bytes = this.residents.share(this.wanted.length) / stride(sources.size);
+    const levels = levelsToFetch(
+      first.volume.levels,
+      isStandIn ? Math.min(bytes, STAND_IN_BYTES) : bytes,
+      Math.min(this.limits.side, this.limits.edge),
+    );
+    const finest = levels[levels.length - 1];
+    resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1), finest);
+  }
+
+  /** Announced once: the drawn level is coarser than the finest one there is. */
+  private reportLimit({ volume }: VolumeSource): void {
+    const { side } = this.limits;
+    const longest = Math.max(...volume.size);
+    if (longest <= side || this.hasReportedLimit) return;
+    this.hasReportedLimit = true;
+    this.onError(tooLong(longest, side));
+  }
+
+  private addTile(tile: string): Resident {
+    const onChange = () => {
+      this.march(tile);
+      this.onChange();
+    };
+    const limits = { ...this.limits, bytes: this.residents.share(this.wanted.length) };
+    const bricks = this.state !== null && isTraced(this.state) ? null : this.bricks;
+    const texture =
+      bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
+      new TileTexture(this.queue, onChange, this.onError);
+    return this.residents.add(tile, texture);
+  }
+
   /** A tile that can't be had as bricks comes as files. */
   private replace(tile: string): void {
     if (this.residents.get(tile) === undefined) return;
     this.bricks?.refuse(tile);
     this.residents.drop(tile);
-    this.followAgain();
+    if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
   }
 
-  private dress(resident: Resident): void {
-    if (this.state !== null) this.marches.dress(resident, this.state);
+  private canCome(channel: string, tile: string): boolean {
+    const volumes = this.channels.get(channel);
+    if (volumes === undefined) return !this.channels.hasFailed(channel);
+    return volumes.sources.has(tile) && !this.residents.get(tile)?.texture.hasFailed(channel);
   }
 
-  private followAgain(): void {
-    if (this.request === null) return;
-    const { state, tiles, mayRefine } = this.request;
-    this.follow(state, tiles, mayRefine);
+  /** Make the march of what has come of a tile. */
+  private march(tile: string): void {
+    const { state } = this;
+    const resident = this.residents.get(tile);
+    if (state === null || resident === undefined) return;
+    if (!this.marches.follow(resident, state)) this.replace(tile);
   }
 
-  private get state(): ViewerState | null {
-    return this.request?.state ?? null;
-  }
-
-  private get wanted(): readonly WantedTile[] {
-    return this.request?.tiles ?? [];
-  }
-
-  /** Drop all that is on the GPU; what is wanted comes anew. */
+  /** Drop all that is on the GPU; what is wanted comes again. */
   forget(): void {
     this.residents.dropAll();
-    this.shading.forget();
+    this.marches.forget();
   }
 
   dispose(): void {
     this.forget();
     this.marches.dispose();
-    this.shading.dispose();
   }
+}
+
+function tooLong(longest: number, side: number): BundleError {
+  return new BundleError(
+    `This device draws volumes of at most ${side} voxels along an edge: ` +
+      `those of ${longest} are shown at a coarser level.`,
+  );
 }

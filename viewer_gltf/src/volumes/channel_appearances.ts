@@ -1,13 +1,11 @@
-/** How each channel's volumes look: its colour, and its opacity by value. */
+/** How the volumes of each channel look: colour, window and transfer function, by the state. */
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import { isTraced } from "../state/parameters/volumes";
 import { isInDisc } from "../state/representation";
 import { isTwoD, shapesOf } from "../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
-import { BrickTile } from "./bricks/brick_atlas";
 import type { ChannelLists } from "./channel_volumes";
-import { type Appearance, floorOf } from "./tile_raymarch";
-import type { TileTexture } from "./tile_texture";
+import type { Appearance } from "./march_tables";
 import { tracedTable, tracedTable2d } from "./traced_table";
 import { lookUpTable } from "./transfer_luts";
 import { NO_ENTRIES, type TransferTable2d, transferTable2d } from "./transfer_table_2d";
@@ -20,15 +18,15 @@ type MadeTable2d = Readonly<{
   table: TransferTable2d;
 }>;
 
-export class Appearances {
-  /** The last table of each channel: all tiles ask for the same. */
+export class ChannelAppearances {
+  /** The last table of each channel: all tiles ask for the same one. */
   private readonly tables2d = new Map<string, MadeTable2d>();
 
-  constructor(private readonly channels: ChannelLists) {}
+  constructor(private readonly lists: ChannelLists) {}
 
-  /** The appearance of a channel. The channel's list must have come. */
+  /** The appearance of a channel, whose list must have come. */
   of(state: ViewerState, id: string): Appearance {
-    const appearance = this.ownAppearance(state, id);
+    const appearance = this.untraced(state, id);
     if (!isTraced(state)) return appearance;
     const { trace } = state;
     const { table2d } = appearance;
@@ -37,34 +35,25 @@ export class Appearances {
     return { ...appearance, table2d: shifted, table: shifted.envelope };
   }
 
-  /** Its appearance by its transfer function alone. */
-  private ownAppearance(state: ViewerState, id: string): Appearance {
-    const channel = state.channels.find((c) => c.id === id);
-    const volumes = this.channels.get(id);
+  /** The appearance of a channel by its transfer function alone. */
+  private untraced(state: ViewerState, id: string): Appearance {
+    const channel = state.channels.find((each) => each.id === id);
+    const volumes = this.lists.get(id);
     if (channel === undefined || volumes === undefined) {
-      throw new Error(`channel ${id} has come without a look`);
+      throw new Error(`the list of volumes of channel ${id} has not come`);
     }
+    const { color, window, opacity, transferFunction: name } = channel;
+    const common = { color, window, isInDisc: isInDisc(state, channel) };
     const table2d = this.table2dOf(channel);
-    if (table2d !== null) {
-      const { color } = channel;
-      const { window } = channel;
-      const table = table2d.envelope;
-      return { color, table, table2d, window, isInDisc: isInDisc(state, channel) };
-    }
-    const { transferFunction: name } = channel;
-    // one's own function has no one-dimensional one that stands for it
+    if (table2d !== null) return { ...common, table: table2d.envelope, table2d };
+    // a two-dimensional function of the user's own has no one-dimensional one that stands for it
     const entries =
       volumes.transferFunctions.get(name) ?? (isTwoD(channel) ? NO_ENTRIES : undefined);
-    if (entries === undefined) throw new Error(`no transfer function ${name}`);
-    return {
-      color: channel.color,
-      table: lookUpTable(entries, channel.window, channel.opacity),
-      window: channel.window,
-      isInDisc: isInDisc(state, channel),
-    };
+    if (entries === undefined) throw new Error(`channel ${id} has no transfer function ${name}`);
+    return { ...common, table: lookUpTable(entries, window, opacity) };
   }
 
-  /** The table of a two-dimensional function, as soon as its shapes have come. */
+  /** The table of a two-dimensional function; null: the function has one dimension, or its shapes have not come. */
   private table2dOf(channel: ChannelState): TransferTable2d | null {
     const { id, transfer2d, window, opacity } = channel;
     const shapes = shapesOf(channel);
@@ -80,14 +69,4 @@ export class Appearances {
     this.tables2d.set(id, { shapes, transfer2d, window, opacity, table });
     return table;
   }
-}
-
-/** Whether functions show what bricks leave out. */
-export function showsBelow(
-  texture: TileTexture | BrickTile,
-  appearances: readonly Appearance[],
-): boolean {
-  if (!(texture instanceof BrickTile)) return false;
-  const { thresholds } = texture;
-  return appearances.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
 }
