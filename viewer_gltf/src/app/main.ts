@@ -21,9 +21,10 @@ import { FirstHint, Notices, ProgressBar, Said, showFatal, WayBack } from "../pa
 import { opensAr, WaysIn } from "../panel/html/ways_in";
 import { sizeText } from "../probe/measure";
 import type { Theme } from "../render/theme";
+import { withTyped } from "../share/address";
 import type { Opened } from "../share/address_bar";
 import { flightAsked } from "../share/bench_parameter";
-import { openAddress } from "../share/open_address";
+import { loadLink, openAddress } from "../share/open_address";
 import { isLight, isPlain, panelOf } from "../share/page_parameters";
 import type { XrSupport } from "../state/stereo";
 import { startSplit } from "../stereo/start_split";
@@ -106,10 +107,13 @@ async function open(parent: HTMLElement): Promise<Host> {
   checkWebGl2();
   sayAtStart("Reading the bundle");
   const page = pageAddress();
-  const bundle = await loadBundle(bundleAddress(page));
+  const { search, hash } = new URL(page);
+  const [bundle, readLink] = await Promise.all([
+    loadBundle(bundleAddress(page)),
+    loadLink(withTyped(hash)),
+  ]);
   document.title = `${bundle.manifest.specimen.name} · StereoCell`;
   const isFramed = window.parent !== window;
-  const { search, hash } = new URL(page);
   document.documentElement.dataset.panel = panelOf(search);
 
   const { host, waysIn, hint } = makeHost(parent, bundle, isFramed);
@@ -117,7 +121,7 @@ async function open(parent: HTMLElement): Promise<Host> {
   host.panel.learn({ subtitle: describeSize(bundle.manifest) });
   const ofPage = new Page(host, parent, said);
   host.add(ofPage);
-  openAddress(host, search, hash);
+  openAddress(host, search, readLink);
   const { viewpoint, renderer } = host.display;
   openedAs = { state: host.state, camera: viewpoint.cameraView };
   renderer.domElement.addEventListener("webglcontextlost", () => {

@@ -18,7 +18,6 @@ import type { Packed } from "../volumes/tile_texture";
 import type { TransferTable2d } from "../volumes/transfer_table_2d";
 import type { VolumeSource } from "../volumes/volume_source";
 import type { Marched } from "./denoise_and_tone";
-import { loadEnvironment, readEnvironment } from "./environment_file";
 import { type ChannelSources, MediumLoader, type MediumTexels, withVolumes } from "./medium_loader";
 import type { Tracer } from "./path_tracer";
 import { frameOf } from "./texel_frame";
@@ -145,6 +144,7 @@ export class TracedVolume {
 
   /** Light by a file of the user's; the state then has to hold "own". */
   async lightBy(file: File): Promise<void> {
+    const { readEnvironment } = await loadLightReader();
     const [tables, tracer] = await Promise.all([readEnvironment(file), this.prepare()]);
     tracer.lightBy(tables);
     this.environment = "own";
@@ -359,6 +359,7 @@ export class TracedVolume {
     this.hasLightFailed = false;
     this.isLightComing = true;
     try {
+      const { loadEnvironment } = await loadLightReader();
       const tables = await loadEnvironment(viewerAddress(), name);
       if (this.environment === name) this.tracer?.lightBy(tables);
     } catch (error) {
@@ -403,4 +404,11 @@ export class TracedVolume {
     this.tracer?.dispose();
     this.overlay?.dispose();
   }
+}
+
+/** Loads the code that reads files of light. Rejects with a TemporaryError. */
+function loadLightReader() {
+  return import("./environment_file").catch((cause) => {
+    throw new TemporaryError(NOT_LOADED, { cause });
+  });
 }

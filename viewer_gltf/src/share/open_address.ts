@@ -1,18 +1,35 @@
 /** Opens the view that the page's address asks for. */
+import { BundleError } from "../bundle/errors";
 import type { PartHost } from "../host/part";
 import { setTo } from "../state/parameters/kinds";
 import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
-import { withTyped } from "./address";
 import { settingsOf, standOf } from "./page_parameters";
-import { readLink } from "./permalink";
 
 /** Least switch distance at the opening, as a multiple of the eye's distance from the middle. */
 const NEAR_AT_START = 1.1;
 
-export function openAddress(host: PartHost, search: string, hash: string): void {
+const NOT_LOADED =
+  "The part of the page that reads links could not be loaded. Check the connection and try again.";
+
+/** Reads a link for a state, within the specimen's bounds. */
+export type LinkReader = (
+  state: Parameters<typeof import("./permalink").readLink>[1],
+  bounds_um: Parameters<typeof import("./permalink").readLink>[2],
+) => ReturnType<typeof import("./permalink").readLink>;
+
+/** Returns a reader of a link; its code loads only where there is a link. Rejects with a BundleError. */
+export async function loadLink(link: string): Promise<LinkReader> {
+  if (link.length < 2) return () => ({ actions: [], camera: null });
+  const { readLink } = await import("./permalink").catch((cause) => {
+    throw new BundleError(NOT_LOADED, { cause });
+  });
+  return (state, bounds_um) => readLink(link, state, bounds_um);
+}
+
+export function openAddress(host: PartHost, search: string, readLink: LinkReader): void {
   const { viewpoint } = host.display;
   const { bounds_um } = host.bundle.manifest.specimen;
-  const { actions, camera } = readLink(withTyped(hash), host.state, bounds_um);
+  const { actions, camera } = readLink(host.state, bounds_um);
   const asked = [...settingsOf(search), ...actions];
   for (const action of asked) host.dispatch(action);
   const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);

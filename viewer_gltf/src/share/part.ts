@@ -1,10 +1,10 @@
 /** The link to the view as a part of the viewer: in the clipboard, in the address bar and in the panel. */
 import { hasAddress, pageAddress } from "../bundle/address";
 import { copyText } from "../dom/clipboard";
+import { NOT_LOADED } from "../host/later";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import { initialState } from "../state/initial_state";
 import { isPassingStep, writeAddress } from "./address";
-import { leftOutOfLink, linkOf } from "./link_of";
 import { SETTINGS } from "./page_parameters";
 
 class SharePart implements Part {
@@ -15,6 +15,12 @@ class SharePart implements Part {
 
   private async share(): Promise<void> {
     const { host } = this;
+    const part = await import("./link_of").catch(() => null);
+    if (part === null) {
+      host.announce(NOT_LOADED);
+      return;
+    }
+    const { leftOutOfLink, linkOf } = part;
     const address = new URL(pageAddress());
     for (const name of SETTINGS) address.searchParams.delete(name);
     address.hash = linkOf(host, initialState(host.bundle.manifest));

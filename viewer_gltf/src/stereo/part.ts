@@ -5,7 +5,6 @@ import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { Lenses } from "../panel/controls";
 import type { CardMeasure } from "../panel/html/card_measure";
 import type { ViewerState } from "../state/viewer_state";
-import { cssPixelsPerInch } from "../xr/cardboard/lens";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
 import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
@@ -120,12 +119,16 @@ class StereoPart implements Part {
   private async measureScreen(): Promise<void> {
     const { host } = this;
     const { display } = host;
-    const part = await import("../panel/html/card_measure").catch(() => null);
-    if (part === null) {
+    const parts = await Promise.all([
+      import("../panel/html/card_measure"),
+      import("../xr/cardboard/lens"),
+    ]).catch(() => null);
+    if (parts === null) {
       host.announce(NOT_LOADED);
       return;
     }
-    this.card ??= new part.CardMeasure(host.view.parentElement ?? host.view, (perInch) => {
+    const [{ CardMeasure }, { cssPixelsPerInch }] = parts;
+    this.card ??= new CardMeasure(host.view.parentElement ?? host.view, (perInch) => {
       rememberScreen(perInch);
       display.setScreen(perInch);
       host.announce(
