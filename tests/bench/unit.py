@@ -41,7 +41,8 @@ from wrap import (
 )
 
 from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, UnitOptions, build_unit
+from stereocell.building.unit import UnitInput, build_unit
+from stereocell.building.unit_steps import unit_options
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair, sum_components
@@ -84,7 +85,7 @@ def whole_unit(volume: Volume, given: Input) -> Mesh:
             ),
             step=(1, 1, 1),
             intensity_window=(float(volume.voxels.min()), float(volume.voxels.max())),
-            options=UnitOptions.of(settings),
+            options=unit_options(settings),
         ),
     )
     return unit.lods[0].mesh

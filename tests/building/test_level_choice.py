@@ -9,7 +9,8 @@ import pytest
 from corpus.real import data_folder
 from stereocell.building.level_choice import choose_rung
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.survey_file import Survey, read_survey
+from stereocell.building.survey import Survey
+from stereocell.building.survey_file import read_survey
 from stereocell.cli.__main__ import main
 from support import phantoms
 

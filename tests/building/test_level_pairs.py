@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, UnitOptions, build_unit
+from stereocell.building.unit import UnitInput, build_unit
+from stereocell.building.unit_steps import unit_options
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.formats.gltf_decode import Drawn, read_glb
 from stereocell.isosurface.repair import RepairOptions
@@ -45,7 +46,7 @@ def levels(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Drawn], ...]:
             repair=RepairOptions(0.3, 0.5, 0.5),
             step=(1, 1, 1),
             intensity_window=(-3000.0, 3000.0),
-            options=UnitOptions.of(settings),
+            options=unit_options(settings),
         )
         unit = build_unit(Volume(field[window.slices], SPACING), given)
         drawn = []

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stereocell.building.channels import MR_GREY, Channel, has_brain, opens
 from stereocell.building.settings import load, preset_names
-from stereocell.building.survey_file import ChannelSurvey
+from stereocell.building.survey import ChannelSurvey
 from stereocell.building.vessel_color import VESSEL_RED, color_vessels
 from stereocell.isosurface.options import parse_level
 from stereocell.isosurface.repair import RepairOptions

@@ -6,9 +6,9 @@ from dataclasses import fields, replace
 import jsonschema
 
 from stereocell.building.channels import Channel
-from stereocell.building.phases import provenance
 from stereocell.building.plan import Plan
 from stereocell.building.plan_file import from_json, to_json
+from stereocell.building.provenance import provenance
 from stereocell.storage.assets import schema_path
 from support.plans import plan_of
 from support.sealed_files import seal

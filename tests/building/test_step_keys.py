@@ -11,7 +11,7 @@ import pytest
 
 from stereocell.building.steps.learn_tissue import LearnTissue
 from stereocell.cli.__main__ import main
-from stereocell.engine.step import Step
+from stereocell.engine.step import Keyed
 from stereocell.model.object_table import ObjectTable, SharedWalls
 from support import phantoms
 from support.step_record import find_steps
@@ -22,7 +22,7 @@ PLACES = {("SourceRef", "source"), ("Labels", "name"), ("Labels", "shape"), ("La
 
 
 @pytest.fixture(scope="module")
-def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Step[Any]]:
+def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Keyed]:
     """One step of each class, of a build of two tiles, two channels and objects."""
     folder = tmp_path_factory.mktemp("build")
     field = phantoms.blurred_ball(SHAPE, (1, 1, 1), (8, 12, 24), 6.0, 1.0)
@@ -30,31 +30,29 @@ def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Step[Any]]:
     image, labels = folder / "i.ome.tif", folder / "l.ome.tif"
     phantoms.write_ome_tiff(image, np.stack([counts, counts[:, ::-1]]), "CZYX")
     phantoms.write_ome_tiff(labels, (field > 0.5).astype(np.uint16), "ZYX")
-    found: dict[str, Step[Any]] = {}
-    right = Step.key.fget
+    found: dict[str, Keyed] = {}
+    right = Keyed.key.fget
     assert right is not None
 
-    def key(self: Step[Any]) -> str:
+    def key(self: Keyed) -> str:
         found[type(self).__name__] = self
         return str(right(self))
 
     flags = ["--grid", "2x1", "--labels", f"cells={labels}", "--workers", "0"]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Step, "key", property(key))
+        patch.setattr(Keyed, "key", property(key))
         assert main(["build", str(image), "-o", str(folder / "out"), *flags]) == 0
     window = found["FindWindow"]
     found["LearnTissue"] = LearnTissue(window.voxels, window.region, "MR", {"classes": 3})  # type: ignore[attr-defined]
     return found
 
 
-def test_the_build_has_a_step_of_each_class(steps: dict[str, Step[Any]]) -> None:
+def test_the_build_has_a_step_of_each_class(steps: dict[str, Keyed]) -> None:
     assert steps.keys() == {step.__name__ for step in find_steps()}
 
 
 @pytest.mark.parametrize("name", [step.__name__ for step in find_steps()])
-def test_every_field_changes_the_key_and_no_place_does(
-    steps: dict[str, Step[Any]], name: str
-) -> None:
+def test_every_field_changes_the_key_and_no_place_does(steps: dict[str, Keyed], name: str) -> None:
     step = steps[name]
     changed = 0
     for path, other in variants(step):

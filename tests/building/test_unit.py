@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, UnitOptions, build_unit
+from stereocell.building.unit import UnitInput, build_unit
+from stereocell.building.unit_steps import unit_options
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
@@ -26,7 +27,7 @@ def _given(scale: float) -> UnitInput:
     iso = LatticeField(((9.5,), (19.5,), (19.5,)), np.full((1, 1, 1), 0.5 * scale))
     repair, step = RepairOptions(0.6, 0.9, 1.2), (1, 1, 1)
     lattice = Lattice.of_whole(BOX, SPACING)
-    return UnitInput(lattice, iso, None, repair, step, (0.0, scale), UnitOptions.of(settings))
+    return UnitInput(lattice, iso, None, repair, step, (0.0, scale), unit_options(settings))
 
 
 @pytest.mark.parametrize("scale", [2.0**-100, 2.0**100])

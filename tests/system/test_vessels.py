@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.survey_file import ChannelSurvey, read_survey
+from stereocell.building.survey import ChannelSurvey
+from stereocell.building.survey_file import read_survey
 from stereocell.building.vessel_levels import choose_connected
 from stereocell.cli.__main__ import main
 from stereocell.filters.denoise import denoise

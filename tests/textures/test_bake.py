@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, UnitOptions, build_unit
+from stereocell.building.unit import UnitInput, build_unit
+from stereocell.building.unit_steps import unit_options
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.meshes.simplify import simplify
 from stereocell.model.lattice import Lattice
@@ -190,7 +191,7 @@ def neighbours() -> tuple[tuple[Lod, ...], ...]:
             repair=RepairOptions(2.0, 3.0, 3.0),
             step=(1, 1, 1),
             intensity_window=(0.0, 1000.0),
-            options=UnitOptions.of(settings),
+            options=unit_options(settings),
         )
         built.append(build_unit(Volume(field[window.slices], SPACING), given).lods)
     return tuple(built)

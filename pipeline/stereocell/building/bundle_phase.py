@@ -36,7 +36,9 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
             require_bundle(out_folder.bundle_dir)  # before the phase is begun
         done = partial(digest_of_bundle, out_folder)
         if not phase.is_done(step.key, done, require_own=require_own_bundle):
-            step.write(out_folder, path, viewer, engine.run)
+            out_folder.remove_other_folders(out_folder.parts_dir, {step.key})
+            parts = out_folder.parts_dir / step.key
+            step.write(out_folder.bundle_dir, path, viewer, parts=parts, run=engine.run)
             phase.about = "" if stage is None else f"of {printable(path.name)}"
     remove(out_folder.parts_dir)
     _tell_of_page(phase, viewer)

@@ -29,7 +29,8 @@ from stereocell.building.run_on_input import run_pass
 from stereocell.building.steps.find_window import Window
 from stereocell.building.steps.gather_evidence import GatherEvidence
 from stereocell.building.steps.sum_components import SumComponents, Sums
-from stereocell.building.survey_file import ChannelSurvey, Curve, Survey, TileIso, save_survey
+from stereocell.building.survey import ChannelSurvey, Curve, Survey, TileIso
+from stereocell.building.survey_file import save_survey
 from stereocell.building.survey_steps import components_step, evidence_step, window_step
 from stereocell.building.vessel_color import color_vessels
 from stereocell.engine.run import Engine, console

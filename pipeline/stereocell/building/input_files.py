@@ -7,6 +7,7 @@ its end.
 from dataclasses import replace
 
 from stereocell.building.open_source import SourceRef, open_source
+from stereocell.building.settings import PlanOptions
 from stereocell.model.errors import SourceError
 from stereocell.read import Dataset
 from stereocell.storage.file_states import FileStates
@@ -14,6 +15,20 @@ from stereocell.storage.location import Location
 
 _first: dict[SourceRef, FileStates] = {}  # by reference, without the fingerprint
 _tables: dict[str, FileStates] = {}  # by the path in the settings
+
+
+def as_asked(source: str, options: PlanOptions, *, fingerprint: str = "") -> SourceRef:
+    """Return the reference to a source that is read as the settings say."""
+    return SourceRef(
+        source,
+        options.time,
+        options.spacing_um,
+        options.series,
+        fingerprint,
+        options.pattern,
+        options.axes,
+        options.dark,
+    )
 
 
 def open_anew(ref: SourceRef) -> Dataset:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.label_maps import Labels
+from stereocell.building.steps.labels import Labels
 from stereocell.model.errors import UsageError
 from stereocell.model.tiling import Box
 from stereocell.objects.label_rule import Kind, recognise

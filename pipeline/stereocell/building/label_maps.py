@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from stereocell.building.input_files import open_anew
+from stereocell.building.input_files import as_asked, open_anew
 from stereocell.building.label_grids import (
     has_other_spacing,
     note_on_assumed,
@@ -12,13 +12,12 @@ from stereocell.building.label_grids import (
     require_overlap,
     settle_spacing,
 )
-from stereocell.building.open_source import SourceRef, as_asked, open_source
+from stereocell.building.open_source import SourceRef
 from stereocell.building.settings import PlanOptions, Settings
-from stereocell.engine.step import content_of
+from stereocell.building.steps.labels import Labels, Triple
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
 from stereocell.read.dataset import Dataset
-from stereocell.read.label_map import LabelMap
 from stereocell.read.remarks import CAST
 from stereocell.storage.location import Location
 
@@ -26,72 +25,6 @@ SELF = "."  # in place of a path: the input itself
 _SHOWN = 4  # names in a note
 _COLOURS = "colour pixels"  # how a reader's remark on them begins
 _AVERAGED = ("resampled", "interpolated")  # in what a reader says of voxels between others
-
-Triple = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class LabelVoxels:
-    """The voxels of a label map.
-
-    channel     index in the source
-    background  number of the voxels that are no object, beside 0; 0: there is no other
-    """
-
-    ref: SourceRef
-    channel: int
-    background: int
-
-    def open(self) -> LabelMap:
-        """Return the label map. Raises SourceError."""
-        return LabelMap(open_source(self.ref), self.channel, self.background)
-
-
-@dataclass(frozen=True, slots=True)
-class Labels:
-    """A label map of a build, a channel beside the image's. Its finest level is what is built.
-
-    ref         how it is opened, with the fingerprint that it had
-    channel     index in the source
-    spacing_um  (z, y, x), um
-    origin_um   (z, y, x), um: centre of its voxel (0, 0, 0), from that of the image's
-    shape       voxels (z, y, x)
-    color       linear RGB 0..1, of objects without one of their own
-    background  number of the voxels that are no object, beside 0; 0: there is no other
-    """
-
-    name: str
-    ref: SourceRef
-    channel: int
-    spacing_um: Triple
-    origin_um: Triple
-    shape: tuple[int, int, int]
-    color: Triple
-    background: int = 0
-
-    @property
-    def id(self) -> str:
-        """The name as an identifier, for paths and prims."""
-        return to_identifier(self.name)
-
-    @property
-    def voxels(self) -> LabelVoxels:
-        """The voxels, which lie nowhere by themselves."""
-        return LabelVoxels(self.ref, self.channel, self.background)
-
-    def key_content(self) -> list[object]:
-        """Return what counts in a key: the voxels and their place, neither name nor colour."""
-        return [content_of(self.voxels), self.spacing_um, self.origin_um]
-
-    def open(self) -> LabelMap:
-        """Return the label map. Raises SourceError."""
-        return self.voxels.open()
-
-    def position_um(self, index_zyx: Sequence[float]) -> Triple:
-        """Return the place of a voxel's centre, (z, y, x) in um, as a plan's `position_um`."""
-        places = zip(self.origin_um, index_zyx, self.spacing_um, strict=True)
-        z, y, x = (float(o + i * s) for o, i, s in places)
-        return z, y, x
 
 
 @dataclass(frozen=True, slots=True)

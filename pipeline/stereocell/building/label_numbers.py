@@ -1,14 +1,25 @@
-"""Notes on the numbers of a label map's objects: a background among them, numbers that merged."""
+"""Notes on a label map's objects: how many, which ones are cut, doubts on their numbers."""
 
 from collections.abc import Iterator
 from math import prod
 
 import numpy as np
 
-from stereocell.building.label_maps import Labels
-from stereocell.building.located_objects import Located
+from stereocell.building.located_objects import (
+    AROUND,
+    CUT,
+    Located,
+    TileGrid,
+    locate,
+    tile_boxes,
+)
+from stereocell.building.plan import Plan
+from stereocell.building.steps.find_extents import FindExtents
+from stereocell.building.steps.labels import Labels
+from stereocell.model.counted import counted
 from stereocell.model.settings import MAX_COUNT
 
+_COUNTED_AT_ONCE = 1 << 25  # voxels of a label map that `plan` counts: half a second
 _SIDES = 6  # sides of a volume, all of which a background touches
 _SIDES_OF_MOST_VOXELS = 3  # at least that many, where it has over half of the voxels
 
@@ -58,3 +69,41 @@ def _merged(labels: Labels, located: Located) -> str:
             "objects, several of them share a number; save the labels as uint32"
         )
     return ""
+
+
+def told_of(labels: Labels, located: Located) -> str:
+    """Return how many objects there are, which are cut, and how many are left out, in words."""
+    summary = counted(len(located.owners), "object")
+    cut = located.extents.labels[located.owners == CUT]
+    if len(cut):
+        shown = ", ".join(map(str, cut[:8].tolist())) + ", ..." * (len(cut) > 8)
+        summary += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
+    if located.small:
+        summary += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
+    return f"{labels.name}: {summary}"
+
+
+def is_large(labels: Labels) -> bool:
+    """Return whether a label map has too many voxels for `plan` to count its objects."""
+    return prod(labels.shape) > _COUNTED_AT_ONCE
+
+
+def told_before(plan: Plan) -> Iterator[str]:
+    """Yield of each label map what its units will cut, from its voxels where these are few.
+
+    Raises SourceError where they are no labels.
+    """
+    for labels in plan.labels:
+        boxes = tile_boxes(TileGrid.of(plan, labels))
+        if not is_large(labels):
+            parts = {tile: FindExtents(labels.voxels, box).run() for tile, box in boxes.items()}
+            found = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
+            yield told_of(labels, found)
+            yield from notes_on_numbers(labels, found)
+        elif len(plan.tiles) > 1:
+            largest = np.max([box.shape for box in boxes.values()], axis=0) * labels.spacing_um
+            z, y, x = ((1 + 2 * AROUND) * largest).tolist()
+            yield (
+                f"{labels.name}: objects larger than a tile and half around it, {z:.4g} x {y:.4g} "
+                f"x {x:.4g} um (z, y, x), will be cut at the tiles' planes: `units` names them"
+            )

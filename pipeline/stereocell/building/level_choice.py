@@ -11,7 +11,7 @@ import numpy as np
 from stereocell.building.channels import Channel
 from stereocell.building.plan import Plan
 from stereocell.building.steps.find_window import Window
-from stereocell.building.survey_file import TileIso
+from stereocell.building.survey import TileIso
 from stereocell.building.vessel_levels import choose_connected, find_vessel_levels
 from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level import Level, bodies_in_haze

@@ -3,7 +3,7 @@
 from stereocell.building.channels import Channel
 from stereocell.building.level_choice import Found, find_doubt, given_level
 from stereocell.building.plan import Plan
-from stereocell.building.survey_file import TileIso
+from stereocell.building.survey import TileIso
 from stereocell.isosurface.channel_level import FEW_SHARE
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.near_levels import ABOVE_BACKGROUND, MARK, find_near_levels, words_of

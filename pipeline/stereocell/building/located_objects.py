@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.label_maps import Labels
 from stereocell.building.plan import Plan
+from stereocell.building.steps.labels import Labels
 from stereocell.formats.gltf_features import MAX_OBJECTS
 from stereocell.model.errors import UsageError
 from stereocell.model.tiling import Box

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.label_maps import Labels
 from stereocell.building.located_objects import CUT, Located
 from stereocell.building.plan import Plan
+from stereocell.building.steps.labels import Labels
 from stereocell.building.stopped_levels import told_of_stopped
 from stereocell.model.channel import Appearance
 from stereocell.model.counted import counted

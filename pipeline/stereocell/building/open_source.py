@@ -5,7 +5,6 @@ from functools import lru_cache
 from pathlib import Path
 
 from stereocell import read
-from stereocell.building.settings import PlanOptions
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
@@ -80,18 +79,4 @@ def open_afresh(ref: SourceRef) -> read.Dataset:
         pattern=ref.pattern,
         axes=ref.axes,
         dark=ref.dark,
-    )
-
-
-def as_asked(source: str, options: PlanOptions, *, fingerprint: str = "") -> SourceRef:
-    """Return the reference to a source that is read as the settings say."""
-    return SourceRef(
-        source,
-        options.time,
-        options.spacing_um,
-        options.series,
-        fingerprint,
-        options.pattern,
-        options.axes,
-        options.dark,
     )

@@ -4,27 +4,20 @@ The survey finds each channel's window and level, dataset-wide (channel_survey.p
 volumes are built. Every result lies under a name that says what it depends on.
 """
 
-from itertools import product
-
 from stereocell.building.channel_survey import survey_channels
 from stereocell.building.channels import Channel
-from stereocell.building.label_maps import Labels
-from stereocell.building.object_passes import locate_objects, object_steps, save_notes, tell_objects
+from stereocell.building.object_passes import locate_objects, save_notes, tell_objects
+from stereocell.building.object_steps import object_steps
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.plan_source import voxels_of
 from stereocell.building.run_on_input import run_pass
 from stereocell.building.running_pass import remove_mixed
-from stereocell.building.steps.build_unit import BuildUnit
-from stereocell.building.survey_file import Survey
-from stereocell.building.survey_steps import around
-from stereocell.building.unit import UnitInput, UnitOptions
+from stereocell.building.steps.labels import Labels
+from stereocell.building.unit_steps import unit_steps
 from stereocell.engine.run import Engine
 from stereocell.engine.run_steps import Kept
 from stereocell.engine.step import Step
 from stereocell.model.errors import UsageError
-from stereocell.model.lattice import Lattice
-from stereocell.model.tiling import Tile
 from stereocell.model.unit import Unit
 
 
@@ -50,11 +43,12 @@ def run_passes(
     }
     missing, others = [], 0
     for name, step in steps.items():
-        place = out_folder.unit_dir(name, step.key)
-        if step.is_kept(place):
+        label = wanted[name].name if name in wanted else ""
+        unit = Kept(f"{name.split('/')[0]}/{label}", step, out_folder.unit_dir(name, step.key))
+        if unit.is_whole():
             continue
         if name in wanted:
-            missing.append(Kept(f"{name.split('/')[0]}/{wanted[name].name}", step, place))
+            missing.append(unit)
         else:
             others += 1
     if missing:
@@ -64,14 +58,6 @@ def run_passes(
     if not others:  # all there: the stage may be made of them
         out_folder.save_units(plan, {name: step.key for name, step in steps.items()})
     return len(missing), others
-
-
-def unit_steps(plan: Plan, survey: Survey) -> dict[str, BuildUnit]:
-    """Return the step of every unit, by `<tile>/<channel>`."""
-    return {
-        f"{tile.id}/{channel.id}": _unit_step(plan, tile, channel, survey)
-        for tile, channel in product(plan.tiles, plan.channels)
-    }
 
 
 def _select(plan: Plan, only: str | None) -> list[tuple[str, Channel | Labels]]:
@@ -93,24 +79,3 @@ def _names(channel: Channel | Labels) -> tuple[str | int, ...]:
     if isinstance(channel, Labels):
         return channel.name, channel.id
     return (channel.name, channel.id) + (() if channel.source else (channel.index,))
-
-
-def _unit_step(plan: Plan, tile: Tile, channel: Channel, survey: Survey) -> BuildUnit:
-    found = survey[channel.id]
-    painter, level = plan.painter(channel), found.appearance.level
-    own = tile.lattice(plan.region)
-    window = own.grown(plan.halo, plan.region)
-    given = UnitInput(
-        lattice=Lattice(window, own, plan.region, plan.spacing_um, plan.origin_um),
-        iso=None if level is None else around(level.field, window),
-        background=around(found.statistics.background, window),
-        repair=found.repair,
-        step=plan.with_grid(found.grid_um).step,
-        intensity_window=found.statistics.window,
-        options=UnitOptions.of(plan.settings),
-        painted=None if painter is None else survey[painter.id].statistics.window,
-        holder=found.holder and found.holder.around(window),
-        max_shift=None if level is None else level.max_shift,
-    )
-    painted = None if painter is None else voxels_of(plan, painter)
-    return BuildUnit(voxels_of(plan, channel), given, painted)

@@ -18,8 +18,8 @@ from stereocell.building.channels import (
     require_no_background,
     windows_of,
 )
-from stereocell.building.label_maps import Labels
 from stereocell.building.settings import Settings
+from stereocell.building.steps.labels import Labels
 from stereocell.filters.denoise import SMOOTHING_REACH
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.errors import SourceError, UsageError

@@ -1,7 +1,8 @@
 """How a plan's source is opened, and those of its channels that have one of their own."""
 
 from stereocell.building.channels import Channel
-from stereocell.building.open_source import SourceRef, Voxels, as_asked
+from stereocell.building.input_files import as_asked
+from stereocell.building.open_source import SourceRef, Voxels
 from stereocell.building.plan import Plan
 
 

@@ -12,7 +12,8 @@ from stereocell.building.ct_evidence import (
     find_ct_evidence,
     is_other_scale,
 )
-from stereocell.building.open_source import as_asked, open_source
+from stereocell.building.input_files import as_asked
+from stereocell.building.open_source import open_source
 from stereocell.building.settings import HOUNSFIELD, NO_PRESET, Settings, load
 from stereocell.building.tracer_name import tracer_word
 from stereocell.engine.run import console

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from stereocell.building.input_unchanged import (
     InputChangedError,
@@ -16,7 +15,7 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.running_pass import begin, end
 from stereocell.engine.run import Engine
-from stereocell.engine.run_steps import Kept, run_missing
+from stereocell.engine.run_steps import Task, run_missing
 from stereocell.storage.workspace import remove
 
 
@@ -57,7 +56,7 @@ def run_pass(
     plan: Plan,
     engine: Engine,
     label: str,
-    wanted: Iterable[Kept[Any]],
+    wanted: Iterable[Task],
     *,
     is_last: bool = False,
 ) -> int:

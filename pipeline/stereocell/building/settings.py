@@ -28,6 +28,7 @@ from stereocell.model.settings import (
     require_bounds,
     setting,
 )
+from stereocell.model.unit import EIGHT_BITS
 from stereocell.objects.options import ObjectOptions
 from stereocell.storage.documents import SETTINGS
 from stereocell.textures.options import UnwrapOptions
@@ -37,7 +38,6 @@ from stereocell.transfer.windows import parse_window
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-EIGHT_BITS = 8
 MAX_INDEX = 2**31  # of levels, and of voxels along an axis
 # values of taken_as: voxels are intensities, even if they look like labels, or Hounsfield units,
 # even if neither the source nor air and fat among the voxels show it

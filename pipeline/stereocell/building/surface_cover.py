@@ -11,7 +11,8 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.steps.find_window import FindWindow
 from stereocell.building.steps.gather_evidence import GatherEvidence
-from stereocell.building.survey_file import ChannelSurvey, read_survey
+from stereocell.building.survey import ChannelSurvey
+from stereocell.building.survey_file import read_survey
 from stereocell.building.unit_files import cover_of, load_record
 from stereocell.isosurface.lifted_by_noise import Lifted, count_lifted
 from stereocell.model.unit import MAX_MISSING, Cover

@@ -20,9 +20,9 @@ from stereocell.building.model_process import ModelBounds, opened_network
 from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_places, require_own_tissue
-from stereocell.building.phases import provenance_record
 from stereocell.building.plan import Plan
 from stereocell.building.plan_source import voxels_of
+from stereocell.building.provenance import provenance_record
 from stereocell.building.sealed_documents import require_documents
 from stereocell.building.steps.learn_tissue import LearnTissue
 from stereocell.building.tissue_files import (

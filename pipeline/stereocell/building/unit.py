@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.building.closed_copy import close_tile
-from stereocell.building.settings import EIGHT_BITS, Settings
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.cover import measure_cover
 from stereocell.isosurface.distance_field import to_distance
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.repair import Repaired, RepairOptions, repair
-from stereocell.meshes.alpha_wrap import alpha_wrap, find_wrapper
+from stereocell.meshes.alpha_wrap import alpha_wrap
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.rims import thin_rims
 from stereocell.model.lattice import Lattice, Step
@@ -23,12 +22,11 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
-from stereocell.model.unit import Cover, Unit
+from stereocell.model.unit import EIGHT_BITS, Cover, Unit
 from stereocell.model.volume import Volume
 from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels
-from stereocell.textures.map_packages import unwrapper_version
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.sample_channel import sample_channel
 from stereocell.textures.texture_lod import Texturer, VertexValues
@@ -56,20 +54,6 @@ class UnitOptions:
     unwrap: UnwrapOptions
     wrapper: str = ""
     unwrapper: str = ""
-
-    @classmethod
-    def of(cls, settings: Settings) -> "UnitOptions":
-        """Return the unit's part of settings. Raises UsageError where a package is missing."""
-        surface = settings.surface
-        return cls(
-            float(surface.smoothing_um),
-            surface.closed_tiles,
-            settings.volume.bits,
-            settings.lod,
-            settings.unwrap,
-            find_wrapper() if surface.wrap == "alpha-wrap" else "",
-            unwrapper_version() if settings.unwrap.maps else "",
-        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ the first pass, and not when the plan is made.
 from dataclasses import replace
 
 from stereocell.building.channels import MR_GREY
-from stereocell.building.survey_file import ChannelSurvey
+from stereocell.building.survey import ChannelSurvey
 
 VESSEL_RED = (0.74, 0.12, 0.08)  # linear RGB, of blood
 

@@ -249,9 +249,9 @@ def slices(options: argparse.Namespace) -> Answer:
     """Write PNG slices of one channel."""
     if listed := _series(options):
         return listed
-    from stereocell.building import phases
     from stereocell.building.plan_notes import print_notes
     from stereocell.building.preset_choice import load_for
+    from stereocell.building.settle import settle
     from stereocell.preview.png_slices import (
         require_slices_or_nothing,
         without_surface,
@@ -263,7 +263,7 @@ def slices(options: argparse.Namespace) -> Answer:
     require_slices_or_nothing(options.out)
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    plan = phases.settle(options.input, without_surface(wanted), choice)
+    plan = settle(options.input, without_surface(wanted), choice)
     print_notes(plan)
     written = write_slices(plan, options.out, plane=options.plane)
     print_unless_json(options, f"wrote to {options.out}: {written.line}")

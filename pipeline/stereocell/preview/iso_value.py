@@ -24,11 +24,11 @@ from stereocell.building.level_choice import (
 )
 from stereocell.building.open_source import open_source
 from stereocell.building.other_levels import ends_of, find_other_levels, take
-from stereocell.building.phases import settle
 from stereocell.building.plan import Plan
 from stereocell.building.plan_notes import print_notes
 from stereocell.building.plan_source import source_of
 from stereocell.building.settings import Settings
+from stereocell.building.settle import settle
 from stereocell.building.steps.find_window import Window
 from stereocell.building.survey_steps import evidence_step, window_step
 from stereocell.filters.denoise import denoise

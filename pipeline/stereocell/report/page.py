@@ -20,7 +20,7 @@ from stereocell.building.level_choice import given_level, highest_of
 from stereocell.building.other_levels import OtherLevel, ends_of, find_other_levels
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
-from stereocell.building.survey_file import ChannelSurvey
+from stereocell.building.survey import ChannelSurvey
 from stereocell.building.unit_files import load_lods, load_volume, lod_file
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.identifiers import from_identifier

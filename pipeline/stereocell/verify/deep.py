@@ -7,10 +7,10 @@ from pathlib import Path
 from stereocell.building.channels import Channel
 from stereocell.building.input_unchanged import require_added, require_input, require_labels
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.passes import unit_steps
 from stereocell.building.plan import Plan
 from stereocell.building.surface_cover import SurfaceCover, lifted_by_tile, sum_lifted
 from stereocell.building.survey_file import read_survey
+from stereocell.building.unit_steps import unit_steps
 from stereocell.bundle.manifest import MANIFEST
 from stereocell.engine.run import Engine
 from stereocell.isosurface.lifted_by_noise import Lifted

@@ -15,14 +15,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.label_maps import Labels
 from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
-from stereocell.building.object_passes import images_of, read_notes
+from stereocell.building.object_passes import read_notes
+from stereocell.building.object_steps import images_of
 from stereocell.building.object_tables import make_table, table_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.plan import Plan
 from stereocell.building.steps.build_objects import Image, read_on_labels
 from stereocell.building.steps.find_extents import FindExtents
+from stereocell.building.steps.labels import Labels
 from stereocell.building.unit_files import load_objects
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.label_maps import Labels
 from stereocell.building.open_source import Voxels
+from stereocell.building.steps.labels import Labels
 from stereocell.building.unit_files import UNIT_FOLDER, UnitFolder
 from stereocell.engine.step import Step
 from stereocell.model.lattice import Lattice

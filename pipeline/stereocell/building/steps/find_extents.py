@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from stereocell.building.label_maps import LabelVoxels
+from stereocell.building.steps.labels import LabelVoxels
 from stereocell.building.units_again import AGAIN
 from stereocell.engine.step import Document, Step
 from stereocell.model.tiling import Box

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.building.open_source import Voxels
-from stereocell.engine.step import Step
+from stereocell.engine.step import Keyed
 from stereocell.model.tiling import Box
 from stereocell.tissue.classify import TissueOptions, learn_tissue
 from stereocell.tissue.onnx_classifier import Network, apply_network
@@ -31,7 +31,7 @@ class Learned:
 
 
 @dataclass(frozen=True, slots=True)
-class LearnTissue(Step[Learned]):
+class LearnTissue(Keyed):
     """Learn the classes of a channel in the planned region.
 
     channel   its name, which the record states

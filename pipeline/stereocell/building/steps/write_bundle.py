@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from stereocell.building.out_folder import OutFolder
 from stereocell.bundle.write import Run, write_bundle
 from stereocell.engine.run import console
-from stereocell.engine.step import Step
+from stereocell.engine.step import Keyed
 
 
 @dataclass(frozen=True, slots=True)
-class WriteBundle(Step[None]):
+class WriteBundle(Keyed):
     """Write the bundle.
 
     stage    path, size and time of each file that the stage consists of; of one on object storage
@@ -26,20 +25,22 @@ class WriteBundle(Step[None]):
     page: tuple[object, ...]
     encoder: str | None
 
-    def write(self, out_folder: OutFolder, stage: Path, viewer: Path | None, run: Run) -> None:
-        """Write OUT/bundle; its finished tiles are kept until it is whole.
+    def write(
+        self, bundle_dir: Path, stage: Path, viewer: Path | None, *, parts: Path, run: Run
+    ) -> None:
+        """Write the bundle into a folder.
 
         stage   the layer to export
+        parts   a folder that keeps finished tiles until the bundle is whole
         viewer  the folder of the page; None: the bundle has none
         run     runs tasks, as `Engine.run`
         """
-        out_folder.remove_other_folders(out_folder.parts_dir, {self.key})
         write_bundle(
             stage,
-            out_folder.bundle_dir,
+            bundle_dir,
             viewer,
             run=run,
-            parts=out_folder.parts_dir / self.key,
+            parts=parts,
             report_line=_print_line,
         )
 

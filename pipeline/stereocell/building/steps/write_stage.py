@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from stereocell.building.steps.write_stage_tile import WriteStageTile, digest_of_table
-from stereocell.engine.step import Step
+from stereocell.engine.step import Keyed
 from stereocell.model.channel import Appearance
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.spacing import Spacing
@@ -28,7 +28,7 @@ class Tables:
 
 
 @dataclass(frozen=True, slots=True)
-class WriteStage(Step[None]):
+class WriteStage(Keyed):
     """Write what the tiles of a stage share; the fields are those of `usd.write_stage`."""
 
     VERSION: ClassVar[int] = 1
