@@ -53,10 +53,10 @@ def build(
     from stereocell.building import phases
     from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import require_build_or_nothing
-    from stereocell.building.preset_choice import load_for
-    from stereocell.building.setting_names import named_as_settings
     from stereocell.engine.run import Engine
     from stereocell.engine.worker_pool import leave_if_importing_main
+    from stereocell.planning.preset_choice import load_for
+    from stereocell.planning.setting_names import named_as_settings
     from stereocell.report import phase as report_phase
     from stereocell.storage.claim import LOCK
     from stereocell.storage.location import Location, require_apart
@@ -125,7 +125,7 @@ def open_volume(source: str | Path, **options: Any) -> "Dataset":
         volume = dataset.read(0, dataset.levels[-1].box, level=len(dataset.levels) - 1)
     """
     from stereocell import read
-    from stereocell.building.setting_names import named_as_settings
+    from stereocell.planning.setting_names import named_as_settings
 
     with named_as_settings(has_sections=False):
         return read.open(source, **options)

@@ -8,12 +8,12 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building import phases
-from stereocell.building import settings as settings_module
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.unit_files import load_lods
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh
+from stereocell.planning import settings as settings_module
 from stereocell.samples import write_cycif
+from stereocell.steps.unit_files import load_lods
 from support import phantoms
 from support.meshes import enclosed_volume, open_edges
 

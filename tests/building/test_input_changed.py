@@ -13,16 +13,17 @@ import tifffile
 import zarr
 from numpy.typing import NDArray
 
-from stereocell.building import input_files, run_on_input
-from stereocell.building.open_source import SourceRef, open_afresh
-from stereocell.building.steps.build_objects import BuildObjects
-from stereocell.building.steps.build_unit import BuildUnit
-from stereocell.building.steps.find_extents import FindExtents
-from stereocell.building.steps.learn_tissue import Learned, LearnTissue
+from stereocell.building import run_on_input
 from stereocell.cli.__main__ import main
 from stereocell.objects.extents import Extents
+from stereocell.planning import input_files
 from stereocell.read import fingerprint
 from stereocell.read import tables as tables_module
+from stereocell.steps.build_objects import BuildObjects
+from stereocell.steps.build_unit import BuildUnit
+from stereocell.steps.find_extents import FindExtents
+from stereocell.steps.learn_tissue import Learned, LearnTissue
+from stereocell.steps.open_source import SourceRef, open_afresh
 from stereocell.storage import file_states
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location

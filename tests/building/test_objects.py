@@ -14,11 +14,8 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 
 from stereocell import samples
 from stereocell.building import object_passes
-from stereocell.building.located_objects import CUT
 from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps import build_objects as objects_maker
-from stereocell.building.unit_files import load_objects
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
@@ -27,7 +24,10 @@ from stereocell.objects import build_objects as building
 from stereocell.objects.build_objects import BuiltObjects
 from stereocell.objects.intensities import Measured
 from stereocell.objects.walls import Walls
+from stereocell.planning.located_objects import CUT
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
+from stereocell.steps import build_objects as objects_maker
+from stereocell.steps.unit_files import load_objects
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
 from support.dicom_series import sample as scene_on

@@ -18,12 +18,12 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building import bundle_phase, input_unchanged, model_process
-from stereocell.building.open_source import open_source
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps import learn_tissue as learn_tissue_step
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import console
 from stereocell.report import phase as report
+from stereocell.steps import learn_tissue as learn_tissue_step
+from stereocell.steps.open_source import open_source
 from stereocell.storage.claim import LOCK
 from stereocell.storage.documents import NOT_WRITTEN
 from stereocell.tissue.classify import TissueOptions

@@ -14,13 +14,13 @@ from PIL import Image
 
 from corpus.real import data_folder
 from stereocell import read
-from stereocell.building.open_source import open_source
-from stereocell.building.plan_source import source_of
-from stereocell.building.settings import PlanOptions, Settings
-from stereocell.building.settle import settle
 from stereocell.cli.__main__ import main
+from stereocell.planning.plan_source import source_of
+from stereocell.planning.settings import PlanOptions, Settings
+from stereocell.planning.settle import settle
 from stereocell.preview.cut_planes import LONGEST_PX, cut_planes, square_pixels
 from stereocell.preview.png_slices import to_bytes, without_surface
+from stereocell.steps.open_source import open_source
 from stereocell.storage.assets import schema_path
 from support import phantoms
 from support.dicom_reading import interpolation_bound

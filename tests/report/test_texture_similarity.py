@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, build_unit
-from stereocell.building.unit_steps import unit_options
 from stereocell.isosurface.array_levels import find_array_levels
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.lattice import Lattice
@@ -16,9 +13,12 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Lod
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from stereocell.planning.settings import Settings
+from stereocell.planning.unit_steps import unit_options
 from stereocell.report.texture_similarity import CLOSE_PX, VIEWS, compare, draw, find_likeness
 from stereocell.samples.cycif_geometry import grow_tissue
 from stereocell.samples.microscope import SPACING_UM, STAINS, record
+from stereocell.steps.unit import UnitInput, build_unit
 from support.exhaustive import sweep
 
 SPACING = (1.0, 1.0, 1.0)

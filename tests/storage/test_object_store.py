@@ -16,11 +16,11 @@ from typing import Any
 
 import pytest
 
-from stereocell.building.steps.build_unit import BuildUnit
 from stereocell.building.tissue import TissueRequest, add_tissue
 from stereocell.cli.__main__ import main
 from stereocell.engine import object_store_tasks
 from stereocell.model.errors import OutputError
+from stereocell.steps.build_unit import BuildUnit
 from stereocell.storage import workspace
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.object_lock import alone_at

@@ -7,9 +7,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, build_unit
-from stereocell.building.unit_steps import unit_options
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.meshes.simplify import simplify
 from stereocell.model.lattice import Lattice
@@ -17,7 +14,10 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
+from stereocell.planning.settings import Settings
+from stereocell.planning.unit_steps import unit_options
 from stereocell.report.texture_similarity import sample
+from stereocell.steps.unit import UnitInput, build_unit
 from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.ambient_occlusion import sphere as directions
 from stereocell.textures.bake import Baker, FineSurface, bake

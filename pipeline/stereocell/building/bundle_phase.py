@@ -6,11 +6,11 @@ from pathlib import Path
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import no_layer, require_own_bundle
 from stereocell.building.phase import Phase, digest_of_bundle, phase_of, states_of
-from stereocell.building.steps.write_bundle import WriteBundle
 from stereocell.bundle import write as bundle_writer
 from stereocell.bundle.manifest import require_bundle
 from stereocell.engine.run import Engine, console
 from stereocell.read.image import printable
+from stereocell.steps.write_bundle import WriteBundle
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.overwriting import is_forced
 from stereocell.storage.workspace import is_file, objects_below, remove

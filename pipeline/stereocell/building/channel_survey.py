@@ -12,27 +12,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from stereocell.building.channels import Channel, opens
-from stereocell.building.level_choice import (
-    Components,
-    Found,
-    check_components,
-    choose_by_components,
-    find_doubt,
-    find_level,
-    given_level,
-    level_of_tile,
-)
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
 from stereocell.building.run_on_input import run_pass
-from stereocell.building.steps.find_window import Window
-from stereocell.building.steps.gather_evidence import GatherEvidence
-from stereocell.building.steps.sum_components import SumComponents, Sums
-from stereocell.building.survey import ChannelSurvey, Curve, Survey, TileIso
 from stereocell.building.survey_file import save_survey
-from stereocell.building.survey_steps import components_step, evidence_step, window_step
-from stereocell.building.vessel_color import color_vessels
 from stereocell.engine.run import Engine, console
 from stereocell.engine.run_steps import Kept, ReadOnDemand
 from stereocell.engine.step import Step
@@ -44,6 +26,24 @@ from stereocell.model.channel import SurfaceLevel
 from stereocell.model.lattice_field import make_iso_field
 from stereocell.model.modality import SEGMENTATION
 from stereocell.model.tiling import Tile
+from stereocell.planning.channels import Channel, opens
+from stereocell.planning.level_choice import (
+    Components,
+    Found,
+    check_components,
+    choose_by_components,
+    find_doubt,
+    find_level,
+    given_level,
+    level_of_tile,
+)
+from stereocell.planning.plan import Plan
+from stereocell.planning.survey import ChannelSurvey, Curve, Survey, TileIso
+from stereocell.planning.survey_steps import components_step, evidence_step, window_step
+from stereocell.planning.vessel_color import color_vessels
+from stereocell.steps.find_window import Window
+from stereocell.steps.gather_evidence import GatherEvidence
+from stereocell.steps.sum_components import SumComponents, Sums
 from stereocell.transfer.channel_statistics import make_appearance
 
 KEPT_OF_MASK = 0.9  # share of a mask's voxels: what loses more to smoothing is said

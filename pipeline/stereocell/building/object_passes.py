@@ -6,22 +6,22 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from stereocell.building.label_numbers import is_large, notes_on_numbers, told_of
-from stereocell.building.located_objects import (
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.run_on_input import run_pass
+from stereocell.engine.run import Engine, console
+from stereocell.engine.run_steps import Kept
+from stereocell.model.object_notes import ObjectNotes
+from stereocell.planning.label_numbers import is_large, notes_on_numbers, told_of
+from stereocell.planning.located_objects import (
     Located,
     TileGrid,
     locate,
     tile_boxes,
 )
-from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.run_on_input import run_pass
-from stereocell.building.steps.find_extents import FindExtents
-from stereocell.building.steps.labels import Labels
-from stereocell.building.units_again import AGAIN
-from stereocell.engine.run import Engine, console
-from stereocell.engine.run_steps import Kept
-from stereocell.model.object_notes import ObjectNotes
+from stereocell.planning.plan import Plan
+from stereocell.steps.find_extents import FindExtents
+from stereocell.steps.labels import Labels
+from stereocell.steps.units_again import AGAIN
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 from stereocell.storage.location import Location
 

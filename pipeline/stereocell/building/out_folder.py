@@ -14,11 +14,11 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from stereocell.building.plan import Plan
-from stereocell.building.plan_file import from_json, to_json
-from stereocell.building.settings import load
 from stereocell.engine.step import key_of
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_file import from_json, to_json
+from stereocell.planning.settings import load
 from stereocell.storage.contents import contents_of
 from stereocell.storage.documents import NOT_WRITTEN, SETTINGS, parse
 from stereocell.storage.json_files import find_sealed, read_json, read_sealed, sealed, write_sealed

@@ -5,20 +5,20 @@ volumes are built. Every result lies under a name that says what it depends on.
 """
 
 from stereocell.building.channel_survey import survey_channels
-from stereocell.building.channels import Channel
 from stereocell.building.object_passes import locate_objects, save_notes, tell_objects
-from stereocell.building.object_steps import object_steps
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
 from stereocell.building.run_on_input import run_pass
 from stereocell.building.running_pass import remove_mixed
-from stereocell.building.steps.labels import Labels
-from stereocell.building.unit_steps import unit_steps
 from stereocell.engine.run import Engine
 from stereocell.engine.run_steps import Kept
 from stereocell.engine.step import Step
 from stereocell.model.errors import UsageError
 from stereocell.model.unit import Unit
+from stereocell.planning.channels import Channel
+from stereocell.planning.object_steps import object_steps
+from stereocell.planning.plan import Plan
+from stereocell.planning.unit_steps import unit_steps
+from stereocell.steps.labels import Labels
 
 
 def run_passes(

@@ -9,14 +9,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from stereocell.building.input_files import require_table
-from stereocell.building.level_estimate import notes_on_levels
 from stereocell.building.object_passes import locate_objects, read_notes
-from stereocell.building.object_tables import (
-    appearance_of_labels,
-    make_table,
-    table_of,
-)
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import (
     require_own_places,
@@ -27,26 +20,8 @@ from stereocell.building.phase import (
     digest_of_stage,
     phase_of,
 )
-from stereocell.building.plan import Plan
-from stereocell.building.plan_notes import (
-    changes_of,
-    print_notes,
-    words_of_spacing,
-)
-from stereocell.building.provenance import provenance, provenance_record
-from stereocell.building.settings import Settings, to_readable_toml
-from stereocell.building.settle import settle
-from stereocell.building.steps.labels import Labels
-from stereocell.building.steps.write_stage import Tables, WriteStage
-from stereocell.building.steps.write_stage_tile import (
-    StageTile,
-    TableOfTile,
-    UnitPart,
-    WriteStageTile,
-)
 from stereocell.building.surface_cover import notes_on_cover
 from stereocell.building.survey_file import read_survey
-from stereocell.building.unit_files import load_objects
 from stereocell.engine.run import Engine, console
 from stereocell.engine.run_steps import run_missing
 from stereocell.model.channel import PaintColors
@@ -54,6 +29,31 @@ from stereocell.model.counted import counted
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tile_content import TileContent
 from stereocell.model.tiling import Tile
+from stereocell.planning.input_files import require_table
+from stereocell.planning.level_estimate import notes_on_levels
+from stereocell.planning.object_tables import (
+    appearance_of_labels,
+    make_table,
+    table_of,
+)
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_notes import (
+    changes_of,
+    print_notes,
+    words_of_spacing,
+)
+from stereocell.planning.provenance import provenance, provenance_record
+from stereocell.planning.settings import Settings, to_readable_toml
+from stereocell.planning.settle import settle
+from stereocell.steps.labels import Labels
+from stereocell.steps.unit_files import load_objects
+from stereocell.steps.write_stage import Tables, WriteStage
+from stereocell.steps.write_stage_tile import (
+    StageTile,
+    TableOfTile,
+    UnitPart,
+    WriteStageTile,
+)
 from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.location import require_apart

@@ -12,10 +12,10 @@ from stereocell.building.input_unchanged import (
     require_still,
 )
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
 from stereocell.building.running_pass import begin, end
 from stereocell.engine.run import Engine
 from stereocell.engine.run_steps import Task, run_missing
+from stereocell.planning.plan import Plan
 from stereocell.storage.workspace import remove
 
 

@@ -8,11 +8,11 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from stereocell.building.input_files import open_states
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
 from stereocell.engine.run import console
+from stereocell.planning.input_files import open_states
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_source import source_of
 from stereocell.storage.json_files import find_json, write_json
 from stereocell.storage.workspace import remove
 

@@ -1,7 +1,7 @@
 """survey.json, which schemas/units.schema.json describes for other readers."""
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.survey import Survey, surveys
+from stereocell.planning.survey import Survey, surveys
 
 
 def read_survey(out_folder: OutFolder) -> Survey:

@@ -103,7 +103,7 @@ def _as_given(options: argparse.Namespace, text: str) -> str:
 
 def settings(options: argparse.Namespace) -> Answer:
     """Print the settings of a preset and a file as TOML."""
-    from stereocell.building import settings as settings_module
+    from stereocell.planning import settings as settings_module
 
     found = settings_module.load(options.preset, options.config, flags={})
     print_unless_json(
@@ -132,7 +132,7 @@ def plan(options: argparse.Namespace) -> Answer:
 def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
     """Write the plan; with the workers of all other phases, where these follow at once."""
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for
+    from stereocell.planning.preset_choice import load_for
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
@@ -154,7 +154,7 @@ def iso(options: argparse.Namespace) -> Answer:
     """Write the picture of one tile's iso-value and print the candidates."""
     if listed := _series(options):
         return listed
-    from stereocell.building.preset_choice import load_for, print_choice
+    from stereocell.planning.preset_choice import load_for, print_choice
     from stereocell.preview import iso_value as iso_preview
 
     if options.out is not None:
@@ -249,9 +249,9 @@ def slices(options: argparse.Namespace) -> Answer:
     """Write PNG slices of one channel."""
     if listed := _series(options):
         return listed
-    from stereocell.building.plan_notes import print_notes
-    from stereocell.building.preset_choice import load_for
-    from stereocell.building.settle import settle
+    from stereocell.planning.plan_notes import print_notes
+    from stereocell.planning.preset_choice import load_for
+    from stereocell.planning.settle import settle
     from stereocell.preview.png_slices import (
         require_slices_or_nothing,
         without_surface,

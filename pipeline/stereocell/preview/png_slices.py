@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.building.open_source import open_source
-from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
-from stereocell.building.settings import Settings
-from stereocell.building.survey_steps import window_step
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.errors import UsageError
 from stereocell.model.version import GENERATOR
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_source import source_of
+from stereocell.planning.settings import Settings
+from stereocell.planning.survey_steps import window_step
 from stereocell.preview.cut_planes import (
     ACQUIRED,
     Cut,
@@ -31,6 +30,7 @@ from stereocell.preview.cut_planes import (
     is_patient,
 )
 from stereocell.preview.views import views_of
+from stereocell.steps.open_source import open_source
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.contents import contents_of, is_ignored, words_for
 from stereocell.storage.json_files import find_json, write_json

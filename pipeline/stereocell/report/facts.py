@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
 from stereocell.building.surface_cover import lifted_by_tile
-from stereocell.building.survey import Survey, TileIso
 from stereocell.building.survey_file import read_survey
-from stereocell.building.unit_files import cover_of, find_seconds, load_record, lod_file
 from stereocell.isosurface.lifted_by_noise import Lifted
 from stereocell.model.tiling import Tile
 from stereocell.model.unit import Cover
+from stereocell.planning.channels import Channel
+from stereocell.planning.plan import Plan
+from stereocell.planning.survey import Survey, TileIso
+from stereocell.steps.unit_files import cover_of, find_seconds, load_record, lod_file
 from stereocell.storage.workspace import sizes_below
 
 PHASES = ("plan", "units", "stage", "bundle")

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.stopped_levels import told_of_stopped
-from stereocell.building.unit_files import load_objects, load_record
+from stereocell.planning.plan import Plan
+from stereocell.planning.stopped_levels import told_of_stopped
+from stereocell.steps.unit_files import load_objects, load_record
 from stereocell.storage.workspace import sizes_below
 
 

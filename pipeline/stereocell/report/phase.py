@@ -10,8 +10,8 @@ from stereocell.building.made_of import FIELD
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_report
 from stereocell.building.phase import digest_of_file, phase_of
-from stereocell.building.provenance import provenance_record
 from stereocell.engine.step import Keyed
+from stereocell.planning.provenance import provenance_record
 from stereocell.report.page import TEMPLATE, write_report
 
 

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from stereocell.building import unit_files
 from stereocell.building.input_unchanged import require_added
 from stereocell.building.out_folder import INDEX, SURVEY, OutFolder
 from stereocell.building.sealed_documents import (
@@ -15,6 +14,7 @@ from stereocell.formats.exr import check_exr
 from stereocell.formats.stl import check_stl
 from stereocell.formats.vdb import check_vdb
 from stereocell.model.errors import CheckError, StereoCellError
+from stereocell.steps import unit_files
 from stereocell.storage.documents import schema_of
 from stereocell.storage.file_list import DAMAGED, MISSING
 from stereocell.storage.json_files import find_sealed, read_json

@@ -4,18 +4,18 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from stereocell.building.channels import Channel
 from stereocell.building.input_unchanged import require_added, require_input, require_labels
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
 from stereocell.building.surface_cover import SurfaceCover, lifted_by_tile, sum_lifted
 from stereocell.building.survey_file import read_survey
-from stereocell.building.unit_steps import unit_steps
 from stereocell.bundle.manifest import MANIFEST
 from stereocell.engine.run import Engine
 from stereocell.isosurface.lifted_by_noise import Lifted
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.unit import Cover
+from stereocell.planning.channels import Channel
+from stereocell.planning.plan import Plan
+from stereocell.planning.unit_steps import unit_steps
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import open_stage, tile_prims

@@ -18,9 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.building.steps.build_unit import BuildUnit
-from stereocell.building.unit import UnitInput, cut_voxels, find_measured, find_surface
-from stereocell.building.unit_files import cover_of, load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas
 from stereocell.formats.vdb import write_vdb
 from stereocell.meshes.distance import Nearest, measure_spread
@@ -31,6 +28,9 @@ from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.rigid_transform import Matrix
 from stereocell.model.tile_content import APRON
 from stereocell.model.unit import Cover
+from stereocell.steps.build_unit import BuildUnit
+from stereocell.steps.unit import UnitInput, cut_voxels, find_measured, find_surface
+from stereocell.steps.unit_files import cover_of, load_lods, load_quality, load_record
 from stereocell.storage.workspace import cached
 from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.usd.read_levels import ComposedLod, read_lods
