@@ -51,7 +51,6 @@ def build(
         built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
     """
     from stereocell.building import phases
-    from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import require_build_or_nothing
     from stereocell.engine.run import Engine
     from stereocell.engine.worker_pool import leave_if_importing_main
@@ -102,10 +101,10 @@ def build(
         wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
-        phases.make(str(source), folder, wanted, choice=choice, engine=engine)
+        phases.make_plan(str(source), folder, wanted, choice=choice, engine=engine)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
-        run_bundle(folder, engine)
+        phases.run_bundle(folder, engine)
         report_phase.run_report(folder)
     parts = ("stage/stage.usda", "bundle/index.html", "report/index.html")
     return Built(shown, *(f"{shown}/{part}" for part in parts))

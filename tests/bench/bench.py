@@ -105,7 +105,7 @@ def main() -> None:
         seconds = {}
         for workers in (1, 2):
             out = Path(folder) / str(workers)
-            phases.make(
+            phases.make_plan(
                 str(source),
                 out,
                 settings_module.load("cycif", None, flags={"plan": {"grid": "4x2"}}),

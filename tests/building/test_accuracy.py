@@ -21,7 +21,7 @@ VOXEL_UM = 0.14  # the finer spacing: the stricter reading of "a voxel"
 
 
 def _units(source: Path, out: Path, channel: str, **plan: object) -> tuple[OutFolder, list[Mesh]]:
-    phases.make(str(source), out, settings_module.load("cycif", None, flags={"plan": plan}))
+    phases.make_plan(str(source), out, settings_module.load("cycif", None, flags={"plan": plan}))
     engine = Engine(0)
     phases.run_units(out, engine)
     out_folder = OutFolder(out)

@@ -181,10 +181,6 @@ class OutFolder:
         """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
-    def relative(self, path: Path) -> str:
-        """Return a path below OUT as it stands in documents: from OUT, with forward slashes."""
-        return path.relative_to(self.out).as_posix()
-
     def notes_file(self, labels_id: str, fingerprint: str) -> Path:
         """Return the path of what a label map's own file says of its objects."""
         return self.out / "units" / f"notes-{labels_id}-{fingerprint[:12]}.json"

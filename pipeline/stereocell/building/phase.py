@@ -46,6 +46,11 @@ class Phase:
             self.save(0.0, is_finished=False)
         return self.is_up_to_date
 
+    def print(self, *lines: str) -> None:
+        """Print lines on the phase."""
+        for line in lines:
+            console.print(f"{self.name}: {line}", markup=False, soft_wrap=True)
+
     def save(self, seconds: float, *, is_finished: bool = True) -> None:
         """Save the phase's record."""
         entry = {"key": "", "results": "", "about": "", "seconds": round(seconds, 2)}

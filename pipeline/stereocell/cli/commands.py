@@ -136,7 +136,7 @@ def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    made = phases.make(options.input, options.out, wanted, choice=choice, engine=engine)
+    made = phases.make_plan(options.input, options.out, wanted, choice=choice, engine=engine)
     return Answer(
         {
             "out": str(options.shown),
@@ -200,7 +200,6 @@ def _run_phases(
     options: argparse.Namespace, out: Path, engine: "Engine", names: Sequence[str]
 ) -> Answer:
     from stereocell.building import phases
-    from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import OutFolder
 
     for name in names:
@@ -209,7 +208,7 @@ def _run_phases(
         elif name == "stage":
             phases.run_stage(out, engine)
         elif name == "bundle":
-            run_bundle(out, engine, stage=getattr(options, "stage", None))
+            phases.run_bundle(out, engine, stage=getattr(options, "stage", None))
         else:
             from stereocell.report import phase  # slow to import: it draws
 

@@ -63,15 +63,17 @@ class Kept(Generic[R]):
         return result
 
 
-class ReadOnDemand(Mapping[str, R]):
-    """Results by name, each read from its file whenever it is asked for.
+class Results(Mapping[str, R]):
+    """Results of a pass by name, each read from its file whenever it is asked for.
 
-    The evidence of a tile takes .3 MB unpacked and .1 MB as it lies there. That of thousands of
-    tiles would fill the memory.
+    The evidence of a tile takes .3 MB unpacked and .1 MB in its file. Results of thousands of tiles
+    would fill the memory.
+
+    out  the folder that `files` counts from
     """
 
-    def __init__(self, kept: Mapping[str, Kept[R]]) -> None:
-        self._kept = kept
+    def __init__(self, kept: Mapping[str, Kept[R]], out: Path) -> None:
+        self._kept, self._out = kept, out
 
     def __getitem__(self, name: str) -> R:
         return self._kept[name].read()
@@ -81,6 +83,12 @@ class ReadOnDemand(Mapping[str, R]):
 
     def __len__(self) -> int:
         return len(self._kept)
+
+    def files(self) -> dict[str, str]:
+        """Return the file of each result, relative to OUT, with forward slashes."""
+        return {
+            name: one.place.relative_to(self._out).as_posix() for name, one in self._kept.items()
+        }
 
 
 def run_plainly(run: Callable[[], object], results: Sequence[Path]) -> None:

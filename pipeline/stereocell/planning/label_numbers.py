@@ -71,6 +71,13 @@ def _merged(labels: Labels, located: Located) -> str:
     return ""
 
 
+def notes_on_objects(labels: Labels, located: Located) -> Iterator[str]:
+    """Yield the number of objects, and the notes on their numbers if `plan` did not count them."""
+    yield told_of(labels, located)
+    if is_large(labels):
+        yield from notes_on_numbers(labels, located)
+
+
 def told_of(labels: Labels, located: Located) -> str:
     """Return how many objects there are, which are cut, and how many are left out, in words."""
     summary = counted(len(located.owners), "object")

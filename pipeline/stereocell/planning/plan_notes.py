@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from stereocell.engine.run import console
 from stereocell.isosurface.options import LADDER, NO_SURFACE, RUNGS
+from stereocell.model.counted import counted
 from stereocell.model.errors import SourceError
 from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
@@ -78,6 +79,17 @@ def _absent(
         f"they are read as {absent.fill}, and the format does not state whether they are empty or "
         "missing"
     ]
+
+
+def summary_of(plan: Plan) -> str:
+    """Return one line on a plan: its level, voxels, tiles and channels."""
+    shape = " x ".join(str(n) for n in plan.region.shape)
+    return (
+        f"{plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x) of "
+        f"{words_of_spacing(plan.spacing_um)}, "
+        f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
+        + "".join(f", objects of {one.name}" for one in plan.labels)
+    )
 
 
 def print_notes(plan: Plan) -> None:

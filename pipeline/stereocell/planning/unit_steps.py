@@ -3,6 +3,7 @@
 from itertools import product
 
 from stereocell.meshes.alpha_wrap import find_wrapper
+from stereocell.model.errors import UsageError
 from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Tile
 from stereocell.planning.channels import Channel
@@ -12,6 +13,7 @@ from stereocell.planning.settings import Settings
 from stereocell.planning.survey import Survey
 from stereocell.planning.survey_steps import around
 from stereocell.steps.build_unit import BuildUnit
+from stereocell.steps.labels import Labels
 from stereocell.steps.unit import UnitInput, UnitOptions
 from stereocell.textures.map_packages import unwrapper_version
 
@@ -43,6 +45,27 @@ def _unit_step(plan: Plan, tile: Tile, channel: Channel, survey: Survey) -> Buil
     )
     painted = None if painter is None else voxels_of(plan, painter)
     return BuildUnit(voxels_of(plan, channel), given, painted)
+
+
+def choose_units(plan: Plan, only: str | None) -> dict[str, str]:
+    """Return the title of each unit, by `<tile>/<channel>`, or of `only` one. Raises UsageError."""
+    every: list[Channel | Labels] = [*plan.channels, *plan.labels]
+    wanted = [(tile.id, channel) for tile in plan.tiles for channel in every]
+    if only is not None:
+        wanted = [(t, c) for t, c in wanted if only in {f"{t}/{name}" for name in _names(c)}]
+    if only is not None and not wanted:
+        raise UsageError(
+            f"--only is {only!r}, expected TILE/CHANNEL with a tile from {plan.tiles[0].id} to "
+            f"{plan.tiles[-1].id} and a channel of {', '.join(c.name for c in every)}"
+        )
+    return {f"{tile}/{channel.id}": f"{tile}/{channel.name}" for tile, channel in wanted}
+
+
+def _names(channel: Channel | Labels) -> tuple[str | int, ...]:
+    """Return what a channel may be called; an index is one of the input's."""
+    if isinstance(channel, Labels):
+        return channel.name, channel.id
+    return (channel.name, channel.id) + (() if channel.source else (channel.index,))
 
 
 def unit_options(settings: Settings) -> UnitOptions:

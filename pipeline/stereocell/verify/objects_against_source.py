@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.object_passes import read_notes
+from stereocell.building.object_records import read_notes
 from stereocell.building.out_folder import OutFolder
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh

@@ -1,4 +1,4 @@
-"""The passes over label maps: first where the objects are, then the units that build them."""
+"""The records in OUT on a label map's objects: the notes of its file, and their table."""
 
 from dataclasses import replace
 from functools import cache
@@ -7,40 +7,20 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.run_on_input import run_pass
-from stereocell.engine.run import Engine, console
-from stereocell.engine.run_steps import Kept
 from stereocell.model.object_notes import ObjectNotes
-from stereocell.planning.label_numbers import is_large, notes_on_numbers, told_of
+from stereocell.model.object_table import ObjectTable
 from stereocell.planning.located_objects import (
     Located,
-    TileGrid,
-    locate,
-    tile_boxes,
 )
+from stereocell.planning.object_tables import make_table, table_of
 from stereocell.planning.plan import Plan
-from stereocell.steps.find_extents import FindExtents
 from stereocell.steps.labels import Labels
+from stereocell.steps.unit_files import load_objects
 from stereocell.steps.units_again import AGAIN
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 from stereocell.storage.location import Location
 
 NOTES = "units.schema.json#Notes"
-
-
-def locate_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> Located:
-    """Return which tile builds which object of a label map; a tile that was searched stays so.
-
-    Raises SourceError where a label map can't be read.
-    """
-    kept = {}
-    for tile, box in tile_boxes(TileGrid.of(plan, labels)).items():
-        step = FindExtents(labels.voxels, box)
-        place = out_folder.tile_result("extents", tile, labels.id, step.key)
-        kept[tile] = Kept(f"{tile}/{labels.name}", step, place)
-    run_pass(out_folder, plan, engine, "objects", kept.values())
-    parts = {tile: one.read() for tile, one in kept.items()}
-    return locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
 
 
 def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
@@ -83,8 +63,14 @@ def _notes() -> TypeAdapter[ObjectNotes]:
     return TypeAdapter(ObjectNotes)
 
 
-def tell_objects(labels: Labels, located: Located) -> None:
-    """Print the number of objects, and the notes on their numbers if `plan` did not count them."""
-    notes = notes_on_numbers(labels, located) if is_large(labels) else ()
-    for note in (told_of(labels, located), *notes):
-        console.print(f"units: {note}", markup=False, soft_wrap=True)
+def table_of_objects(
+    out_folder: OutFolder, plan: Plan, labels: Labels, located: Located
+) -> tuple[ObjectTable, list[str]]:
+    """Return the table of a label map's objects, and remarks on what did not fit it."""
+    index = out_folder.index()
+    names = {tile.id: f"{tile.id}/{labels.id}" for tile in plan.tiles}
+    facts = {
+        tile: load_objects(out_folder.unit_dir(name, index[name])) for tile, name in names.items()
+    }
+    notes = read_notes(out_folder, plan, labels)
+    return make_table(plan, labels, located, facts, notes, table_of(plan, labels))
