@@ -10,7 +10,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from stereocell.building.bundle_inputs import bundle_step, require_kept_stage, require_stage
+from stereocell.building.bundle_inputs import (
+    bundle_step,
+    remove_half_bundle,
+    require_kept_stage,
+    require_stage,
+)
 from stereocell.building.object_records import save_notes, table_of_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import (
@@ -23,7 +28,6 @@ from stereocell.building.phase import Phase, digest_of_bundle, digest_of_stage, 
 from stereocell.building.running_pass import remove_mixed
 from stereocell.building.surface_cover import notes_on_cover
 from stereocell.building.survey_file import read_survey, save_survey
-from stereocell.bundle import write as bundle_writer
 from stereocell.bundle.manifest import require_bundle
 from stereocell.engine.run import Engine, console
 from stereocell.engine.run_steps import Kept, run_missing
@@ -53,7 +57,7 @@ from stereocell.storage.json_files import write_sealed
 from stereocell.storage.location import require_apart
 from stereocell.storage.overwriting import is_forced
 from stereocell.storage.sealed_text import write_sealed_text
-from stereocell.storage.workspace import objects_below, remove
+from stereocell.usd.write_usdz import USDZ_NAME
 
 
 def make_plan(
@@ -188,7 +192,8 @@ def run_stage(out: Path, engine: Engine) -> None:
         done = partial(digest_of_stage, out_folder)
         if phase.is_done(stage.key, done, require_own=require_own_stage):
             return
-        remove(out_folder.stage_list)  # the list of the earlier stage
+        out_folder.remove(stage_dir / USDZ_NAME)
+        out_folder.remove(out_folder.stage_list)  # the list of the earlier stage
         run_missing(engine, "stage", tiles)
         stage.write(stage_dir)
         out_folder.remove_other_folders(stage_dir / "tiles", {tile.id for tile in plan.tiles})
@@ -214,8 +219,7 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         viewer = viewer_dist()
         step = bundle_step(out_folder, path, viewer)
         require_kept_stage(out_folder)
-        if objects_below(path.parent) is not None and out_folder.is_begun("bundle"):
-            bundle_writer.remove_half(out_folder.bundle_dir)
+        remove_half_bundle(out_folder)
         if not is_forced():
             require_bundle(out_folder.bundle_dir)  # before the phase is begun
         done = partial(digest_of_bundle, out_folder)
@@ -224,6 +228,6 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
             parts = out_folder.parts_dir / step.key
             step.write(out_folder.bundle_dir, path, viewer, parts=parts, run=engine.run)
             phase.about = "" if stage is None else f"of {printable(path.name)}"
-    remove(out_folder.parts_dir)
+    out_folder.remove(out_folder.parts_dir)
     if viewer is None and not phase.is_up_to_date:
         phase.print("the viewer is not built, so the bundle has no page: run `make setup`")

@@ -16,7 +16,6 @@ from stereocell.building.running_pass import begin, end
 from stereocell.engine.run import Engine
 from stereocell.engine.run_steps import Task, run_missing
 from stereocell.planning.plan import Plan
-from stereocell.storage.workspace import remove
 
 
 def run_on_input(
@@ -78,7 +77,7 @@ def _require_still(
         require_still(plan, is_last=is_last)
     except InputChangedError as error:
         for result in results if error.has_new_fingerprint else [out_folder.units_dir]:
-            remove(result)
+            out_folder.remove(result)
         raise
     finally:
         end(out_folder)

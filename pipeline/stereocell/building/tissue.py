@@ -100,7 +100,7 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     out_folder = OutFolder(out)
     require_documents(out_folder, "tissue")
     there = out_folder.plan()
-    require_own_tissue(out)
+    require_own_tissue(out_folder)
     # classes that are learned again may be the same, so that the plan and the stage stay
     require_own_places(out_folder, is_same_plan=any(one.source for one in there.channels))
     plan = without_tissue(there)

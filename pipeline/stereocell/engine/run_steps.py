@@ -11,15 +11,25 @@ from stereocell.engine.step import Document, Keyed, Step
 from stereocell.storage.workspace import cached
 
 R = TypeVar("R")
+S = TypeVar("S", bound="Reads")
 # runs a function that reads the inputs and writes results at these places
 Guard = Callable[[Callable[[], object], Sequence[Path]], None]
 
 
-class Task(Protocol):
+class Reads(Protocol):
+    """A task that reads OUT.
+
+    inputs  files and folders of OUT that it reads, which are files of its machine meanwhile
+    """
+
+    @property
+    def inputs(self) -> Sequence[Path]: ...
+
+
+class Task(Reads, Protocol):
     """Work of one worker, with the place of its result. It is picklable.
 
-    name    for progress and errors, as `<tile>/<channel>`
-    inputs  files and folders of OUT that `keep` reads, which are files of this machine meanwhile
+    name  for progress and errors, as `<tile>/<channel>`
     """
 
     @property
@@ -28,8 +38,6 @@ class Task(Protocol):
     def step(self) -> Keyed: ...
     @property
     def place(self) -> Path: ...
-    @property
-    def inputs(self) -> Sequence[Path]: ...
 
     def is_whole(self) -> bool:
         """Return whether the result lies at its place, as it was written."""
@@ -118,3 +126,9 @@ def keep(task: Task) -> None:
     """Compute one result and write it, on a worker."""
     with cached(*task.inputs):
         task.keep()
+
+
+def with_inputs(function: Callable[[S], R], task: S) -> R:
+    """Return a function's result for a task, on a worker."""
+    with cached(*task.inputs):
+        return function(task)

@@ -20,7 +20,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-from stereocell.model.errors import OutputError, StereoCellError, UsageError
+from stereocell.model.errors import StereoCellError, UsageError
+from stereocell.storage.folder_names import names_in_folder
 from stereocell.storage.object_store import STEERING, Mirror, Place
 from stereocell.storage.processes import is_alive, machine
 
@@ -133,12 +134,7 @@ def names_in(folder: Path) -> list[str]:
     if mirror is not None:
         below = {file.relative_to(folder).parts for file in sizes_below(folder) if file != folder}
         return sorted({parts[0] for parts in below})
-    try:
-        return sorted(os.listdir(folder))
-    except (FileNotFoundError, NotADirectoryError):
-        return []
-    except OSError as error:
-        raise OutputError(f"{folder}: can't be listed ({error.strerror})") from None
+    return names_in_folder(folder)
 
 
 def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:

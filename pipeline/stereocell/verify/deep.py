@@ -10,6 +10,7 @@ from stereocell.building.surface_cover import SurfaceCover, lifted_by_tile, sum_
 from stereocell.building.survey_file import read_survey
 from stereocell.bundle.manifest import MANIFEST
 from stereocell.engine.run import Engine
+from stereocell.engine.run_steps import with_inputs
 from stereocell.isosurface.lifted_by_noise import Lifted
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.unit import Cover
@@ -61,7 +62,12 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
         require_added(plan)
         require_labels(plan)
         odd = list(_odd_values(out_folder, plan))
-        findings = engine.run("source", compare_unit, list(_source_tasks(out_folder, plan)))
+        findings = engine.run(
+            "source",
+            partial(with_inputs, compare_unit),
+            list(_source_tasks(out_folder, plan)),
+            needs=(compare_unit.__module__,),
+        )
     except StereoCellError as error:
         yield CheckLine("stage against source", False, _one_line(error))
     else:
