@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import ClassVar
 
 from stereocell.engine.step import Keyed, content_of
-from stereocell.formats.vdb import MEASURED_NAME
-from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.model.channel import PaintColors
 from stereocell.model.object_table import ObjectTable, SharedWalls
 from stereocell.model.tile_content import ChannelContent, TileContent
@@ -151,7 +149,4 @@ def _write(step: WriteStageTile, stage_dir: Path) -> tuple[FileList, int]:
         )
         for unit in step.units
     )
-    files = stage_writer.write_tile(stage_dir, replace(step.content, channels=channels))
-    folder = stage_dir / "tiles" / step.content.id
-    grids = [grid for file in folder.glob("*.vdb") for grid in read_vdb_head(file)]
-    return files, sum(grid.end - grid.start for grid in grids if grid.name == MEASURED_NAME)
+    return stage_writer.write_tile(stage_dir, replace(step.content, channels=channels))

@@ -8,7 +8,9 @@ machine:
   last. It then removes a large file here: the disk holds the work in progress, never the build.
 - `fetch` gets a file before it is read; small files that steer a build are fetched at the start.
 
-For any other folder these functions do nothing, so that readers and writers can always call them.
+For any other folder these functions do nothing. Few modules call them: the functions that read and
+write all documents (seals.py, atomic_write.py, file_list.py), the runner of steps for the inputs of
+each task, and `OutFolder` for phases and checks.
 """
 
 import os
