@@ -73,12 +73,12 @@ def _merged(labels: Labels, located: Located) -> str:
 
 def notes_on_objects(labels: Labels, located: Located) -> Iterator[str]:
     """Yield the number of objects, and the notes on their numbers if `plan` did not count them."""
-    yield told_of(labels, located)
+    yield describe_objects(labels, located)
     if is_large(labels):
         yield from notes_on_numbers(labels, located)
 
 
-def told_of(labels: Labels, located: Located) -> str:
+def describe_objects(labels: Labels, located: Located) -> str:
     """Return how many objects there are, which are cut, and how many are left out, in words."""
     summary = counted(len(located.owners), "object")
     cut = located.extents.labels[located.owners == CUT]
@@ -95,7 +95,7 @@ def is_large(labels: Labels) -> bool:
     return prod(labels.shape) > _COUNTED_AT_ONCE
 
 
-def told_before(plan: Plan) -> Iterator[str]:
+def notes_before_units(plan: Plan) -> Iterator[str]:
     """Yield of each label map what its units will cut, from its voxels where these are few.
 
     Raises SourceError where they are no labels.
@@ -105,7 +105,7 @@ def told_before(plan: Plan) -> Iterator[str]:
         if not is_large(labels):
             parts = {tile: FindExtents(labels.voxels, box).run() for tile, box in boxes.items()}
             found = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
-            yield told_of(labels, found)
+            yield describe_objects(labels, found)
             yield from notes_on_numbers(labels, found)
         elif len(plan.tiles) > 1:
             largest = np.max([box.shape for box in boxes.values()], axis=0) * labels.spacing_um

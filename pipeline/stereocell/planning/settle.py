@@ -12,7 +12,7 @@ from stereocell.planning.hounsfield import believe, settle_modality
 from stereocell.planning.input_files import as_asked, open_anew, watch_table
 from stereocell.planning.intensities import doubt_of, require_intensities
 from stereocell.planning.label_maps import are_alone, find_labels
-from stereocell.planning.label_numbers import told_before
+from stereocell.planning.label_numbers import notes_before_units
 from stereocell.planning.object_tables import (
     require_color_by,
     table_of,
@@ -102,7 +102,7 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
         require_color_by(plan, one, table)
         objects += [f"table: {note}" for note in table.notes] if table else []
     gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
-    objects += told_before(plan)
+    objects += notes_before_units(plan)
     objects += filter(None, map(doubt_of, plan.labels))
     if settings.objects.table and len(plan.labels) > 1:
         objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")

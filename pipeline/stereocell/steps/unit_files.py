@@ -20,7 +20,7 @@ from stereocell.model.errors import OutputError
 from stereocell.model.mesh import Baked, Lod, Mesh, Quality, Spread
 from stereocell.model.unit import Closed, Cover, ObjectFacts, Unit
 from stereocell.storage.atomic_write import replacing_folder
-from stereocell.storage.file_list import DAMAGED, MISSING, find_faults, is_same, measure
+from stereocell.storage.file_list import DAMAGED, MISSING, find_faults, is_same, measure, sizes_of
 from stereocell.storage.json_files import (
     find_json,
     find_sealed,
@@ -28,7 +28,7 @@ from stereocell.storage.json_files import (
     write_json,
     write_sealed,
 )
-from stereocell.storage.workspace import fetch, is_file
+from stereocell.storage.workspace import fetch
 
 SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
 _RECORD, _CLOSED, _SECONDS = "unit.json", "closed.stl", "seconds.json"
@@ -104,7 +104,7 @@ UNIT_FOLDER = UnitFolder()
 
 def find_damage(directory: Path) -> dict[str, str]:
     """Return the fault of each damaged file of a unit, by name; all are hashed."""
-    if not is_file(directory / _RECORD):
+    if _RECORD not in sizes_of(directory):
         return {_RECORD: MISSING}
     record = find_sealed(directory / _RECORD, SCHEMA)
     if record is None:

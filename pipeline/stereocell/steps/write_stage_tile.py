@@ -18,7 +18,6 @@ from stereocell.steps.unit_files import (
 )
 from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
-from stereocell.storage.workspace import remove
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import written_files
 
@@ -100,7 +99,6 @@ class StageTile:
 
     def keep(self) -> None:
         """Write the tile and its record. Raises OutputError where a unit is damaged."""
-        remove(self.place)
         files, measured = _write(self.step, self.stage_dir)
         record = {"key": self.step.key, "files": files, "measured_bytes": measured}
         write_sealed(self.place, record)
