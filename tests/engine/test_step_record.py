@@ -45,9 +45,9 @@ def reaches() -> dict[str, set[Path]]:
         ("meshes/simplify.py", UNITS | {"WriteBundle"}, {"FindWindow", "nifti"}),
         ("filters/denoise.py", TILES, {"nifti"}),
         ("isosurface/level_evidence.py", {"FindWindow", "GatherEvidence"}, {"BuildUnit"}),
-        ("read/ome_zarr.py", {"ome-zarr"}, TILES),
-        ("read/tiff/ome.py", {"tiff"}, TILES | {"dicom"}),
-        ("read/dicom/frame.py", {"dicom"}, TILES | {"tiff"}),
+        ("read/formats/ome_zarr/image.py", {"ome-zarr"}, TILES),
+        ("read/formats/tiff/ome.py", {"tiff"}, TILES | {"dicom"}),
+        ("read/formats/dicom/frame.py", {"dicom"}, TILES | {"tiff"}),
         ("formats/exr.py", {"WriteStageTile", "WriteStage", "WriteBundle"}, TILES),
         ("formats/gltf.py", {"WriteBundle"}, TILES),
         ("objects/extents.py", OBJECTS, TILES),
@@ -201,7 +201,7 @@ def test_packages_are_found_as_python_finds_them() -> None:
         assert set(found[top]) == set(names), top
 
 
-BESIDE = {"bioio", "bioio_base"}  # a user has them beside StereoCell (read/bioio_image.py)
+BESIDE = {"bioio", "bioio_base"}  # a user has them beside StereoCell (read/formats/other.py)
 
 
 @pytest.mark.slow

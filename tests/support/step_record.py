@@ -56,7 +56,7 @@ NEUTRAL = (
 # import name of a library -> those of the libraries that it loads by itself; `*`: any ending
 BEHIND = {
     "bioio": ("bioio_*",),
-    "pydicom": ("gdcm", "openjpeg", "pylibjpeg"),  # read/dicom/stored_values.py
+    "pydicom": ("gdcm", "openjpeg", "pylibjpeg"),  # read/formats/dicom/stored_values.py
     "tifffile": ("imagecodecs",),
     "zarr": ("numcodecs",),
 }

@@ -70,7 +70,7 @@ def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
     notes = labels.open().notes
     if _has_free_names(plan, labels):
         # pydicom takes a third of a second to import: every command and worker would wait for it
-        from stereocell.read.dicom import read_free_labels
+        from stereocell.read.formats.dicom.image import read_free_labels
 
         own = read_free_labels(Location.of(labels.ref.source))
         notes = replace(notes, names=notes.names | own)

@@ -61,7 +61,9 @@ def count_absent(
 
 
 def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
-    from stereocell.read.zarr_store import GuardedStore  # slow to import, and loaded by its reader
+    from stereocell.read.formats.ome_zarr.store import (
+        GuardedStore,  # slow to import, and loaded by its reader
+    )
 
     if not isinstance(getattr(stored, "store", None), GuardedStore):
         return None
@@ -82,7 +84,7 @@ def _in_zarr(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
 
     is_listed = stored.store.is_local and _number(stored.chunks, spans) <= _MOST_COUNTED
     if stored.shards and is_listed:  # at an address each index is a request
-        from stereocell.read.shard_index import absent_in_shards
+        from stereocell.read.formats.ome_zarr.shard_index import absent_in_shards
 
         pairs = zip(stored.chunks, spans, strict=True)
         touched = [_of_axis(size, ranges) for size, ranges in pairs]

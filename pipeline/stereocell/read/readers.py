@@ -79,34 +79,43 @@ class Reader:
 
 READERS = {
     "ome-zarr": Reader(
-        "stereocell.read.ome_zarr", "OME-Zarr", has_series=True, has_axes=True, is_remote=True
+        "stereocell.read.formats.ome_zarr.image",
+        "OME-Zarr",
+        has_series=True,
+        has_axes=True,
+        is_remote=True,
     ),
-    "tiff": Reader("stereocell.read.tiff", "TIFF", has_series=True, has_axes=True, is_remote=True),
+    "tiff": Reader(
+        "stereocell.read.formats.tiff.image", "TIFF", has_series=True, has_axes=True, is_remote=True
+    ),
     "planes": Reader(
-        "stereocell.read.planes",
+        "stereocell.read.formats.planes.image",
         "a folder of TIFF, PNG, JPEG or BMP planes",
         has_series=True,
         has_pattern=True,
     ),
     "dicom": Reader(
-        "stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True, order=_DICOM_ORDER
+        "stereocell.read.formats.dicom.image",
+        "DICOM (a file or a folder)",
+        has_series=True,
+        order=_DICOM_ORDER,
     ),
-    "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze"),
-    "mgh": Reader("stereocell.read.mgh", "MGH (FreeSurfer)"),
-    "ims": Reader("stereocell.read.ims", "Imaris"),
-    "hdf5": Reader("stereocell.read.hdf5", "HDF5 (NAME.h5:/KEY)", has_axes=True),
-    "n5": Reader("stereocell.read.n5", "N5", has_axes=True, is_remote=True),
-    "bdv": Reader("stereocell.read.bdv", "BigDataViewer's XML", has_series=True),
-    "nrrd": Reader("stereocell.read.nrrd", "NRRD"),
-    "metaimage": Reader("stereocell.read.metaimage", "MetaImage"),
-    "mrc": Reader("stereocell.read.mrc", "MRC"),
-    "czi": Reader("stereocell.read.czi", "CZI", has_series=True),
-    "lif": Reader("stereocell.read.lif", "LIF", has_series=True),
-    "nd2": Reader("stereocell.read.nd2", "ND2", has_series=True),
+    "nifti": Reader("stereocell.read.formats.nifti.image", "NIfTI or Analyze"),
+    "mgh": Reader("stereocell.read.formats.mgh", "MGH (FreeSurfer)"),
+    "ims": Reader("stereocell.read.formats.ims.image", "Imaris"),
+    "hdf5": Reader("stereocell.read.formats.hdf5.image", "HDF5 (NAME.h5:/KEY)", has_axes=True),
+    "n5": Reader("stereocell.read.formats.n5.image", "N5", has_axes=True, is_remote=True),
+    "bdv": Reader("stereocell.read.formats.bdv", "BigDataViewer's XML", has_series=True),
+    "nrrd": Reader("stereocell.read.formats.nrrd.image", "NRRD"),
+    "metaimage": Reader("stereocell.read.formats.metaimage.image", "MetaImage"),
+    "mrc": Reader("stereocell.read.formats.mrc.image", "MRC"),
+    "czi": Reader("stereocell.read.formats.czi.image", "CZI", has_series=True),
+    "lif": Reader("stereocell.read.formats.lif", "LIF", has_series=True),
+    "nd2": Reader("stereocell.read.formats.nd2.image", "ND2", has_series=True),
 }
 # a file that no reader above knows is given to this one, which takes what bioio's plugins do
 OTHER = Reader(
-    "stereocell.read.bioio_image", "a file for an installed plugin of bioio", has_series=True
+    "stereocell.read.formats.other", "a file for an installed plugin of bioio", has_series=True
 )
 
 

@@ -1,0 +1,1 @@
+"""CZI of Zeiss."""
