@@ -1,7 +1,7 @@
 """The passes over label maps: first where the objects are, then the units that build them."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -35,6 +35,7 @@ from stereocell.model.counted import counted
 from stereocell.model.object_notes import ObjectNotes
 from stereocell.model.tiling import Tile
 from stereocell.objects.options import ObjectOptions
+from stereocell.read.known_formats import format_of
 from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 from stereocell.storage.location import Location
 
@@ -68,10 +69,7 @@ def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
     if find_sealed(file, NOTES) is not None:
         return
     notes = labels.open().notes
-    if _has_free_names(plan, labels):
-        # pydicom takes a third of a second to import: every command and worker would wait for it
-        from stereocell.read.formats.dicom.image import read_free_labels
-
+    if (read_free_labels := _free_labels_reader(plan, labels)) is not None:
         own = read_free_labels(Location.of(labels.ref.source))
         notes = replace(notes, names=notes.names | own)
     write_sealed(file, {"notes": _notes().dump_python(notes, mode="json")})
@@ -84,14 +82,15 @@ def read_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> ObjectNotes
 
 
 def _notes_file(out_folder: OutFolder, plan: Plan, labels: Labels) -> Path:
-    kind = f"{labels.id}-free" if _has_free_names(plan, labels) else labels.id
+    is_free = _free_labels_reader(plan, labels) is not None
+    kind = f"{labels.id}-free" if is_free else labels.id
     return out_folder.notes_file(kind, labels.ref.fingerprint)
 
 
-def _has_free_names(plan: Plan, labels: Labels) -> bool:
-    """Return whether segments are called by what somebody wrote."""
-    is_dicom = Location.of(labels.ref.source).format == "dicom"
-    return plan.settings.objects.segment_labels and is_dicom
+def _free_labels_reader(plan: Plan, labels: Labels) -> Callable[[Location], dict[int, str]] | None:
+    """Return the function that reads the segments' free names; None: they are not used."""
+    wanted = plan.settings.objects.segment_labels
+    return format_of(labels.ref.source).read_free_labels if wanted else None
 
 
 @cache

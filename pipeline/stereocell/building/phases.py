@@ -64,11 +64,12 @@ from stereocell.model.extra_packages import version_of
 from stereocell.model.object_table import ObjectTable
 from stereocell.model.tiling import Box
 from stereocell.model.version import GENERATOR
-from stereocell.read.readers import format_of
+from stereocell.read.known_formats import format_of
 from stereocell.read.remarks import CAST
+from stereocell.read.source_place import require_apart
 from stereocell.storage.file_list import FileList
 from stereocell.storage.json_files import write_sealed
-from stereocell.storage.location import Location, require_apart
+from stereocell.storage.location import Location
 from stereocell.storage.sealed_text import write_sealed_text
 from stereocell.storage.workspace import remove
 from stereocell.textures.map_packages import (
@@ -188,7 +189,10 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
         slice_axis=dataset.slice_axis(level[0]),
         has_sides=dataset.has_sides,
         labels=found.labels,
-        formats={format_of(location), *(format_of(one.ref.source) for one in found.labels)},
+        formats={
+            format_of(one).name
+            for one in (location, *(labels.ref.source for labels in found.labels))
+        },
     )
     if settings.objects.table:
         watch_table(settings.objects.table)
@@ -231,7 +235,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
     settings = _without_places(to_dict(plan.settings))
     # by the plan's formats, since the sources may be gone when a stage is written; an added
     # channel's source lies in OUT
-    formats = {*plan.formats, *(format_of(c.source) for c in plan.channels if c.source)}
+    formats = {*plan.formats, *(format_of(c.source).name for c in plan.channels if c.source)}
     return {
         "generator": GENERATOR,
         "fingerprint": plan.fingerprint,

@@ -14,8 +14,8 @@ from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset, VoxelArray
 from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.inverted_array import InvertedArray
+from stereocell.read.known_formats import format_of
 from stereocell.read.modulo import PartAlong
-from stereocell.read.readers import format_of
 from stereocell.read.value_scale import ScaledArray
 from stereocell.storage.file_states import FileStates
 
@@ -54,7 +54,7 @@ def count_absent(
     while isinstance(stored, FlippedArray | ScaledArray | PartAlong):
         spans = spans if isinstance(stored, ScaledArray) else stored.stored_spans(spans)
         stored = stored.stored
-    count = _COUNTERS.get(format_of(dataset.source))
+    count = _COUNTERS.get(format_of(dataset.source).name)
     if count is None or not states.is_complete:
         return None
     return count(stored, spans, states)

@@ -9,14 +9,20 @@ from dataclasses import replace
 from stereocell.model.errors import SourceError
 from stereocell.read.bigdataviewer.xml import container_of, read_described
 from stereocell.read.file_kind import require_kind
-from stereocell.read.formats.hdf5 import image as hdf5
-from stereocell.read.formats.n5 import image as n5
+from stereocell.read.format import Format, Guide
 from stereocell.read.image import Image
+from stereocell.read.known_formats import format_of
 from stereocell.read.series import lines
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, is_own, require_own
+from stereocell.storage.location import Location, first_bytes, is_own, require_own
 
-_READERS = {"hdf5": hdf5.read_image, "n5": n5.read_image}
+_CONTAINERS = ("hdf5", "n5")  # formats that an XML may name
+_HEAD_BYTES = 1 << 16  # of an XML, which hold the name of its root
+
+
+def _holds(location: Location) -> bool:
+    is_named = location.source.lower().endswith(".xml")
+    return is_named and b"<SpimData" in first_bytes(location.source, count=_HEAD_BYTES)
 
 
 def read_image(location: Location, *, series: int = 0) -> Image:
@@ -25,7 +31,11 @@ def read_image(location: Location, *, series: int = 0) -> Image:
     Raises SourceError where there is no container in the folder, UsageError for no such view.
     """
     container = _container_of(location)
-    image = _READERS[str(container.format)](container, series=series, xml=location.path)
+    if format_of(container.source).name == "n5":
+        from stereocell.read.formats.n5.image import read_image as read_container
+    else:
+        from stereocell.read.formats.hdf5.image import read_image as read_container
+    image = read_container(container, series=series, xml=location.path)
     return replace(image, files=(location.path, *(image.files or (container.path,))))
 
 
@@ -54,12 +64,33 @@ def _container_of(location: Location) -> Location:
     if not os.path.isdir(path):
         require_own(path, [location.folder], named=field)  # a pipe would block
     container = Location.of(path)
-    if os.path.isdir(path) and container.format == "ome-zarr":
+    format = format_of(path)
+    if os.path.isdir(path) and format.name == "ome-zarr":
         raise SourceError(
             f"{field}: found OME-Zarr, expected HDF5 (.h5) or N5 (.n5); name an image in it, as "
             f"{named}/IMAGE, or save it again as HDF5 in BigStitcher"
         )
-    if not os.path.exists(path) or container.format not in _READERS:
+    if not os.path.exists(path) or format.name not in _CONTAINERS:
         raise SourceError(f"{field}: not found, expected HDF5 (.h5) or N5 beside the XML")
-    require_kind(container, "" if container.format == "n5" else container.format, "HDF5")
+    if not format.folder_endings:
+        require_kind(container, format)
     return container
+
+
+FORMAT = Format(
+    title="BigDataViewer's XML",
+    open=read_image,
+    list_series=list_series,
+    endings=(".xml",),
+    holds=_holds,
+    guides=(
+        Guide(
+            "BigDataViewer",
+            "`NAME.xml`, or its `.h5` or `.n5`",
+            (
+                "levels, time, channels; tiles, angles and illuminations by `--series` (of the "
+                "XML). [Registrations](#bigdataviewer)"
+            ),
+        ),
+    ),
+)

@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 
 from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
-from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
+from stereocell.read.format import Format, Guide, Library
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.plane_positions import falling_notes
 from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import Grid, Triple
+from stereocell.storage.first_bytes import Mark
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_file
+from stereocell.storage.location import Location
 
 _BLOCK = struct.Struct("<2I")  # 0x70, and the length of the description behind it
 _ABOUT = struct.Struct("<BQBI")  # of a block: 0x2A, bytes of voxels, 0x2A, characters of its name
@@ -69,9 +70,8 @@ def list_series(location: Location) -> tuple[str, ...]:
 
 def _images(location: Location, stack: ExitStack) -> tuple[list[Any], list[Candidate]]:
     """Return the images of the file, and what a list says of each."""
-    require_file(location)
-    with extras.required("lif", location.shown, "LIF"):
-        import liffile as library
+    import liffile as library
+
     with one_line(location.shown, "a LIF file that is whole"):
         path = os.path.realpath(location.path)
         _require_whole(path, location.shown)
@@ -216,3 +216,23 @@ def _channels(image: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Col
         colors.append(linear_color(rgb) if rgb else None)
     lacking = [None] * (count - len(names))
     return (*names, *lacking), (*colors, *lacking)
+
+
+FORMAT = Format(
+    title="LIF",
+    open=read_image,
+    list_series=list_series,
+    library=Library("liffile", extra="lif"),
+    endings=(".lif",),
+    marks=(Mark("a LIF file of Leica", rb"\x70\0\0\0....\x2a"),),
+    guides=(
+        Guide(
+            "Leica LIF",
+            "`NAME.lif`",
+            (
+                "images by `--series`, the largest volume by default; any scan order (xyz, xzy), "
+                "time, channels. A lambda stack, or an unmerged mosaic, is refused"
+            ),
+        ),
+    ),
+)

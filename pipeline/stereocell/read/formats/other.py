@@ -1,12 +1,12 @@
 """Any other format, through bioio and those of its plugins that are installed beside StereoCell.
 
-bioio is no dependency: it takes 2 s to import, and most of its plugins stand on libraries of their
-own (read/ome_tiff.py and ome_zarr.py say more). Which files a plugin opens beside the source is the
-plugin's affair, so this runs only for a name that no reader here knows.
+bioio is no dependency: it takes 2 s to import, and most of its plugins need libraries of their own.
+A plugin may open files beside the source, so this runs only for files that no other format takes.
 
 References: https://bioio-devs.github.io/bioio/
 """
 
+import os
 import re
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
+from stereocell.read.format import Format
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import Candidate, candidate, choose, lines
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_file
+from stereocell.storage.location import Location
 
 _MADE_UP = re.compile(r"Channel:\d+(:\d+)*")  # bioio's name where the file has none
 
@@ -41,9 +42,8 @@ class _DaskArray:
 
 def can_read(location: Location) -> bool:
     """Whether bioio is installed, and one of its plugins takes a file on this machine."""
-    if not location.is_local or find_spec("bioio") is None:
+    if not location.is_local or find_spec("bioio") is None or not os.path.isfile(location.path):
         return False
-    require_file(location)
     from bioio_base.exceptions import UnsupportedFileFormatError
 
     with one_line(location.shown, "a file that a plugin of bioio reads"):
@@ -104,3 +104,11 @@ def _spacing(image: Any) -> Triple | None:
         return None
     z, y, x = (abs(float(size)) for size in sizes)
     return z, y, x
+
+
+FORMAT = Format(
+    title="a file for an installed plugin of bioio",
+    open=read_image,
+    list_series=list_series,
+    may_hold=can_read,
+)

@@ -26,7 +26,7 @@ from stereocell.read.hdf5_file.texts import HeapTexts, lies_in_heap
 from stereocell.read.hdf5_file.types import require_standard
 from stereocell.read.hdf5_file.windows import PluginWindows, has_plugins
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_file, require_own
+from stereocell.storage.location import Location, require_own
 
 _MAX_STEPS = 200  # names along a path, links followed
 _MAX_NODES = 20_000  # groups and datasets that a search visits
@@ -44,7 +44,6 @@ class Hdf5Tree:
     """
 
     def __init__(self, location: Location, expected: str) -> None:
-        require_file(location)
         self.where = location.path
         self._folder = location.folder
         self._stack = ExitStack()

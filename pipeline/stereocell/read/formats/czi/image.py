@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from stereocell.model.emission_color import color_of_channel
 from stereocell.model.errors import SourceError
-from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.formats.czi.file import CziFacts, CziFile, Rectangle
 from stereocell.read.image import MAX_CHANNELS, Color, Image
@@ -33,7 +32,7 @@ from stereocell.read.spacing import PartialTriple, grid_of
 from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.storage.child_process import Child
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_file
+from stereocell.storage.location import Location
 
 _TYPES = {"Gray8": "u1", "Gray16": "u2", "Gray32Float": "f4"}
 _OTHERS = {"V": "views", "H": "phases", "I": "illuminations", "R": "rotations", "B": "blocks"}
@@ -49,8 +48,6 @@ class _File:
 
     def __init__(self, location: Location, stack: ExitStack) -> None:
         self.where = location.shown
-        require_file(location)
-        extras.require_installed("pylibCZIrw", "czi", self.where, "CZI")
         with one_line(self.where, "a CZI file that is whole"):
             self._child = stack.enter_context(Child(CziFile, location.path, self.where))
             facts: CziFacts = self._child.call("facts")

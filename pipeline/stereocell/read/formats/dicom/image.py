@@ -37,13 +37,13 @@ from stereocell.read.formats.dicom.stack import Stack
 from stereocell.read.formats.dicom.twice_rescaled import describe_values
 from stereocell.read.formats.dicom.ways_out import in_words
 from stereocell.read.image import Image
+from stereocell.read.known_formats import identify
 from stereocell.read.plane_stack import NoStackError, StackLayout
 from stereocell.read.resample import resample_stack
 from stereocell.read.series import numbers_of
 from stereocell.read.spacing import Grid
 from stereocell.read.statements import omission
 from stereocell.read.whole_array import WholeArray
-from stereocell.storage.first_bytes import identify
 from stereocell.storage.location import Location, first_bytes, is_own
 
 _INSTEAD = "expected the image that it was drawn on"

@@ -37,7 +37,7 @@ from stereocell.read.formats.metaimage.fields import (
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.patient_grid import place
 from stereocell.read.plausible_size import size_notes
-from stereocell.storage.location import Location, require_file, require_own
+from stereocell.storage.location import Location, require_own
 
 _TYPES = {
     "MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2",
@@ -49,7 +49,6 @@ _TYPES = {
 def read_image(location: Location) -> Image:
     """Return the image of the file, with all its time points. Raises SourceError."""
     where = location.shown
-    require_file(location)
     header = read_header(location)
     fields, end = header.fields, header.end
     shape = integers(where, fields, "DimSize")

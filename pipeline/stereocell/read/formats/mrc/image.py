@@ -31,7 +31,7 @@ from stereocell.read.formats.mrc.statements import (
 from stereocell.read.image import Image
 from stereocell.read.spacing import Grid
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_file
+from stereocell.storage.location import Location
 
 _HEADER = 1024  # bytes; an extended header of `nsymbt` follows
 _MAGIC = {b"\x1f\x8b": "gzip", b"BZ": "bzip2"}
@@ -40,7 +40,6 @@ _MAGIC = {b"\x1f\x8b": "gzip", b"BZ": "bzip2"}
 def read_image(location: Location) -> Image:
     """Return the volume of the file. Raises SourceError where it can't be read."""
     where = location.shown
-    require_file(location)
     path = os.path.realpath(location.path)
     with one_line(where, "an MRC or CCP4 file"):
         header, packing, extended = _header(path)

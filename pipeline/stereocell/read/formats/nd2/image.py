@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from stereocell.model.emission_color import color_of_channel
 from stereocell.model.errors import SourceError
-from stereocell.read import extras
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.formats.nd2.frames import BEGIN, Nd2Frames
 from stereocell.read.image import MAX_CHANNELS, Color, Image
@@ -18,7 +17,7 @@ from stereocell.read.plane_array import PlaneArray
 from stereocell.read.series import Candidate, candidate, lines, read_chosen
 from stereocell.read.spacing import PartialTriple, grid_of
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_file
+from stereocell.storage.location import Location
 
 _END = b"ND2 CHUNK MAP SIGNATURE 0000001!"
 _END_BYTES = 40  # bytes of the signature and of the chunk map's place, last in a file
@@ -30,9 +29,8 @@ class _File:
 
     def __init__(self, location: Location, stack: ExitStack) -> None:
         self.where = location.shown
-        require_file(location)
-        with extras.required("nd2", self.where, "ND2"):
-            import nd2 as library
+        import nd2 as library
+
         path = os.path.realpath(location.path)
         _require_end(path, self.where)
         with one_line(self.where, "an ND2 file that is whole"):

@@ -44,7 +44,7 @@ from stereocell.read.patient_grid import place
 from stereocell.read.plausible_size import size_notes
 from stereocell.read.spacing import Grid, PartialTriple, grid_of
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_file, require_own
+from stereocell.storage.location import Location, require_own
 
 NAME = "NRRD"
 _MAX_HEADER = 1 << 20  # bytes
@@ -73,7 +73,6 @@ _IN_MM = ("scanner-xyz", "scanner-xyz-time")
 def read_image(location: Location) -> Image:
     """Return the image of the file, with all its time points. Raises SourceError."""
     where = location.shown
-    require_file(location)
     fields, end = _header(location)
     shape = [int(n) for n in np.atleast_1d(fields["sizes"])]
     labelled = labelled_axes(fields, shape)

@@ -252,7 +252,7 @@ def open_store(location: Location) -> Store:
         return open_zipped(location)
     if location.is_local:
         return LocalStore(location.source, read_only=True)
-    if location.format == "ome-zarr" and location.shown.endswith((".ozx", ".zip")):
+    if location.shown.endswith((".ozx", ".zip")):
         raise SourceError(
             f"{location.shown}: a zip file at an address, expected a path on this machine: copy it "
             "here first, or unpack it there"

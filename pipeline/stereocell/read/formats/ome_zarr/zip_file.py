@@ -15,7 +15,7 @@ from zarr.core.buffer import BufferPrototype
 from zarr.storage import WrapperStore, ZipStore
 
 from stereocell.model.errors import SourceError
-from stereocell.storage.archives import zarr_root_in
+from stereocell.read.formats.ome_zarr.archive import zarr_root_in
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -77,7 +77,10 @@ def open_zipped(location: Location) -> ZippedStore:
             members = {info.filename: info for info in archive.infolist() if not info.is_dir()}
         root = zarr_root_in(members)
         if root is None:
-            raise SourceError(f"{where}: found a zip archive without a Zarr group, expected one")
+            raise SourceError(
+                f"{where}: found a zip archive without a Zarr group, expected OME-Zarr: "
+                "unzip it, and name the file or folder in it"
+            )
         inner = location.source[len(location.path) :].strip("/")
         root += f"{inner}/" if inner else ""
         sizes = {

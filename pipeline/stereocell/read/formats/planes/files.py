@@ -13,18 +13,16 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 
 from stereocell.model.errors import SourceError
+from stereocell.read.formats.planes.endings import BMP, JPEG, PNG, TIFF
 from stereocell.read.formats.planes.head import Head
 from stereocell.read.formats.planes.tiff_head import tiff_head
 from stereocell.read.formats.tiff.open_file import open_tiff
 from stereocell.read.formats.tiff.orientation import turn_by, turn_of, turned_pixels
-from stereocell.storage.first_bytes import HEAD_BYTES, describe
+from stereocell.read.known_formats import identify
+from stereocell.storage.first_bytes import HEAD_BYTES
 from stereocell.storage.library_errors import collected_log, one_line
 from stereocell.storage.location import Location
 
-TIFF = (".tif", ".tiff", ".stk", ".lsm")
-PNG = (".png",)
-JPEG = (".jpg", ".jpeg")
-BMP = (".bmp",)
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _TAIL = 1024  # bytes in which a PNG ends; some programs add a few of their own
 _PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; 3: a palette
@@ -128,7 +126,7 @@ def _begin(path: str, named: str, magic: bytes, title: str) -> bytes:
     with open(path, "rb") as file:
         head = file.read(HEAD_BYTES)
     if not head.startswith(magic):
-        raise SourceError(f"{named}: found {describe(head)}, expected {title}")
+        raise SourceError(f"{named}: found {identify(head).words}, expected {title}")
     return head
 
 

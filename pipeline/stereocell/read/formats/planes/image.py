@@ -12,7 +12,8 @@ from dataclasses import replace
 from stereocell.model.counted import counted
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.beside import or_one_of, others_in
-from stereocell.read.formats.planes.files import TIFF, join, read_head
+from stereocell.read.formats.planes.endings import TIFF
+from stereocell.read.formats.planes.files import join, read_head
 from stereocell.read.formats.planes.listing import list_images, of_one_kind
 from stereocell.read.formats.planes.names import guess, in_natural_order
 from stereocell.read.formats.planes.of_planes import image_of_planes

@@ -2,7 +2,8 @@
 
 import os
 
-from stereocell.read.formats.planes.files import BMP, JPEG, PNG, TIFF, join
+from stereocell.read.formats.planes.endings import BMP, JPEG, PNG, TIFF
+from stereocell.read.formats.planes.files import join
 from stereocell.storage.location import Location, require_own
 
 _KINDS = {"TIFF": TIFF, "PNG": PNG, "JPEG": JPEG, "BMP": BMP}

@@ -11,9 +11,12 @@ from xml.etree import ElementTree
 
 from stereocell.model.errors import SourceError
 from stereocell.read import ome_xml
+from stereocell.read.file_kind import refused
 from stereocell.read.formats.tiff.open_file import SUFFIXES
+from stereocell.read.known_formats import identify
+from stereocell.storage.first_bytes import XML
 from stereocell.storage.library_errors import one_line
-from stereocell.storage.location import Location, require_own
+from stereocell.storage.location import Location, first_bytes, require_own
 
 _SUFFIX = ".companion.ome"
 _MAX_BYTES = 64 << 20  # bytes of an OME-XML beside the TIFF files
@@ -41,6 +44,9 @@ def first_of_set(location: Location) -> Location:
     where = location.shown
     if not location.is_local:
         raise SourceError(f"{where}: found OME-XML at an address, expected the set on this machine")
+    content = identify(first_bytes(location.source))
+    if content.words != XML:
+        raise refused(location, content, "OME-XML")
     name = next(ome_xml.files_of(companion_at(location.source, where).root), "")
     path = os.path.join(location.folder, name)
     if not name or require_own(path, [location.folder], named=f"{where}: {name!r:.200}") is None:

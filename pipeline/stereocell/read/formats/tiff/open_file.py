@@ -17,8 +17,10 @@ import fsspec
 from tifffile import TiffFile, TiffFileError, TiffFrame, TiffPage, TiffPageSeries
 
 from stereocell.model.errors import SourceError
+from stereocell.read.formats.tiff.magic import MAGIC
 from stereocell.read.formats.tiff.segments import require_segments
-from stereocell.storage.first_bytes import HEAD_BYTES, TIFF_MAGIC, describe
+from stereocell.read.known_formats import identify
+from stereocell.storage.first_bytes import HEAD_BYTES
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -60,8 +62,8 @@ def open_tiff(location: Location, stack: ExitStack, **options: Any) -> TiffFile:
 
 def _require_tiff(where: str, file: IO[bytes]) -> None:
     head = file.read(HEAD_BYTES)
-    if not head.startswith(TIFF_MAGIC):
-        raise SourceError(f"{where}: not a TIFF file: found {describe(head)}, expected TIFF")
+    if not head.startswith(MAGIC):
+        raise SourceError(f"{where}: not a TIFF file: found {identify(head).words}, expected TIFF")
 
 
 def require_directories(where: str, file: IO[bytes], size: int) -> int:

@@ -1,11 +1,11 @@
-"""Zip files that hold a Zarr group: OME-Zarr in one file (RFC-9)."""
+"""Recognise a Zarr group in a zip file: OME-Zarr in one file (RFC-9)."""
 
 import os
 import zipfile
 from collections.abc import Collection
 from functools import lru_cache
 
-ARCHIVE_SUFFIXES = (".ozx", ".ome.zarr.zip", ".zarr.zip")
+ARCHIVE_ENDINGS = (".ozx", ".ome.zarr.zip", ".zarr.zip")
 ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
 
 
@@ -21,19 +21,13 @@ def zarr_root_in(names: Collection[str]) -> str | None:
     return folder if any(f"{folder}{file}" in names for file in ZARR_FILES) else None
 
 
-def archive_in(path: str) -> str:
-    """Return the zip file that a local path names, or leads into; empty: it does neither."""
+def is_archive(path: str) -> bool:
+    """Return whether a file is a zip file that holds a Zarr group, or is named as one that does."""
     lower = path.lower()
-    if ".zip" not in lower and ".ozx" not in lower:
-        return ""
-    parts = path.split("/")
-    ends = (i for i, part in enumerate(parts) if part.lower().endswith((".zip", ".ozx")))
-    paths = ("/".join(parts[: end + 1]) for end in ends)
-    return next((one for one in paths if os.path.isfile(one)), "")
-
-
-def has_zarr(path: str) -> bool:
-    """Return whether a zip file holds a Zarr group."""
+    if not lower.endswith((".zip", ".ozx")) or not os.path.isfile(path):
+        return False
+    if lower.endswith(ARCHIVE_ENDINGS) and zipfile.is_zipfile(path):
+        return True  # the reader describes a missing group
     return zarr_root_in(_members(path, os.path.getmtime(path))) is not None
 
 
