@@ -6,10 +6,12 @@ library only when a source is opened, since the rows of all formats are loaded t
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from stereocell.read.chunk_counts import Absent, Spans
 from stereocell.read.extras import require_installed
 from stereocell.read.image import Image
+from stereocell.storage.file_states import FileStates
 from stereocell.storage.first_bytes import Mark
 from stereocell.storage.location import Location
 
@@ -62,6 +64,7 @@ class Format:
     is_unmarked      returns whether a file, by its path and first bytes, may be of the format
                      although it has none of its marks
     packed_endings   of files that are packed by gzip; the bytes in them are checked
+    count_absent     counts the chunks of a part of an array that are not stored; None: all are
     read_free_labels returns the free text by which a label map names each object
     name, module     of the module that holds the row; `known_formats` fills them in
     """
@@ -87,6 +90,7 @@ class Format:
     may_hold: Callable[[Location], bool] | None = None
     is_unmarked: Callable[[str, bytes], bool] | None = None
     packed_endings: tuple[str, ...] = ()
+    count_absent: Callable[[Any, Spans, FileStates], Absent | None] | None = None
     read_free_labels: Callable[[Location], dict[int, str]] | None = None
     name: str = ""
     module: str = ""

@@ -5,14 +5,18 @@ References: https://imagej.net/plugins/bdv/index
 
 import os
 from dataclasses import replace
+from typing import Any
 
 from stereocell.model.errors import SourceError
+from stereocell.read.bigdataviewer.absent import count_in_views
 from stereocell.read.bigdataviewer.xml import container_of, read_described
+from stereocell.read.chunk_counts import Absent, Spans
 from stereocell.read.file_kind import require_kind
 from stereocell.read.format import Format, Guide
 from stereocell.read.image import Image
 from stereocell.read.known_formats import format_of
 from stereocell.read.series import lines
+from stereocell.storage.file_states import FileStates
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, first_bytes, is_own, require_own
 
@@ -43,6 +47,18 @@ def list_series(location: Location) -> tuple[str, ...]:
     """Return a line for each tile, angle and illumination. Raises SourceError."""
     described = read_described(_container_of(location).path, location.path)
     return lines([described.candidate(view) for view in described.views(sorted(described.setups))])
+
+
+def _count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    if hasattr(stored, "path_of"):
+        from stereocell.read.formats.n5.absent import count_absent
+    else:
+        from stereocell.read.formats.hdf5.absent import count_absent
+    return count_absent(stored, spans, states)
+
+
+def _count_absent_in_views(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    return count_in_views(stored, spans, states, _count_absent)
 
 
 def _container_of(location: Location) -> Location:
@@ -83,6 +99,7 @@ FORMAT = Format(
     list_series=list_series,
     endings=(".xml",),
     holds=_holds,
+    count_absent=_count_absent_in_views,
     guides=(
         Guide(
             "BigDataViewer",

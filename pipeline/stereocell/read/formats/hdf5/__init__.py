@@ -1,8 +1,12 @@
 """HDF5, netCDF-4, MATLAB 7.3 and EMD."""
 
+from typing import Any
+
+from stereocell.read.chunk_counts import Absent, Spans
 from stereocell.read.format import Format, Guide
 from stereocell.read.hdf5_file.signature import SIGNATURE, is_hdf5
 from stereocell.read.image import Image
+from stereocell.storage.file_states import FileStates
 from stereocell.storage.first_bytes import Mark
 from stereocell.storage.location import Location
 
@@ -11,6 +15,12 @@ def _open(location: Location, *, axes: str = "") -> Image:
     from stereocell.read.formats.hdf5.image import read_image
 
     return read_image(location, axes=axes)
+
+
+def _count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    from stereocell.read.formats.hdf5.absent import count_absent
+
+    return count_absent(stored, spans, states)
 
 
 FORMAT = Format(
@@ -24,6 +34,7 @@ FORMAT = Format(
         Mark("a MATLAB 7.3 file", rb"MATLAB 7\.3"),  # HDF5 behind a block of 512 bytes
     ),
     is_unmarked=is_hdf5,
+    count_absent=_count_absent,
     guides=(
         Guide(
             "HDF5, netCDF-4, MATLAB 7.3, EMD",

@@ -1,9 +1,12 @@
 """N5."""
 
 import os
+from typing import Any
 
+from stereocell.read.chunk_counts import Absent, Spans
 from stereocell.read.format import Format, Guide
 from stereocell.read.image import Image
+from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
 
 
@@ -18,6 +21,12 @@ def _holds(location: Location) -> bool:
     return os.path.exists(f"{location.source}/attributes.json")
 
 
+def _count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    from stereocell.read.formats.n5.absent import count_absent
+
+    return count_absent(stored, spans, states)
+
+
 FORMAT = Format(
     title="N5",
     open=_open,
@@ -26,6 +35,7 @@ FORMAT = Format(
     is_remote=True,
     folder_endings=(".n5",),
     holds=_holds,
+    count_absent=_count_absent,
     guides=(
         Guide(
             "N5",

@@ -1,10 +1,13 @@
 """OME-Zarr, and Zarr without its metadata."""
 
 import os
+from typing import Any
 
+from stereocell.read.chunk_counts import Absent, Spans
 from stereocell.read.format import Format, Guide
 from stereocell.read.formats.ome_zarr.archive import ARCHIVE_ENDINGS, ZARR_FILES, is_archive
 from stereocell.read.image import Image
+from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
 
 
@@ -26,6 +29,12 @@ def _holds(location: Location) -> bool:
     return any(os.path.exists(f"{location.source}/{name}") for name in ZARR_FILES)
 
 
+def _count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
+    from stereocell.read.formats.ome_zarr.absent import count_absent
+
+    return count_absent(stored, spans, states)
+
+
 FORMAT = Format(
     title="OME-Zarr",
     open=_open,
@@ -37,6 +46,7 @@ FORMAT = Format(
     endings=ARCHIVE_ENDINGS,
     folder_endings=(".zarr", ".ome.zarr"),
     holds=_holds,
+    count_absent=_count_absent,
     guides=(
         Guide(
             "OME-Zarr 0.1 to 0.6",
