@@ -18,7 +18,7 @@ import numpy as np
 from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.formats.ims.statements import settle_lengths
+from stereocell.read.formats.ims.statements import settle_lengths, size_notes
 from stereocell.read.hdf5_file.tree import Hdf5Array, Hdf5Tree
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.spacing import Grid, Triple
@@ -90,6 +90,7 @@ def _image(tree: Hdf5Tree) -> Image:
         spacing = extents and _triple(e / n for e, n in zip(extents, shape, strict=True))
         half = spacing and _triple(0.5 * s for s in spacing)
         grids.append(Grid(shape, spacing, half))
+    notes = (*notes, *size_notes(_stated_size(tree, 0), arrays[0].shape))
     names, colors = zip(*(_channel(tree, index) for index in range(channels)), strict=True)
     return Image(
         tuple(arrays), tuple(grids), names, colors, 1, tree.close, notes=notes, files=tree.files
@@ -148,9 +149,7 @@ def _level(tree: Hdf5Tree, level: int, times: int, channels: int) -> VoxelArray:
 
     first = find(0, 0)
     group = f"/DataSet/ResolutionLevel {level}/TimePoint 0/Channel 0"
-    stated = [_number(tree, group, f"ImageSize{axis}") for axis in "ZYX"]
-    if level == 0 and None in stated:
-        stated = [_number(tree, "/DataSetInfo/Image", axis) for axis in "ZYX"]
+    stated = _stated_size(tree, level)
     if level == 0:
         _require_size(tree, group, stated)
     size = [n if s is None else int(s) for s, n in zip(stated, first.shape, strict=True)]
@@ -160,6 +159,15 @@ def _level(tree: Hdf5Tree, level: int, times: int, channels: int) -> VoxelArray:
                 f"{tree.where}: {group}: ImageSize{axis}: found {found}, expected 1 to {most}"
             )
     return VoxelArray(_Level((times, channels, *size), first, find), tuple("tczyx"))
+
+
+def _stated_size(tree: Hdf5Tree, level: int) -> list[float | None]:
+    """Return the voxels (z, y, x) of a level without its padding; None each: not stated."""
+    group = f"/DataSet/ResolutionLevel {level}/TimePoint 0/Channel 0"
+    stated = [_number(tree, group, f"ImageSize{axis}") for axis in "ZYX"]
+    if level == 0 and None in stated:
+        stated = [_number(tree, "/DataSetInfo/Image", axis) for axis in "ZYX"]
+    return stated
 
 
 def _require_size(tree: Hdf5Tree, group: str, stated: list[float | None]) -> None:

@@ -15,6 +15,7 @@ _RECORDED = {
     "x": "RecordingEntrySampleSpacing",
 }
 _INDEX = {"z": 2, "y": 1, "x": 0}  # of ExtMin and ExtMax
+_SIZE = Subject("size of the image (ImageSizeZ, ImageSizeY, ImageSizeX)", "voxels")
 _UNIT = Subject("unit of length", remedy="--spacing-um z,y,x replaces the spacing")
 
 
@@ -52,6 +53,18 @@ def settle_lengths(
         )
     z, y, x = lengths
     return (z, y, x), tuple(notes)
+
+
+def size_notes(stated: Sequence[float | None], shape: Sequence[int]) -> tuple[str, ...]:
+    """Return a note where the size without padding is not stated.
+
+    stated  voxels (z, y, x) of the finest level; None each: not stated
+    shape   the voxels that are read
+    """
+    if None not in stated:
+        return ()
+    taken = Statement(tuple(map(float, shape)), "as of the dataset with its padding", Trust.ASSUMED)
+    return settle(_SIZE, [taken]).notes
 
 
 def _along(

@@ -35,7 +35,7 @@ from stereocell.read.formats.metaimage.fields import (
     value_notes,
 )
 from stereocell.read.image import MAX_CHANNELS, Image
-from stereocell.read.patient_grid import place
+from stereocell.read.patient_grid import place, settle_origin
 from stereocell.read.plausible_size import size_notes
 from stereocell.storage.location import Location, require_own
 
@@ -128,12 +128,13 @@ def _affine(
     turned = np.eye(n) if matrix is None else np.array(matrix).reshape(n, n)
     affine = np.eye(4)
     affine[:3, :3] = turned[:3, :3].T * np.array(spacing[:3])  # a row for each axis of the image
-    affine[:3, 3] = (numbers(where, fields, "Offset", n) or [0.0] * n)[:3]
+    affine[:3, 3], origin_notes = settle_origin("Offset", numbers(where, fields, "Offset", n))
     per, unit_notes = unit_mm(fields)
     affine[:3] *= per
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
     axes = turned[:3, :3].T
     notes = [*header.notes, *unit_notes, *side_notes(fields, axes)]
+    notes += origin_notes if matrix is not None else ()  # else it lies in no patient
     notes += scale_notes(spacing[:3], axes, per)
     return affine, (*notes, *value_notes(where, fields), *size_notes(lengths.tolist(), shape[:3]))
 

@@ -24,6 +24,7 @@ from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.formats.mrc.statements import (
     STACK_OF_VOLUMES,
     angle_notes,
+    settle_order,
     settle_sign,
     settle_spacing,
     volumes_of,
@@ -45,14 +46,12 @@ def read_image(location: Location) -> Image:
         header, packing, extended = _header(path)
         dtype = data_dtype_from_header(header)
         shape = tuple(int(header[name]) for name in ("nz", "ny", "nx"))
-        order = [int(header[name]) for name in ("maps", "mapr", "mapc")]
+        order, order_notes = settle_order(header)
         offset = _HEADER + int(header["nsymbt"])
     if min(shape) < 1 or offset < _HEADER:
         raise SourceError(f"{where}: size (z, y, x): found {shape}, expected voxels")
     if dtype.kind == "c":
         raise SourceError(f"{where}: mode: found {int(header['mode'])} (complex), expected numbers")
-    if order == [0, 0, 0]:
-        order = [3, 2, 1]  # writers that leave it out
     if sorted(order) != [1, 2, 3]:
         raise SourceError(f"{where}: MAPS, MAPR, MAPC: found {order}, expected 1, 2 and 3")
     group, sampling = int(header["ispg"]), int(header["mz"])
@@ -71,7 +70,7 @@ def read_image(location: Location) -> Image:
         dtype = np.dtype(np.int8 if is_signed else np.uint8)
         notes += sign_notes
     spacing, spacing_notes = settle_spacing(header, extended, is_stack=is_stack)
-    notes += [*spacing_notes, *angle_notes(header)]
+    notes += [*order_notes, *spacing_notes, *angle_notes(header)]
     array: StoredArray
     if packing:
         array = PackedArray(

@@ -22,6 +22,7 @@ _SIGNED_FLAG = 1  # bit of IMOD's flags
 _FIRST_OF_2014 = 20140  # first `nversion` of MRC2014
 _LARGEST_SIGNED = 127
 _AXES = "zyx"
+_ORDER = Subject("axes of columns, rows and sections (MAPC, MAPR, MAPS)")
 _SIGN = Subject("bytes of mode 0")
 _RIGHT_ANGLE = 90.0  # degrees
 _MIN_SKEW = 0.01  # degrees; a smaller difference is rounding
@@ -111,6 +112,15 @@ def volumes_of(header: Any) -> int:
     if not is_stack or not 0 < sampling < sections or sections % sampling:
         return 1
     return sections // sampling
+
+
+def settle_order(header: Any) -> tuple[list[int], tuple[str, ...]]:
+    """Return the axes (x 1, y 2, z 3) of sections, rows and columns, and notes."""
+    stated = [int(header[name]) for name in ("maps", "mapr", "mapc")]
+    if any(stated):
+        return stated, ()
+    usual = Statement(("x", "y", "z"), "as in most files", Trust.ASSUMED)
+    return [3, 2, 1], settle(_ORDER, [usual]).notes
 
 
 def angle_notes(header: Any) -> tuple[str, ...]:

@@ -40,7 +40,7 @@ from stereocell.read.formats.nrrd.statements import (
 from stereocell.read.formats.nrrd.values import ValueAxis, value_axis
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.ordered_array import OrderedArray
-from stereocell.read.patient_grid import place
+from stereocell.read.patient_grid import place, settle_origin
 from stereocell.read.plausible_size import size_notes
 from stereocell.read.spacing import Grid, PartialTriple, grid_of
 from stereocell.storage.library_errors import one_line
@@ -106,12 +106,15 @@ def read_image(location: Location) -> Image:
         )  # fmt: skip
     affine = np.eye(4)
     affine[:3, :3] = to_lps @ spatial.T / 1000.0
-    origin = np.ravel(fields.get("space origin", np.zeros(3))).astype(float)[:3]
-    origin = np.where(np.isfinite(origin), origin, 0.0) * factors.max(axis=0)
-    affine[:3, 3] = to_lps @ origin / 1000.0
+    stated = fields.get("space origin")
+    origin, origin_notes = settle_origin(
+        "space origin", None if stated is None else np.ravel(stated).tolist()
+    )
+    affine[:3, 3] = to_lps @ (origin * factors.max(axis=0)) / 1000.0
     label_notes = notes_beside_directions([labelled[index] for index in at if labelled], affine)
     notes = (
         *notes,
+        *origin_notes,
         *label_notes,
         *size_notes(np.linalg.norm(affine[:3, :3], axis=0).tolist(), sizes),
     )
