@@ -18,7 +18,7 @@ import { drawEyes } from "../gpu/offscreen_target";
 import { GROUND, SKY } from "../gpu/room_light";
 import { ScreenPass } from "../gpu/screen_pass";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
-import type { MarchLight } from "../volumes/tile_raymarch";
+import type { MarchLight } from "../volumes/march_frame";
 import { DenoiseAndTone, type Marched } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
 import type { MediumAppearance } from "./extinction";

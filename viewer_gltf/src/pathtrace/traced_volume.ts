@@ -10,11 +10,12 @@ import { ENOUGH_SAMPLES, gathersAnew, type TraceSettings } from "../state/path_t
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import type { BrickTile } from "../volumes/bricks/brick_atlas";
 import type { BrickService } from "../volumes/bricks/brick_service";
+import type { MarchLight } from "../volumes/march_frame";
+import type { Appearance } from "../volumes/march_tables";
+import { showsBelow } from "../volumes/marches";
 import type { VolumeLimits } from "../volumes/mip_levels";
-import type { Appearance, MarchLight } from "../volumes/tile_raymarch";
 import type { Packed } from "../volumes/tile_texture";
 import type { TransferTable2d } from "../volumes/transfer_table_2d";
-import { showsBelow } from "../volumes/volume_set";
 import type { VolumeSource } from "../volumes/volume_source";
 import type { Marched } from "./denoise_and_tone";
 import { loadEnvironment, readEnvironment } from "./environment_file";
@@ -33,7 +34,7 @@ const MAX_MOVING_PIXELS = 160_000;
 /** The part of the volumes that the tracer uses. */
 export type Volumes = Readonly<{
   sourcesOf: (channel: string) => Promise<ReadonlyMap<string, VolumeSource> | null>;
-  appearance: (state: ViewerState, channel: string) => Appearance;
+  appearances: Readonly<{ of: (state: ViewerState, channel: string) => Appearance }>;
 }>;
 
 export class TracedVolume {
@@ -110,7 +111,7 @@ export class TracedVolume {
     const { state } = this;
     if (state === null || !this.isShown) return [];
     return this.sources.flatMap(({ id, tiles }) => {
-      const { table } = this.volumes.appearance(state, id);
+      const { table } = this.volumes.appearances.of(state, id);
       return [...tiles].flatMap(([tile, source]) => {
         const isHidden = state.isolated !== null && tile !== state.isolated;
         return isHidden ? [] : [{ tile, channel: id, source, table, isInDisc: false }];
@@ -374,7 +375,7 @@ export class TracedVolume {
   private setAppearances(): void {
     const { state, texels } = this;
     if (state === null || texels === null) return;
-    const appearances = texels.channels.map((id) => this.volumes.appearance(state, id));
+    const appearances = texels.channels.map((id) => this.volumes.appearances.of(state, id));
     const { density } = state.trace;
     const { brickTile } = this;
     if (brickTile !== null && showsBelow(brickTile, appearances)) {
