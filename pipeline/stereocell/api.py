@@ -56,9 +56,10 @@ def build(
     from stereocell.engine.worker_pool import leave_if_importing_main
     from stereocell.planning.preset_choice import load_for
     from stereocell.planning.setting_names import named_as_settings
+    from stereocell.read.source_place import require_apart
     from stereocell.report import phase as report_phase
     from stereocell.storage.claim import LOCK
-    from stereocell.storage.location import Location, require_apart
+    from stereocell.storage.location import Location
     from stereocell.storage.lock import alone_in
     from stereocell.storage.overwriting import IN_PYTHON, forcing
     from stereocell.storage.shell_commands import as_shown, filling_in

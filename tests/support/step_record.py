@@ -33,7 +33,7 @@ from packaging.utils import canonicalize_name
 import stereocell
 from stereocell.engine.step import Keyed, Step
 from stereocell.engine.step_record import RECORD
-from stereocell.read.readers import OTHER, READERS
+from stereocell.read.known_formats import known_formats
 from stereocell.storage.assets import find_asset
 
 PACKAGE = Path(stereocell.__file__).parent
@@ -49,6 +49,8 @@ NEUTRAL = (
     "planning.plan",
     "planning.plan_file",
     "building.out_folder",
+    "read.format",
+    "read.known_formats",
     "read.readers",
     "read.file_kind",
     "read.remarks",
@@ -56,7 +58,7 @@ NEUTRAL = (
 # import name of a library -> those of the libraries that it loads by itself; `*`: any ending
 BEHIND = {
     "bioio": ("bioio_*",),
-    "pydicom": ("gdcm", "openjpeg", "pylibjpeg"),  # read/dicom/stored_values.py
+    "pydicom": ("gdcm", "openjpeg", "pylibjpeg"),  # read/formats/dicom/stored_values.py
     "tifffile": ("imagecodecs",),
     "zarr": ("numcodecs",),
 }
@@ -71,11 +73,11 @@ def record() -> dict[str, Any]:
     libraries  the locked versions of those that can change a result
     """
     steps = {step.__name__: _entry(step.__module__, step.VERSION) for step in find_steps()}
-    readers = {name: _entry(one.module, one.version) for name, one in READERS.items()}
-    readers["other"] = _entry(OTHER.module, OTHER.version)
+    formats = known_formats()
+    readers = {name: _entry(one.module, one.version) for name, one in formats.items()}
     entries = {**dict(sorted(steps.items())), **dict(sorted(readers.items()))}
     modules = {step.__module__ for step in find_steps()}
-    modules |= {one.module for one in (*READERS.values(), OTHER)}
+    modules |= {one.module for one in formats.values()}
     used = {library for module in modules for library in reach(module)[1]}
     lines = re.findall(r"^([\w.-]+)(?:\[.*\])?==([^\s;]+)", LOCK.read_text("utf-8"), re.M)
     locked = {canonicalize_name(name): version for name, version in lines}
@@ -184,7 +186,7 @@ def main(arguments: list[str]) -> None:
     if lines:
         raise SystemExit(
             "\n".join(lines) + "\nWhere the same inputs give another result, raise the step's "
-            "VERSION (a reader's `version` in read/readers.py). Then, or where results are the "
+            "VERSION (a format's `version` in its row). Then, or where results are the "
             "same, run `make record-steps`."
         )
 

@@ -240,7 +240,7 @@ def test_no_identity_of_a_segmentation_is_in_what_is_made_of_its_objects(
 def test_a_leak_put_in_by_hand_is_found(
     series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from stereocell.read import dicom
+    from stereocell.read.formats.dicom import image as dicom
 
     honest = dicom.read_image
 

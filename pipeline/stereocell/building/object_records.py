@@ -1,5 +1,6 @@
 """The records in OUT on a label map's objects: the notes of its file, and their table."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,7 @@ from stereocell.planning.located_objects import (
 )
 from stereocell.planning.object_tables import make_table, table_of
 from stereocell.planning.plan import Plan
+from stereocell.read.known_formats import format_of
 from stereocell.steps.labels import Labels
 from stereocell.steps.unit_files import load_objects
 from stereocell.steps.units_again import AGAIN
@@ -32,10 +34,7 @@ def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
     if find_sealed(file, NOTES) is not None:
         return
     notes = labels.open().notes
-    if _has_free_names(plan, labels):
-        # pydicom takes a third of a second to import: every command and worker would wait for it
-        from stereocell.read.dicom import read_free_labels
-
+    if (read_free_labels := _free_labels_reader(plan, labels)) is not None:
         own = read_free_labels(Location.of(labels.ref.source))
         notes = replace(notes, names=notes.names | own)
     write_sealed(file, {"notes": _notes().dump_python(notes, mode="json")})
@@ -48,14 +47,15 @@ def read_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> ObjectNotes
 
 
 def _notes_file(out_folder: OutFolder, plan: Plan, labels: Labels) -> Path:
-    kind = f"{labels.id}-free" if _has_free_names(plan, labels) else labels.id
+    is_free = _free_labels_reader(plan, labels) is not None
+    kind = f"{labels.id}-free" if is_free else labels.id
     return out_folder.notes_file(kind, labels.ref.fingerprint)
 
 
-def _has_free_names(plan: Plan, labels: Labels) -> bool:
-    """Return whether segments are called by what somebody wrote."""
-    is_dicom = Location.of(labels.ref.source).format == "dicom"
-    return plan.settings.objects.segment_labels and is_dicom
+def _free_labels_reader(plan: Plan, labels: Labels) -> Callable[[Location], dict[int, str]] | None:
+    """Return the function that reads the segments' free names; None: they are not used."""
+    wanted = plan.settings.objects.segment_labels
+    return format_of(labels.ref.source).read_free_labels if wanted else None
 
 
 @cache

@@ -51,10 +51,10 @@ from stereocell.planning.stage_steps import stage_step, stage_tile_step
 from stereocell.planning.survey import Survey
 from stereocell.planning.unit_steps import choose_units, unit_steps
 from stereocell.read.image import printable
+from stereocell.read.source_place import require_apart
 from stereocell.steps.write_stage_tile import StageTile
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
-from stereocell.storage.location import require_apart
 from stereocell.storage.overwriting import is_forced
 from stereocell.storage.sealed_text import write_sealed_text
 from stereocell.usd.write_usdz import USDZ_NAME

@@ -256,7 +256,7 @@ def slices(options: argparse.Namespace) -> Answer:
         without_surface,
         write_slices,
     )
-    from stereocell.storage.location import require_apart
+    from stereocell.read.source_place import require_apart
 
     require_apart(options.input, options.out)
     require_slices_or_nothing(options.out)

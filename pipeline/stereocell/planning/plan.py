@@ -57,7 +57,7 @@ class Plan:
     has_sides   whether the source states where the patient's left, back and head are: then the
                 specimen's place is the patient's world (read/anatomical_axes.py)
     labels      label maps whose objects are built, channels beside `channels`
-    formats     which formats the source and the label maps have, sorted (readers.format_of)
+    formats     which formats the source and the label maps have, sorted (known_formats.format_of)
     notes       what was chosen, assumed or left out in reading the source, a sentence each
     is_hounsfield  whether values may be compared with Hounsfield units, if it is a CT
     """

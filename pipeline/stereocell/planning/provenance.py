@@ -7,7 +7,7 @@ from stereocell.model.extra_packages import version_of
 from stereocell.model.version import GENERATOR
 from stereocell.planning.plan import Plan
 from stereocell.planning.settings import to_dict
-from stereocell.read.readers import format_of
+from stereocell.read.known_formats import format_of
 from stereocell.steps.build_unit import BuildUnit
 from stereocell.steps.find_window import FindWindow
 from stereocell.steps.gather_evidence import GatherEvidence
@@ -28,7 +28,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
     settings = _without_places(to_dict(plan.settings))
     # by the plan's formats, since the sources may be gone when a stage is written; an added
     # channel's source lies in OUT
-    formats = {*plan.formats, *(format_of(c.source) for c in plan.channels if c.source)}
+    formats = {*plan.formats, *(format_of(c.source).name for c in plan.channels if c.source)}
     return {
         "generator": GENERATOR,
         "fingerprint": plan.fingerprint,

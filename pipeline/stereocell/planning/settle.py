@@ -24,7 +24,7 @@ from stereocell.planning.plan_notes import (
     told_of_gaps,
 )
 from stereocell.planning.settings import INTENSITY, Settings
-from stereocell.read.readers import format_of
+from stereocell.read.known_formats import format_of
 from stereocell.read.remarks import CAST
 from stereocell.storage.location import Location
 from stereocell.textures.map_packages import (
@@ -91,7 +91,10 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
         slice_axis=dataset.slice_axis(level[0]),
         has_sides=dataset.has_sides,
         labels=found.labels,
-        formats={format_of(location), *(format_of(one.ref.source) for one in found.labels)},
+        formats={
+            format_of(one).name
+            for one in (location, *(labels.ref.source for labels in found.labels))
+        },
     )
     if settings.objects.table:
         watch_table(settings.objects.table)

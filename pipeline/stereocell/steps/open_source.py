@@ -8,7 +8,7 @@ from stereocell import read
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
-from stereocell.read.readers import reader_version
+from stereocell.read.known_formats import format_of
 from stereocell.storage.workspace import fetch
 
 
@@ -36,7 +36,8 @@ class SourceRef:
     def key_content(self) -> list[object]:
         """Return what counts in a key: the volume and its reader, never the address."""
         own = [getattr(self, one.name) for one in fields(self) if one.name != "source"]
-        return [*own, *reader_version(self.source)]
+        format = format_of(self.source)
+        return [*own, format.name, format.version]
 
 
 @dataclass(frozen=True, slots=True)

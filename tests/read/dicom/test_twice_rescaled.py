@@ -10,7 +10,7 @@ import pytest
 from stereocell import read
 from stereocell.cli.__main__ import main
 from stereocell.planning.settings import load
-from stereocell.read.dicom.twice_rescaled import LEVEL_HU, WINDOW_HU
+from stereocell.read.formats.dicom.twice_rescaled import LEVEL_HU, WINDOW_HU
 from support.dicom_series import grid, write_series
 
 SHAPE = (8, 40, 44)
