@@ -54,7 +54,7 @@ PARSED = {
     "build s3://": "object storage: storage/test_object_store.py",
     "build stack.tif": "masks of another program: building/test_objects.py",
     "build store.zarr": "the same: read/tables/test_tables.py",
-    "build ct.nii.gz": "the same: building/test_label_maps.py",
+    "build ct.nii.gz": "the same: planning/test_label_maps.py",
     "build CT_FOLDER": "the same: read/dicom/test_segmentation.py",
     "build seg.dcm": "the same",
 }

@@ -80,7 +80,7 @@ def test_a_changed_constant_in_a_reached_file_asks_for_a_decision(
             "read_bytes",
             lambda self: content.encode() if self == path else read(self),
         )
-        found = step_record._entry("stereocell.building.steps.find_extents", 1)
+        found = step_record._entry("stereocell.steps.find_extents", 1)
         monkeypatch.undo()
         return str(found["code"])
 
@@ -166,7 +166,7 @@ def test_what_decodes_for_a_reader_is_a_library_of_it_alone(
     modules = {name: reader.module for name, reader in known_formats().items()}
     users = {name for name, module in modules.items() if library in step_record.reach(module)[1]}
     assert users == readers
-    assert library not in step_record.reach("stereocell.building.steps.build_unit")[1]
+    assert library not in step_record.reach("stereocell.steps.build_unit")[1]
 
 
 def test_libraries_that_can_change_no_byte_ask_for_no_decision(recorded: dict[str, Any]) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import zarr
 
-from stereocell.building import input_files
 from stereocell.cli.__main__ import main
+from stereocell.planning import input_files
 from stereocell.read import chunk_counts
 from support import phantoms
 from support.array_files import write_n5

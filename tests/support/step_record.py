@@ -31,7 +31,7 @@ from typing import Any
 from packaging.utils import canonicalize_name
 
 import stereocell
-from stereocell.engine.step import Step
+from stereocell.engine.step import Keyed, Step
 from stereocell.engine.step_record import RECORD
 from stereocell.read.known_formats import known_formats
 from stereocell.storage.assets import find_asset
@@ -45,9 +45,9 @@ NEUTRAL = (
     "model.settings",
     "model.timing",
     "kernels.cache_place",
-    "building.settings",
-    "building.plan",
-    "building.plan_file",
+    "planning.settings",
+    "planning.plan",
+    "planning.plan_file",
     "building.out_folder",
     "read.format",
     "read.known_formats",
@@ -62,7 +62,7 @@ BEHIND = {
     "tifffile": ("imagecodecs",),
     "zarr": ("numcodecs",),
 }
-_STEP = re.compile(r"^class \w+\(Step\[", re.MULTILINE)
+_STEP = re.compile(r"^class \w+\((?:Step\[|Keyed\))", re.MULTILINE)
 
 
 def record() -> dict[str, Any]:
@@ -88,7 +88,7 @@ def record() -> dict[str, Any]:
     }
 
 
-def find_steps() -> list[type[Step[Any]]]:
+def find_steps() -> list[type[Keyed]]:
     """Return the class of every step."""
     for name, file in _modules().items():
         if _STEP.search(file.read_text("utf-8")):
@@ -96,8 +96,8 @@ def find_steps() -> list[type[Step[Any]]]:
     # a dataclass with slots is another class than the one that it was made from
     steps = {
         (one.__module__, one.__name__): getattr(sys.modules[one.__module__], one.__name__, None)
-        for one in Step.__subclasses__()
-        if one.__module__.startswith(f"{PACKAGE.name}.")
+        for one in (*Keyed.__subclasses__(), *Step.__subclasses__())
+        if one is not Step and one.__module__.startswith(f"{PACKAGE.name}.")
     }
     return sorted(filter(None, steps.values()), key=lambda step: step.__name__)
 
