@@ -45,38 +45,14 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import in_place, step
 from stereocell.kernels.half_edges import Ints
-from stereocell.kernels.interface_rings import (
-    CORNER,
-    ON_LINE,
-    check_sheets_link,
-    collect_neighbours,
-    collect_triangles,
-    fill_sheets,
-    find_beyond,
-    join_sheets,
-)
+from stereocell.kernels.interface_rings import CORNER, ON_LINE, fill_sheets
+from stereocell.kernels.mesh_rings import check_link, collect_ring, is_surface, mark_ring, move_onto
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.quadrics import CLASSES, NEVER, SURE, add_plane, class_of, price_of
-from stereocell.kernels.ring_checks import check_normals, measure_ring
-from stereocell.kernels.rings import (
-    NEIGHBOURS,
-    TRIANGLES,
-    Flags,
-    Mesh,
-    Ring,
-    make_mesh,
-    make_ring,
-)
-from stereocell.kernels.surface_rings import (
-    check_fan_link,
-    collect_fan,
-    fill_fans,
-    find_cheapest_in_fan,
-    join_fans,
-    mark_fan,
-    stamp_fan,
-)
-from stereocell.kernels.triangles import Points, closest
+from stereocell.kernels.ring_checks import check_normals, measure_ring, measure_stray
+from stereocell.kernels.rings import NEIGHBOURS, Flags, Mesh, Ring, make_mesh, make_ring
+from stereocell.kernels.surface_rings import fill_fans, find_cheapest_in_fan, stamp_fan
+from stereocell.kernels.triangles import Points
 
 PASSES = 4  # passes over one class; the last class has LAST
 LAST = 40
@@ -286,11 +262,12 @@ def try_collapse(u: int, limit: int, mesh: Mesh, work: Work, limits: Limits) -> 
     allowed = limits.sharpest
     if worst > allowed:
         allowed = max(allowed, 1 - SHARPER * (1 - worst))
+    form = mean, allowed
     if is_surface(mesh):
         stamp_fan(ring)
     while costs[u] <= limit:
         v = ring.near[chosen]
-        if check_normals(u, v, mesh, ring, (mean, allowed)) and check_link(mesh, work, chosen):
+        if check_normals(u, v, mesh, ring, form) and check_link(mesh, ring, chosen, work.other):
             strayed = measure_stray(u, v, mesh, ring)
             if strayed <= limits.stray * mesh.errors[u]:
                 move_onto(u, chosen, mesh, ring, strayed)
@@ -357,88 +334,3 @@ def find_cheapest(ring: Ring) -> int:
         if ring.price[j] < ring.price[cheapest]:
             cheapest = j
     return cheapest
-
-
-@step
-def measure_stray(u: int, v: int, mesh: Mesh, ring: Ring) -> float:
-    """Return the distance of u, and all that went into it, from the result once u is at v.
-
-    The result is the triangles that take the place of u's, or the line that u is on.
-    """
-    at = mesh.at
-    if not is_surface(mesh) and mesh.on_line[u]:
-        beyond = find_beyond(v, ring)
-        if beyond >= 0:
-            return at[u, 3] + _distance_to_segment(at, u, v, beyond)
-    least = np.inf
-    for k in range(ring.sizes[TRIANGLES]):
-        x, y = ring.first[k], ring.second[k]
-        if x != v and y != v:
-            square, _ = closest(at[u, 0], at[u, 1], at[u, 2], at, v, x, y)
-            least = min(least, square)
-    return at[u, 3] + np.sqrt(least)
-
-
-@step
-def _distance_to_segment(at: Points, u: int, v: int, w: int) -> float:
-    """Return the distance of u from the segment vw."""
-    px, py, pz = at[w, 0] - at[v, 0], at[w, 1] - at[v, 1], at[w, 2] - at[v, 2]
-    qx, qy, qz = at[u, 0] - at[v, 0], at[u, 1] - at[v, 1], at[u, 2] - at[v, 2]
-    length = px * px + py * py + pz * pz
-    share = (px * qx + py * qy + pz * qz) / length if length > 0 else 0.0
-    share = min(max(share, 0.0), 1.0)
-    dx, dy, dz = qx - share * px, qy - share * py, qz - share * pz
-    return np.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-# ---- where surfaces and interfaces differ
-
-
-@step
-def is_surface(mesh: Mesh) -> bool:
-    """Return whether the mesh is a surface; else it is interfaces."""
-    return len(mesh.on_line) == 0
-
-
-@step
-def collect_ring(u: int, mesh: Mesh, ring: Ring) -> bool:
-    """Write the ring of u; return whether there is room for it, and it is not empty."""
-    if is_surface(mesh):
-        return collect_fan(u, mesh, ring)
-    if not collect_triangles(u, mesh, ring):
-        return False
-    collect_neighbours(ring)
-    return ring.sizes[TRIANGLES] > 0
-
-
-@step
-def mark_ring(u: int, mesh: Mesh, ring: Ring, marks: Flags) -> None:
-    """Mark the neighbours of u."""
-    if is_surface(mesh):
-        mark_fan(u, mesh, marks)
-    else:
-        collect_triangles(u, mesh, ring)
-        for k in range(ring.sizes[TRIANGLES]):
-            marks[ring.first[k]] = marks[ring.second[k]] = True
-
-
-@step
-def check_link(mesh: Mesh, work: Work, chosen: int) -> bool:
-    """Return whether topology stays when the ring's vertex moves onto the chosen neighbour."""
-    if is_surface(mesh):
-        return check_fan_link(mesh, work.ring, chosen)
-    return check_sheets_link(mesh, work.ring, chosen, work.other)
-
-
-@step
-def move_onto(u: int, chosen: int, mesh: Mesh, ring: Ring, strayed: float) -> None:
-    """Let u become the chosen neighbour; what went into u is at most `strayed` from the result."""
-    v = ring.near[chosen]
-    mesh.at[v, 3] = max(mesh.at[v, 3], strayed)
-    if is_surface(mesh):
-        join_fans(mesh, ring, chosen)
-    else:
-        join_sheets(mesh, ring, v)
-    for p in range(11):
-        mesh.quadrics[v, p] += mesh.quadrics[u, p]
-    mesh.start[u] = -1
