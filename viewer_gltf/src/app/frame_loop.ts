@@ -15,7 +15,7 @@ import type { QualityLevel, QualitySettings } from "../state/quality_controller"
 import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
-import { MAX_STEPS, REST_STEPS } from "../volumes/tile_raymarch";
+import { MAX_STEPS, REST_STEPS } from "../volumes/march_frame";
 import type { Stereo } from "../xr/stereo";
 import { Pulse } from "./pulse";
 import type { Contents } from "./scene_contents";

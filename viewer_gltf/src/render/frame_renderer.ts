@@ -22,7 +22,7 @@ import { KEY_AT, towards } from "../gpu/room_light";
 import type { Clip } from "../math/clip";
 import type { TracedVolume } from "../pathtrace/traced_volume";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "../surfaces/blend_material";
-import { lightByRoom, makeFrame, REST_STEPS } from "../volumes/tile_raymarch";
+import { lightByRoom, makeFrame, REST_STEPS } from "../volumes/march_frame";
 import type { VolumeSet } from "../volumes/volume_set";
 import { CrossFade } from "./cross_fade";
 import { DepthPass } from "./depth_pass";
@@ -141,6 +141,7 @@ export class Picture {
   ): void {
     const { renderer, room, hybrid } = this;
     const { volumes, traced, panes, overlays, bounds, solids } = drawn;
+    const { marches } = volumes;
     const specimen = room.specimen.group.matrixWorld;
     renderer.info.reset();
     room.light(head);
@@ -149,7 +150,7 @@ export class Picture {
     this.cuts.follow(clip, specimen);
     this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
-    this.marchFrame.uIsCrossing.value = volumes.isInDisc;
+    this.marchFrame.uIsCrossing.value = marches.isInDisc;
     this.march.hide();
     this.marchWithin.hide();
     traced.hide();
@@ -160,32 +161,33 @@ export class Picture {
         ...blended.map(({ scene }) => scene),
       ]);
     const isTraced = traced.isShown;
-    if (isTraced || !volumes.isEmpty) opaque();
-    const isMarched = !volumes.isEmpty && !(isTraced && this.needsNoMarch(drawn, clip, isMoving));
-    const isMixed = isMarched && !isTraced && hybrid.outer_rad > 0 && volumes.isPartlyInDisc;
+    if (isTraced || !marches.isEmpty) opaque();
+    const isMarched = !marches.isEmpty && !(isTraced && this.needsNoMarch(drawn, clip, isMoving));
+    const isMixed = isMarched && !isTraced && hybrid.outer_rad > 0 && marches.isPartlyInDisc;
     if (isMarched) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
-      volumes.placeAs(specimen);
+      marches.placeAs(specimen);
       const lamp = this.lamp.set(...towards(KEY_AT)).transformDirection(head);
       lamp.transformDirection(toSpecimen);
       if (isTraced) traced.lightMarch(this.marchFrame, specimen, head);
       else lightByRoom(this.marchFrame);
-      volumes.aim(eye, hybrid.apex_um, hybrid.axis_um, this.cuts.march, lamp);
+      const { apex_um: apex, axis_um: axis } = hybrid;
+      volumes.aim({ eye, apex, axis, clip: this.cuts.march, lamp });
       this.shiftNoise(isMoving, gathers);
       const marchBy = (pass: MarchPass, blended = panes) => {
         const hasPane = blended.some(({ isPane }) => isPane);
         this.marchFrame.uHasPane.value = hasPane;
         if (hasPane) this.depth.renderPanes(renderer, room.scene, this.eyes);
-        pass.render(volumes.scene, this.eyes, resolution, gathers);
+        pass.render(marches.scene, this.eyes, resolution, gathers);
       };
       if (isMixed) {
         this.marchFrame.uDisc.value.set(...EVERYWHERE);
-        volumes.endAtDisc(true);
+        marches.endAtDisc(true);
         marchBy(this.marchWithin);
         renderer.setRenderTarget(this.drawInto(this.within));
         this.marchWithin.hide();
-        volumes.endAtDisc(false);
+        marches.endAtDisc(false);
         this.marchFrame.uDisc.value.set(...NOWHERE);
         const translucent = panes.filter(({ isSolid }) => !isSolid);
         opaque(translucent); // beyond the disc the others are whole
@@ -198,7 +200,7 @@ export class Picture {
     if (isTraced) {
       const scene = { specimen, clip: this.cuts.march, bounds, solids };
       const standIn = isMarched || this.stoodIn !== "" ? this.march.marched : null;
-      traced.render(renderer, this.eyes, scene, resolution, isMoving, passes, standIn);
+      traced.render(renderer, this.eyes, scene, { resolution, isMoving, passes, standIn });
       if (traced.isOnScreen) this.march.hide();
     }
     this.show(isSmooth ? this.light : this.draft, isMixed);

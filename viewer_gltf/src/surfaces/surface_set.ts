@@ -8,6 +8,7 @@ import type { ShownSurface } from "../state/on_screen";
 import {
   type FocusTiles,
   isInDisc,
+  marchedTile,
   NO_FOCUS,
   takenFrom,
   wantsSurface,
@@ -17,10 +18,15 @@ import type { BlendedScene, SurfaceFrame } from "./blend_material";
 import type { SurfaceLoader } from "./gltf_loader";
 import { overview, type Progress } from "./overview_progress";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
+import { type Face, faceTowards } from "./thin_rests";
 import { coarserFor, FINEST } from "./triangle_budget";
 
 /** Screen-space error, in pixels, down to which LODs are refined where frames come in time. */
 export const ERROR_TARGET_PX = 2;
+/** The presence of a volume from which the thin rests beside it are left out, 0..1. */
+const RESTS_GO_AT = 0.5;
+
+const CLOSED = { tile: null, faces: new Map<string, Face>() };
 
 export class SurfaceSet {
   /** In um, world. */
@@ -28,6 +34,8 @@ export class SurfaceSet {
   private readonly tilesets = new Map<string, SurfaceTileset>();
   private state: ViewerState | null = null;
   private focusTiles: FocusTiles = NO_FOCUS;
+  /** The tile that is drawn as a volume, and the faces of its neighbours towards it, by neighbour. */
+  private open: Readonly<{ tile: string | null; faces: ReadonlyMap<string, Face> }> = CLOSED;
   /** Whether the first picture is whole. */
   private hasBegun = false;
   private errorTarget_px = ERROR_TARGET_PX;
@@ -122,6 +130,7 @@ export class SurfaceSet {
   follow(state: ViewerState, focusTiles: FocusTiles): void {
     this.state = state;
     this.focusTiles = focusTiles;
+    this.openTile(marchedTile(state, focusTiles));
     for (const channel of state.channels) {
       const isWanted = wantsSurface(state, channel);
       if (isWanted && channel.hasSurface && !this.tilesets.has(channel.id)) this.add(channel.id);
@@ -185,6 +194,21 @@ export class SurfaceSet {
       rank: state.channels.filter((each) => each.shown).indexOf(channel),
     });
     paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
+    const { open } = this;
+    const isOpen = open.tile !== null && this.presence(open.tile, id) >= RESTS_GO_AT;
+    surface.leaveRestsOut((isOpen && open.faces.get(tile.id)) || null);
+  }
+
+  private openTile(id: string | null): void {
+    if (id === this.open.tile) return;
+    const { tiles } = this.bundle.manifest;
+    const opened = tiles.find((tile) => tile.id === id);
+    const faces = new Map<string, Face>();
+    for (const tile of opened === undefined ? [] : tiles) {
+      const face = opened && faceTowards(tile.bounds_um, opened.bounds_um);
+      if (face) faces.set(tile.id, face);
+    }
+    this.open = { tile: id, faces };
   }
 
   dispose(): void {

@@ -9,6 +9,7 @@ import { TilesRenderer } from "3d-tiles-renderer";
 import type { Tile } from "3d-tiles-renderer/core";
 import {
   Box3,
+  type BufferGeometry,
   type Camera,
   Color,
   DoubleSide,
@@ -31,6 +32,7 @@ import { branchOf, leaveOut, putBack } from "./failed_branch";
 import { TilesetFiles } from "./fetch_content";
 import type { SurfaceLoader } from "./gltf_loader";
 import type { TileProgress } from "./overview_progress";
+import { type Face, leaveRestsOut } from "./thin_rests";
 import type { Coarser, Levels } from "./triangle_budget";
 
 const UM_PER_METRE = 1e6;
@@ -47,9 +49,14 @@ export type Surface = Readonly<{
   materials: readonly MeshStandardMaterial[];
   /** Linear, as the glb has it. */
   colors: readonly Rgb[];
+  /** Those that are drawn when it is on screen. */
   triangles: number;
   blend: BlendedSurface;
+  /** Leave the thin rests at a face out from now on; null: draw all. */
+  leaveRestsOut: (face: Face | null) => void;
 }>;
+
+type PlacedMesh = Readonly<{ geometry: BufferGeometry; toWorld: Matrix4 }>;
 
 export class SurfaceTileset {
   readonly group = new Group();
@@ -239,11 +246,9 @@ export class SurfaceTileset {
   private adopt(scene: Object3D, tile: Tile): void {
     const materials = new Set<MeshStandardMaterial>();
     let id: string | null = null;
-    let triangles = 0;
     scene.traverse((object) => {
       if (typeof object.userData.tile === "string") id = object.userData.tile;
       if (!(object instanceof Mesh)) return;
-      triangles += (object.geometry.index ?? object.geometry.attributes.position).count / 3;
       for (const material of [object.material].flat() as Material[]) {
         if (material instanceof MeshStandardMaterial) materials.add(material);
       }
@@ -253,17 +258,26 @@ export class SurfaceTileset {
     }
     for (const material of materials) material.side = DoubleSide; // cut open at the tile's border
     const list = [...materials];
+    const meshes = placedMeshes(scene, this.matrix);
+    let shownFace: Face | null = null;
     const surface = {
       scene,
       tile: id,
       materials: list,
       colors: list.map(({ color }) => [color.r, color.g, color.b] as const),
-      triangles,
+      get triangles() {
+        return meshes.reduce((sum, { geometry }) => sum + drawnTriangles(geometry), 0);
+      },
       blend: new BlendedSurface(scene, list, this.frame),
+      leaveRestsOut: (face: Face | null) => {
+        if (face === shownFace) return;
+        shownFace = face;
+        for (const { geometry, toWorld } of meshes) leaveRestsOut(geometry, toWorld, face);
+      },
     };
     this.surfaces.set(scene, surface);
     if (tile.internal.depth === DEPTH_OF_COARSEST && !this.done.has(tile)) {
-      this.outermost.push(...extremePoints(somePoints(scene, this.matrix)));
+      this.outermost.push(...extremePoints(somePoints(meshes)));
     }
     this.onSurface(surface);
   }
@@ -275,20 +289,34 @@ export class SurfaceTileset {
   }
 }
 
-/** Some of the vertices of what has no parent yet, moved by a matrix. */
-function somePoints(scene: Object3D, matrix: Matrix4): readonly Vec3[] {
-  const found: Vec3[] = [];
+/** The meshes of a scene that has no parent yet. */
+function placedMeshes(scene: Object3D, toWorld: Matrix4): readonly PlacedMesh[] {
+  const found: PlacedMesh[] = [];
   scene.updateMatrixWorld(true);
   scene.traverse((object) => {
     if (!(object instanceof Mesh)) return;
-    const { position } = object.geometry.attributes;
-    const step = Math.ceil(position.count / MAX_POINTS);
-    for (let i = 0; i < position.count; i += step) {
-      const at = new Vector3().fromBufferAttribute(position, i);
-      found.push(at.applyMatrix4(object.matrixWorld).applyMatrix4(matrix).toArray());
-    }
+    const { geometry, matrixWorld } = object;
+    found.push({ geometry, toWorld: toWorld.clone().multiply(matrixWorld) });
   });
   return found;
+}
+
+function drawnTriangles({ index, attributes: { position }, drawRange }: BufferGeometry): number {
+  return Math.min((index ?? position).count, drawRange.count) / 3;
+}
+
+/** Some of the vertices, um, world. */
+function somePoints(meshes: readonly PlacedMesh[]): readonly Vec3[] {
+  return meshes.flatMap(({ geometry, toWorld }) => {
+    const { position } = geometry.attributes;
+    const step = Math.ceil(position.count / MAX_POINTS);
+    return Array.from({ length: Math.ceil(position.count / step) }, (_, i) =>
+      new Vector3()
+        .fromBufferAttribute(position, i * step)
+        .applyMatrix4(toWorld)
+        .toArray(),
+    );
+  });
 }
 
 /** Paint a surface; the colour is linear. */

@@ -5,11 +5,7 @@ import {
   BoxGeometry,
   CustomBlending,
   Data3DTexture,
-  DataArrayTexture,
-  DataTexture,
-  type DepthTexture,
   GLSL3,
-  LinearFilter,
   Matrix4,
   MaxEquation,
   Mesh,
@@ -17,19 +13,13 @@ import {
   OneFactor,
   OneMinusSrcAlphaFactor,
   RedFormat,
-  RepeatWrapping,
-  RGBAFormat,
   ShaderMaterial,
-  type Texture,
   UnsignedByteType,
-  Vector2,
   Vector3,
   Vector4,
 } from "three";
 import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { TileVolume } from "../bundle/generated/volumes";
-import { COLUMNS, ROWS } from "../bundle/transfer_2d";
-import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import {
   boxAround,
   type ClipUniforms,
@@ -37,126 +27,22 @@ import {
   type MarchClip,
   noCorner,
 } from "../gpu/clip_uniforms";
-import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
-import type { Rgb } from "../math/color";
 import { extremePoints } from "../math/extreme_points";
 import type { Vec3 } from "../math/vec3";
 import type { Compositing } from "../state/parameters/volumes";
 import { distanceInGrid } from "./blend_order";
+import { MAX_STEPS, type MarchFrame, REST_STEPS } from "./march_frame";
+import { type Appearance, MarchTables } from "./march_tables";
 import { occupiedCorners } from "./occupied_bricks";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 import { brickCounts } from "./skip_bricks";
 import { textureCorners } from "./texture_space";
 import type { Packed } from "./tile_texture";
-import { ENTRIES, edgeContrast, opacities } from "./transfer_luts";
-import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
-/** Most steps of a ray while anything moves, for any size of the volume and any number of tiles. */
-export const MAX_STEPS = 100;
-/** Most steps of a ray at rest: one a voxel through 512 of them. */
-export const REST_STEPS = 512;
-/** Opacity, 0..1, at which a ray ends. */
-const OPAQUE = 0.99;
 /** Shortest step, in voxels. */
 const STEP_VOXELS = 1;
-
-/** The light on all tiles: see gpu/chunks/shade.glsl. The directions are in the axes of the eye. */
-export type MarchLight = ReturnType<typeof marchLight>;
-
-/** Uniforms of a light that is still dark. */
-export function marchLight() {
-  return {
-    uLight: { value: new Vector3() },
-    uFill: { value: new Vector3() },
-    uKeyLight: { value: new Vector3() },
-    uFillLight: { value: new Vector3() },
-    uSkyLight: { value: new Vector3() },
-    uGroundLight: { value: new Vector3() },
-    uGloss: { value: GLOSS },
-  };
-}
-
-/** The room's own light, which surfaces have too. */
-export function lightByRoom(light: MarchLight): void {
-  light.uLight.value.set(...towards(KEY_AT)).normalize();
-  light.uFill.value.set(...towards(FILL_AT)).normalize();
-  light.uKeyLight.value.set(...KEY);
-  light.uFillLight.value.set(...FILL);
-  light.uSkyLight.value.set(...SKY);
-  light.uGroundLight.value.set(...GROUND);
-  light.uGloss.value = GLOSS;
-}
-
-/** Uniforms that all tiles share in a frame, by reference. */
-export type MarchFrame = Readonly<{
-  uSceneDepth: { value: DepthTexture };
-  /** Of the nearest translucent surface, if there is any. */
-  uPaneDepth: { value: DepthTexture };
-  uHasPane: { value: boolean };
-  uNoise: { value: Texture };
-  /** By how much the noise is shifted in this frame, 0..1. */
-  uPhase: { value: number };
-  /** The eye's part of the picture, and of the march: x, y, width, height in pixels of each. */
-  uEye: { value: Vector4 };
-  uPart: { value: Vector4 };
-  /** Tangents from the eye's axis by its clip space: factor, offset; 0: it looks through no lens. */
-  uLens: { value: Vector4 };
-  /** Cosines of the disc's inner and outer radius; below -1 the disc is everything. */
-  uDisc: { value: Vector2 };
-  /** Cosine of the radius within which the disc is marched. */
-  uReach: { value: number };
-  /** Whether all that is marched shows in the disc alone: then its picture is mixed with the surfaces'. */
-  uIsCrossing: { value: boolean };
-  uSteps: { value: number };
-  /** Light that comes to each cell of a coarse grid, and by how much it counts, 0..1. */
-  uReached: { value: Data3DTexture | null };
-  uDepthShading: { value: number };
-  /** Factor to the opacities' optical depth. */
-  uDensity: { value: number };
-}> &
-  MarchLight;
-
-/** Depth of what is opaque, and of the nearest that is translucent. */
-export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
-  const noise = new DataTexture(blueNoise(), NOISE_SIZE, NOISE_SIZE, RedFormat, UnsignedByteType);
-  noise.wrapS = noise.wrapT = RepeatWrapping;
-  noise.minFilter = noise.magFilter = NearestFilter;
-  noise.needsUpdate = true;
-  const light = marchLight();
-  lightByRoom(light);
-  return {
-    ...light,
-    uSceneDepth: { value: depth },
-    uPaneDepth: { value: pane },
-    uHasPane: { value: false },
-    uNoise: { value: noise },
-    uPhase: { value: 0 },
-    uEye: { value: new Vector4(0, 0, 1, 1) },
-    uPart: { value: new Vector4(0, 0, 1, 1) },
-    uLens: { value: new Vector4(0, 0, 0, 0) },
-    uDisc: { value: new Vector2(-2, -3) },
-    uReach: { value: -1 },
-    uIsCrossing: { value: false },
-    uSteps: { value: MAX_STEPS },
-    uReached: { value: null },
-    uDepthShading: { value: 0 },
-    uDensity: { value: 1 },
-  };
-}
-
-/** How one channel of a tile looks. */
-export type Appearance = Readonly<{
-  color: Rgb;
-  /** 256 RGBA entries, of `lookUpTable`; beside a 2D table, what of it shows at any gradient. */
-  table: Uint8Array;
-  /** A two-dimensional transfer function. */
-  table2d?: TransferTable2d | null;
-  /** Part of the intensities, 0..1, that is shown from dark to bright; absent: all. */
-  window?: readonly [number, number];
-  isInDisc: boolean;
-}>;
-
-const ALL = [0, 1] as const;
+/** Opacity, 0..1, at which a ray ends. */
+const OPAQUE = 0.99;
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
 
 function skipTexture(skips: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
@@ -166,19 +52,6 @@ function skipTexture(skips: Uint8Array<ArrayBuffer>, size: readonly [number, num
   texture.minFilter = texture.magFilter = NearestFilter;
   texture.unpackAlignment = 1;
   texture.needsUpdate = true;
-  return texture;
-}
-
-function emptyTables2d(channels: number): DataArrayTexture {
-  const texture = new DataArrayTexture(
-    new Uint8Array(channels * ROWS * COLUMNS * 4),
-    COLUMNS,
-    ROWS,
-    channels,
-  );
-  texture.format = RGBAFormat;
-  texture.type = UnsignedByteType;
-  texture.minFilter = texture.magFilter = LinearFilter;
   return texture;
 }
 
@@ -197,15 +70,7 @@ export class TileMarch {
   /** All zero, nothing may be skipped, until the table has come. */
   private readonly skips: Uint8Array<ArrayBuffer>;
   private readonly occupancy: Data3DTexture;
-  private readonly lut: DataTexture;
-  /** The tables of value and gradient, a layer each channel; null: no channel has needed any. */
-  private tables2d: DataArrayTexture | null = null;
-  /** The content of each layer; null: a table that knows no gradients. */
-  private readonly layers: (Uint8Array | null)[] = [];
-  /** Goes up with each change of the tables. */
-  looks = 0;
-  /** Of each channel, whether it shows in the disc alone. */
-  private inDisc: readonly boolean[] = [];
+  readonly tables: MarchTables;
   private readonly low: Vector3;
   private readonly toTile: Matrix4;
   /** Between the world and the box from its low corner. */
@@ -223,9 +88,7 @@ export class TileMarch {
     const { low, high } = textureCorners(volume);
     const intervals = volume.size.map((n) => n - 1 - 2 * volume.apron);
     const voxel = Math.min(...size.toArray().map((edge, i) => edge / Math.max(1, intervals[i])));
-    const rows = new Uint8Array(channelCount * ENTRIES * 4);
-    this.lut = new DataTexture(rows, ENTRIES, channelCount, RGBAFormat, UnsignedByteType);
-    this.lut.minFilter = this.lut.magFilter = LinearFilter;
+    this.tables = new MarchTables(channelCount);
     const bricks = brickCounts(volume.size);
     this.skips = new Uint8Array(bricks[0] * bricks[1] * bricks[2]);
     this.occupancy = skipTexture(this.skips, bricks);
@@ -241,21 +104,16 @@ export class TileMarch {
       depthWrite: false,
       uniforms: {
         ...frame,
+        ...this.tables.uniforms,
         uSize: { value: size },
         uTexLow: { value: low },
         uTexHigh: { value: high },
         uTexels: { value: new Vector3(...volume.size) },
         uVoxel: { value: voxel },
         uMinStep: { value: voxel },
-        uFloor: { value: new Vector4(1, 1, 1, 1) },
-        uContrast: { value: new Vector4(1, 1, 1, 1) },
-        uWindowLow: { value: new Vector4() },
-        uWindowHigh: { value: new Vector4(1, 1, 1, 1) },
         uBrickSlack: { value: 0 },
         uToShading: { value: new Matrix4() },
         uShadingCell: { value: 0 },
-        uColor: { value: Array.from({ length: channelCount }, () => new Vector3()) },
-        uInDisc: { value: [false, false, false, false] },
         uAllInDisc: { value: false },
         uApex: { value: new Vector3() },
         uAxis: { value: new Vector3(0, 0, -1) },
@@ -272,9 +130,6 @@ export class TileMarch {
         uOldVolume: { value: null },
         uFresh: { value: 1 },
         uOccupancy: { value: this.occupancy },
-        uLut: { value: this.lut },
-        uTables2d: { value: null },
-        ...tableUniforms(),
       },
     });
     const matrix = new Matrix4().fromArray(volume.matrix);
@@ -318,11 +173,6 @@ export class TileMarch {
     return this.mesh.material.uniforms.uVoxel.value;
   }
 
-  /** The opacities of a channel's table, as it is drawn. */
-  opacitiesOf(channel: number): Uint8Array {
-    return opacities((this.lut.image.data as Uint8Array).subarray(channel * ENTRIES * 4));
-  }
-
   /** Grow a box of the world, um, round this one. */
   growBox(min: Vector3, max: Vector3): void {
     const { x, y, z } = this.mesh.material.uniforms.uSize.value;
@@ -340,7 +190,7 @@ export class TileMarch {
     const size: Vector3 = uSize.value;
     const corners = occupiedCorners(
       ranges,
-      this.opacitiesOf(channel),
+      this.tables.opacitiesOf(channel),
       brickCounts(this.volume.size),
     );
     const across = uTexHigh.value.clone().sub(uTexLow.value);
@@ -388,76 +238,18 @@ export class TileMarch {
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
   }
 
-  /** Whether all of its channels show in the disc alone. */
-  get isInDisc(): boolean {
-    return this.inDisc.length > 0 && this.inDisc.every((is) => is);
-  }
-
-  /** Whether any of its channels does. */
-  get isPartlyInDisc(): boolean {
-    return this.inDisc.includes(true);
-  }
-
   /** March what lies in the disc's cone alone, whatever the channels. */
   endAtDisc(ends: boolean): void {
-    this.mesh.material.uniforms.uAllInDisc.value = ends || this.isInDisc;
+    this.mesh.material.uniforms.uAllInDisc.value = ends || this.tables.isInDisc;
   }
 
   /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
   setAppearances(appearances: readonly Appearance[]): boolean {
-    const { uniforms } = this.mesh.material;
-    const rows = this.lut.image.data as Uint8Array;
-    let differs = false;
-    appearances.forEach(({ color, table, isInDisc, window: [low, high] = ALL }, c) => {
-      (uniforms.uColor.value as Vector3[])[c].set(...color);
-      uniforms.uInDisc.value[c] = isInDisc;
-      uniforms.uFloor.value.setComponent(c, floorOf(table));
-      uniforms.uContrast.value.setComponent(c, edgeContrast(table));
-      uniforms.uWindowLow.value.setComponent(c, low);
-      uniforms.uWindowHigh.value.setComponent(c, high);
-      const row = rows.subarray(c * table.length, (c + 1) * table.length);
-      if (table.every((value, i) => value === row[i])) return;
-      row.set(table);
-      differs = true;
-    });
-    if (differs) {
-      this.lut.needsUpdate = true;
-      this.looks++;
-    }
-    this.fillTables2d(appearances);
-    this.inDisc = appearances.map(({ isInDisc }) => isInDisc);
+    const differs = this.tables.follow(appearances);
+    this.define("TWO_D", this.tables.isTwoD ? 1 : null);
     this.endAtDisc(false);
-    this.define("DISC", this.isPartlyInDisc ? 1 : null);
+    this.define("DISC", this.tables.isPartlyInDisc ? 1 : null);
     return differs;
-  }
-
-  /** If any channel has a table of value and gradient, all have: the others' rows are alike. */
-  private fillTables2d(appearances: readonly Appearance[]): void {
-    const isTwoD = appearances.some(({ table2d }) => table2d != null);
-    this.define("TWO_D", isTwoD ? 1 : null);
-    if (!isTwoD) return;
-    const { uniforms } = this.mesh.material;
-    this.tables2d ??= emptyTables2d(this.channelCount);
-    uniforms.uTables2d.value = this.tables2d;
-    const cells = this.tables2d.image.data as Uint8Array;
-    const { length } = appearances[0].table;
-    tablesInto(
-      uniforms as ReturnType<typeof tableUniforms>,
-      appearances.map(({ table2d }) => table2d),
-    );
-    appearances.forEach(({ table, table2d }, c) => {
-      const at = c * ROWS * length;
-      const isThere =
-        table2d != null
-          ? this.layers[c] === table2d.cells
-          : this.layers[c] === null && table.every((value, i) => value === cells[at + i]);
-      if (isThere) return;
-      cells.set(table2d?.cells ?? alikeRows(table), at);
-      this.layers[c] = table2d?.cells ?? null;
-      if (this.tables2d === null) return;
-      this.tables2d.addLayerUpdate(c); // the others stay as they are on the GPU
-      this.tables2d.needsUpdate = true;
-    });
   }
 
   /** What a ray makes of its samples, and how tiles are blended: as samples within one are. */
@@ -486,14 +278,7 @@ export class TileMarch {
   dispose(): void {
     this.mesh.removeFromParent();
     this.mesh.material.dispose();
-    this.lut.dispose();
-    this.tables2d?.dispose();
+    this.tables.dispose();
     this.occupancy.dispose();
   }
-}
-
-/** The intensity 0..1 up to which a table shows nothing; it is linear between its entries. */
-export function floorOf(table: Uint8Array): number {
-  for (let i = 0; i < ENTRIES; i++) if (table[4 * i + 3] > 0) return (i - 1) / (ENTRIES - 1);
-  return 1;
 }

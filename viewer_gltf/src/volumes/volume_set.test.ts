@@ -12,8 +12,8 @@ import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import { NO_FOCUS, wantedTiles } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
+import { makeFrame } from "./march_frame";
 import { texels } from "./mip_levels";
-import { makeFrame } from "./tile_raymarch";
 import { VolumeSet } from "./volume_set";
 import { stride } from "./volume_texture";
 

@@ -1,43 +1,26 @@
 /** All volumes on screen: shows and hides them, loads missing ones, drops unused ones. */
-import { Group, type Matrix4, Scene, Vector3 } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
-import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
-import type { MarchClip } from "../gpu/clip_uniforms";
 import type { Vec3 } from "../math/vec3";
 import type { ShownVolume } from "../state/on_screen";
-import { canBeShaded, isTraced } from "../state/parameters/volumes";
-import { isInDisc, type WantedTile } from "../state/representation";
-import { isTwoD, shapesOf } from "../state/transfer_functions_2d";
-import type { ChannelState, ViewerState } from "../state/viewer_state";
-import { BrickTile } from "./bricks/brick_atlas";
+import { isTraced } from "../state/parameters/volumes";
+import type { WantedTile } from "../state/representation";
+import type { ViewerState } from "../state/viewer_state";
 import type { BrickService } from "./bricks/brick_service";
+import { ChannelAppearances } from "./channel_appearances";
 import { ChannelLists } from "./channel_volumes";
-import { OccupancyClient } from "./empty_space_client";
-import { CoarseTexels } from "./light/coarse_texels";
-import type { DepthShading, Marched } from "./light/depth_shading";
 import { LoadQueue } from "./load_queue";
+import type { MarchFrame } from "./march_frame";
+import { Marches, type MarchView } from "./marches";
 import { levelsToFetch, type VolumeLimits } from "./mip_levels";
 import { Residency, type Resident } from "./residency";
-import { brickCounts } from "./skip_bricks";
-import { type Appearance, floorOf, type MarchFrame, TileMarch } from "./tile_raymarch";
-import { type Packed, TileTexture } from "./tile_texture";
-import { tracedTable, tracedTable2d } from "./traced_table";
-import { lookUpTable, opacities } from "./transfer_luts";
-import { NO_ENTRIES, type TransferTable2d, transferTable2d } from "./transfer_table_2d";
+import { TileTexture } from "./tile_texture";
 import type { VolumeSource } from "./volume_source";
 import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
 /** Most bytes of a channel in a tile, where the march only stands in for paths of light. */
 const STAND_IN_BYTES = 2 ** 21;
-type MadeTable2d = Readonly<{
-  shapes: Shapes;
-  transfer2d: Transfer2d;
-  window: readonly [number, number];
-  opacity: number;
-  table: TransferTable2d;
-}>;
 
 export type VolumeStatus = Readonly<{
   tile: string;
@@ -47,27 +30,20 @@ export type VolumeStatus = Readonly<{
 }>;
 
 export class VolumeSet {
-  readonly scene = new Scene();
-  private readonly group = new Group();
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
-  private readonly occupancy = new OccupancyClient();
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
-  /** What shades; its code comes with the first volumes that are shaded. */
-  private shading: DepthShading | null = null;
-  private shadingIs: "none" | "coming" | "there" | "failed" = "none";
-  /** The last table of each channel: all tiles ask for the same. */
-  private readonly tables2d = new Map<string, MadeTable2d>();
+  /** What is drawn. */
+  readonly marches: Marches;
+  readonly appearances: ChannelAppearances;
   private state: ViewerState | null = null;
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
-  /** Tables of skips that are being made. */
-  private skipsUnderWay = 0;
   private hasReportedLimit = false;
 
   constructor(
     bundle: Bundle,
-    private readonly frame: MarchFrame,
+    frame: MarchFrame,
     private limits: VolumeLimits,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
@@ -80,15 +56,13 @@ export class VolumeSet {
       this.onChange();
     };
     this.channels = new ChannelLists(bundle, onList, onError);
-    this.group.matrixAutoUpdate = false;
-    this.scene.add(this.group);
+    this.appearances = new ChannelAppearances(this.channels);
+    this.marches = new Marches(this.residents, this.appearances, frame, onChange, onError);
   }
 
   get isLoading(): boolean {
     return (
-      this.skipsUnderWay > 0 ||
-      this.shadingIs === "coming" ||
-      this.shading?.isLoading === true ||
+      this.marches.isLoading ||
       this.channels.isLoading ||
       this.residents.all.some(({ texture }) => texture.isLoading)
     );
@@ -103,25 +77,14 @@ export class VolumeSet {
     });
   }
 
-  /** Whether anything is to be marched. */
-  get isEmpty(): boolean {
-    return !this.group.children.some(({ visible }) => visible);
-  }
-
   /** Whether all that is marched shows in the disc alone. */
   get isInDisc(): boolean {
-    const drawn = this.drawn();
-    return drawn.length > 0 && drawn.every(({ march }) => march.isInDisc);
+    return this.marches.isInDisc;
   }
 
-  /** Whether of what is marched some shows in the disc alone, and some beyond it too. */
-  get isPartlyInDisc(): boolean {
-    return !this.isInDisc && this.drawn().some(({ march }) => march.isPartlyInDisc);
-  }
-
-  /** March what lies in the disc's cone alone, whatever the channels; false: as each shows. */
-  endAtDisc(ends: boolean): void {
-    for (const { march } of this.drawn()) march.endAtDisc(ends);
+  /** Before every frame: where all is seen from. See `Marches`. */
+  aim(view: MarchView): void {
+    this.marches.aim(this.state, view);
   }
 
   /** Bytes on the GPU. */
@@ -141,10 +104,7 @@ export class VolumeSet {
 
   /** A text that changes with what a march would draw: with the levels that have come, and in each step of a fade. */
   get marchKey(): string {
-    const drawn = this.drawn().map(({ march, packed, resident: { texture, presence } }) => [
-      ...[march.volume.tile, packed.channels, packed.level, texture.fresh, presence],
-    ]);
-    return JSON.stringify([this.status(), drawn]);
+    return JSON.stringify([this.status(), this.marches.key]);
   }
 
   /** How far the volume of a channel in a tile has faded in, 0..1. */
@@ -171,16 +131,7 @@ export class VolumeSet {
 
   /** The channels of the tiles that are on screen. */
   shown(): readonly ShownVolume[] {
-    const { state } = this;
-    return this.residents.byTile.flatMap(([tile, { march, packed, texture }]) => {
-      if (state === null || packed === null || !march?.mesh.visible) return [];
-      return packed.channels.flatMap((channel) => {
-        const source = texture.kept.get(channel);
-        if (source === undefined) return [];
-        const { table, isInDisc } = this.appearance(state, channel);
-        return [{ tile, channel, source, table, isInDisc }];
-      });
-    });
+    return this.state === null ? [] : this.marches.shown(this.state);
   }
 
   /** Outermost points, um, world, of what a channel shows as volumes; null: not all has come. */
@@ -206,58 +157,10 @@ export class VolumeSet {
     );
   }
 
-  /** Places the volumes: they lie in the specimen's world. `specimen` is its pose in the room. */
-  placeAs(specimen: Matrix4): void {
-    this.group.matrix.copy(specimen);
-    this.group.matrixWorldNeedsUpdate = true;
-  }
-
-  /** Before every frame. `eye` and the disc's cone in um, world; `lamp`: the direction towards it. */
-  aim(eye: Vector3, apex: Vector3, axis: Vector3, clip: MarchClip, lamp: Vector3): void {
-    const boxes = new Bounds();
-    const drawn = this.drawn();
-    for (const { march } of drawn) boxes.add(march);
-    this.shade(drawn, clip, lamp);
-    const { state } = this;
-    this.frame.uDensity.value = state !== null && isTraced(state) ? state.trace.density : 1;
-    for (const { march } of drawn) {
-      this.shading?.place(march);
-      march.sortBy(eye);
-      march.aim(apex, axis);
-      march.clip(clip);
-      march.shareWith(boxes.min, boxes.max, boxes.count);
-    }
-  }
-
-  private shade(drawn: readonly Marched[], clip: MarchClip, lamp: Vector3): void {
-    const { state, frame, onChange, onError } = this;
-    const strength = state !== null && canBeShaded(state) ? state.depthShading : 0;
-    if (strength > 0 && drawn.length > 0 && this.shadingIs === "none") {
-      this.shadingIs = "coming";
-      import("./light/depth_shading")
-        .then(({ DepthShading }) => {
-          this.shading = new DepthShading(
-            frame,
-            new CoarseTexels(onChange, onError),
-            onChange,
-            onError,
-          );
-          this.shadingIs = "there";
-        })
-        .catch((error: unknown) => {
-          this.shadingIs = "failed"; // volumes are drawn without
-          onError(error);
-        })
-        .finally(onChange);
-    }
-    this.shading?.set(strength);
-    this.shading?.follow(drawn, clip, lamp);
-  }
-
   /** Go on with all fades; whether any is still under way. */
   advance(dt_s: number): boolean {
     const isFading = this.residents.advance(dt_s);
-    for (const resident of this.residents.all) this.show(resident);
+    this.marches.show();
     return isFading;
   }
 
@@ -277,7 +180,7 @@ export class VolumeSet {
     for (const each of wanted) this.want(each);
     this.channels.forgetFailed(wanted.flatMap(({ channels }) => channels));
     this.residents.evict();
-    for (const resident of this.residents.all) this.setAppearances(resident);
+    for (const [tile] of this.residents.byTile) this.march(tile);
   }
 
   /** From the next `follow` on. */
@@ -308,10 +211,10 @@ export class VolumeSet {
     if (first === undefined) return;
     this.reportLimit(first);
     const isStandIn = this.state !== null && isTraced(this.state);
-    const share = this.share / stride(sources.size);
+    const bytes = this.residents.share(this.wanted.length) / stride(sources.size);
     const levels = levelsToFetch(
       first.volume.levels,
-      isStandIn ? Math.min(share, STAND_IN_BYTES) : share,
+      isStandIn ? Math.min(bytes, STAND_IN_BYTES) : bytes,
       Math.min(this.limits.side, this.limits.edge),
     );
     const finest = levels[levels.length - 1];
@@ -324,21 +227,15 @@ export class VolumeSet {
     const longest = Math.max(...volume.size);
     if (longest <= side || this.hasReportedLimit) return;
     this.hasReportedLimit = true;
-    this.onError(
-      new BundleError(
-        `This device draws volumes of at most ${side} voxels along an edge: ` +
-          `those of ${longest} are shown at a coarser level.`,
-      ),
-    );
+    this.onError(tooLong(longest, side));
   }
 
   private addTile(tile: string): Resident {
     const onChange = () => {
-      const resident = this.residents.get(tile);
-      if (resident !== undefined) this.setAppearances(resident);
+      this.march(tile);
       this.onChange();
     };
-    const limits = { ...this.limits, bytes: this.share };
+    const limits = { ...this.limits, bytes: this.residents.share(this.wanted.length) };
     const bricks = this.state !== null && isTraced(this.state) ? null : this.bricks;
     const texture =
       bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
@@ -354,176 +251,35 @@ export class VolumeSet {
     if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
   }
 
-  /** Bytes of the GPU's memory for each tile. */
-  private get share(): number {
-    return this.residents.share(this.wanted.length);
-  }
-
   private canCome(channel: string, tile: string): boolean {
     const volumes = this.channels.get(channel);
     if (volumes === undefined) return !this.channels.hasFailed(channel);
     return volumes.sources.has(tile) && !this.residents.get(tile)?.texture.hasFailed(channel);
   }
 
-  /** A march for what has come, in the colours of the state. */
-  private setAppearances(resident: Resident): void {
+  /** Make the march of what has come of a tile. */
+  private march(tile: string): void {
     const { state } = this;
-    const { shown } = resident.texture;
-    if (state === null) return;
-    if (shown === null) {
-      resident.march?.dispose();
-      resident.march = null;
-      resident.packed = null;
-      return;
-    }
-    const appearances = shown.channels.map((id) => this.appearance(state, id));
-    if (showsBelow(resident.texture, appearances)) {
-      const [{ tile }] = [...resident.texture.kept.values()].map(({ volume }) => volume);
-      this.replace(tile);
-      return;
-    }
-    const isNewSet = resident.packed?.channels.join() !== shown.channels.join();
-    const { march: before } = resident;
-    let march = before;
-    if (march === null || march.channelCount !== shown.channels.length) {
-      before?.dispose();
-      const volume = this.volumeOf(shown.channels[0], resident);
-      march = new TileMarch(volume, shown.channels.length, this.frame);
-      resident.march = march;
-      this.group.add(march.mesh);
-    }
-    resident.packed = shown;
-    march.composite(isTraced(state) ? "over" : state.compositing);
-    const differs = march.setAppearances(appearances);
-    if (differs || isNewSet || march !== before) void this.findSkips(march, shown, appearances);
+    const resident = this.residents.get(tile);
+    if (state === null || resident === undefined) return;
+    if (!this.marches.follow(resident, state)) this.replace(tile);
   }
 
-  private volumeOf(channel: string, { texture }: Resident) {
-    const source = texture.kept.get(channel);
-    if (source === undefined) throw new Error(`channel ${channel} has come without a source`);
-    return source.volume;
-  }
-
-  /** The appearance of a channel. The channel's list must have come. */
-  appearance(state: ViewerState, id: string): Appearance {
-    const appearance = this.ownAppearance(state, id);
-    if (!isTraced(state)) return appearance;
-    const { trace } = state;
-    const { table2d } = appearance;
-    if (table2d == null) return { ...appearance, table: tracedTable(appearance.table, trace) };
-    const shifted = tracedTable2d(table2d, trace);
-    return { ...appearance, table2d: shifted, table: shifted.envelope };
-  }
-
-  /** Its appearance by its transfer function alone. */
-  private ownAppearance(state: ViewerState, id: string): Appearance {
-    const channel = state.channels.find((c) => c.id === id);
-    const volumes = this.channels.get(id);
-    if (channel === undefined || volumes === undefined) {
-      throw new Error(`channel ${id} has come without a look`);
-    }
-    const table2d = this.table2dOf(channel);
-    if (table2d !== null) {
-      const { color } = channel;
-      const { window } = channel;
-      const table = table2d.envelope;
-      return { color, table, table2d, window, isInDisc: isInDisc(state, channel) };
-    }
-    const { transferFunction: name } = channel;
-    // one's own function has no one-dimensional one that stands for it
-    const entries =
-      volumes.transferFunctions.get(name) ?? (isTwoD(channel) ? NO_ENTRIES : undefined);
-    if (entries === undefined) throw new Error(`no transfer function ${name}`);
-    return {
-      color: channel.color,
-      table: lookUpTable(entries, channel.window, channel.opacity),
-      window: channel.window,
-      isInDisc: isInDisc(state, channel),
-    };
-  }
-
-  /** The table of a two-dimensional function, as soon as its shapes have come. */
-  private table2dOf(channel: ChannelState): TransferTable2d | null {
-    const { id, transfer2d, window, opacity } = channel;
-    const shapes = shapesOf(channel);
-    if (transfer2d === null || shapes.length === 0) return null;
-    const made = this.tables2d.get(id);
-    const isSame =
-      made?.shapes === shapes &&
-      made.transfer2d === transfer2d &&
-      made.window === window &&
-      made.opacity === opacity;
-    if (isSame) return made.table;
-    const table = transferTable2d(shapes, transfer2d, window, opacity);
-    this.tables2d.set(id, { shapes, transfer2d, window, opacity, table });
-    return table;
-  }
-
-  private async findSkips(
-    march: TileMarch,
-    shown: Packed,
-    appearances: readonly Appearance[],
-  ): Promise<void> {
-    march.skipBy(null); // what the old table skips over may show now
-    this.skipsUnderWay++;
-    const distances = await this.occupancy
-      .computeDistances(march.volume.tile, {
-        bricks: shown.bricks,
-        alphas: appearances.map(({ table }) => opacities(table)),
-        count: brickCounts(march.volume.size),
-      })
-      .finally(() => {
-        this.skipsUnderWay--;
-        this.onChange();
-      });
-    if (distances === null || this.residents.get(march.volume.tile)?.march !== march) return;
-    march.skipBy(distances);
-  }
-
-  private show({ march, texture, packed, presence }: Resident): void {
-    if (march === null || packed === null) return;
-    march.mesh.visible = presence > 0;
-    march.show(packed, texture.old, texture.fresh, presence);
-  }
-
-  private drawn(): Marched[] {
-    return this.residents.all.flatMap((resident) => {
-      const { march, packed } = resident;
-      return march?.mesh.visible && packed !== null ? [{ march, packed, resident }] : [];
-    });
-  }
-
-  /** Drop all that is on the GPU; what is wanted comes anew. */
+  /** Drop all that is on the GPU; what is wanted comes again. */
   forget(): void {
     this.residents.dropAll();
-    this.shading?.forget();
+    this.marches.forget();
   }
 
   dispose(): void {
     this.forget();
-    this.occupancy.dispose();
-    this.shading?.dispose();
+    this.marches.dispose();
   }
 }
 
-/** Whether functions show what bricks leave out. */
-export function showsBelow(
-  texture: TileTexture | BrickTile,
-  appearances: readonly Appearance[],
-): boolean {
-  if (!(texture instanceof BrickTile)) return false;
-  const { thresholds } = texture;
-  return appearances.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
-}
-
-/** The box round several marched tiles, um, world. */
-class Bounds {
-  readonly min = new Vector3().setScalar(Number.POSITIVE_INFINITY);
-  readonly max = new Vector3().setScalar(Number.NEGATIVE_INFINITY);
-  count = 0;
-
-  add(march: TileMarch): void {
-    march.growBox(this.min, this.max);
-    this.count++;
-  }
+function tooLong(longest: number, side: number): BundleError {
+  return new BundleError(
+    `This device draws volumes of at most ${side} voxels along an edge: ` +
+      `those of ${longest} are shown at a coarser level.`,
+  );
 }

@@ -8,6 +8,8 @@ import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "../support/browser/stand";
 
 const VIEWPORT = { width: 480, height: 270 };
+/** A tile of the demo beside which two rests of cells are thinner than 1 um. */
+const OPEN_TILE = "r0_c2";
 
 const withSurface = ({ manifest }: Stand) =>
   manifest.channels.filter(({ tileset }) => tileset !== null);
@@ -45,6 +47,20 @@ describeInChromium("the demo", () => {
         100,
       );
     }
+  });
+
+  it("draws no thin rests beside the tile that is a volume", async () => {
+    const triangles = async () => (await stand.viewer.snapshot()).triangles;
+    await stand.open(`#v=1&mode=off&tile=${OPEN_TILE}`);
+    await stand.viewer.settled();
+    const all = await triangles();
+    await stand.open(`#v=1&mode=off&only=${OPEN_TILE}`);
+    await stand.viewer.settled();
+    const own = await triangles();
+    await stand.open(`#v=1&mode=tile&switch=9&tile=${OPEN_TILE}`);
+    await stand.viewer.settled();
+    expect((await stand.viewer.snapshot()).volumes.map(({ tile }) => tile)).toContain(OPEN_TILE);
+    expect(await triangles()).toBeLessThan(all - own);
   });
 });
 

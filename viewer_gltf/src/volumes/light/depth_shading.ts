@@ -17,9 +17,10 @@ import { SKIP_BRICK } from "../../bundle/generated/constants";
 import type { TileVolume } from "../../bundle/generated/volumes";
 import type { MarchClip } from "../../gpu/clip_uniforms";
 import type { Vec3 } from "../../math/vec3";
+import type { MarchFrame } from "../march_frame";
 import type { Resident } from "../residency";
 import { textureCorners } from "../texture_space";
-import type { MarchFrame, TileMarch } from "../tile_raymarch";
+import type { TileMarch } from "../tile_raymarch";
 import type { Packed } from "../tile_texture";
 import type { VolumeSource } from "../volume_source";
 import { type Cut, type Grid, gridRound, type TileMatter } from "./coarse_matter";
@@ -79,7 +80,11 @@ export class DepthShading {
     if (tiles === null) return; // it comes with `onChange`
     const cut = cutOf(clip);
     const key = [
-      ...marched.flatMap(({ march, packed }) => [march, packed.channels.join(), march.looks]),
+      ...marched.flatMap(({ march, packed }) => [
+        march,
+        packed.channels.join(),
+        march.tables.changes,
+      ]),
       ...tiles.flatMap((tile) => tile.channels.map(({ texels }) => texels)),
       JSON.stringify(cut),
     ];
@@ -110,7 +115,7 @@ export class DepthShading {
       const isStreamed = packed.index !== null;
       const level = isStreamed ? null : levelFor(sources, edge, MAX_TEXELS / count);
       const channels = packed.channels.map((_, c) => {
-        const alphas = march.opacitiesOf(c);
+        const alphas = march.tables.opacitiesOf(c);
         if (level === null) return { texels: middles(packed, c), opacities: alphas };
         used.add(sources[c]);
         const texels = this.coarse.get(sources[c], level);

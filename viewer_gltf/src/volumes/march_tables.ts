@@ -1,0 +1,156 @@
+/** The colours and transfer functions of a tile's channels, as the march looks them up. */
+import {
+  DataArrayTexture,
+  DataTexture,
+  LinearFilter,
+  RGBAFormat,
+  UnsignedByteType,
+  Vector3,
+  Vector4,
+} from "three";
+import { COLUMNS, ROWS } from "../bundle/transfer_2d";
+import type { Rgb } from "../math/color";
+import { ENTRIES, edgeContrast, opacities } from "./transfer_luts";
+import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
+
+/** How one channel of a tile looks. */
+export type Appearance = Readonly<{
+  color: Rgb;
+  /** 256 RGBA entries, of `lookUpTable`; beside a 2D table, what of it shows at any gradient. */
+  table: Uint8Array;
+  /** A two-dimensional transfer function. */
+  table2d?: TransferTable2d | null;
+  /** Part of the intensities, 0..1, that is shown from dark to bright; absent: all. */
+  window?: readonly [number, number];
+  isInDisc: boolean;
+}>;
+
+const ALL = [0, 1] as const;
+
+function emptyTables2d(channels: number): DataArrayTexture {
+  const texture = new DataArrayTexture(
+    new Uint8Array(channels * ROWS * COLUMNS * 4),
+    COLUMNS,
+    ROWS,
+    channels,
+  );
+  texture.format = RGBAFormat;
+  texture.type = UnsignedByteType;
+  texture.minFilter = texture.magFilter = LinearFilter;
+  return texture;
+}
+
+function makeUniforms(channels: number, lut: DataTexture) {
+  return {
+    uColor: { value: Array.from({ length: channels }, () => new Vector3()) },
+    uInDisc: { value: [false, false, false, false] },
+    uFloor: { value: new Vector4(1, 1, 1, 1) },
+    uContrast: { value: new Vector4(1, 1, 1, 1) },
+    uWindowLow: { value: new Vector4() },
+    uWindowHigh: { value: new Vector4(1, 1, 1, 1) },
+    uLut: { value: lut },
+    uTables2d: { value: null as DataArrayTexture | null },
+    ...tableUniforms(),
+  };
+}
+
+export class MarchTables {
+  readonly uniforms;
+  private readonly lut: DataTexture;
+  /** The tables of value and gradient, a layer each channel; null: no channel has needed any. */
+  private tables2d: DataArrayTexture | null = null;
+  /** The content of each layer; null: a table that knows no gradients. */
+  private readonly layers: (Uint8Array | null)[] = [];
+  /** Whether each channel shows in the disc alone. */
+  private inDisc: readonly boolean[] = [];
+  /** Whether any channel has a table of value and gradient. */
+  isTwoD = false;
+  /** Goes up with each change of the tables. */
+  changes = 0;
+
+  constructor(private readonly channelCount: number) {
+    const rows = new Uint8Array(channelCount * ENTRIES * 4);
+    this.lut = new DataTexture(rows, ENTRIES, channelCount, RGBAFormat, UnsignedByteType);
+    this.lut.minFilter = this.lut.magFilter = LinearFilter;
+    this.uniforms = makeUniforms(channelCount, this.lut);
+  }
+
+  /** Whether all channels show in the disc alone. */
+  get isInDisc(): boolean {
+    return this.inDisc.length > 0 && this.inDisc.every((is) => is);
+  }
+
+  /** Whether any channel shows in the disc alone. */
+  get isPartlyInDisc(): boolean {
+    return this.inDisc.includes(true);
+  }
+
+  /** The opacities of a channel's table, as it is drawn. */
+  opacitiesOf(channel: number): Uint8Array {
+    return opacities((this.lut.image.data as Uint8Array).subarray(channel * ENTRIES * 4));
+  }
+
+  /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
+  follow(appearances: readonly Appearance[]): boolean {
+    const { uniforms } = this;
+    const rows = this.lut.image.data as Uint8Array;
+    let differs = false;
+    appearances.forEach(({ color, table, isInDisc, window: [low, high] = ALL }, c) => {
+      uniforms.uColor.value[c].set(...color);
+      uniforms.uInDisc.value[c] = isInDisc;
+      uniforms.uFloor.value.setComponent(c, floorOf(table));
+      uniforms.uContrast.value.setComponent(c, edgeContrast(table));
+      uniforms.uWindowLow.value.setComponent(c, low);
+      uniforms.uWindowHigh.value.setComponent(c, high);
+      const row = rows.subarray(c * table.length, (c + 1) * table.length);
+      if (table.every((value, i) => value === row[i])) return;
+      row.set(table);
+      differs = true;
+    });
+    if (differs) {
+      this.lut.needsUpdate = true;
+      this.changes++;
+    }
+    this.inDisc = appearances.map(({ isInDisc }) => isInDisc);
+    this.isTwoD = appearances.some(({ table2d }) => table2d != null);
+    if (this.isTwoD) this.fillTables2d(appearances);
+    return differs;
+  }
+
+  /** If any channel has a table of value and gradient, all have: the others' rows are alike. */
+  private fillTables2d(appearances: readonly Appearance[]): void {
+    const { uniforms } = this;
+    this.tables2d ??= emptyTables2d(this.channelCount);
+    const { tables2d } = this;
+    uniforms.uTables2d.value = tables2d;
+    const cells = tables2d.image.data as Uint8Array;
+    const { length } = appearances[0].table;
+    tablesInto(
+      uniforms,
+      appearances.map(({ table2d }) => table2d),
+    );
+    appearances.forEach(({ table, table2d }, c) => {
+      const at = c * ROWS * length;
+      const isThere =
+        table2d != null
+          ? this.layers[c] === table2d.cells
+          : this.layers[c] === null && table.every((value, i) => value === cells[at + i]);
+      if (isThere) return;
+      cells.set(table2d?.cells ?? alikeRows(table), at);
+      this.layers[c] = table2d?.cells ?? null;
+      tables2d.addLayerUpdate(c); // the others stay as they are on the GPU
+      tables2d.needsUpdate = true;
+    });
+  }
+
+  dispose(): void {
+    this.lut.dispose();
+    this.tables2d?.dispose();
+  }
+}
+
+/** The intensity 0..1 up to which a table shows nothing; it is linear between its entries. */
+export function floorOf(table: Uint8Array): number {
+  for (let i = 0; i < ENTRIES; i++) if (table[4 * i + 3] > 0) return (i - 1) / (ENTRIES - 1);
+  return 1;
+}

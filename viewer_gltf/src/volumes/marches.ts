@@ -1,0 +1,223 @@
+/** The marches of all tiles whose volumes have come: a box each, with the textures and tables of its channels. */
+import { Group, type Matrix4, Scene, Vector3 } from "three";
+import type { TileVolume } from "../bundle/generated/volumes";
+import type { MarchClip } from "../gpu/clip_uniforms";
+import type { ShownVolume } from "../state/on_screen";
+import { canBeShaded, isTraced } from "../state/parameters/volumes";
+import type { ViewerState } from "../state/viewer_state";
+import { BrickTile } from "./bricks/brick_atlas";
+import type { ChannelAppearances } from "./channel_appearances";
+import { OccupancyClient } from "./empty_space_client";
+import type { Marched } from "./light/depth_shading";
+import { LaterShading } from "./light/later_shading";
+import type { MarchFrame } from "./march_frame";
+import { type Appearance, floorOf } from "./march_tables";
+import type { Residency, Resident } from "./residency";
+import { brickCounts } from "./skip_bricks";
+import { TileMarch } from "./tile_raymarch";
+import type { Packed, TileTexture } from "./tile_texture";
+import { opacities } from "./transfer_luts";
+
+/** Where a frame is seen from: um, world. The disc's cone has an apex and an axis; `lamp` is the direction towards it. */
+export type MarchView = Readonly<{
+  eye: Vector3;
+  apex: Vector3;
+  axis: Vector3;
+  clip: MarchClip;
+  lamp: Vector3;
+}>;
+
+export class Marches {
+  readonly scene = new Scene();
+  private readonly group = new Group();
+  private readonly occupancy = new OccupancyClient();
+  private readonly shading: LaterShading;
+  /** Tables of skips that are being computed. */
+  private skipsUnderWay = 0;
+
+  constructor(
+    private readonly residents: Residency,
+    private readonly appearances: ChannelAppearances,
+    private readonly frame: MarchFrame,
+    private readonly onChange: () => void,
+    onError: (error: unknown) => void,
+  ) {
+    this.shading = new LaterShading(frame, onChange, onError);
+    this.group.matrixAutoUpdate = false;
+    this.scene.add(this.group);
+  }
+
+  get isLoading(): boolean {
+    return this.skipsUnderWay > 0 || this.shading.isLoading;
+  }
+
+  /** Whether anything is to be marched. */
+  get isEmpty(): boolean {
+    return !this.group.children.some(({ visible }) => visible);
+  }
+
+  /** Whether all that is marched shows in the disc alone. */
+  get isInDisc(): boolean {
+    const { drawn } = this;
+    return drawn.length > 0 && drawn.every(({ march }) => march.tables.isInDisc);
+  }
+
+  /** Whether of what is marched some shows in the disc alone, and some beyond it too. */
+  get isPartlyInDisc(): boolean {
+    return !this.isInDisc && this.drawn.some(({ march }) => march.tables.isPartlyInDisc);
+  }
+
+  /** March what lies in the disc's cone alone, whatever the channels; false: as each shows. */
+  endAtDisc(ends: boolean): void {
+    for (const { march } of this.drawn) march.endAtDisc(ends);
+  }
+
+  /** Those on screen. */
+  get drawn(): readonly Marched[] {
+    return this.residents.all.flatMap((resident) => {
+      const { march, packed } = resident;
+      return march?.mesh.visible && packed !== null ? [{ march, packed, resident }] : [];
+    });
+  }
+
+  /** Values that change with what is drawn, as a level that has come and each step of a fade. */
+  get key(): readonly unknown[] {
+    return this.drawn.map(({ march, packed, resident: { texture, presence } }) => [
+      ...[march.volume.tile, packed.channels, packed.level, texture.fresh, presence],
+    ]);
+  }
+
+  /** The channels of the tiles that are on screen. */
+  shown(state: ViewerState): readonly ShownVolume[] {
+    return this.drawn.flatMap(({ march, packed, resident: { texture } }) =>
+      packed.channels.flatMap((channel) => {
+        const source = texture.kept.get(channel);
+        if (source === undefined) return [];
+        const { table, isInDisc } = this.appearances.of(state, channel);
+        return [{ tile: march.volume.tile, channel, source, table, isInDisc }];
+      }),
+    );
+  }
+
+  /** Make the march of what has come of a tile, by the state. Returns false if its bricks lack what shows now. */
+  follow(resident: Resident, state: ViewerState): boolean {
+    const { shown } = resident.texture;
+    if (shown === null) {
+      resident.march?.dispose();
+      resident.march = null;
+      resident.packed = null;
+      return true;
+    }
+    const appearances = shown.channels.map((id) => this.appearances.of(state, id));
+    if (showsBelow(resident.texture, appearances)) return false;
+    const isNewSet = resident.packed?.channels.join() !== shown.channels.join();
+    const { march: before } = resident;
+    const march = this.marchOf(resident, shown);
+    resident.packed = shown;
+    march.composite(isTraced(state) ? "over" : state.compositing);
+    const differs = march.setAppearances(appearances);
+    if (differs || isNewSet || march !== before) void this.findSkips(march, shown, appearances);
+    return true;
+  }
+
+  private marchOf(resident: Resident, { channels }: Packed): TileMarch {
+    const { march: before } = resident;
+    if (before?.channelCount === channels.length) return before;
+    before?.dispose();
+    const march = new TileMarch(volumeOf(channels[0], resident), channels.length, this.frame);
+    resident.march = march;
+    this.group.add(march.mesh);
+    return march;
+  }
+
+  private async findSkips(
+    march: TileMarch,
+    shown: Packed,
+    appearances: readonly Appearance[],
+  ): Promise<void> {
+    march.skipBy(null); // what the old table skips over may show now
+    this.skipsUnderWay++;
+    const distances = await this.occupancy
+      .computeDistances(march.volume.tile, {
+        bricks: shown.bricks,
+        alphas: appearances.map(({ table }) => opacities(table)),
+        count: brickCounts(march.volume.size),
+      })
+      .finally(() => {
+        this.skipsUnderWay--;
+        this.onChange();
+      });
+    if (distances === null || this.residents.get(march.volume.tile)?.march !== march) return;
+    march.skipBy(distances);
+  }
+
+  /** Show each march as far as it has faded in. */
+  show(): void {
+    for (const { march, texture, packed, presence } of this.residents.all) {
+      if (march === null || packed === null) continue;
+      march.mesh.visible = presence > 0;
+      march.show(packed, texture.old, texture.fresh, presence);
+    }
+  }
+
+  /** The volumes lie in the specimen's world; `specimen` is its pose in the scene. */
+  placeAs(specimen: Matrix4): void {
+    this.group.matrix.copy(specimen);
+    this.group.matrixWorldNeedsUpdate = true;
+  }
+
+  /** Before every frame. */
+  aim(state: ViewerState | null, { eye, apex, axis, clip, lamp }: MarchView): void {
+    const boxes = new Bounds();
+    const { drawn } = this;
+    for (const { march } of drawn) boxes.add(march);
+    const strength = state !== null && canBeShaded(state) ? state.depthShading : 0;
+    this.shading.follow(drawn, strength, clip, lamp);
+    this.frame.uDensity.value = state !== null && isTraced(state) ? state.trace.density : 1;
+    for (const { march } of drawn) {
+      this.shading.place(march);
+      march.sortBy(eye);
+      march.aim(apex, axis);
+      march.clip(clip);
+      march.shareWith(boxes.min, boxes.max, boxes.count);
+    }
+  }
+
+  /** Drop what is on the GPU beside the residents' own. */
+  forget(): void {
+    this.shading.forget();
+  }
+
+  dispose(): void {
+    this.occupancy.dispose();
+    this.shading.dispose();
+  }
+}
+
+function volumeOf(channel: string, { texture }: Resident): TileVolume {
+  const source = texture.kept.get(channel);
+  if (source === undefined) throw new Error(`channel ${channel} has come without a source`);
+  return source.volume;
+}
+
+/** Whether functions show what bricks leave out. */
+export function showsBelow(
+  texture: TileTexture | BrickTile,
+  appearances: readonly Appearance[],
+): boolean {
+  if (!(texture instanceof BrickTile)) return false;
+  const { thresholds } = texture;
+  return appearances.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
+}
+
+/** The box round several marched tiles, um, world. */
+class Bounds {
+  readonly min = new Vector3().setScalar(Number.POSITIVE_INFINITY);
+  readonly max = new Vector3().setScalar(Number.NEGATIVE_INFINITY);
+  count = 0;
+
+  add(march: TileMarch): void {
+    march.growBox(this.min, this.max);
+    this.count++;
+  }
+}
