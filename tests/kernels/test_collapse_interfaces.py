@@ -1,9 +1,10 @@
-"""Walls that are simplified: lines and corners between several of them."""
+"""Interfaces that are simplified: lines and corners between several of them."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.collapse_walls import collapse_walls, find_orders
+from stereocell.kernels.collapse import collapse_interfaces
+from stereocell.kernels.interface_rings import find_orders
 
 SHARPEST = float(np.cos(np.radians(12)))
 
@@ -35,8 +36,8 @@ def simplified(
     at: NDArray[np.float64], triangles: NDArray[np.int32], error: float = 0.05
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     free = np.zeros(len(at), bool)
-    left, gone, _ = collapse(at, triangles, free, error)
-    return left[~gone], gone
+    left, is_left, _ = collapse(at, triangles, free, error)
+    return left[is_left], is_left
 
 
 def collapse(
@@ -48,12 +49,12 @@ def collapse(
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.int32]]:
     past = np.zeros((0, 2), np.int32) if past is None else past
     errors, orders = np.full(len(at), error), find_orders(triangles, len(at))
-    return collapse_walls(at, triangles, locked, errors, 3.0, SHARPEST, orders, past)
+    return collapse_interfaces(at, triangles, locked, errors, 3.0, SHARPEST, orders, past)
 
 
 def test_three_half_planes_keep_their_line_and_their_borders() -> None:
     at, triangles = sheets((0, 110, 230))
-    left, gone = simplified(at, triangles)
+    left, is_left = simplified(at, triangles)
     assert len(left) < 0.6 * len(triangles)
     on_line = np.unique(left[np.isin(left, np.arange(9))])
     assert {0, 8} <= set(on_line.tolist())  # the ends lie on borders
@@ -65,7 +66,7 @@ def test_three_half_planes_keep_their_line_and_their_borders() -> None:
     area = np.linalg.norm(
         np.cross(at[left[:, 1]] - at[left[:, 0]], at[left[:, 2]] - at[left[:, 0]]), axis=1
     )
-    np.testing.assert_allclose(np.bincount(sheet[~gone], area), np.full(3, 128.0), rtol=1e-9)
+    np.testing.assert_allclose(np.bincount(sheet[is_left], area), np.full(3, 128.0), rtol=1e-9)
 
 
 def test_a_bent_line_stays_where_it_is_bent() -> None:
@@ -75,7 +76,7 @@ def test_a_bent_line_stays_where_it_is_bent() -> None:
     assert 4 in left
 
 
-def test_a_wall_within_two_objects_alone_is_simplified_like_a_surface() -> None:
+def test_an_interface_within_two_objects_alone_is_simplified_like_a_surface() -> None:
     at, triangles = sheets((0, 180))
     left, _ = simplified(at, triangles)
     inner = (np.abs(at[:, 0]) < 8) & (at[:, 2] > 0) & (at[:, 2] < 8)
@@ -83,38 +84,38 @@ def test_a_wall_within_two_objects_alone_is_simplified_like_a_surface() -> None:
 
 
 def test_a_tetrahedron_and_two_that_share_a_face_stay() -> None:
-    """Any collapse would lay walls on one another."""
+    """Any collapse would lay interfaces on one another."""
     at = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.9, 0], [0.5, 0.3, 0.8], [0.5, 0.3, -0.8]])
     faces = [(0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3), (1, 0, 4), (2, 1, 4), (0, 2, 4)]
     for triangles in (faces[:4], faces):
         given = np.array(triangles, np.int32)
-        left, gone = simplified(at, given, error=10.0)
-        assert not gone.any()
+        left, is_left = simplified(at, given, error=10.0)
+        assert is_left.all()
         np.testing.assert_array_equal(left, given)
 
 
 def test_locked_vertices_stay() -> None:
     at, triangles = sheets((0, 110, 230))
     locked = np.ones(len(at), bool)
-    _, gone, _ = collapse(at, triangles, locked, 1.0)
-    assert not gone.any()
+    _, is_left, _ = collapse(at, triangles, locked, 1.0)
+    assert is_left.all()
 
 
 def test_what_was_done_before_is_done_again_but_round_what_is_locked_now() -> None:
     at, triangles = sheets((0, 110, 230), cells=20)
     at += np.random.default_rng(4).normal(scale=0.02, size=at.shape)
     free = np.zeros(len(at), bool)
-    first, gone, made = collapse(at, triangles, free, 0.1)
-    again, gone_again, same = collapse(at, triangles, free, 0.1, made)
-    np.testing.assert_array_equal(first[~gone], again[~gone_again])
+    first, is_left, made = collapse(at, triangles, free, 0.1)
+    again, is_left_again, same = collapse(at, triangles, free, 0.1, made)
+    np.testing.assert_array_equal(first[is_left], again[is_left_again])
     np.testing.assert_array_equal(made, same)
     locked = free.copy()
     locked[made[len(made) // 2]] = True
     moved, kept = made[len(made) // 2]
-    left, gone_now, _ = collapse(at, triangles, locked, 0.1, made)
-    assert {moved, kept} <= set(left[~gone_now].ravel().tolist())
+    left, is_left_now, _ = collapse(at, triangles, locked, 0.1, made)
+    assert {moved, kept} <= set(left[is_left_now].ravel().tolist())
     # far from there all is as before
     far = np.linalg.norm(at - at[kept], axis=1) > 8
     was, now = ({tuple(t) for t in some if far[t].all()} for some in
-                (first[~gone].tolist(), left[~gone_now].tolist()))  # fmt: skip
+                (first[is_left].tolist(), left[is_left_now].tolist()))  # fmt: skip
     assert len(was & now) > 0.8 * len(was) > 50
