@@ -74,7 +74,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture careless bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture careless bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences format-table clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -398,6 +398,9 @@ platforms: setup ## Resolve the requirements for each system and Python, and wri
 
 licences: $(READY) ## Write docs/licences.md from the packages that are installed
 	$(BIN)/python docs/licences.py
+
+format-table: $(READY) ## Write the table of formats in docs/own-data.md from the formats' rows
+	$(BIN)/python docs/format_table.py
 
 clean: ## Remove .venv, the viewer's packages and build, and caches; builds in out/ stay
 	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

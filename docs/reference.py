@@ -248,7 +248,7 @@ def commands_page() -> str:
 
 def settings_page() -> str:
     """Return the page of every setting, and of what each preset changes."""
-    from stereocell.building import settings as settings_module
+    from stereocell.planning import settings as settings_module
 
     parts = [
         "# Settings",

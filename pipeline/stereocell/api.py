@@ -51,15 +51,15 @@ def build(
         built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
     """
     from stereocell.building import phases
-    from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import require_build_or_nothing
-    from stereocell.building.preset_choice import load_for
-    from stereocell.building.setting_names import named_as_settings
     from stereocell.engine.run import Engine
     from stereocell.engine.worker_pool import leave_if_importing_main
+    from stereocell.planning.preset_choice import load_for
+    from stereocell.planning.setting_names import named_as_settings
+    from stereocell.read.source_place import require_apart
     from stereocell.report import phase as report_phase
     from stereocell.storage.claim import LOCK
-    from stereocell.storage.location import Location, require_apart
+    from stereocell.storage.location import Location
     from stereocell.storage.lock import alone_in
     from stereocell.storage.overwriting import IN_PYTHON, forcing
     from stereocell.storage.shell_commands import as_shown, filling_in
@@ -102,10 +102,10 @@ def build(
         wanted, choice = load_for(source, preset, file, flags=settings or {}, where="settings")
         engine = Engine(workers, scheduler, folder / LOCK if place.is_local else None)
         stack.callback(engine.close)
-        phases.make(str(source), folder, wanted, choice=choice, engine=engine)
+        phases.make_plan(str(source), folder, wanted, choice=choice, engine=engine)
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
-        run_bundle(folder, engine)
+        phases.run_bundle(folder, engine)
         report_phase.run_report(folder)
     parts = ("stage/stage.usda", "bundle/index.html", "report/index.html")
     return Built(shown, *(f"{shown}/{part}" for part in parts))
@@ -125,7 +125,7 @@ def open_volume(source: str | Path, **options: Any) -> "Dataset":
         volume = dataset.read(0, dataset.levels[-1].box, level=len(dataset.levels) - 1)
     """
     from stereocell import read
-    from stereocell.building.setting_names import named_as_settings
+    from stereocell.planning.setting_names import named_as_settings
 
     with named_as_settings(has_sections=False):
         return read.open(source, **options)

@@ -17,7 +17,6 @@ from skimage import measure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from stereocell.building import phases
-from stereocell.building import settings as settings_module
 from stereocell.engine.run import Engine
 from stereocell.filters import denoise
 from stereocell.isosurface import extract, repair
@@ -26,6 +25,7 @@ from stereocell.meshes import simplify
 from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from stereocell.planning import settings as settings_module
 from support.many_tiles import CHANNELS, COLUMNS, ROWS, open_unloaded, write_many
 from support.phantoms import blurred_ball, write_ome_tiff
 
@@ -105,7 +105,7 @@ def main() -> None:
         seconds = {}
         for workers in (1, 2):
             out = Path(folder) / str(workers)
-            phases.make(
+            phases.make_plan(
                 str(source),
                 out,
                 settings_module.load("cycif", None, flags={"plan": {"grid": "4x2"}}),

@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps.find_window import JOINT_VOXELS, SURVEY_VOXELS
-from stereocell.building.survey_steps import evidence_step, window_step
 from stereocell.model.tiling import Box, cut
+from stereocell.planning.survey_steps import evidence_step, window_step
+from stereocell.steps.find_window import JOINT_VOXELS, SURVEY_VOXELS
 from stereocell.transfer.joint_histogram import sample_boxes
 from support.phantoms import write_ome_zarr
 

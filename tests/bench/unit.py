@@ -40,8 +40,6 @@ from wrap import (
     wrap,
 )
 
-from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, UnitOptions, build_unit
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair, sum_components
@@ -52,6 +50,9 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from stereocell.planning.settings import Settings
+from stereocell.planning.unit_steps import unit_options
+from stereocell.steps.unit import UnitInput, build_unit
 
 Run = Callable[[], tuple[Mesh, float]]  # a mesh, and the seconds that it took
 ROUNDS = 3
@@ -84,7 +85,7 @@ def whole_unit(volume: Volume, given: Input) -> Mesh:
             ),
             step=(1, 1, 1),
             intensity_window=(float(volume.voxels.min()), float(volume.voxels.max())),
-            options=UnitOptions.of(settings),
+            options=unit_options(settings),
         ),
     )
     return unit.lods[0].mesh

@@ -8,12 +8,12 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building import phases
-from stereocell.building import settings as settings_module
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.unit_files import load_lods
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh
+from stereocell.planning import settings as settings_module
 from stereocell.samples import write_cycif
+from stereocell.steps.unit_files import load_lods
 from support import phantoms
 from support.meshes import enclosed_volume, open_edges
 
@@ -21,7 +21,7 @@ VOXEL_UM = 0.14  # the finer spacing: the stricter reading of "a voxel"
 
 
 def _units(source: Path, out: Path, channel: str, **plan: object) -> tuple[OutFolder, list[Mesh]]:
-    phases.make(str(source), out, settings_module.load("cycif", None, flags={"plan": plan}))
+    phases.make_plan(str(source), out, settings_module.load("cycif", None, flags={"plan": plan}))
     engine = Engine(0)
     phases.run_units(out, engine)
     out_folder = OutFolder(out)

@@ -8,10 +8,10 @@ from scipy import ndimage
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.survey_file import read_survey
-from stereocell.building.unit_files import load_lods
 from stereocell.cli.__main__ import main
 from stereocell.meshes.validity import find_defects
 from stereocell.model.mesh import Mesh
+from stereocell.steps.unit_files import load_lods
 from support import phantoms
 from support.meshes import welded
 

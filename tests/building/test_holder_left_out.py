@@ -7,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.settings import load
-from stereocell.building.unit_files import load_measured, load_volume
 from stereocell.cli.__main__ import main
 from stereocell.model.tile_content import APRON
+from stereocell.planning.settings import load
 from stereocell.preview.iso_value import preview
+from stereocell.steps.unit_files import load_measured, load_volume
 from support import nifti_files
 from support.validators import make_assets
 

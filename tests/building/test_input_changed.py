@@ -13,16 +13,17 @@ import tifffile
 import zarr
 from numpy.typing import NDArray
 
-from stereocell.building import input_files, run_on_input
-from stereocell.building.open_source import SourceRef, open_afresh
-from stereocell.building.steps.build_objects import BuildObjects
-from stereocell.building.steps.build_unit import BuildUnit
-from stereocell.building.steps.find_extents import FindExtents
-from stereocell.building.steps.learn_tissue import Learned, LearnTissue
+from stereocell.building import run_on_input
 from stereocell.cli.__main__ import main
+from stereocell.model.unit import Unit
 from stereocell.objects.extents import Extents
+from stereocell.planning import input_files
 from stereocell.read import fingerprint
 from stereocell.read import tables as tables_module
+from stereocell.steps.find_extents import FindExtents
+from stereocell.steps.learn_tissue import Learned, LearnTissue
+from stereocell.steps.open_source import SourceRef, open_afresh
+from stereocell.steps.unit_files import UnitFolder
 from stereocell.storage import file_states
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
@@ -63,20 +64,14 @@ SOURCES = {"TIFF": write_tiff, "OME-Zarr": write_zarr, "planes": write_planes}
 
 def after_the_first_unit(monkeypatch: pytest.MonkeyPatch, change: Callable[[], object]) -> None:
     """Call `change` once, between the first unit and the second."""
-    left = [change]
-    for step in (BuildUnit, BuildObjects):
-        monkeypatch.setattr(step, "keep", _then(step.keep, left))
+    left, write = [change], UnitFolder.write
 
-
-def _then(
-    keep: Callable[[Any, Path], None], left: list[Callable[[], object]]
-) -> Callable[[Any, Path], None]:
-    def keep_and_change(step: Any, place: Path) -> None:
-        keep(step, place)
+    def write_and_change(form: UnitFolder, place: Path, result: Unit) -> None:
+        write(form, place, result)
         if left:
             left.pop()()
 
-    return keep_and_change
+    monkeypatch.setattr(UnitFolder, "write", write_and_change)
 
 
 def units_of(out: Path) -> dict[str, str]:

@@ -13,12 +13,8 @@ import zarr
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from stereocell import samples
-from stereocell.building import object_passes
-from stereocell.building.located_objects import CUT
-from stereocell.building.object_passes import locate_objects
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps import build_objects as objects_maker
-from stereocell.building.unit_files import load_objects
+from stereocell.building.passes import Passes
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
@@ -27,7 +23,11 @@ from stereocell.objects import build_objects as building
 from stereocell.objects.build_objects import BuiltObjects
 from stereocell.objects.intensities import Measured
 from stereocell.objects.walls import Walls
+from stereocell.planning import label_numbers
+from stereocell.planning.located_objects import CUT
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
+from stereocell.steps import build_objects as objects_maker
+from stereocell.steps.unit_files import load_objects
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
 from support.dicom_series import sample as scene_on
@@ -298,7 +298,7 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
     assert f"plan: organs: {words}" in told
     assert f"units: organs: {words}" in told
     # of more voxels it tells which will be, without reading any
-    monkeypatch.setattr(object_passes, "_COUNTED_AT_ONCE", 1000)
+    monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 1000)
     assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
     assert "organs: objects larger than a tile and half around it, 40 x 80 x 80 um" in said(capsys)
     folder = out / "bundle/channels/organs"
@@ -366,7 +366,7 @@ def test_small_objects_are_counted_and_others_end_with_the_region(
     told = said(capsys)
     assert "l: 2 objects; 1 of too few voxels are left out" in told
     plan = OutFolder(out).plan()
-    located = locate_objects(OutFolder(out), plan, plan.labels[0], Engine(0))
+    located = Passes(OutFolder(out), plan, Engine(0)).objects(plan.labels[0])
     assert located.extents.labels.tolist() == [6, 2**62]
     facts = load_objects(next(one for one in (out / "units/r0_c0/l").iterdir() if one.is_dir()))
     assert facts.voxels.tolist() == located.extents.voxels.tolist() == [6 * 8 * 6, 6 * 8 * 8]
@@ -403,7 +403,7 @@ def test_what_can_not_be_built_is_told_in_one_line(
     told = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
     assert "found -7, expected 0 or more in labels" in told
     assert not (tmp_path / "n").exists()
-    monkeypatch.setattr(object_passes, "_COUNTED_AT_ONCE", 100)  # a map that is too large to look
+    monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 100)  # a map that is too large to look
     assert run("plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags) == 0
     assert run("units", tmp_path / "n", "--workers", 0) == 1
     assert "found -7, expected 0 or more in labels" in capsys.readouterr().err

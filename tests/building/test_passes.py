@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps.gather_evidence import GatherEvidence, evidence_from_json
-from stereocell.building.unit_files import load_lods
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.volume import zyx_to_xyz
+from stereocell.steps.gather_evidence import GatherEvidence, evidence_from_json
+from stereocell.steps.unit_files import load_lods
 from support import phantoms
 from support.exhaustive import sweep
 from support.meshes import enclosed_volume

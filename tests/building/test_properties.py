@@ -16,10 +16,6 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from jsonschema import Draft202012Validator
 
-from stereocell.building import settings as settings_module
-from stereocell.building.channels import Channel
-from stereocell.building.plan import Plan, choose_level, make_plan
-from stereocell.building.plan_file import from_json, to_json
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.brick_stream import content_hash, decode_brick, encode_tree, parse_table
 from stereocell.formats.ktx2 import decode_finest, encode_2d, encode_3d
@@ -28,6 +24,10 @@ from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.formats.voxel_bvh import build
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import from_identifier, to_identifier
+from stereocell.planning import settings as settings_module
+from stereocell.planning.channels import Channel
+from stereocell.planning.plan import Plan, choose_level, make_plan
+from stereocell.planning.plan_file import from_json, to_json
 from stereocell.read import Level
 from stereocell.storage.assets import schema_path
 from support.ktx2_parser import parse

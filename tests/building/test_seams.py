@@ -14,8 +14,6 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.unit_files import load_lods, load_record, load_volume
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.channel_level import ChannelLevels
 from stereocell.isosurface.extract import extract_surface
@@ -25,6 +23,8 @@ from stereocell.meshes.validity import find_defects
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box, Tile, cut
+from stereocell.planning.plan import Plan
+from stereocell.steps.unit_files import load_lods, load_record, load_volume
 from support import phantoms
 from support.meshes import welded
 

@@ -13,10 +13,10 @@ from scipy import ndimage
 from skimage.measure import marching_cubes
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.unit_files import load_lods
 from stereocell.cli.__main__ import main
 from stereocell.report.facts import gather
 from stereocell.report.remarks import find_remarks
+from stereocell.steps.unit_files import load_lods
 from support import phantoms
 from support.exhaustive import sweep
 from support.validators import make_assets

@@ -12,7 +12,6 @@ from skimage.measure import marching_cubes
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.surface_cover import NO_REMEDY, REMEDY, SurfaceCover
-from stereocell.building.unit_files import cover_of, load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.cover import measure_cover
 from stereocell.isosurface.lifted_by_noise import Lifted, count_lifted
@@ -22,6 +21,7 @@ from stereocell.model.tiling import Box
 from stereocell.model.unit import Cover
 from stereocell.report.facts import gather
 from stereocell.report.remarks import find_remarks
+from stereocell.steps.unit_files import cover_of, load_lods, load_record
 from support import phantoms
 from support.thin_shells import BODY, GROUND, ThinBody
 from support.validators import make_assets

@@ -9,15 +9,15 @@ import trimesh
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.settings import load as load_settings
 from stereocell.building.survey_file import read_survey
-from stereocell.building.unit_files import cover_of, load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.filters.denoise import denoise
 from stereocell.filters.noise import NoiseSample, find_max_shift
 from stereocell.meshes.validity import find_defects
 from stereocell.model.unit import Cover
 from stereocell.model.volume import Volume
+from stereocell.planning.settings import load as load_settings
+from stereocell.steps.unit_files import cover_of, load_lods, load_record
 from support.meshes import welded
 
 SIDE, SPACING_MM = 64, 0.6

@@ -13,11 +13,11 @@ import zarr
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan_file import from_json, to_json
-from stereocell.building.steps import learn_tissue as learn_tissue_step
 from stereocell.cli.__main__ import main
+from stereocell.planning.plan_file import from_json, to_json
 from stereocell.samples.head import make_head
 from stereocell.samples.head_dicom import PATIENT, write_dicom
+from stereocell.steps import learn_tissue as learn_tissue_step
 from stereocell.storage.assets import find_asset
 from stereocell.storage.json_files import read_json
 from stereocell.tissue.classify import TissueOptions

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building import bundle_phase, input_unchanged, model_process
-from stereocell.building.open_source import open_source
+from stereocell.building import input_unchanged, model_process, phases
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps import learn_tissue as learn_tissue_step
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import console
 from stereocell.report import phase as report
+from stereocell.steps import learn_tissue as learn_tissue_step
+from stereocell.steps.open_source import open_source
 from stereocell.storage.claim import LOCK
 from stereocell.storage.documents import NOT_WRITTEN
 from stereocell.tissue.classify import TissueOptions
@@ -71,7 +71,7 @@ OTHER_CLASSES = [
 def without_viewer() -> Iterator[None]:
     """The viewer may be built anew meanwhile, and is most of a small bundle."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bundle_phase, "viewer_dist", lambda: None)
+        patch.setattr(phases, "viewer_dist", lambda: None)
         patch.setattr(learn_tissue_step, "learn_tissue", learn)
         yield
 
@@ -181,7 +181,7 @@ def run_until(out: str, flags: list[str], event: str, place: str) -> None:
                 os.kill(os.getpid(), signal.SIGKILL)
 
     console.quiet = True
-    bundle_phase.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
+    phases.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
     learn_tissue_step.learn_tissue = learn  # type: ignore[assignment]
     sys.addaudithook(hook)
     tissue(Path(out), *flags)

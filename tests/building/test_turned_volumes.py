@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.survey_file import read_survey
-from stereocell.building.unit_files import cover_of, load_lods, load_record
 from stereocell.filters.min_max_bricks import min_max_bricks
 from stereocell.model.mesh import Lod
 from stereocell.model.unit import Cover
+from stereocell.steps.unit_files import cover_of, load_lods, load_record
 from support import phantoms
 from support.validators import make_assets
 

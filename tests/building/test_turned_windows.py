@@ -10,15 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps import find_window as window_module
-from stereocell.building.steps.find_window import Window
-from stereocell.building.survey_steps import window_step
 from stereocell.cli.__main__ import main
 from stereocell.filters.background import find_background
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.isosurface.find_holder import find_holder
 from stereocell.model.image_plane import back_of_three, slices_back
 from stereocell.model.tiling import Box
+from stereocell.planning.survey_steps import window_step
+from stereocell.steps import find_window as window_module
+from stereocell.steps.find_window import Window
 from support import phantoms
 
 SHAPE, SPACING = (20, 72, 60), (4.0, 1.0, 1.0)  # (slice, row, column)

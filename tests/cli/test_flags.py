@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from stereocell.building.settings import Settings, apply
 from stereocell.cli import flags
 from stereocell.cli.__main__ import _parser
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import Flag, setting
+from stereocell.planning.settings import Settings, apply
 
 # what a person types, and the setting that it has to become
 TYPED: dict[str, tuple[list[str], str, str, Any]] = {

@@ -17,7 +17,6 @@ from contextlib import redirect_stdout
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,12 +29,12 @@ from stereocell import samples
 from stereocell.building.out_folder import OutFolder
 from stereocell.cli import __main__ as cli
 from stereocell.model.errors import UsageError
-from stereocell.read import readers
+from stereocell.read import formats
+from stereocell.read.known_formats import known_formats
 from stereocell.report import phase as drawing
 from stereocell.samples.head import make_head
 from stereocell.samples.head_dicom import write_dicom
 from stereocell.storage.json_files import write_sealed
-from stereocell.storage.location import Location
 from support import phantoms
 from support.dicom_series import write_enhanced, write_f_nifti, write_series
 
@@ -55,7 +54,7 @@ PARSED = {
     "build s3://": "object storage: storage/test_object_store.py",
     "build stack.tif": "masks of another program: building/test_objects.py",
     "build store.zarr": "the same: read/tables/test_tables.py",
-    "build ct.nii.gz": "the same: building/test_label_maps.py",
+    "build ct.nii.gz": "the same: planning/test_label_maps.py",
     "build CT_FOLDER": "the same: read/dicom/test_segmentation.py",
     "build seg.dcm": "the same",
 }
@@ -260,19 +259,25 @@ def test_python_runs(sources: Path) -> None:
 
 
 def test_the_reader_that_is_shown_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    names: dict[str, Any] = {}
-    exec(compile(blocks(DOCS / "extending.md", "python")[0], "docs/extending.md", "exec"), names)
-    body = phantoms.f_phantom()
-    np.save(tmp_path / "f.npy", body)
-    monkeypatch.setattr(Location, "format", property(lambda location: "npy"))
-    monkeypatch.setitem(sys.modules, "npy_reader", SimpleNamespace(read_image=names["read_image"]))
-    reader = readers.Reader("npy_reader", "NumPy")
-    monkeypatch.setitem(readers.READERS, "npy", reader)
-    dataset = stereocell.open_volume(tmp_path / "f.npy", spacing_um=(0.5, 0.2, 0.2))
-    assert (dataset.read(0, dataset.levels[0].box, 0).voxels == body).all()
-    np.save(tmp_path / "f.npy", body[0])
-    with pytest.raises(stereocell.StereoCellError, match="expected z, y, x"):
-        stereocell.open_volume(tmp_path / "f.npy")
+    (tmp_path / "cube.py").write_text(blocks(DOCS / "extending.md", "python")[0])
+    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
+    known_formats.cache_clear()
+    try:
+        body = phantoms.f_phantom().astype(np.uint8)
+        path = tmp_path / "f.cube"
+        path.write_bytes(" ".join(map(str, body.shape)).encode() + b"\n" + body.tobytes())
+        dataset = stereocell.open_volume(path, spacing_um=(0.5, 0.2, 0.2))
+        assert dataset.name == "f"
+        assert (dataset.read(0, dataset.levels[0].box, 0).voxels == body).all()
+        path.write_bytes(b"4 4\n" + body.tobytes())
+        with pytest.raises(stereocell.StereoCellError, match="expected z, y, x"):
+            stereocell.open_volume(path)
+        path.write_bytes(b"<html>")
+        with pytest.raises(stereocell.StereoCellError, match=r"an HTML page .* expected Cube"):
+            stereocell.open_volume(path)
+    finally:
+        known_formats.cache_clear()
+        sys.modules.pop("stereocell.read.formats.cube", None)
 
 
 def test_functions_that_are_named_exist() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.engine.step import Step, content_of
+from stereocell.engine.step import Keyed, content_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Sum(Step[int]):
+class Sum(Keyed):
     VERSION: ClassVar[int] = 1
 
     source: Source
@@ -31,7 +31,7 @@ class Sum(Step[int]):
 
 
 @dataclass(frozen=True, slots=True)
-class Mean(Step[int]):
+class Mean(Keyed):
     VERSION: ClassVar[int] = 1
 
     source: Source
@@ -40,7 +40,7 @@ class Mean(Step[int]):
 
 
 @dataclass(frozen=True, slots=True)
-class Twice(Step[int]):
+class Twice(Keyed):
     VERSION: ClassVar[int] = 1
 
     first: Sum

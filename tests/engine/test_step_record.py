@@ -12,7 +12,7 @@ from packaging.utils import canonicalize_name
 
 from stereocell.engine import step_record as shipped
 from stereocell.engine.step_record import libraries_of
-from stereocell.read.readers import OTHER, READERS
+from stereocell.read.known_formats import known_formats
 from stereocell.storage.assets import find_asset
 from support import step_record
 
@@ -31,7 +31,7 @@ def recorded() -> dict[str, Any]:
 def reaches() -> dict[str, set[Path]]:
     """The files that each step and each reader reaches."""
     modules = {step.__name__: step.__module__ for step in step_record.find_steps()}
-    modules |= {name: reader.module for name, reader in READERS.items()}
+    modules |= {name: reader.module for name, reader in known_formats().items()}
     return {name: set(step_record.reach(module)[0]) for name, module in modules.items()}
 
 
@@ -45,9 +45,9 @@ def reaches() -> dict[str, set[Path]]:
         ("meshes/simplify.py", UNITS | {"WriteBundle"}, {"FindWindow", "nifti"}),
         ("filters/denoise.py", TILES, {"nifti"}),
         ("isosurface/level_evidence.py", {"FindWindow", "GatherEvidence"}, {"BuildUnit"}),
-        ("read/ome_zarr.py", {"ome-zarr"}, TILES),
-        ("read/tiff/ome.py", {"tiff"}, TILES | {"dicom"}),
-        ("read/dicom/frame.py", {"dicom"}, TILES | {"tiff"}),
+        ("read/formats/ome_zarr/image.py", {"ome-zarr"}, TILES),
+        ("read/formats/tiff/ome.py", {"tiff"}, TILES | {"dicom"}),
+        ("read/formats/dicom/frame.py", {"dicom"}, TILES | {"tiff"}),
         ("formats/exr.py", {"WriteStageTile", "WriteStage", "WriteBundle"}, TILES),
         ("formats/gltf.py", {"WriteBundle"}, TILES),
         ("objects/extents.py", OBJECTS, TILES),
@@ -80,7 +80,7 @@ def test_a_changed_constant_in_a_reached_file_asks_for_a_decision(
             "read_bytes",
             lambda self: content.encode() if self == path else read(self),
         )
-        found = step_record._entry("stereocell.building.steps.find_extents", 1)
+        found = step_record._entry("stereocell.steps.find_extents", 1)
         monkeypatch.undo()
         return str(found["code"])
 
@@ -163,10 +163,10 @@ def test_modules_that_are_left_out_exist() -> None:
 def test_what_decodes_for_a_reader_is_a_library_of_it_alone(
     library: str, readers: set[str]
 ) -> None:
-    modules = {name: reader.module for name, reader in READERS.items()} | {"other": OTHER.module}
+    modules = {name: reader.module for name, reader in known_formats().items()}
     users = {name for name, module in modules.items() if library in step_record.reach(module)[1]}
     assert users == readers
-    assert library not in step_record.reach("stereocell.building.steps.build_unit")[1]
+    assert library not in step_record.reach("stereocell.steps.build_unit")[1]
 
 
 def test_libraries_that_can_change_no_byte_ask_for_no_decision(recorded: dict[str, Any]) -> None:
@@ -201,7 +201,7 @@ def test_packages_are_found_as_python_finds_them() -> None:
         assert set(found[top]) == set(names), top
 
 
-BESIDE = {"bioio", "bioio_base"}  # a user has them beside StereoCell (read/bioio_image.py)
+BESIDE = {"bioio", "bioio_base"}  # a user has them beside StereoCell (read/formats/other.py)
 
 
 @pytest.mark.slow

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.building.plan import Plan
 from stereocell.isosurface.components import find_components
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.repair import RepairOptions, repair
 from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box
+from stereocell.planning.plan import Plan
 from stereocell.read import Level
 from support.plans import CHANNELS, choose, plan_of
 

@@ -25,7 +25,7 @@ def _source(folder: Path) -> str:
 def test_more_tiles_than_one_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("stereocell.building.phases.find_wrapper", lambda: "1")
+    monkeypatch.setattr("stereocell.planning.settle.find_wrapper", lambda: "1")
     flags = ["-o", str(tmp_path / "out"), "--wrap", "alpha-wrap", "--grid", "2x1"]
     assert main(["plan", _source(tmp_path), *flags]) == 2
     assert "closes each tile by itself, and there are 2 tiles: expected one" in (

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
+from stereocell.planning.settings import load
 from stereocell.preview import iso_value
 from stereocell.preview.iso_value import COLORS, Candidate, preview, table
 from support import phantoms

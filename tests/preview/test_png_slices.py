@@ -14,13 +14,13 @@ from PIL import Image
 
 from corpus.real import data_folder
 from stereocell import read
-from stereocell.building import phases
-from stereocell.building.open_source import open_source
-from stereocell.building.plan_source import source_of
-from stereocell.building.settings import PlanOptions, Settings
 from stereocell.cli.__main__ import main
+from stereocell.planning.plan_source import source_of
+from stereocell.planning.settings import PlanOptions, Settings
+from stereocell.planning.settle import settle
 from stereocell.preview.cut_planes import LONGEST_PX, cut_planes, square_pixels
 from stereocell.preview.png_slices import to_bytes, without_surface
+from stereocell.steps.open_source import open_source
 from stereocell.storage.assets import schema_path
 from support import phantoms
 from support.dicom_reading import interpolation_bound
@@ -163,7 +163,7 @@ def test_every_plane_of_every_orientation_is_the_right_way_up(
         write(tmp_path / "s.nii", affine, np.rint(sample(affine, SHAPE)).astype(np.int16))
     source = str(tmp_path / ("s" if kind == "dicom" else "s.nii"))
     for flag in (False, True):
-        plan = phases.settle(source, without_surface(Settings(plan=PlanOptions(neurological=flag))))
+        plan = settle(source, without_surface(Settings(plan=PlanOptions(neurological=flag))))
         dataset = open_source(source_of(plan))
         for plane in ("acquired", "axial", "coronal", "sagittal"):
             cut = cut_planes(dataset, plan, 0, plane)

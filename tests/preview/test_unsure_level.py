@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.settings import load
 from stereocell.building.survey_file import read_survey
 from stereocell.cli.__main__ import main
+from stereocell.planning.settings import load
 from stereocell.preview import iso_value
 from stereocell.preview.iso_value import preview, table
 from support import nifti_files, phantoms

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import zarr
 
-from stereocell.building import input_files
 from stereocell.cli.__main__ import main
-from stereocell.read import absent_chunks
+from stereocell.planning import input_files
+from stereocell.read import chunk_counts
 from support import phantoms
 from support.array_files import write_n5
 
@@ -114,5 +114,5 @@ def test_chunks_that_ranges_touch_are_counted_as_a_list_of_them_has_them(seed: i
     rng = np.random.default_rng(seed)
     ranges = [range(int(a), int(a + rng.integers(1, 9))) for a in rng.integers(0, 60, 7)]
     touched = {voxel // 4 for one in ranges for voxel in one}
-    assert absent_chunks._count(4, ranges) == len(touched)
-    assert absent_chunks._count(1, [range(10**15), range(10**14, 10**15 + 1)]) == 10**15 + 1
+    assert chunk_counts._count(4, ranges) == len(touched)
+    assert chunk_counts._count(1, [range(10**15), range(10**14, 10**15 + 1)]) == 10**15 + 1

@@ -16,7 +16,8 @@ from conftest import Server
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
-from stereocell.storage.location import Location, require_apart
+from stereocell.read.source_place import require_apart
+from stereocell.storage.location import Location
 from support.phantoms import f_phantom, write_ome_tiff
 
 BOX = Box((1, 3, 5), (4, 30, 21))

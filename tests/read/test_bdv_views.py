@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from stereocell import read
-from stereocell.building import input_files
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.planning import input_files
 from stereocell.read import list_series
 from support.array_files import write_n5
 from support.phantoms import f_phantom

@@ -12,10 +12,10 @@ import tifffile
 from ome_types.model import OME, Channel, Color, Image, Pixels, TiffData
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from stereocell.building.channels import PALETTE
 from stereocell.cli.__main__ import main
 from stereocell.model.color import linear_color, to_srgb8
 from stereocell.model.emission_color import color_of_wavelength
+from stereocell.planning.channels import PALETTE
 from support.array_files import write_czi
 from support.nd2_files import write_nd2
 from support.phantoms import f_phantom

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
-from stereocell.read import hdf5_texts
-from stereocell.read.hdf5_types import require_standard
+from stereocell.read.hdf5_file import texts as hdf5_texts
+from stereocell.read.hdf5_file.types import require_standard
 from support.array_files import SIZE_UM, characters, write_bdv_xml, write_ims
 from support.phantoms import F_BODY, f_phantom
 

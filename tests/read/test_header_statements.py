@@ -17,6 +17,8 @@ from support.phantoms import f_phantom
 
 NRRD_HEAD = "NRRD0005\ntype: uint16\ndimension: 3\nsizes: 36 48 16\nendian: little\nencoding: raw\n"
 META_HEAD = "ObjectType = Image\nNDims = 3\nDimSize = 36 48 16\nElementType = MET_USHORT\n"
+TURNED = "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0"
+ORIGIN = "space origin: (0,0,0)"
 SLICER = "as Slicer and ITK do in a patient's space"
 
 
@@ -76,7 +78,7 @@ def test_units_may_differ_from_axis_to_axis(tmp_path: Path) -> None:
 def test_a_unit_that_a_patient_s_nrrd_lacks_is_an_assumption(
     tmp_path: Path, units: str, reason: str
 ) -> None:
-    lines = ("space: LPS", f"{units}space directions: (1,0,0) (0,1,0) (0,0,2)")
+    lines = ("space: LPS", f"{units}space directions: (1,0,0) (0,1,0) (0,0,2)", ORIGIN)
     (note,) = read.open(write_nrrd(tmp_path / "a.nrrd", *lines)).notes
     assert note.startswith("unit of length: not stated, mm is assumed")
     assert reason in note
@@ -168,7 +170,7 @@ def test_a_field_that_is_there_twice_is_reported_and_read_as_itk_does(tmp_path: 
 
 
 def test_a_field_that_is_there_twice_with_one_value_needs_no_note(tmp_path: Path) -> None:
-    lines = ("TransformMatrix = 1 0 0 0 1 0 0 0 1", "ElementSpacing = 1 1 2")
+    lines = (TURNED, "ElementSpacing = 1 1 2")
     assert read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1.0 1 2")).notes == ()
 
 
@@ -191,14 +193,14 @@ def test_a_scale_in_the_matrix_is_reported_and_followed_as_itk_does(tmp_path: Pa
 
 
 def test_names_of_a_field_that_agree_need_no_note(tmp_path: Path) -> None:
-    lines = ("TransformMatrix = 1 0 0 0 1 0 0 0 1", "Rotation = 1.0 0 0 0 1 0 0 0 1")
+    lines = (TURNED, "Rotation = 1.0 0 0 0 1 0 0 0 1")
     lines += ("ElementSpacing = 1 1 1", "ElementSize = 1.0 1.0 1.0")
     lines += ("AnatomicalOrientation = RAI", "ElementToIntensityFunctionSlope = 1")
     assert read.open(write_meta(tmp_path / "a.mha", *lines)).notes == ()
 
 
 def test_an_anatomical_orientation_that_contradicts_the_matrix_is_reported(tmp_path: Path) -> None:
-    lines = ("TransformMatrix = 1 0 0 0 1 0 0 0 1", "AnatomicalOrientation = LAI")
+    lines = (TURNED, "AnatomicalOrientation = LAI")
     path = write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1 1 1")
     (note,) = read.open(path).notes
     assert "TransformMatrix states R, A, I, AnatomicalOrientation states L, A, I" in note
@@ -206,7 +208,7 @@ def test_an_anatomical_orientation_that_contradicts_the_matrix_is_reported(tmp_p
 
 @pytest.mark.parametrize(("unit", "per"), [("um", 1), ("mm", 1000), ("cm", 10_000)])
 def test_metaimage_s_unit_of_length_is_followed(tmp_path: Path, unit: str, per: float) -> None:
-    lines = (f"DistanceUnits = {unit}", "TransformMatrix = 1 0 0 0 1 0 0 0 1")
+    lines = (f"DistanceUnits = {unit}", TURNED)
     dataset = read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1.2 1.3 1.4"))
     found = sorted(dataset.levels[0].spacing_um)
     assert found == pytest.approx([1.2 * per, 1.3 * per, 1.4 * per])
@@ -214,7 +216,7 @@ def test_metaimage_s_unit_of_length_is_followed(tmp_path: Path, unit: str, per: 
 
 
 def test_a_scale_of_values_that_itk_leaves_out_is_reported(tmp_path: Path) -> None:
-    lines = ("TransformMatrix = 1 0 0 0 1 0 0 0 1", "ElementToIntensityFunctionSlope = 2")
+    lines = (TURNED, "ElementToIntensityFunctionSlope = 2")
     dataset = read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1 1 1"))
     assert "ElementToIntensityFunctionSlope 2" in dataset.notes[0]
     assert whole(dataset).max() == f_phantom().max()
@@ -361,3 +363,57 @@ def test_segments_of_slicer_are_objects_with_their_names(tmp_path: Path) -> None
     assert dataset.labels == "segments of 3D Slicer in its header"
     assert dataset.objects.names == {3: "liver"}
     assert dataset.objects.colors == {3: (1.0, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize("stated", [None, "(nan,nan,nan)", "(3,4,5)"])
+def test_a_place_in_the_patient_that_is_not_stated_is_noted(
+    tmp_path: Path, stated: str | None
+) -> None:
+    lines = ["space: left-posterior-superior", "space directions: (1,0,0) (0,1,0) (0,0,1)"]
+    lines += [] if stated is None else [f"space origin: {stated}"]
+    notes = read.open(write_nrrd(tmp_path / "a.nrrd", *lines)).notes
+    found = [note for note in notes if note.startswith("place of the first voxel in the patient")]
+    reason = "is absent" if stated is None else "holds no numbers"
+    expected = f"patient: not stated, 0, 0, 0 mm is assumed, since space origin {reason}"
+    assert [note.endswith(expected) for note in found] == [True] * (stated != "(3,4,5)")
+
+
+@pytest.mark.parametrize("lines", [("Offset = 3 4 5",), ()])
+def test_a_metaimage_without_an_offset_is_noted_in_a_patient_alone(
+    tmp_path: Path, lines: tuple[str, ...]
+) -> None:
+    turned = ("TransformMatrix = 1 0 0 0 1 0 0 0 1",)
+    for matrix, is_noted in ((turned, not lines), ((), False)):
+        path = write_meta(tmp_path / "a.mha", "ElementSpacing = 1 1 1", *lines, *matrix)
+        assert any("since Offset is absent" in note for note in read.open(path).notes) == is_noted
+
+
+def test_axes_of_an_mrc_that_are_not_stated_are_noted(tmp_path: Path) -> None:
+    with mrcfile.new(tmp_path / "a.mrc") as file:
+        file.set_data(f_phantom().astype(np.int16))
+        file.set_volume()
+        file.voxel_size = 2.0
+    stated = read.open(tmp_path / "a.mrc")
+    with mrcfile.open(tmp_path / "a.mrc", mode="r+") as file:
+        for name in ("mapc", "mapr", "maps"):
+            file.header[name] = 0
+    dataset = read.open(tmp_path / "a.mrc")
+    (note,) = set(dataset.notes) - set(stated.notes)
+    assert note.endswith("not stated, x, y, z is assumed, as in most files")
+    np.testing.assert_array_equal(whole(dataset), whole(stated))
+
+
+def test_a_size_that_imaris_does_not_state_is_noted(tmp_path: Path) -> None:
+    path = write_ims(tmp_path / "a.ims", np.stack([f_phantom()] * 2), pad=2)
+    stated = read.open(path).notes
+    with h5py.File(path, "r+") as file:
+        for axis in "ZYX":
+            del file["DataSet/ResolutionLevel 0/TimePoint 0/Channel 0"].attrs[f"ImageSize{axis}"]
+    assert read.open(path).notes == stated  # /DataSetInfo/Image repeats it
+    with h5py.File(path, "r+") as file:
+        for axis in "ZYX":
+            del file["DataSetInfo/Image"].attrs[axis]
+    (note,) = set(read.open(path).notes) - set(stated)
+    assert note.endswith(
+        "not stated, 18, 50, 38 voxels is assumed, as of the dataset with its padding"
+    )

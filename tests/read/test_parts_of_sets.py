@@ -14,9 +14,9 @@ import zarr
 from zarr.codecs import BloscCodec, BytesCodec, GzipCodec, ZstdCodec
 
 from stereocell import read
-from stereocell.building import input_files
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
+from stereocell.planning import input_files
 from support import phantoms
 from support.array_files import characters, write_bdv_xml, write_ims, write_n5
 from support.tiff_files import write_ndtiff

@@ -15,7 +15,7 @@ from PIL import Image as Pillow
 from stereocell import read
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
 from stereocell.model.tiling import Box
-from stereocell.read.planes import files as planes_files
+from stereocell.read.formats.planes import files as planes_files
 from stereocell.read.spacing import Triple
 
 GIVEN: Triple = (2.0, 1.0, 1.0)

@@ -10,8 +10,8 @@ import pytest
 import zarr
 
 from stereocell import read
-from stereocell.building import input_files
 from stereocell.cli.__main__ import main
+from stereocell.planning import input_files
 from support.phantoms import f_phantom, write_ome_zarr
 
 BODY = f_phantom().astype(np.int16)

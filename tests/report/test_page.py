@@ -16,15 +16,14 @@ from markupsafe import escape
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.unit_files import is_whole
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.errors import OutputError
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, Tile
 from stereocell.model.volume import zyx_to_xyz
+from stereocell.planning.channels import Channel
 from stereocell.preview.draw_slices import (
     OUTLINE,
     Slice,
@@ -36,6 +35,7 @@ from stereocell.preview.draw_slices import (
 from stereocell.report import charts, page, select_units, write_report
 from stereocell.report.facts import LodFacts, StepFacts, UnitFacts, gather, sum_up
 from stereocell.report.remarks import find_remarks
+from stereocell.steps.unit_files import is_whole
 from support import phantoms
 
 NASTY = 'F <b> & "body"'

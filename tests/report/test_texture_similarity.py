@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, UnitOptions, build_unit
 from stereocell.isosurface.array_levels import find_array_levels
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.lattice import Lattice
@@ -15,9 +13,12 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Lod
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from stereocell.planning.settings import Settings
+from stereocell.planning.unit_steps import unit_options
 from stereocell.report.texture_similarity import CLOSE_PX, VIEWS, compare, draw, find_likeness
 from stereocell.samples.cycif_geometry import grow_tissue
 from stereocell.samples.microscope import SPACING_UM, STAINS, record
+from stereocell.steps.unit import UnitInput, build_unit
 from support.exhaustive import sweep
 
 SPACING = (1.0, 1.0, 1.0)
@@ -49,7 +50,7 @@ def lods() -> tuple[Lod, ...]:
         repair=RepairOptions(2.0, 3.0, 4.0),
         step=(1, 1, 1),
         intensity_window=(0.0, 1000.0),
-        options=UnitOptions.of(settings),
+        options=unit_options(settings),
     )
     volume = Volume((1000 * field).astype(np.float32), SPACING)
     return build_unit(volume, given).lods
@@ -90,7 +91,7 @@ def test_coarsest_level_has_the_finest_s_outlines(stain: int) -> None:
         repair=RepairOptions(0.6, 0.9, 1.2),
         step=(1, 1, 1),
         intensity_window=(0.0, float(volume.voxels.max())),
-        options=UnitOptions.of(replace(settings, surface=settings.surface.resolved(SPACING_UM))),
+        options=unit_options(replace(settings, surface=settings.surface.resolved(SPACING_UM))),
     )
     fine, *_, coarse = build_unit(volume, given).lods
     assert len(coarse.mesh.triangles) < 0.1 * len(fine.mesh.triangles)

@@ -16,11 +16,12 @@ from typing import Any
 
 import pytest
 
-from stereocell.building.steps.build_unit import BuildUnit
 from stereocell.building.tissue import TissueRequest, add_tissue
 from stereocell.cli.__main__ import main
 from stereocell.engine import object_store_tasks
 from stereocell.model.errors import OutputError
+from stereocell.model.unit import Unit
+from stereocell.steps.unit_files import UnitFolder
 from stereocell.storage import workspace
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.object_lock import alone_at
@@ -101,15 +102,15 @@ def test_an_input_written_during_a_build_is_reported_if_its_bytes_differ(
     fs.put(str(tmp_path / "a"), source, recursive=True)
     chunk = "0/c/0/1/0"
     new = (tmp_path / ("b" if is_other else "a") / chunk).read_bytes()
-    keep, left = BuildUnit.keep, [1]
+    write, left = UnitFolder.write, [1]
 
-    def keep_and_change(step: BuildUnit, place: Path) -> None:
-        keep(step, place)
+    def write_and_change(form: UnitFolder, place: Path, result: Unit) -> None:
+        write(form, place, result)
         if left:
             left.pop()
             fs.pipe_file(f"{source}/{chunk}", new)
 
-    monkeypatch.setattr(BuildUnit, "keep", keep_and_change)
+    monkeypatch.setattr(UnitFolder, "write", write_and_change)
     out = tmp_path / "out"
     assert main(["plan", f"s3://{source}", "-o", str(out), "--grid", GRID]) == 0
     assert main(["units", str(out), "--workers", "0"]) == int(is_other)

@@ -45,7 +45,7 @@ def test_every_place_in_a_command_of_a_message_is_one_that_is_filled_in() -> Non
         for command in COMMAND.findall(node.value)
         for word in re.findall(r"\b[A-Z][A-Z_]+\b", command)
     }
-    assert named >= {("building/out_folder.py", "OUT"), ("building/plan_file.py", "INPUT")}
+    assert named >= {("building/out_folder.py", "OUT"), ("planning/plan_file.py", "INPUT")}
     assert {one for one in named if one[1] not in KNOWN and one[0] != "export/__init__.py"} == set()
 
 

@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from stereocell.building import settings as settings_module
-from stereocell.building.channels import Channel
-from stereocell.building.plan import Plan, choose_level, make_plan
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair
+from stereocell.planning import settings as settings_module
+from stereocell.planning.channels import Channel
+from stereocell.planning.plan import Plan, choose_level, make_plan
 from stereocell.read import Level
 
 LEVELS = (

@@ -31,9 +31,9 @@ from typing import Any
 from packaging.utils import canonicalize_name
 
 import stereocell
-from stereocell.engine.step import Step
+from stereocell.engine.step import Keyed, Step
 from stereocell.engine.step_record import RECORD
-from stereocell.read.readers import OTHER, READERS
+from stereocell.read.known_formats import known_formats
 from stereocell.storage.assets import find_asset
 
 PACKAGE = Path(stereocell.__file__).parent
@@ -45,10 +45,12 @@ NEUTRAL = (
     "model.settings",
     "model.timing",
     "kernels.cache_place",
-    "building.settings",
-    "building.plan",
-    "building.plan_file",
+    "planning.settings",
+    "planning.plan",
+    "planning.plan_file",
     "building.out_folder",
+    "read.format",
+    "read.known_formats",
     "read.readers",
     "read.file_kind",
     "read.remarks",
@@ -56,11 +58,11 @@ NEUTRAL = (
 # import name of a library -> those of the libraries that it loads by itself; `*`: any ending
 BEHIND = {
     "bioio": ("bioio_*",),
-    "pydicom": ("gdcm", "openjpeg", "pylibjpeg"),  # read/dicom/stored_values.py
+    "pydicom": ("gdcm", "openjpeg", "pylibjpeg"),  # read/formats/dicom/stored_values.py
     "tifffile": ("imagecodecs",),
     "zarr": ("numcodecs",),
 }
-_STEP = re.compile(r"^class \w+\(Step\[", re.MULTILINE)
+_STEP = re.compile(r"^class \w+\((?:Step\[|Keyed\))", re.MULTILINE)
 
 
 def record() -> dict[str, Any]:
@@ -71,11 +73,11 @@ def record() -> dict[str, Any]:
     libraries  the locked versions of those that can change a result
     """
     steps = {step.__name__: _entry(step.__module__, step.VERSION) for step in find_steps()}
-    readers = {name: _entry(one.module, one.version) for name, one in READERS.items()}
-    readers["other"] = _entry(OTHER.module, OTHER.version)
+    formats = known_formats()
+    readers = {name: _entry(one.module, one.version) for name, one in formats.items()}
     entries = {**dict(sorted(steps.items())), **dict(sorted(readers.items()))}
     modules = {step.__module__ for step in find_steps()}
-    modules |= {one.module for one in (*READERS.values(), OTHER)}
+    modules |= {one.module for one in formats.values()}
     used = {library for module in modules for library in reach(module)[1]}
     lines = re.findall(r"^([\w.-]+)(?:\[.*\])?==([^\s;]+)", LOCK.read_text("utf-8"), re.M)
     locked = {canonicalize_name(name): version for name, version in lines}
@@ -86,7 +88,7 @@ def record() -> dict[str, Any]:
     }
 
 
-def find_steps() -> list[type[Step[Any]]]:
+def find_steps() -> list[type[Keyed]]:
     """Return the class of every step."""
     for name, file in _modules().items():
         if _STEP.search(file.read_text("utf-8")):
@@ -94,8 +96,8 @@ def find_steps() -> list[type[Step[Any]]]:
     # a dataclass with slots is another class than the one that it was made from
     steps = {
         (one.__module__, one.__name__): getattr(sys.modules[one.__module__], one.__name__, None)
-        for one in Step.__subclasses__()
-        if one.__module__.startswith(f"{PACKAGE.name}.")
+        for one in (*Keyed.__subclasses__(), *Step.__subclasses__())
+        if one is not Step and one.__module__.startswith(f"{PACKAGE.name}.")
     }
     return sorted(filter(None, steps.values()), key=lambda step: step.__name__)
 
@@ -184,7 +186,7 @@ def main(arguments: list[str]) -> None:
     if lines:
         raise SystemExit(
             "\n".join(lines) + "\nWhere the same inputs give another result, raise the step's "
-            "VERSION (a reader's `version` in read/readers.py). Then, or where results are the "
+            "VERSION (a format's `version` in its row). Then, or where results are the "
             "same, run `make record-steps`."
         )
 

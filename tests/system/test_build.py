@@ -12,9 +12,9 @@ from pxr import Usd, UsdGeom
 from threadpoolctl import threadpool_limits
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.unit_files import load_record
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
+from stereocell.steps.unit_files import load_record
 from support import phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep

@@ -9,9 +9,9 @@ import pytest
 import tifffile
 from pxr import Usd
 
-from stereocell.building.channels import PALETTE
 from stereocell.cli.__main__ import main
 from stereocell.model.emission_color import color_of_light
+from stereocell.planning.channels import PALETTE
 from stereocell.usd.layer import CHANNELS
 
 Color = tuple[float, ...]

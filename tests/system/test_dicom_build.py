@@ -10,8 +10,8 @@ import zstandard
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from stereocell.building.channels import MR_GREY, SKIN
 from stereocell.cli.__main__ import main
+from stereocell.planning.channels import MR_GREY, SKIN
 from stereocell.verify.formats import check
 from support.bundles import load
 from support.dicom_series import BODIES, BRIGHTEST, grid, sample, turn, write_enhanced, write_series

@@ -22,10 +22,10 @@ from pydicom.dataset import Dataset
 from pydicom.uid import JPEGLosslessSV1
 
 from stereocell import read
-from stereocell.building.open_source import open_source
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.serve.brick_library import BrickLibrary
+from stereocell.steps.open_source import open_source
 from support import dicom_mosaics, identity_search
 from support.dicom_segmentations import write_segmentation
 from support.dicom_series import compress, grid, write_enhanced, write_series
@@ -240,7 +240,7 @@ def test_no_identity_of_a_segmentation_is_in_what_is_made_of_its_objects(
 def test_a_leak_put_in_by_hand_is_found(
     series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from stereocell.read import dicom
+    from stereocell.read.formats.dicom import image as dicom
 
     honest = dicom.read_image
 

@@ -19,7 +19,7 @@ import pytest
 from aiohttp import ClientTimeout
 
 from stereocell import read
-from stereocell.building import passes
+from stereocell.building import phases
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.storage import location
@@ -68,14 +68,13 @@ def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     away, out = volume.with_name("away"), tmp_path / "out"
-    survey = passes.survey_channels
+    save = phases.save_survey
 
-    def vanish(*arguments: Any) -> Any:
-        found = survey(*arguments)
+    def vanish(*arguments: Any) -> None:
+        save(*arguments)
         volume.rename(away)
-        return found
 
-    monkeypatch.setattr(passes, "survey_channels", vanish)
+    monkeypatch.setattr(phases, "save_survey", vanish)
     assert make_assets(volume, out, GRID, "--workers", "0") == 1
     assert "f.ome.zarr: " in only_line(capsys)
     assert not list(out.rglob("unit.json"))

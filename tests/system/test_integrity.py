@@ -16,8 +16,8 @@ import pytest
 from pxr import Sdf
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.unit_files import find_damage, is_whole
 from stereocell.cli.__main__ import main
+from stereocell.steps.unit_files import find_damage, is_whole
 from stereocell.storage import file_list
 from stereocell.verify.check_line import CheckLine
 from stereocell.verify.formats import check

@@ -61,10 +61,10 @@ OF_A_BUILD = {name for name, places in PLACES.items() if places.writes == "out" 
 
 # the functions with which the work of the commands begins; a guard comes before each of them
 BEGINNINGS = (
-    "building.phases.run_passes",
-    "building.steps.write_stage_tile.WriteStageTile.keep",
+    "building.phases.remove_mixed",
+    "steps.write_stage_tile.StageTile.keep",
     "building.tissue._learn",
-    "building.steps.write_bundle.write_bundle",
+    "steps.write_bundle.write_bundle",
     "export.write.Chosen",
     "export.write.write_scene",
     "preview.iso_value.window_step",
@@ -81,7 +81,7 @@ BEGINNINGS = (
 # and those that open the source: only its fingerprint tells whether a build is another's
 OPENINGS = (
     "building.phases.settle",
-    "building.preset_choice.open_source",
+    "planning.preset_choice.open_source",
     "preview.iso_value.settle",
 )
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from pxr import Sdf
 
-from stereocell.building.open_source import open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import main
+from stereocell.steps.open_source import open_source
 from support import ctrl_c, phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep

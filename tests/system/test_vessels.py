@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.survey_file import ChannelSurvey, read_survey
-from stereocell.building.vessel_levels import choose_connected
+from stereocell.building.survey_file import read_survey
 from stereocell.cli.__main__ import main
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.volume import Volume
+from stereocell.planning.survey import ChannelSurvey
+from stereocell.planning.vessel_levels import choose_connected
 
 SHAPE = (40, 96, 96)
 BLOOD, TISSUE, NOISE, BLUR = 400.0, 60.0, 6.0, 1.1  # voxel values; voxels

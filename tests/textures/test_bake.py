@@ -7,8 +7,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.building.settings import Settings
-from stereocell.building.unit import UnitInput, UnitOptions, build_unit
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.meshes.simplify import simplify
 from stereocell.model.lattice import Lattice
@@ -16,7 +14,10 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
+from stereocell.planning.settings import Settings
+from stereocell.planning.unit_steps import unit_options
 from stereocell.report.texture_similarity import sample
+from stereocell.steps.unit import UnitInput, build_unit
 from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.ambient_occlusion import sphere as directions
 from stereocell.textures.bake import Baker, FineSurface, bake
@@ -190,7 +191,7 @@ def neighbours() -> tuple[tuple[Lod, ...], ...]:
             repair=RepairOptions(2.0, 3.0, 3.0),
             step=(1, 1, 1),
             intensity_window=(0.0, 1000.0),
-            options=UnitOptions.of(settings),
+            options=unit_options(settings),
         )
         built.append(build_unit(Volume(field[window.slices], SPACING), given).lods)
     return tuple(built)

@@ -9,7 +9,6 @@ import pyvista as pv
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.building.settings import Settings
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import simplify_valid
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
@@ -21,6 +20,7 @@ from stereocell.model.lattice import Lattice, Plane
 from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
+from stereocell.planning.settings import Settings
 from stereocell.textures import lod_chain
 from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels, sharpest_angle

@@ -10,7 +10,6 @@ from PIL import Image
 from pxr import Usd, UsdGeom, UsdShade
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.unit_files import load_lods, load_record
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import PaintColors
 from stereocell.model.color import to_srgb8
@@ -18,6 +17,7 @@ from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume, zyx_to_xyz
+from stereocell.steps.unit_files import load_lods, load_record
 from stereocell.textures.sample_channel import sample_channel
 from stereocell.usd.validate import validate_stage
 from support import phantoms

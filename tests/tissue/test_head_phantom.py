@@ -9,9 +9,9 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 
 from stereocell import read
-from stereocell.building.channels import MR_GREY
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.planning.channels import MR_GREY
 from stereocell.samples import write_head
 from stereocell.samples.head import (
     BACKGROUND,

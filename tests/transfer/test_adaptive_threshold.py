@@ -13,13 +13,13 @@ from scipy.stats import norm
 from skimage import filters
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps.find_window import Window, window_from_json, window_to_json
 from stereocell.building.survey_file import read_survey
 from stereocell.cli.__main__ import main
 from stereocell.isosurface.level_evidence import Counting
 from stereocell.isosurface.level_histogram import Scale
 from stereocell.model.channel import SurfaceLevel
 from stereocell.report.thresholds import describe, draw_cut, draw_threshold, find_peers
+from stereocell.steps.find_window import Window, window_from_json, window_to_json
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
     Threshold,

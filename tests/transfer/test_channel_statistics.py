@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.steps import find_window as window_task
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import OpacityPoints, SurfaceLevel
 from stereocell.model.lattice_field import LatticeField
+from stereocell.steps import find_window as window_task
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
 from stereocell.transfer.opacity import (
     AT_SURFACE_OF_MAGNITUDES,

@@ -6,15 +6,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from stereocell.building import settings as settings_module
-from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import make_plan
 from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.stl import write_stl
 from stereocell.model.errors import OutputError
+from stereocell.planning import settings as settings_module
+from stereocell.planning.channels import Channel
+from stereocell.planning.plan import make_plan
 from stereocell.read import Level
 from stereocell.storage.assets import find_asset
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile

@@ -1,1 +1,1 @@
-"""Plan, units and phases. Only this package knows their order."""
+"""Passes and phases on OUT. Only this package knows their order."""

@@ -7,19 +7,17 @@ therefore compared, too: a file written while tasks ran may differ in voxels out
 from collections.abc import Iterator
 from pathlib import Path
 
-from stereocell.building.input_files import first_states, forget, open_watched
-from stereocell.building.open_source import SourceRef, open_afresh
-from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
 from stereocell.building.tissue_files import read_whole
 from stereocell.model.errors import SourceError
+from stereocell.planning.input_files import first_states, forget, open_watched
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_source import source_of
 from stereocell.read.fingerprint import covers_all
-from stereocell.read.readers import format_of
+from stereocell.read.known_formats import format_of
 from stereocell.read.remarks import LEFT_OUT
+from stereocell.steps.open_source import SourceRef, open_afresh
 from stereocell.storage.file_states import FileStates
 
-# Formats whose files are named by numbers. Other formats' file names may contain a patient's name.
-_NAMED = ("ome-zarr", "n5", "planes", "tiff")
 _SHOWN = 100  # characters of a path in a message
 
 
@@ -148,7 +146,7 @@ def _in_words(ref: SourceRef, states: FileStates, changed: list[str]) -> str:
     words = f"{count} of {total} files"
     if not changed:
         return "its address lists no files"
-    if format_of(ref.source) not in _NAMED:
+    if not format_of(ref.source).has_plain_names:
         return words if total > 1 else "its file"
     root = ref.source.partition("://")[2] or ref.source
     first = changed[0].removeprefix(root).lstrip("/") or changed[0].rpartition("/")[2]

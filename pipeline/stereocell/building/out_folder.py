@@ -14,18 +14,19 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from stereocell.building.plan import Plan
-from stereocell.building.plan_file import from_json, to_json
-from stereocell.building.settings import load
 from stereocell.engine.step import key_of
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_file import from_json, to_json
+from stereocell.planning.settings import load
+from stereocell.storage import workspace
 from stereocell.storage.contents import contents_of
 from stereocell.storage.documents import NOT_WRITTEN, SETTINGS, parse
+from stereocell.storage.file_list import sizes_of
 from stereocell.storage.json_files import find_sealed, read_json, read_sealed, sealed, write_sealed
 from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import is_forced, or_force, require_free
 from stereocell.storage.sealed_text import is_sealed_text
-from stereocell.storage.workspace import is_file, names_in, remove, sizes_below
 
 SURVEY = "units.schema.json#Survey"
 PLAN = "plan.schema.json"
@@ -52,7 +53,7 @@ def require_build_or_nothing(out: Path, source: str | Path) -> None:
     if found.kind in (Kind.FILE, Kind.SCENE):
         raise OutputError(f"{out}: found {found.words}, expected a folder")
     beside = {Path(source).name} if Path(source).parent.resolve() == out.resolve() else set()
-    others = {name for name in names_in(out) if not name.startswith(".")} - beside
+    others = {name for name in workspace.names_in(out) if not name.startswith(".")} - beside
     if others and found.kind is not Kind.BUILD:
         require_free(out, expected="nothing or a build")
 
@@ -99,6 +100,37 @@ class OutFolder:
                 f"{self.out}: can't be written ({error.strerror}), expected a folder of your own"
             ) from None
 
+    # --- files, which may be objects of a storage
+
+    @property
+    def is_stored(self) -> bool:
+        """Whether OUT is on object storage: its files are here only while they are needed."""
+        return workspace.is_mirrored(self.out)
+
+    def has(self, file: Path) -> bool:
+        """Return whether a file exists. It may also be one outside of OUT."""
+        return workspace.is_file(file)
+
+    def size(self, file: Path) -> int:
+        """Return the bytes of a file; 0: it does not exist."""
+        return workspace.sizes_below(file).get(file, 0)
+
+    def names(self, folder: Path) -> list[str]:
+        """Return the names in a folder; empty if there is none."""
+        return workspace.names_in(folder)
+
+    def remove(self, path: Path) -> None:
+        """Remove a file, or a folder with all its files, if it exists."""
+        workspace.remove(path)
+
+    def fetch(self, folder: Path) -> None:
+        """Fetch all files of a folder, for functions that read files of this machine."""
+        workspace.fetch(folder)
+
+    def marks(self, folder: Path) -> list[tuple[str, int, str]] | None:
+        """Return key, bytes and mark of all objects below a folder; None: OUT is not stored."""
+        return workspace.objects_below(folder)
+
     # --- the plan
 
     def save_plan(self, plan: Plan) -> bool:
@@ -119,7 +151,7 @@ class OutFolder:
         input.
         """
         try:
-            there = self.plan() if is_file(self.plan_file) else None
+            there = self.plan() if workspace.is_file(self.plan_file) else None
         except OutputError:
             if not is_forced():
                 raise
@@ -136,7 +168,7 @@ class OutFolder:
     def require_own_settings(self, plan: Plan, there: Plan | None) -> None:
         """Raise OutputError where stereocell.toml is the user's own file, not a plan's record."""
         file = self.settings_file
-        if not is_file(file) or is_sealed_text(file) or is_forced():
+        if not workspace.is_file(file) or is_sealed_text(file) or is_forced():
             return
         try:
             found = load(None, file, flags={})
@@ -180,10 +212,6 @@ class OutFolder:
     def statistics_file(self, channel_id: str, key: str) -> Path:
         """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
-
-    def relative(self, path: Path) -> str:
-        """Return a path below OUT as it stands in documents: from OUT, with forward slashes."""
-        return path.relative_to(self.out).as_posix()
 
     def notes_file(self, labels_id: str, fingerprint: str) -> Path:
         """Return the path of what a label map's own file says of its objects."""
@@ -245,9 +273,9 @@ class OutFolder:
 
     def remove_other_folders(self, parent: Path, keep: set[str]) -> None:
         """Remove the folders in `parent` that an earlier plan left, all except `keep`."""
-        names = {file.relative_to(parent).parts for file in sizes_below(parent)}
-        for name in {parts[0] for parts in names if len(parts) > 1} - keep:
-            remove(parent / name)
+        paths = [path.split("/") for path in sizes_of(parent)]
+        for name in {parts[0] for parts in paths if len(parts) > 1} - keep:
+            self.remove(parent / name)
 
     # --- the phases
 
@@ -258,7 +286,7 @@ class OutFolder:
 
     def phases_fault(self) -> str | None:
         """Return a line on a damaged record of the phases; None: it is sound, or there is none."""
-        if not is_file(self.phases_file):
+        if not workspace.is_file(self.phases_file):
             return None
         try:
             read_sealed(self.phases_file, PHASES, "so no phase counts as done")
@@ -284,7 +312,7 @@ class OutFolder:
 
     def require_finished(self, name: str) -> None:
         """Raise OutputError where a phase began and did not finish, or its record is damaged."""
-        if is_file(self.phases_file):
+        if workspace.is_file(self.phases_file):
             read_sealed(self.phases_file, PHASES, PHASES_AGAIN)
         if self.is_begun(name):
             raise OutputError(

@@ -11,10 +11,10 @@ from stereocell.building.tissue_files import FOLDER, RECORD
 from stereocell.bundle.manifest import MANIFEST, find_others, require_bundle
 from stereocell.model.errors import OutputError
 from stereocell.storage.contents import contents_of, is_ignored, words_for
+from stereocell.storage.file_list import sizes_of
 from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import is_forced, or_force, refused
 from stereocell.storage.sealed_text import is_sealed_text
-from stereocell.storage.workspace import is_file, remove, sizes_below
 from stereocell.usd.written_files import ADVICE, CHANGED, DOUBTFUL, find_damage, read_stage_list
 
 
@@ -64,8 +64,8 @@ def require_own_bundle(out_folder: OutFolder) -> None:
     folder = out_folder.bundle_dir
     files = _files(folder)
     if is_forced():
-        if files and not is_file(folder / MANIFEST):
-            remove(folder)
+        if files and not out_folder.has(folder / MANIFEST):
+            out_folder.remove(folder)
         return
     require_bundle(folder)
     if others := find_others(folder):
@@ -86,23 +86,22 @@ def no_layer(path: Path, *, is_given: bool) -> OutputError:
 def require_own_report(out_folder: OutFolder) -> None:
     """Raise OutputError where report.html is a page that no report phase wrote."""
     file = out_folder.report_file
-    if is_file(file) and not (
+    if out_folder.has(file) and not (
         is_sealed_text(file) or out_folder.has_begun("report") or is_forced()
     ):
         raise refused(file, "another page", "nothing or a report of this build")
 
 
-def require_own_tissue(out: Path) -> None:
+def require_own_tissue(out_folder: OutFolder) -> None:
     """Raise OutputError where OUT/tissue holds files without the record of `stereocell tissue`."""
-    folder = out / FOLDER
-    if _files(folder) and not is_file(folder / RECORD) and not is_forced():
+    folder = out_folder.out / FOLDER
+    if _files(folder) and not out_folder.has(folder / RECORD) and not is_forced():
         raise refused(folder, _words(folder), "nothing or tissue classes of this build")
 
 
 def _files(folder: Path) -> set[str]:
     """Return the relative paths of the files below a folder, except files of the system."""
-    found = (file.relative_to(folder) for file in sizes_below(folder) if file != folder)
-    return {file.as_posix() for file in found if not is_ignored(file.name)}
+    return {path for path in sizes_of(folder) if not is_ignored(path.rpartition("/")[2])}
 
 
 def _words(folder: Path) -> str:

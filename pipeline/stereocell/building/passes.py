@@ -1,116 +1,114 @@
-"""The passes over the units: first what all of a channel's tiles share, then the units themselves.
+"""The passes over a plan's voxels: each runs the steps whose results are missing.
 
-The survey finds each channel's window and level, dataset-wide (channel_survey.py). Then meshes and
-volumes are built. Every result lies under a name that says what it depends on.
+All passes but that of the units find what the tiles of a channel or a label map share.
 """
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import product
+from typing import TypeVar
 
-from stereocell.building.channel_survey import survey_channels
-from stereocell.building.channels import Channel
-from stereocell.building.label_maps import Labels
-from stereocell.building.object_passes import locate_objects, object_steps, save_notes, tell_objects
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.plan_source import voxels_of
 from stereocell.building.run_on_input import run_pass
-from stereocell.building.running_pass import remove_mixed
-from stereocell.building.steps.build_unit import BuildUnit
-from stereocell.building.survey_file import Survey
-from stereocell.building.survey_steps import around
-from stereocell.building.unit import UnitInput, UnitOptions
 from stereocell.engine.run import Engine
-from stereocell.engine.run_steps import Kept
+from stereocell.engine.run_steps import Kept, Results
 from stereocell.engine.step import Step
-from stereocell.model.errors import UsageError
-from stereocell.model.lattice import Lattice
+from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.model.tiling import Tile
 from stereocell.model.unit import Unit
+from stereocell.planning.channels import Channel
+from stereocell.planning.level_choice import Found
+from stereocell.planning.located_objects import Located, TileGrid, locate, tile_boxes
+from stereocell.planning.plan import Plan
+from stereocell.planning.survey_steps import components_step, evidence_step, window_step
+from stereocell.steps.find_extents import FindExtents
+from stereocell.steps.find_window import Window
+from stereocell.steps.gather_evidence import GatherEvidence
+from stereocell.steps.labels import Labels
+from stereocell.steps.sum_components import SumComponents, Sums
+
+R = TypeVar("R")
+ByChannel = dict[str, Results[R]]  # by channel ID, each by tile ID
 
 
-def run_passes(
-    out_folder: OutFolder, plan: Plan, *, engine: Engine, only: str | None
-) -> tuple[int, int]:
-    """Build the units (or `only` one, `<tile>/<channel>`).
+@dataclass(frozen=True, slots=True)
+class Passes:
+    """The passes over one plan, with the folder of their results and the workers.
 
-    Returns how many were not done already, and how many others are still to be built.
-
-    Raises SourceError if the source is no longer what was planned, TasksFailedError once all
-    others are finished.
+    Each raises SourceError where an input changed since the plan, TasksFailedError where steps
+    fail.
     """
-    remove_mixed(out_folder, plan)
-    wanted = {f"{tile_id}/{channel.id}": channel for tile_id, channel in _select(plan, only)}
-    survey = survey_channels(out_folder, plan, engine)
-    for labels in plan.labels:
-        save_notes(out_folder, plan, labels)
-    located = {one.id: locate_objects(out_folder, plan, one, engine) for one in plan.labels}
-    steps: dict[str, Step[Unit]] = {
-        **unit_steps(plan, survey),
-        **object_steps(plan, located, survey),
-    }
-    missing, others = [], 0
-    for name, step in steps.items():
-        place = out_folder.unit_dir(name, step.key)
-        if step.is_kept(place):
-            continue
-        if name in wanted:
-            missing.append(Kept(f"{name.split('/')[0]}/{wanted[name].name}", step, place))
-        else:
-            others += 1
-    if missing:
-        for labels in plan.labels:
-            tell_objects(labels, located[labels.id])
-    run_pass(out_folder, plan, engine, "units", missing, is_last=True)
-    if not others:  # all there: the stage may be made of them
-        out_folder.save_units(plan, {name: step.key for name, step in steps.items()})
-    return len(missing), others
+
+    out_folder: OutFolder
+    plan: Plan
+    engine: Engine
+
+    def windows(self) -> Results[Window]:
+        """Return each channel's window and background, by channel ID."""
+        kept = {}
+        for channel in self.plan.channels:
+            step = window_step(self.plan, channel)
+            place = self.out_folder.statistics_file(channel.voxels_id, step.key)
+            kept[channel.id] = Kept(channel.base or channel.name, step, place)
+        run_pass(self.out_folder, self.plan, self.engine, "windows", kept.values())
+        return Results(kept, self.out_folder.out)
+
+    def evidence(self, windows: Mapping[str, Window]) -> ByChannel[TileEvidence]:
+        """Return what each tile shows of the levels of a channel."""
+
+        def step_of(tile: Tile, channel: Channel) -> GatherEvidence | None:
+            if channel.source:  # shares of tissue, whose level is known
+                return None
+            return evidence_step(self.plan, tile.box, channel=channel, window=windows[channel.id])
+
+        return self._by_tile("evidence", step_of)
+
+    def components(self, found: Mapping[str, Found]) -> list[ByChannel[Sums]]:
+        """Return the sums over each tile's components, for each level that a channel may have."""
+
+        def of_level(rung: int) -> ByChannel[Sums]:
+            def step_of(tile: Tile, channel: Channel) -> SumComponents | None:
+                return components_step(self.plan, tile, channel, found[channel.id], rung)
+
+            return self._by_tile("components", step_of)
+
+        most = max((len(one.rungs) for one in found.values()), default=0)
+        return [of_level(rung) for rung in range(most)]
+
+    def objects(self, labels: Labels) -> Located:
+        """Return which tile builds which object of a label map."""
+        kept = {}
+        for tile, box in tile_boxes(TileGrid.of(self.plan, labels)).items():
+            step = FindExtents(labels.voxels, box)
+            place = self.out_folder.tile_result("extents", tile, labels.id, step.key)
+            kept[tile] = Kept(f"{tile}/{labels.name}", step, place)
+        run_pass(self.out_folder, self.plan, self.engine, "objects", kept.values())
+        parts = {tile: one.read() for tile, one in kept.items()}
+        return locate(self.plan, labels, parts, self.plan.settings.objects.smallest_voxels)
+
+    def units(self, missing: list[Kept[Unit]]) -> None:
+        """Build units. This pass is the last one that reads the inputs."""
+        run_pass(self.out_folder, self.plan, self.engine, "units", missing, is_last=True)
+
+    def _by_tile(
+        self, name: str, step_of: Callable[[Tile, Channel], Step[R] | None]
+    ) -> ByChannel[R]:
+        """Run a pass over the tiles of all channels.
+
+        step_of  returns the step of a tile of a channel; None: there is none
+        """
+        kept: dict[str, dict[str, Kept[R]]] = {channel.id: {} for channel in self.plan.channels}
+        for tile, channel in product(self.plan.tiles, self.plan.channels):
+            step = step_of(tile, channel)
+            if step is not None:
+                place = self.out_folder.tile_result(name, tile.id, channel.voxels_id, step.key)
+                title = f"{tile.id}/{channel.base or channel.name}"
+                kept[channel.id][tile.id] = Kept(title, step, place)
+        every = [one for tile in self.plan.tiles for one in _of_tile(kept, tile.id)]
+        run_pass(self.out_folder, self.plan, self.engine, name, every)
+        return {id_: Results(by_tile, self.out_folder.out) for id_, by_tile in kept.items()}
 
 
-def unit_steps(plan: Plan, survey: Survey) -> dict[str, BuildUnit]:
-    """Return the step of every unit, by `<tile>/<channel>`."""
-    return {
-        f"{tile.id}/{channel.id}": _unit_step(plan, tile, channel, survey)
-        for tile, channel in product(plan.tiles, plan.channels)
-    }
-
-
-def _select(plan: Plan, only: str | None) -> list[tuple[str, Channel | Labels]]:
-    every: list[Channel | Labels] = [*plan.channels, *plan.labels]
-    wanted = [(tile.id, channel) for tile in plan.tiles for channel in every]
-    if only is None:
-        return wanted
-    chosen = [(t, c) for t, c in wanted if only in {f"{t}/{n}" for n in _names(c)}]
-    if not chosen:
-        raise UsageError(
-            f"--only is {only!r}, expected TILE/CHANNEL with a tile from {plan.tiles[0].id} to "
-            f"{plan.tiles[-1].id} and a channel of {', '.join(c.name for c in every)}"
-        )
-    return chosen
-
-
-def _names(channel: Channel | Labels) -> tuple[str | int, ...]:
-    """Return what a channel may be called; an index is one of the input's."""
-    if isinstance(channel, Labels):
-        return channel.name, channel.id
-    return (channel.name, channel.id) + (() if channel.source else (channel.index,))
-
-
-def _unit_step(plan: Plan, tile: Tile, channel: Channel, survey: Survey) -> BuildUnit:
-    found = survey[channel.id]
-    painter, level = plan.painter(channel), found.appearance.level
-    own = tile.lattice(plan.region)
-    window = own.grown(plan.halo, plan.region)
-    given = UnitInput(
-        lattice=Lattice(window, own, plan.region, plan.spacing_um, plan.origin_um),
-        iso=None if level is None else around(level.field, window),
-        background=around(found.statistics.background, window),
-        repair=found.repair,
-        step=plan.with_grid(found.grid_um).step,
-        intensity_window=found.statistics.window,
-        options=UnitOptions.of(plan.settings),
-        painted=None if painter is None else survey[painter.id].statistics.window,
-        holder=found.holder and found.holder.around(window),
-        max_shift=None if level is None else level.max_shift,
-    )
-    painted = None if painter is None else voxels_of(plan, painter)
-    return BuildUnit(voxels_of(plan, channel), given, painted)
+def _of_tile(kept: Mapping[str, Mapping[str, Kept[R]]], tile_id: str) -> list[Kept[R]]:
+    """Return the results of one tile, in the order of the channels."""
+    return [by_tile[tile_id] for by_tile in kept.values() if tile_id in by_tile]

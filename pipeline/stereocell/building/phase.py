@@ -12,8 +12,7 @@ from stereocell.building.sealed_documents import require_documents
 from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.engine.run import console
 from stereocell.model.errors import OutputError
-from stereocell.storage.file_list import find_faults, measure, read_list
-from stereocell.storage.workspace import cached, sizes_below
+from stereocell.storage.file_list import find_faults, list_files, read_list, sizes_of
 from stereocell.usd import written_files
 
 
@@ -45,6 +44,11 @@ class Phase:
             # an empty key: a killed phase is not done
             self.save(0.0, is_finished=False)
         return self.is_up_to_date
+
+    def print(self, *lines: str) -> None:
+        """Print lines on the phase."""
+        for line in lines:
+            console.print(f"{self.name}: {line}", markup=False, soft_wrap=True)
 
     def save(self, seconds: float, *, is_finished: bool = True) -> None:
         """Save the phase's record."""
@@ -86,12 +90,11 @@ def states_of(files: Iterable[Path]) -> list[tuple[str, int, int]]:
     return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
 
 
-def digest_of(results: Iterable[Path]) -> str:
-    """Return a digest of all files' names and sizes: damage changes it."""
+def digest_of_names(folder: Path) -> str:
+    """Return a digest of the names and sizes of all files below a folder: damage changes it."""
     digest = hashlib.sha256()
-    for result in results:
-        for file, size in (sizes_below(result) or {result: -1}).items():
-            digest.update(f"{file.relative_to(result.parent)} {size}\n".encode())
+    for path, size in sizes_of(folder).items():
+        digest.update(f"{folder.name}/{path} {size}\n".encode())
     return digest.hexdigest()[:20]
 
 
@@ -103,7 +106,7 @@ def digest_of_bundle(out_folder: OutFolder) -> str:
     except OutputError:
         return ""
     faults = find_faults(out_folder.bundle_dir, listed, since=path)
-    return "" if faults else digest_of([out_folder.bundle_dir]) + digest_of_manifest(out_folder)
+    return "" if faults else digest_of_names(out_folder.bundle_dir) + digest_of_manifest(out_folder)
 
 
 def digest_of_manifest(out_folder: OutFolder) -> str:
@@ -113,8 +116,8 @@ def digest_of_manifest(out_folder: OutFolder) -> str:
 
 def digest_of_file(file: Path) -> str:
     """Return a digest of a file's content; empty: there is none."""
-    with cached(file):
-        return str(measure(file)["sha256"])[:20] if file.is_file() else ""
+    listed = list_files(file, root=file.parent)
+    return str(listed[file.name]["sha256"])[:20] if listed else ""
 
 
 def digest_of_stage(out_folder: OutFolder) -> str:

@@ -1,88 +1,66 @@
-"""The first phases of a build, each a function on OUT: plan -> units -> stage.
+"""The way of a build, from top to bottom: plan -> units -> stage -> bundle. A report follows.
 
-The bundle and the report follow: bundle_phase.py, report/phase.py. Every phase skips finished
-work: a result is named by everything that it depends on.
+The units come after passes that find what the tiles of a channel share: windows -> evidence ->
+levels -> components. Each phase is a function on OUT, and skips finished work: the name of a result
+is a key of all that it depends on.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from stereocell.building.channel_colors import choose_colors, is_lone, lies_at_bone, shows_stain
-from stereocell.building.channels import PALETTE, Channel, with_surfaces
-from stereocell.building.hounsfield import believe, settle_modality
-from stereocell.building.input_files import open_anew, require_table, watch_table
-from stereocell.building.intensities import doubt_of, require_intensities
-from stereocell.building.label_maps import Labels, are_alone, find_labels
-from stereocell.building.level_estimate import notes_on_levels
-from stereocell.building.object_passes import locate_objects, read_notes, told_before
-from stereocell.building.object_tables import (
-    appearance_of_labels,
-    make_table,
-    require_color_by,
-    table_of,
+from stereocell.building.bundle_inputs import (
+    bundle_step,
+    remove_half_bundle,
+    require_kept_stage,
+    require_stage,
 )
-from stereocell.building.open_source import as_asked
+from stereocell.building.object_records import save_notes, table_of_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import (
+    require_own_bundle,
     require_own_places,
     require_own_stage,
 )
-from stereocell.building.passes import run_passes
-from stereocell.building.phase import (
-    digest_of_stage,
-    phase_of,
-)
-from stereocell.building.plan import Plan, choose_level, make_plan, parse_region
-from stereocell.building.plan_notes import (
-    changes_of,
-    ignored_notes,
-    print_notes,
-    told_of_absent,
-    told_of_gaps,
-    words_of_spacing,
-)
-from stereocell.building.settings import INTENSITY, Settings, to_dict, to_readable_toml
-from stereocell.building.steps.build_unit import BuildUnit
-from stereocell.building.steps.find_window import FindWindow
-from stereocell.building.steps.gather_evidence import GatherEvidence
-from stereocell.building.steps.sum_components import SumComponents
-from stereocell.building.steps.write_stage import Tables, WriteStage
-from stereocell.building.steps.write_stage_tile import WriteStageTile, stage_tile_step
+from stereocell.building.passes import Passes
+from stereocell.building.phase import Phase, digest_of_bundle, digest_of_stage, phase_of
+from stereocell.building.running_pass import remove_mixed
 from stereocell.building.surface_cover import notes_on_cover
-from stereocell.building.survey_file import read_survey
-from stereocell.building.unit_files import load_objects
+from stereocell.building.survey_file import read_survey, save_survey
+from stereocell.bundle.manifest import require_bundle
 from stereocell.engine.run import Engine, console
 from stereocell.engine.run_steps import Kept, run_missing
-from stereocell.engine.step_record import libraries_of
-from stereocell.meshes.alpha_wrap import find_wrapper
-from stereocell.model.counted import counted
-from stereocell.model.errors import UsageError
-from stereocell.model.extra_packages import version_of
-from stereocell.model.object_table import ObjectTable
-from stereocell.model.tiling import Box
-from stereocell.model.version import GENERATOR
-from stereocell.read.readers import format_of
-from stereocell.read.remarks import CAST
-from stereocell.storage.file_list import FileList
+from stereocell.planning.channel_survey import (
+    choose_level_of,
+    notes_on_holders,
+    notes_on_survey,
+    survey_channel,
+)
+from stereocell.planning.input_files import require_table
+from stereocell.planning.label_numbers import notes_on_objects
+from stereocell.planning.level_choice import find_level
+from stereocell.planning.level_estimate import notes_on_levels
+from stereocell.planning.object_steps import object_steps
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_notes import changes_of, print_notes, summary_of
+from stereocell.planning.provenance import provenance_record
+from stereocell.planning.settings import Settings, to_readable_toml
+from stereocell.planning.settle import settle
+from stereocell.planning.stage_steps import stage_step, stage_tile_step
+from stereocell.planning.survey import Survey
+from stereocell.planning.unit_steps import choose_units, unit_steps
+from stereocell.read.image import printable
+from stereocell.read.source_place import require_apart
+from stereocell.steps.write_stage_tile import StageTile
+from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
-from stereocell.storage.location import Location, require_apart
+from stereocell.storage.overwriting import is_forced
 from stereocell.storage.sealed_text import write_sealed_text
-from stereocell.storage.workspace import remove
-from stereocell.textures.map_packages import (
-    UNWRAPPER,
-    require_map_packages,
-)
-
-# the steps whose libraries stand in the provenance of a stage
-_STEPS = tuple(
-    step.__name__ for step in (FindWindow, GatherEvidence, SumComponents, BuildUnit, WriteStageTile)
-)
+from stereocell.usd.write_usdz import USDZ_NAME
 
 
-def make(
+def make_plan(
     source: str,
     out: Path,
     settings: Settings,
@@ -113,158 +91,14 @@ def make(
         if engine is not None:
             require_own_places(out_folder, is_same_plan=there == plan)
             engine.join()
-        print_notes(plan)  # an error stands alone
+        print_notes(plan)  # only now, since an error is printed alone
         if there is not None and (changes := changes_of(there, plan)):
-            console.print(f"plan: {changes}", markup=False, soft_wrap=True)
+            phase.print(changes)
         phase.is_up_to_date = not out_folder.save_plan(plan)
         write_sealed_text(out_folder.settings_file, text)
         write_sealed(out_folder.provenance_file, provenance_record(plan))
-    shape = " x ".join(str(n) for n in plan.region.shape)
-    console.print(
-        f"plan: {plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x) of "
-        f"{words_of_spacing(plan.spacing_um)}, "
-        f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
-        + "".join(f", objects of {one.name}" for one in plan.labels)
-    )
+    console.print(f"plan: {summary_of(plan)}")
     return plan
-
-
-def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
-    """Return the plan of a build, with its notes. Nothing is written or printed.
-
-    choice  notes on how the settings were chosen; see `load_for`
-
-    Raises StereoCellError where the source can't be read, or the settings don't fit it.
-    """
-    location = Location.of(source).source
-    options = settings.plan
-    if settings.surface.wrap == "alpha-wrap":
-        find_wrapper()
-    if settings.unwrap.maps:
-        require_map_packages()
-    _require_labels(settings)
-    dataset = believe(open_anew(as_asked(location, options)), options.taken_as)
-    alone = are_alone(settings.labels)
-    settings, modality = settle_modality(dataset, settings, are_labels=alone)
-    indices = dataset.find_channels(options.channels) if options.channels else None
-    chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
-    wanted = [dataset.channels[index] for index in chosen]
-    colors = choose_colors(
-        [(one.name, one.color) for one in wanted],
-        modality=modality.code,
-        is_alone=is_lone([one.name for one in dataset.channels]),
-        is_bone=lies_at_bone(settings.iso_values, is_hounsfield=modality.is_hounsfield),
-        is_stained=shows_stain(dataset.levels[0].spacing_um, is_dark=options.dark),
-    )
-    channels = [
-        Channel(index, one.name, color)
-        for index, one, color in zip(chosen, wanted, colors, strict=True)
-    ]
-    channels = with_surfaces(channels, settings.surfaces)
-    level = choose_level(dataset.levels, len(channels), settings)
-    found = find_labels(
-        dataset,
-        location,
-        settings.labels,
-        settings=settings,
-        colors=PALETTE[len(channels) :] + PALETTE[: len(channels)],
-        taken=[channel.name for channel in channels],
-    )
-    if options.taken_as != INTENSITY and channels:
-        whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
-        require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
-    origin = dataset.levels[level[0]].origin_um
-    plan = make_plan(
-        location,
-        dataset.name,
-        fingerprint=dataset.fingerprint,
-        levels=dataset.levels,
-        origin_um=origin,
-        channels=channels,
-        level=level,
-        settings=settings,
-        modality=modality.code,
-        placement=dataset.placement,
-        slice_axis=dataset.slice_axis(level[0]),
-        has_sides=dataset.has_sides,
-        labels=found.labels,
-        formats={format_of(location), *(format_of(one.ref.source) for one in found.labels)},
-    )
-    if settings.objects.table:
-        watch_table(settings.objects.table)
-    objects = list(found.notes)
-    for one in plan.labels:
-        # a table that can't be read, or lacks a column, ends the command before the build
-        table = table_of(plan, one)
-        require_color_by(plan, one, table)
-        objects += [f"table: {note}" for note in table.notes] if table else []
-    gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
-    objects += told_before(plan)
-    objects += filter(None, map(doubt_of, plan.labels))
-    if settings.objects.table and len(plan.labels) > 1:
-        objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
-    # numbers of objects are read as they are
-    read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
-    kind = [modality.note] if modality.note else []
-    notes = (*read, *choice, *kind, *gaps, *objects, *ignored_notes(settings, channels))
-    return replace(plan, notes=notes, is_hounsfield=modality.is_hounsfield)
-
-
-def _require_labels(settings: Settings) -> None:
-    """Raise UsageError where something is said of objects that nobody asked for."""
-    options = settings.objects
-    for flag, value in {
-        "--table": options.table,
-        "--table-key": options.table_key,
-        "--columns": ",".join(options.columns),
-        "--color-by": options.color_by,
-        "--background": str(options.background or ""),
-    }.items():
-        if value and not settings.labels:
-            raise UsageError(f"{flag} is {value!r:.60}: of no objects, expected --labels with it")
-        if value and not options.table and flag in ("--table-key", "--columns"):
-            raise UsageError(f"{flag} is {value!r:.60}: of no table, expected --table with it")
-
-
-def provenance(plan: Plan) -> dict[str, Any]:
-    """Return the provenance that results carry: settings and versions, no paths, no identities."""
-    settings = _without_places(to_dict(plan.settings))
-    # by the plan's formats, since the sources may be gone when a stage is written; an added
-    # channel's source lies in OUT
-    formats = {*plan.formats, *(format_of(c.source) for c in plan.channels if c.source)}
-    return {
-        "generator": GENERATOR,
-        "fingerprint": plan.fingerprint,
-        "level": plan.level,
-        "spacing_um": list(plan.spacing_um),
-        "settings": settings,
-        "libraries": {
-            **libraries_of(*_STEPS, *sorted(formats)),
-            **({UNWRAPPER: version_of(UNWRAPPER)} if plan.settings.unwrap.maps else {}),
-        },
-        **_added(plan),
-    }
-
-
-def provenance_record(plan: Plan) -> dict[str, Any]:
-    """Return the content of provenance.json: the provenance, and the notes on reading the source.
-
-    The notes stay beside the plan, because some name the source's files.
-    """
-    return {**provenance(plan), "notes": list(plan.notes)}
-
-
-def _without_places(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return settings without the paths in them, which may name a patient or a person."""
-    labels = dict.fromkeys(settings["labels"], "")
-    objects = {**settings["objects"], "table": "table" if settings["objects"]["table"] else ""}
-    return {**settings, "labels": labels, "objects": objects}
-
-
-def _added(plan: Plan) -> dict[str, Any]:
-    """Return the channels with a source of their own, and that source's fingerprint."""
-    added = {c.name: c.fingerprint for c in plan.channels if c.source}
-    return {"added_channels": added} if added else {}
 
 
 def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
@@ -277,17 +111,58 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
     out_folder = OutFolder(out)
     plan = out_folder.plan()
     with phase_of(out_folder, "units") as phase:
-        built, missing = run_passes(out_folder, plan, engine=engine, only=only)
-        phase.is_up_to_date = not built
-        phase.is_whole = not missing
-        units = len(plan.tiles) * (len(plan.channels) + len(plan.labels))
-        phase.about = "" if built == units else f"{built} of {units} units"
-        if missing:
-            console.print(f"units: {missing} of {units} are still to be built")
-        elif built:
-            for note in notes_on_cover(out_folder, plan):
-                console.print(f"units: {note}", markup=False, soft_wrap=True)
+        remove_mixed(out_folder, plan)
+        wanted = choose_units(plan, only)
+        passes = Passes(out_folder, plan, engine)
+        survey = _survey(passes, phase)
+        for labels in plan.labels:
+            save_notes(out_folder, plan, labels)
+        located = {labels.id: passes.objects(labels) for labels in plan.labels}
+        steps = {**unit_steps(plan, survey), **object_steps(plan, located, survey)}
+        units = {
+            name: Kept(wanted.get(name, name), step, out_folder.unit_dir(name, step.key))
+            for name, step in steps.items()
+        }
+        missing = {name: unit for name, unit in units.items() if not unit.is_whole()}
+        to_build = [unit for name, unit in missing.items() if name in wanted]
+        if to_build:
+            for labels in plan.labels:
+                phase.print(*notes_on_objects(labels, located[labels.id]))
+        passes.units(to_build)
+        phase.is_up_to_date = not to_build
+        if len(to_build) < len(units):
+            phase.about = f"{len(to_build)} of {len(units)} units"
+        phase.is_whole = len(missing) == len(to_build)
+        if not phase.is_whole:
+            phase.print(f"{len(missing) - len(to_build)} of {len(units)} are still to be built")
+        else:
+            out_folder.save_units(plan, {name: step.key for name, step in steps.items()})
+            if to_build:
+                phase.print(*notes_on_cover(out_folder, plan))
     require_table(plan.settings.objects.table)
+
+
+def _survey(passes: Passes, phase: Phase) -> Survey:
+    """Find each channel's window, level, repair and appearance, one for all its tiles."""
+    plan = passes.plan
+    found_windows = passes.windows()
+    windows, files = dict(found_windows), found_windows.files()
+    phase.print(*notes_on_holders(plan, windows))
+    evidence = passes.evidence(windows)
+    found = {
+        one.id: find_level(plan, one, windows[one.id], evidence[one.id]) for one in plan.channels
+    }
+    components = passes.components(found)
+    chosen = {
+        id_: choose_level_of(plan, one, evidence[id_], [level[id_] for level in components])
+        for id_, one in found.items()
+    }
+    survey = {
+        one.id: survey_channel(plan, one, chosen[one.id], files[one.id]) for one in plan.channels
+    }
+    save_survey(passes.out_folder, survey)
+    phase.print(*notes_on_survey(plan, survey, chosen))
+    return survey
 
 
 def run_stage(out: Path, engine: Engine) -> None:
@@ -300,71 +175,59 @@ def run_stage(out: Path, engine: Engine) -> None:
     plan = out_folder.plan()
     with phase_of(out_folder, "stage") as phase:
         out_folder.require_units_of(plan)
-        index, survey = out_folder.index(), read_survey(out_folder)
-        appearances = [survey[channel.id].appearance for channel in plan.channels]
-        opens_cut = plan.opens_cut and any(survey[one.id].is_body for one in plan.channels)
-        appearances += [
-            appearance_of_labels(labels, painter=painter.id if painter else "")
-            for labels in plan.labels
-            for painter in [plan.painter(labels)]
-        ]
-        tables = {
-            labels.id: _table(out_folder, plan, labels, index, engine) for labels in plan.labels
-        }
+        survey, stage_dir = read_survey(out_folder), out_folder.stage_dir
+        units = {name: out_folder.unit_dir(name, key) for name, key in out_folder.index().items()}
+        tables = {}
+        for labels in plan.labels:
+            located = Passes(out_folder, plan, engine).objects(labels)
+            tables[labels.id], remarks = table_of_objects(out_folder, plan, labels, located)
+            phase.print(*remarks)
         tiles = [
-            stage_tile_step(out_folder, plan, index=index, tile=tile, tables=tables)
+            StageTile(
+                stage_tile_step(plan, tile, units, tables), out_folder.tile_file(tile.id), stage_dir
+            )
             for tile in plan.tiles
         ]
-        places = {tile.id: out_folder.tile_file(tile.id) for tile in plan.tiles}
-        stage = WriteStage(
-            plan.name,
-            tuple(tiles),
-            plan.spacing_um,
-            tuple(appearances),
-            provenance(plan),
-            plan.modality,
-            plan.placement,
-            plan.has_sides,
-            opens_cut,
-            Tables(tables),
-        )
+        stage = stage_step(plan, survey, [tile.step for tile in tiles], tables)
         done = partial(digest_of_stage, out_folder)
         if phase.is_done(stage.key, done, require_own=require_own_stage):
             return
-        remove(out_folder.stage_list)  # the list of the earlier stage
-        kept = zip(places.items(), tiles, strict=True)
-        run_missing(engine, "stage", [Kept(id_, step, place) for (id_, place), step in kept])
-        stage.write(out_folder.stage_dir)
-        out_folder.remove_other_folders(
-            out_folder.stage_dir / "tiles", {tile.id for tile in plan.tiles}
-        )
-        lists = [tile.listed(places[tile.content.id]) for tile in tiles]
+        out_folder.remove(stage_dir / USDZ_NAME)
+        out_folder.remove(out_folder.stage_list)  # the list of the earlier stage
+        run_missing(engine, "stage", tiles)
+        stage.write(stage_dir)
+        out_folder.remove_other_folders(stage_dir / "tiles", {tile.id for tile in plan.tiles})
+        lists = [tile.listed() for tile in tiles]
         files = {path: entry for listed, _ in lists for path, entry in listed.items()}
-        _tell_size(files, sum(measured for _, measured in lists))
-        stage.write_list(out_folder.stage_dir, files)
+        if measured := sum(measured for _, measured in lists):
+            whole = sum(entry["bytes"] for entry in files.values())
+            phase.print(
+                f"{measured / 1e6:.1f} of {whole / 1e6:.1f} MB are voxels as measured, for other "
+                "windows; --bits 8 leaves them out"
+            )
+        stage.write_list(stage_dir, files)
 
 
-def _table(
-    out_folder: OutFolder, plan: Plan, labels: Labels, index: Mapping[str, str], engine: Engine
-) -> ObjectTable:
-    """Return the table of a label map's objects, and print what did not fit it."""
-    names = {tile.id: f"{tile.id}/{labels.id}" for tile in plan.tiles}
-    facts = {
-        tile: load_objects(out_folder.unit_dir(name, index[name])) for tile, name in names.items()
-    }
-    located = locate_objects(out_folder, plan, labels, engine)
-    notes = read_notes(out_folder, plan, labels)
-    table, remarks = make_table(plan, labels, located, facts, notes, table_of(plan, labels))
-    for remark in remarks:
-        console.print(f"stage: {remark}", markup=False, soft_wrap=True)
-    return table
+def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
+    """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it (`stage`).
 
-
-def _tell_size(tiles: FileList, measured: int) -> None:
-    """Say what the voxels as measured take, in bytes, of the files of all tiles."""
-    if measured:
-        whole = sum(entry["bytes"] for entry in tiles.values())
-        console.print(
-            f"stage: {measured / 1e6:.1f} of {whole / 1e6:.1f} MB are voxels as measured, for "
-            "other windows; --bits 8 leaves them out"
-        )
+    Raises OutputError where the stage is missing, StageError where it can't be read.
+    """
+    out_folder = OutFolder(out)
+    with phase_of(out_folder, "bundle") as phase:
+        path = require_stage(out_folder, stage)
+        viewer = viewer_dist()
+        step = bundle_step(out_folder, path, viewer)
+        require_kept_stage(out_folder)
+        remove_half_bundle(out_folder)
+        if not is_forced():
+            require_bundle(out_folder.bundle_dir)  # before the phase is begun
+        done = partial(digest_of_bundle, out_folder)
+        if not phase.is_done(step.key, done, require_own=require_own_bundle):
+            out_folder.remove_other_folders(out_folder.parts_dir, {step.key})
+            parts = out_folder.parts_dir / step.key
+            step.write(out_folder.bundle_dir, path, viewer, parts=parts, run=engine.run)
+            phase.about = "" if stage is None else f"of {printable(path.name)}"
+    out_folder.remove(out_folder.parts_dir)
+    if viewer is None and not phase.is_up_to_date:
+        phase.print("the viewer is not built, so the bundle has no page: run `make setup`")

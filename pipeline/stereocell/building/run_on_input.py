@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from stereocell.building.input_unchanged import (
     InputChangedError,
@@ -13,11 +12,10 @@ from stereocell.building.input_unchanged import (
     require_still,
 )
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
 from stereocell.building.running_pass import begin, end
 from stereocell.engine.run import Engine
-from stereocell.engine.run_steps import Kept, run_missing
-from stereocell.storage.workspace import remove
+from stereocell.engine.run_steps import Task, run_missing
+from stereocell.planning.plan import Plan
 
 
 def run_on_input(
@@ -57,7 +55,7 @@ def run_pass(
     plan: Plan,
     engine: Engine,
     label: str,
-    wanted: Iterable[Kept[Any]],
+    wanted: Iterable[Task],
     *,
     is_last: bool = False,
 ) -> int:
@@ -79,7 +77,7 @@ def _require_still(
         require_still(plan, is_last=is_last)
     except InputChangedError as error:
         for result in results if error.has_new_fingerprint else [out_folder.units_dir]:
-            remove(result)
+            out_folder.remove(result)
         raise
     finally:
         end(out_folder)

@@ -8,13 +8,12 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from stereocell.building.input_files import open_states
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
 from stereocell.engine.run import console
+from stereocell.planning.input_files import open_states
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_source import source_of
 from stereocell.storage.json_files import find_json, write_json
-from stereocell.storage.workspace import remove
 
 _SCHEMA = "units.schema.json#Running"
 
@@ -27,7 +26,7 @@ def begin(out_folder: OutFolder, plan: Plan, results: Sequence[Path]) -> None:
 
 def end(out_folder: OutFolder) -> None:
     """Remove the note: the pass ended, and its inputs were compared."""
-    remove(out_folder.running_file)
+    out_folder.remove(out_folder.running_file)
 
 
 def remove_mixed(out_folder: OutFolder, plan: Plan) -> None:
@@ -42,7 +41,7 @@ def remove_mixed(out_folder: OutFolder, plan: Plan) -> None:
         )
         for result in (out_folder.out / name for name in left["results"]):
             if result.is_relative_to(out_folder.units_dir) and ".." not in result.parts:
-                remove(result)
+                out_folder.remove(result)
     end(out_folder)
 
 

@@ -21,7 +21,6 @@ from stereocell.building.out_folder import (
 from stereocell.model.errors import OutputError
 from stereocell.storage.json_files import read_sealed
 from stereocell.storage.sealed_text import require_sealed_text
-from stereocell.storage.workspace import is_file, names_in
 from stereocell.usd import written_files
 
 _PLAN_AGAIN = "run `stereocell plan INPUT -o OUT` again"
@@ -71,23 +70,23 @@ def checks_of(out_folder: OutFolder, part: str) -> list[_Check]:
 
 def has_units(out_folder: OutFolder) -> bool:
     """Return whether OUT holds units: a copy that is only looked at needs none."""
-    return bool(names_in(out_folder.units_dir))
+    return bool(out_folder.names(out_folder.units_dir))
 
 
 def has_report(out_folder: OutFolder) -> bool:
     """Return whether OUT holds a report, or should: its phase ended, and the units are there."""
     is_recorded = bool(out_folder.phases().get("report", {"key": ""})["key"])
-    return is_file(out_folder.report_file) or (is_recorded and has_units(out_folder))
+    return out_folder.has(out_folder.report_file) or (is_recorded and has_units(out_folder))
 
 
 def _is_build(out_folder: OutFolder) -> bool:
     records = (out_folder.plan_file, out_folder.provenance_file, out_folder.units_plan_file)
-    return any(map(is_file, records))
+    return any(map(out_folder.has, records))
 
 
 def _plan(out_folder: OutFolder) -> list[_Check]:
     settings = out_folder.settings_file
-    remedy = f"remove it and {_PLAN_AGAIN}" if is_file(settings) else _PLAN_AGAIN
+    remedy = f"remove it and {_PLAN_AGAIN}" if out_folder.has(settings) else _PLAN_AGAIN
     return [
         out_folder.plan,
         lambda: read_sealed(out_folder.provenance_file, PROVENANCE, _PLAN_AGAIN),
@@ -129,7 +128,7 @@ def _require_stage_list(out_folder: OutFolder) -> None:
 
 
 def _exports(out_folder: OutFolder) -> list[_Check]:
-    if not is_file(out_folder.exports_file):
+    if not out_folder.has(out_folder.exports_file):
         return []
     return [lambda: read_sealed(out_folder.exports_file, EXPORTS, _EXPORTS_AGAIN)]
 

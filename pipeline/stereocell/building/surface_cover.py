@@ -8,13 +8,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.steps.find_window import FindWindow
-from stereocell.building.steps.gather_evidence import GatherEvidence
-from stereocell.building.survey_file import ChannelSurvey, read_survey
-from stereocell.building.unit_files import cover_of, load_record
+from stereocell.building.survey_file import read_survey
 from stereocell.isosurface.lifted_by_noise import Lifted, count_lifted
 from stereocell.model.unit import MAX_MISSING, Cover
+from stereocell.planning.plan import Plan
+from stereocell.planning.survey import ChannelSurvey
+from stereocell.steps.find_window import FindWindow
+from stereocell.steps.gather_evidence import GatherEvidence
+from stereocell.steps.unit_files import cover_of, load_record
 
 # Both were tried on a CT of a trunk in voxels of 3 mm, at 300 HU: from 59 % left out to 17 and 5 %.
 REMEDY = (

@@ -14,17 +14,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.channels import GREY_MATTER, PALETTE, WHITE_MATTER, Channel
 from stereocell.building.input_unchanged import require_input, require_still
 from stereocell.building.model_process import ModelBounds, opened_network
-from stereocell.building.open_source import SourceRef, open_source
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_places, require_own_tissue
-from stereocell.building.phases import provenance_record
-from stereocell.building.plan import Plan
-from stereocell.building.plan_source import voxels_of
 from stereocell.building.sealed_documents import require_documents
-from stereocell.building.steps.learn_tissue import LearnTissue
 from stereocell.building.tissue_files import (
     FOLDER,
     RECORD,
@@ -37,6 +31,12 @@ from stereocell.engine.step_record import libraries_of
 from stereocell.formats.ome_zarr_write import write_probabilities
 from stereocell.model.errors import OutputError, SourceError, UsageError
 from stereocell.model.version import GENERATOR
+from stereocell.planning.channels import GREY_MATTER, PALETTE, WHITE_MATTER, Channel
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_source import voxels_of
+from stereocell.planning.provenance import provenance_record
+from stereocell.steps.learn_tissue import LearnTissue
+from stereocell.steps.open_source import SourceRef, open_source
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.json_files import write_json, write_sealed
 from stereocell.storage.shell_commands import fill_in
@@ -100,7 +100,7 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     out_folder = OutFolder(out)
     require_documents(out_folder, "tissue")
     there = out_folder.plan()
-    require_own_tissue(out)
+    require_own_tissue(out_folder)
     # classes that are learned again may be the same, so that the plan and the stage stay
     require_own_places(out_folder, is_same_plan=any(one.source for one in there.channels))
     plan = without_tissue(there)

@@ -10,10 +10,9 @@ from typing import Any
 
 from stereocell.model.errors import OutputError
 from stereocell.storage.contents import is_ignored, words_for
-from stereocell.storage.file_list import read_list
+from stereocell.storage.file_list import read_list, sizes_of
 from stereocell.storage.json_files import read_sealed
 from stereocell.storage.overwriting import or_force
-from stereocell.storage.workspace import is_file, sizes_below
 
 MANIFEST = "manifest.json"
 FILES = "files.json"
@@ -39,8 +38,7 @@ def find_others(bundle: Path) -> list[str]:
 
     Its list says which are its own; where that is lost or damaged, their paths do.
     """
-    found = (file.relative_to(bundle) for file in sizes_below(bundle) if file != bundle)
-    names = {file.as_posix() for file in found if not is_ignored(file.name)}
+    names = {path for path in sizes_of(bundle) if not is_ignored(path.rpartition("/")[2])}
     try:
         return sorted(names - read_list(bundle / FILES, "").keys() - {MANIFEST, FILES})
     except OutputError:
@@ -50,7 +48,7 @@ def find_others(bundle: Path) -> list[str]:
 def require_bundle(place: Path) -> None:
     """Raise OutputError if something else than a bundle lies there. Its manifest may be lost."""
     is_other = place.exists() and not place.is_dir()
-    if is_file(place / MANIFEST) or not (is_other or (others := find_others(place))):
+    if MANIFEST in sizes_of(place) or not (is_other or (others := find_others(place))):
         return
     words = "a file" if is_other else f"{words_for(others)}, and no {MANIFEST}"
     raise OutputError(

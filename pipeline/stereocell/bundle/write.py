@@ -42,7 +42,7 @@ from stereocell.model.version import GENERATOR
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import encode, to_json
 from stereocell.storage.json_files import compact_json, sealed
-from stereocell.storage.workspace import is_file, move, remove, sizes_below
+from stereocell.storage.workspace import move
 from stereocell.transfer.opacity import evaluate
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
@@ -103,12 +103,6 @@ def write_bundle(
     with usd_boundary(stage_path), replacing_folder(bundle_dir) as folder:
         _fill(stage_path, folder, viewer_dist, run, parts or folder / ".parts", report_line)
         shutil.rmtree(folder / ".parts", ignore_errors=True)
-
-
-def remove_half(place: Path) -> None:
-    """Remove a bundle whose command was killed while it put it on object storage, file by file."""
-    if _holds(place) and not is_file(place / MANIFEST):
-        remove(place)
 
 
 def _fill(
@@ -337,9 +331,3 @@ def _copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
             raise OutputError(f"{source}: the bundle has a {path} of its own")
         refs.append(write_file(root, path, source.read_bytes()))
     return refs
-
-
-def _holds(folder: Path) -> bool:
-    if not folder.is_dir():
-        return folder.exists() or bool(sizes_below(folder))
-    return any(folder.iterdir())

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.storage.file_list import measure
-from stereocell.storage.workspace import remove
 from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
 from stereocell.usd.written_files import AsWritten
 
@@ -30,7 +29,7 @@ def write_ar(
     entry = {"path": USDZ_NAME, **measure(path)}
     if entry["bytes"] <= MAX_USDZ_BYTES:
         return entry, ""
-    remove(path)
+    path.unlink()  # of a folder that is stored once it is whole
     return None, (
         f"{entry['bytes'] / 2**20:.0f} MiB, more than the {MAX_USDZ_BYTES / 2**20:.0f} MiB "
         "that a phone is sent"

@@ -32,9 +32,8 @@ from stereocell.formats.tiles3d import TileLod
 from stereocell.model.errors import OutputError, StageError
 from stereocell.model.mesh import Mesh
 from stereocell.storage.atomic_write import replacing_folder, write_bytes
-from stereocell.storage.file_list import measure
+from stereocell.storage.file_list import measure, sizes_of
 from stereocell.storage.json_files import read_json, write_json
-from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd.layer import move_box
 from stereocell.usd.read_appearances import ComposedAppearance
 from stereocell.usd.read_attributes import Point
@@ -133,13 +132,11 @@ def _records() -> TypeAdapter[BundleTile]:
 
 def find_part(part: Path) -> BundleTile | None:
     """Return the tile whose part lies in a folder, or None where it isn't there as a whole."""
-    if not is_file(part / _RECORD):
-        return None
     try:
         tile = _records().validate_python(read_json(part / _RECORD, None, ""))
     except (OutputError, ValidationError):
         return None
-    sizes = {file.relative_to(part).as_posix(): size for file, size in sizes_below(part).items()}
+    sizes = sizes_of(part)
     refs = [ref for channel in tile.channels for ref in channel.files]
     # by these names files are moved: they must be of this folder
     is_own = tile.id == part.name and all(sizes.get(ref.path) == ref.bytes for ref in refs)

@@ -120,7 +120,7 @@ def _run(options: argparse.Namespace) -> int:
                 opened(out, command=name) if is_writer else opened(out, only=READERS[name])
             )
         elif name in WRITERS and hasattr(options, "input"):
-            from stereocell.storage.location import require_apart
+            from stereocell.read.source_place import require_apart
 
             require_apart(options.input, options.out)
         if name in WRITERS | READERS.keys():

@@ -103,7 +103,7 @@ def _as_given(options: argparse.Namespace, text: str) -> str:
 
 def settings(options: argparse.Namespace) -> Answer:
     """Print the settings of a preset and a file as TOML."""
-    from stereocell.building import settings as settings_module
+    from stereocell.planning import settings as settings_module
 
     found = settings_module.load(options.preset, options.config, flags={})
     print_unless_json(
@@ -132,11 +132,11 @@ def plan(options: argparse.Namespace) -> Answer:
 def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
     """Write the plan; with the workers of all other phases, where these follow at once."""
     from stereocell.building import phases
-    from stereocell.building.preset_choice import load_for
+    from stereocell.planning.preset_choice import load_for
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    made = phases.make(options.input, options.out, wanted, choice=choice, engine=engine)
+    made = phases.make_plan(options.input, options.out, wanted, choice=choice, engine=engine)
     return Answer(
         {
             "out": str(options.shown),
@@ -154,7 +154,7 @@ def iso(options: argparse.Namespace) -> Answer:
     """Write the picture of one tile's iso-value and print the candidates."""
     if listed := _series(options):
         return listed
-    from stereocell.building.preset_choice import load_for, print_choice
+    from stereocell.planning.preset_choice import load_for, print_choice
     from stereocell.preview import iso_value as iso_preview
 
     if options.out is not None:
@@ -200,7 +200,6 @@ def _run_phases(
     options: argparse.Namespace, out: Path, engine: "Engine", names: Sequence[str]
 ) -> Answer:
     from stereocell.building import phases
-    from stereocell.building.bundle_phase import run_bundle
     from stereocell.building.out_folder import OutFolder
 
     for name in names:
@@ -209,7 +208,7 @@ def _run_phases(
         elif name == "stage":
             phases.run_stage(out, engine)
         elif name == "bundle":
-            run_bundle(out, engine, stage=getattr(options, "stage", None))
+            phases.run_bundle(out, engine, stage=getattr(options, "stage", None))
         else:
             from stereocell.report import phase  # slow to import: it draws
 
@@ -249,21 +248,21 @@ def slices(options: argparse.Namespace) -> Answer:
     """Write PNG slices of one channel."""
     if listed := _series(options):
         return listed
-    from stereocell.building import phases
-    from stereocell.building.plan_notes import print_notes
-    from stereocell.building.preset_choice import load_for
+    from stereocell.planning.plan_notes import print_notes
+    from stereocell.planning.preset_choice import load_for
+    from stereocell.planning.settle import settle
     from stereocell.preview.png_slices import (
         require_slices_or_nothing,
         without_surface,
         write_slices,
     )
-    from stereocell.storage.location import require_apart
+    from stereocell.read.source_place import require_apart
 
     require_apart(options.input, options.out)
     require_slices_or_nothing(options.out)
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    plan = phases.settle(options.input, without_surface(wanted), choice)
+    plan = settle(options.input, without_surface(wanted), choice)
     print_notes(plan)
     written = write_slices(plan, options.out, plane=options.plane)
     print_unless_json(options, f"wrote to {options.out}: {written.line}")

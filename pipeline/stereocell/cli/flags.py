@@ -72,7 +72,7 @@ def declare_setting(parser: Any, flag: Flag, field: Field[Any]) -> None:
 
 def _settings() -> Iterator[tuple[Flag, tuple[str, ...], Field[Any]]]:
     """Yield each setting that has a flag: the flag, the section and key, the field."""
-    from stereocell.building.setting_names import flagged_settings
+    from stereocell.planning.setting_names import flagged_settings
 
     return flagged_settings()
 
@@ -81,7 +81,7 @@ def as_typed(options: argparse.Namespace, line: str) -> str:
     """Return an error's line with flags in place of the settings that were given by them."""
     if not hasattr(options, "spacing_um"):  # a command without a source
         return line
-    from stereocell.building.setting_names import in_flags
+    from stereocell.planning.setting_names import in_flags
 
     flags = (flag.name for flag, _, _ in _settings())
     return in_flags(
@@ -247,7 +247,7 @@ def flags_of(options: argparse.Namespace) -> dict[str, Any]:
 
 def declare_settings(parser: argparse.ArgumentParser) -> None:
     """Declare presets, the settings file and a flag a setting."""
-    from stereocell.building.settings import preset_names
+    from stereocell.planning.settings import preset_names
 
     presets = ", ".join(preset_names())
     parser.add_argument(

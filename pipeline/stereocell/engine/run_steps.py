@@ -4,30 +4,64 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from stereocell.engine.run import Engine
-from stereocell.engine.step import Document, Step
+from stereocell.engine.step import Document, Keyed, Step
+from stereocell.storage.workspace import cached
 
 R = TypeVar("R")
+S = TypeVar("S", bound="Reads")
 # runs a function that reads the inputs and writes results at these places
 Guard = Callable[[Callable[[], object], Sequence[Path]], None]
 
 
-@dataclass(frozen=True, slots=True)
-class Kept(Generic[R]):
-    """A step, and the place of its result.
+class Reads(Protocol):
+    """A task that reads OUT.
+
+    inputs  files and folders of OUT that it reads, which are files of its machine meanwhile
+    """
+
+    @property
+    def inputs(self) -> Sequence[Path]: ...
+
+
+class Task(Reads, Protocol):
+    """Work of one worker, with the place of its result. It is picklable.
 
     name  for progress and errors, as `<tile>/<channel>`
     """
 
+    @property
+    def name(self) -> str: ...
+    @property
+    def step(self) -> Keyed: ...
+    @property
+    def place(self) -> Path: ...
+
+    def is_whole(self) -> bool:
+        """Return whether the result lies at its place, as it was written."""
+
+    def keep(self) -> None:
+        """Compute the result and write it, whole or not at all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kept(Generic[R]):
+    """A step, and the place of its result."""
+
     name: str
     step: Step[R]
     place: Path
+    inputs: tuple[Path, ...] = ()
 
     def is_whole(self) -> bool:
-        """Return whether the result is there."""
-        return self.step.is_kept(self.place)
+        """Return whether the result lies at its place, as it was written."""
+        return self.step.FORM.is_whole(self.place)
+
+    def keep(self) -> None:
+        """Compute the result and write it."""
+        self.step.FORM.write(self.place, self.step.run())
 
     def read(self) -> R:
         """Return the result of a step that keeps a document. Raises OutputError."""
@@ -37,15 +71,17 @@ class Kept(Generic[R]):
         return result
 
 
-class ReadOnDemand(Mapping[str, R]):
-    """Results by name, each read from its file whenever it is asked for.
+class Results(Mapping[str, R]):
+    """Results of a pass by name, each read from its file whenever it is asked for.
 
-    The evidence of a tile takes .3 MB unpacked and .1 MB as it lies there. That of thousands of
-    tiles would fill the memory.
+    The evidence of a tile takes .3 MB unpacked and .1 MB in its file. Results of thousands of tiles
+    would fill the memory.
+
+    out  the folder that `files` counts from
     """
 
-    def __init__(self, kept: Mapping[str, Kept[R]]) -> None:
-        self._kept = kept
+    def __init__(self, kept: Mapping[str, Kept[R]], out: Path) -> None:
+        self._kept, self._out = kept, out
 
     def __getitem__(self, name: str) -> R:
         return self._kept[name].read()
@@ -56,6 +92,12 @@ class ReadOnDemand(Mapping[str, R]):
     def __len__(self) -> int:
         return len(self._kept)
 
+    def files(self) -> dict[str, str]:
+        """Return the file of each result, relative to OUT, with forward slashes."""
+        return {
+            name: one.place.relative_to(self._out).as_posix() for name, one in self._kept.items()
+        }
+
 
 def run_plainly(run: Callable[[], object], results: Sequence[Path]) -> None:
     """Run steps that read no inputs, whose results are at these places."""
@@ -63,23 +105,30 @@ def run_plainly(run: Callable[[], object], results: Sequence[Path]) -> None:
 
 
 def run_missing(
-    engine: Engine, label: str, wanted: Iterable[Kept[Any]], guard: Guard = run_plainly
+    engine: Engine, label: str, wanted: Iterable[Task], guard: Guard = run_plainly
 ) -> int:
-    """Run the steps whose results are missing or damaged; return their number.
+    """Run the tasks whose results are missing or damaged; return their number.
 
     label  the pass, for progress and errors
     guard  runs the work, so that it can compare the inputs before and after
 
-    Raises TasksFailedError where steps fail; all others are finished then.
+    Raises TasksFailedError where tasks fail; all others are finished then.
     """
-    missing = {kept.place: kept for kept in wanted if not kept.is_whole()}
-    tasks = [(kept.name, kept) for kept in missing.values()]
-    modules = {type(kept.step).__module__: None for kept in missing.values()}
+    missing = {task.place: task for task in wanted if not task.is_whole()}
+    tasks = [(task.name, task) for task in missing.values()]
+    modules = {type(task.step).__module__: None for task in missing.values()}
     run = partial(engine.run, label, keep, tasks, needs=tuple(modules))
     guard(run, list(missing))
     return len(tasks)
 
 
-def keep(kept: Kept[Any]) -> None:
+def keep(task: Task) -> None:
     """Compute one result and write it, on a worker."""
-    kept.step.keep(kept.place)
+    with cached(*task.inputs):
+        task.keep()
+
+
+def with_inputs(function: Callable[[S], R], task: S) -> R:
+    """Return a function's result for a task, on a worker."""
+    with cached(*task.inputs):
+        return function(task)

@@ -7,6 +7,7 @@ the code that each step reaches with a recorded digest, and asks for a decision 
 
 import hashlib
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -31,26 +32,17 @@ class Form(Protocol[R_contra]):
         """Write a result, whole or not at all. Raises OutputError."""
 
 
-class Step(Generic[R]):
-    """A computation whose result is kept. Subclasses are frozen dataclasses, and are picklable.
+class Keyed:
+    """Work that is skipped where its key is unchanged. Subclasses are frozen dataclasses.
 
-    A field that does not change the result is not a field.
+    A field that does not change the result is not a field. Work that a phase carries out as a whole
+    is a direct subclass, with a method of its own, as `write` of `WriteStage`.
 
     VERSION  is raised when the same fields give another result
-    FORM     the form of the result in OUT
     """
 
     __slots__ = ()
     VERSION: ClassVar[int]
-    FORM: ClassVar[Form[Any]]
-
-    def run(self) -> R:
-        """Compute the result.
-
-        Steps that a phase carries out as a whole have a method of their own instead, as `write` of
-        `WriteStage` and `learn` of `LearnTissue`: they need more than one task of a worker.
-        """
-        raise NotImplementedError(f"{type(self).__name__} is carried out by its phase")
 
     @property
     def key(self) -> str:
@@ -58,13 +50,19 @@ class Step(Generic[R]):
         own = {one.name: content_of(getattr(self, one.name)) for one in fields(self)}  # type: ignore[arg-type]
         return key_of([type(self).__name__, self.VERSION, own])
 
-    def is_kept(self, place: Path) -> bool:
-        """Return whether the result lies at a place, as it was written."""
-        return self.FORM.is_whole(place)
 
-    def keep(self, place: Path) -> None:
-        """Compute the result and write it."""
-        self.FORM.write(place, self.run())
+class Step(Keyed, ABC, Generic[R]):
+    """A task of one worker, whose result is kept. Subclasses are picklable.
+
+    FORM  the form of the result in OUT
+    """
+
+    __slots__ = ()
+    FORM: ClassVar[Form[Any]]
+
+    @abstractmethod
+    def run(self) -> R:
+        """Compute the result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +110,7 @@ def content_of(value: Any) -> Any:
     An object with a `key_content` counts by it: a source by its fingerprint, never by its path. A
     step counts by its own key. Raises TypeError for a path, as for all types that are not listed.
     """
-    if isinstance(value, Step):
+    if isinstance(value, Keyed):
         return value.key
     if hasattr(value, "key_content"):
         return value.key_content()

@@ -19,7 +19,7 @@ RECORD = Path(__file__).with_name("step_record.json")
 def libraries_of(*names: str) -> dict[str, str]:
     """Return the version of each installed library that steps or readers use.
 
-    names  of steps' classes, and of formats (keys of `read.readers.READERS`, or `other`)
+    names  of steps' classes, and of formats (read/known_formats.py)
     """
     found: dict[str, str] = {}
     for name in names:

@@ -30,7 +30,6 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.atomic_write import put_in_place
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
-from stereocell.storage.workspace import fetch, is_file
 from stereocell.usd.stage_files import dependencies
 from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.write_usdz import MAX_TRIANGLES
@@ -114,7 +113,7 @@ def export(
     require_documents(out_folder, "export")
     out_folder.require_finished("stage")
     path = stage if stage is not None else out_folder.stage_file
-    if not is_file(path):
+    if not out_folder.has(path):
         raise no_layer(path, is_given=stage is not None)
     files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
     _require_outside(file, out_folder, files)
@@ -194,7 +193,7 @@ def _export_page(
     _require_folder(file)
     ours = partial(is_own, out_folder.out)
     require_free(file, expected=_EXPECTED, is_ours=ours(file))
-    fetch(out_folder.bundle_dir)
+    out_folder.fetch(out_folder.bundle_dir)
     with _folder_beside(file) as beside:
         line = write_scene(
             out_folder.bundle_dir,

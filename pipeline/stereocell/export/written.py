@@ -13,7 +13,6 @@ from stereocell.building.out_folder import EXPORTS, OutFolder
 from stereocell.model.errors import OutputError
 from stereocell.storage.file_list import encode, list_files, measure
 from stereocell.storage.json_files import find_sealed, write_sealed
-from stereocell.storage.workspace import is_mirrored
 
 
 def is_own(out: Path, file: Path) -> bool:
@@ -27,9 +26,10 @@ def remember(out: Path, files: Iterable[Path]) -> None:
 
     An OUT on object storage has no list either: an export only reads it.
     """
-    if is_mirrored(out):
+    out_folder = OutFolder(out)
+    if out_folder.is_stored:
         return
-    list_file = OutFolder(out).exports_file
+    list_file = out_folder.exports_file
     found = find_sealed(list_file, EXPORTS) or {"files": {}}
     kept = {name: digest for name, digest in found["files"].items() if Path(name).exists()}
     with suppress(OutputError):

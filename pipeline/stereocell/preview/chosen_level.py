@@ -6,19 +6,19 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.level_choice import (
+from stereocell.isosurface.level import Level
+from stereocell.isosurface.options import CONNECTED
+from stereocell.isosurface.repair_rules import sum_components
+from stereocell.model.channel import LOW_CONFIDENCE
+from stereocell.model.tiling import Tile
+from stereocell.planning.level_choice import (
     Components,
     Found,
     choose_by_components,
     find_doubt,
     level_of_tile,
 )
-from stereocell.building.plan import Plan
-from stereocell.isosurface.level import Level
-from stereocell.isosurface.options import CONNECTED
-from stereocell.isosurface.repair_rules import sum_components
-from stereocell.model.channel import LOW_CONFIDENCE
-from stereocell.model.tiling import Tile
+from stereocell.planning.plan import Plan
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.building.plan import Plan
 from stereocell.model.errors import UsageError
 from stereocell.model.rigid_transform import IDENTITY
 from stereocell.model.tiling import Box
 from stereocell.model.volume import zyx_to_xyz
+from stereocell.planning.plan import Plan
 from stereocell.preview.views import View, views_of
 from stereocell.read import Dataset
 

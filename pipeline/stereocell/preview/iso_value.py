@@ -14,32 +14,32 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
-from stereocell.building.channels import Channel
-from stereocell.building.level_choice import (
-    Found,
-    check_histogram,
-    find_level,
-    given_level,
-    highest_of,
-)
-from stereocell.building.open_source import open_source
-from stereocell.building.other_levels import ends_of, find_other_levels, take
-from stereocell.building.phases import settle
-from stereocell.building.plan import Plan
-from stereocell.building.plan_notes import print_notes
-from stereocell.building.plan_source import source_of
-from stereocell.building.settings import Settings
-from stereocell.building.steps.find_window import Window
-from stereocell.building.survey_steps import evidence_step, window_step
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels
 from stereocell.isosurface.options import LADDER
 from stereocell.model.errors import NoSurfaceError, OutputError, UsageError
 from stereocell.model.tiling import Tile
 from stereocell.model.version import GENERATOR
+from stereocell.planning.channels import Channel
+from stereocell.planning.level_choice import (
+    Found,
+    check_histogram,
+    find_level,
+    given_level,
+    highest_of,
+)
+from stereocell.planning.other_levels import ends_of, find_other_levels, take
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_notes import print_notes
+from stereocell.planning.plan_source import source_of
+from stereocell.planning.settings import Settings
+from stereocell.planning.settle import settle
+from stereocell.planning.survey_steps import evidence_step, window_step
 from stereocell.preview.chosen_level import Chosen, choose_level
 from stereocell.preview.draw_slices import Color, Slice, find_font, paint_slices
 from stereocell.preview.views import views_of
+from stereocell.steps.find_window import Window
+from stereocell.steps.open_source import open_source
 from stereocell.storage.atomic_write import replacing
 from stereocell.storage.overwriting import require_free
 

@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.building.open_source import open_source
-from stereocell.building.plan import Plan
-from stereocell.building.plan_source import source_of
-from stereocell.building.settings import Settings
-from stereocell.building.survey_steps import window_step
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.model.errors import UsageError
 from stereocell.model.version import GENERATOR
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_source import source_of
+from stereocell.planning.settings import Settings
+from stereocell.planning.survey_steps import window_step
 from stereocell.preview.cut_planes import (
     ACQUIRED,
     Cut,
@@ -31,12 +30,13 @@ from stereocell.preview.cut_planes import (
     is_patient,
 )
 from stereocell.preview.views import views_of
+from stereocell.steps.open_source import open_source
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.contents import contents_of, is_ignored, words_for
+from stereocell.storage.folder_names import names_in_folder
 from stereocell.storage.json_files import find_json, write_json
 from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import require_free
-from stereocell.storage.workspace import names_in
 
 INDEX = "slices.json"
 _EXPECTED = "nothing or slices of the same source"
@@ -141,7 +141,7 @@ def require_slices_or_nothing(folder: Path) -> None:
 def _require_own(folder: Path, plan: Plan) -> None:
     """Raise OutputError unless a folder is empty, or holds only slices of the same source."""
     found = contents_of(folder)
-    names = {name for name in names_in(folder) if not is_ignored(name)}
+    names = {name for name in names_in_folder(folder) if not is_ignored(name)}
     is_ours = found.kind is Kind.SLICES and found.fingerprint == plan.fingerprint
     if is_ours and (others := sorted(names - {INDEX, *_listed(folder)})):
         require_free(folder, expected="slices and no other file", found=words_for(others))

@@ -35,7 +35,6 @@ from stereocell.storage.contents import PUBLISHED, Contents, contents_of
 from stereocell.storage.file_list import DAMAGED, FileList, find_faults, read_list
 from stereocell.storage.kinds import Kind
 from stereocell.storage.overwriting import is_forced
-from stereocell.storage.workspace import cached
 
 _LAST = ("sw.js", FILES, MANIFEST, INDEX)
 _REMEDY = "run `stereocell bundle OUT` first"
@@ -227,8 +226,7 @@ def _files_of(bundle: Path, listed: FileList) -> dict[str, _File]:
 
 
 def _content(file: Path) -> bytes:
-    with cached(file):
-        return file.read_bytes()
+    return file.read_bytes()
 
 
 def _made(content: bytes) -> _File:

@@ -50,20 +50,29 @@ FOREIGN = (
     Foreign((".pt", ".pth", ".ckpt"), "a file of PyTorch",
             "tifffile.imwrite makes a TIFF of its array"),
 )  # fmt: skip
+_PHILIPS = "dcm2niix makes NIfTI of the pair"
 _VOXELS = (".raw", ".vol", ".bin", ".dat")
 _SIDECARS = (".vgi", ".info", ".vol.info", ".raw.info")  # VGStudio, PyHST
 
 
-def foreign_words(name: str, *, only_other: bool = False) -> str:
-    """Return what a file is by its name, with the way out; empty: its ending says nothing.
+def foreign_words(path: str, *, only_other: bool = False) -> str:
+    """Return words for a file by its name, with a remedy; empty: its ending says nothing.
 
-    only_other  whether only formats count that begin as another one that is read
+    only_other  whether only formats count whose files begin as those of a format that is read
     """
-    lower = name.lower()
+    lower = path.lower()
+    if lower.endswith(".rec") and (header := _par_beside(Path(path))):
+        return f"the voxels of a Philips PAR/REC pair, beside {header!r:.100} ({_PHILIPS})"
     for one in FOREIGN:
         if lower.endswith(one.endings) and (one.is_other or not only_other):
             return f"{one.title} ({one.remedy})"
     return ""
+
+
+def _par_beside(path: Path) -> str:
+    """Return the name of the header of Philips beside a .rec; empty: there is none."""
+    names = (path.with_suffix(suffix).name for suffix in (".PAR", ".par"))
+    return next((name for name in names if path.with_name(name).is_file()), "")
 
 
 def bare_voxels_words(path: Path) -> str:

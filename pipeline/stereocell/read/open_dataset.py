@@ -15,9 +15,10 @@ from stereocell.read.image import Image, printable
 from stereocell.read.inverted_array import InvertedArray
 from stereocell.read.level_spacing import settle_levels
 from stereocell.read.plausible_size import ratio_notes
-from stereocell.read.readers import find_reader
+from stereocell.read.readers import find_reader, read_image
 from stereocell.read.remarks import cast_note
 from stereocell.read.repeats import collected
+from stereocell.read.source_place import name_of
 from stereocell.read.spacing import Triple, levels_of
 from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location
@@ -35,9 +36,9 @@ def open(
     axes: str = "",
     dark: bool = False,
 ) -> Dataset:
-    """Open a source of any format of READERS (read/readers.py).
+    """Open a source of any format that is read (`read/formats`).
 
-    source      a local path or, where the format's Reader says so, an address (`http://`,
+    source      a local path or, where the format's row says so, an address (`http://`,
                 `https://`, `s3://`, or another one that fsspec knows)
     time        time point, from 0
     spacing_um  (z, y, x), um; replaces the voxel spacing that the source states
@@ -58,10 +59,10 @@ def open(
         dataset = open("head.ome.zarr")
         volume = dataset.read(0, Box((0, 0, 0), (64, 64, 64)))
     """
-    location, reader = find_reader(source)
-    with library_boundary(location.shown, f"{reader.name} that is whole"):
+    location, format = find_reader(source)
+    with library_boundary(location.shown, f"{format.short_title} that is whole"):
         with collected() as repeats:
-            image = reader.read_image(location, series=series, pattern=pattern, axes=axes)
+            image = read_image(location, format, series=series, pattern=pattern, axes=axes)
         notes = (note for _, note in sorted(repeats.items()))
         image = replace(image, notes=(*image.notes, *notes))
         try:
@@ -87,7 +88,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
     channels = map(ChannelInfo, _unique(given), image.colors, map(bool, given))
     return Dataset(
         source=location.source,
-        name=image.title or printable(location.name) or "dataset",
+        name=image.title or printable(name_of(location)) or "dataset",
         dtype=built_dtype(finest.array.dtype) or np.dtype(finest.array.dtype),
         levels=levels,
         channels=tuple(channels),

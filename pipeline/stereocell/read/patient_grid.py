@@ -16,8 +16,10 @@ from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.image import Image
 from stereocell.read.resample import orthogonal_grid, resample_sheared
 from stereocell.read.spacing import Grid
+from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.read.whole_array import WholeArray
 
+_ORIGIN = Subject("place of the first voxel in the patient", "mm")
 _SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
 _MIN_VOLUME = 0.1  # least volume of the three unit axes' parallelepiped; below, they lie in a plane
 
@@ -45,6 +47,22 @@ class Placed:
             has_sides=has_sides,
             notes=(*notes, *self.notes),
         )
+
+
+def settle_origin(
+    field: str, stated: Sequence[float] | None
+) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Return the place of the first voxel's centre in the field's unit, and notes.
+
+    field   of the header that holds it
+    stated  its three numbers; None: it is absent
+    """
+    found = np.zeros(3) if stated is None else np.array(stated, float)[:3]
+    if stated is not None and np.isfinite(found).all():
+        return found, ()
+    reason = f"since {field} {'holds no numbers' if stated is not None else 'is absent'}"
+    notes = settle(_ORIGIN, [Statement((0.0, 0.0, 0.0), reason, Trust.ASSUMED)]).notes
+    return np.where(np.isfinite(found), found, 0.0), notes
 
 
 def place(

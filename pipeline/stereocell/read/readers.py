@@ -1,9 +1,6 @@
-"""The formats that are read, and which one a source has."""
+"""Find the reader of a source, and check that the source is there and of its format."""
 
 import os
-import zipfile
-from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +9,11 @@ import fsspec
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.file_kind import require_kind
 from stereocell.read.foreign_files import bare_voxels_words, foreign_words
+from stereocell.read.format import Format
 from stereocell.read.image import Image, printable
-from stereocell.storage.archives import ARCHIVE_SUFFIXES
+from stereocell.read.known_formats import OTHER, find_format, identify, known_formats
 from stereocell.storage.contents import contents_of
-from stereocell.storage.first_bytes import SHARED, identify
+from stereocell.storage.first_bytes import SHARED
 from stereocell.storage.kinds import Kind
 from stereocell.storage.library_errors import library_boundary, one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, first_bytes, require_own
@@ -25,114 +23,27 @@ _SURFACES = (
     *(".usda", ".usdc", ".usdz"),
 )
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp")  # which are planes of a folder
-_FOLDERS = ("planes", "dicom")  # formats of folders whose files may have any name
-_DICOM_ORDER = (
-    "images before phases, projections and localizers, larger series first; then images as "
-    "acquired before derived ones, in phase and water before opposed phase and fat, then lower "
-    "echo times, b-values and energies"
-)
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
 
 
-@dataclass(frozen=True, slots=True)
-class Reader:
-    """One format: its names, and the module whose `read_image(location) -> Image` reads it.
-
-    title       the format's usual name
-    has_series  one source may hold several images: `read_image(location, series=1)`
-    order       a sentence on the order of its images; empty: the source's own
-    has_pattern names of files tell what they hold: `read_image(location, pattern="a_z{z}.tif")`
-    has_axes    a source may not name its axes: `read_image(location, axes="czyx")`
-    is_remote   it is read from an address, too
-    version     is raised when the same file gives other voxels or another place: a part of the key
-                of each result
+def read_image(
+    location: Location, format: Format, *, series: int = 0, pattern: str = "", axes: str = ""
+) -> Image:
+    """Return the image of a source. Raises UsageError for an option that its format doesn't take,
+    and SourceError where a library is missing or the source can't be read.
     """
-
-    module: str
-    title: str
-    has_series: bool = False
-    order: str = ""
-    has_pattern: bool = False
-    has_axes: bool = False
-    is_remote: bool = False
-    version: int = 1
-
-    @property
-    def name(self) -> str:
-        """The title without its part in brackets, for messages."""
-        return self.title.partition(" (")[0]
-
-    def read_image(
-        self, location: Location, *, series: int = 0, pattern: str = "", axes: str = ""
-    ) -> Image:
-        """Return the image of a source. Raises UsageError for an option that it doesn't take."""
-        given: dict[str, Any] = {}
-        for name, value in (("series", series), ("pattern", pattern), ("axes", axes)):
-            if getattr(self, f"has_{name}"):
-                given[name] = value
-            elif value:
-                raise _not_taken(location, self, name, str(value))
-        # imported on use: each import takes up to 2 s, and a process needs one
-        image: Image = import_module(self.module).read_image(location, **given)
-        return image
+    given: dict[str, Any] = {}
+    for name, value in (("series", series), ("pattern", pattern), ("axes", axes)):
+        if getattr(format, f"has_{name}"):
+            given[name] = value
+        elif value:
+            raise _not_taken(location, format, name, str(value))
+    format.require_library(location)
+    return format.open(location, **given)
 
 
-READERS = {
-    "ome-zarr": Reader(
-        "stereocell.read.ome_zarr", "OME-Zarr", has_series=True, has_axes=True, is_remote=True
-    ),
-    "tiff": Reader("stereocell.read.tiff", "TIFF", has_series=True, has_axes=True, is_remote=True),
-    "planes": Reader(
-        "stereocell.read.planes",
-        "a folder of TIFF, PNG, JPEG or BMP planes",
-        has_series=True,
-        has_pattern=True,
-    ),
-    "dicom": Reader(
-        "stereocell.read.dicom", "DICOM (a file or a folder)", has_series=True, order=_DICOM_ORDER
-    ),
-    "nifti": Reader("stereocell.read.nifti", "NIfTI or Analyze"),
-    "mgh": Reader("stereocell.read.mgh", "MGH (FreeSurfer)"),
-    "ims": Reader("stereocell.read.ims", "Imaris"),
-    "hdf5": Reader("stereocell.read.hdf5", "HDF5 (NAME.h5:/KEY)", has_axes=True),
-    "n5": Reader("stereocell.read.n5", "N5", has_axes=True, is_remote=True),
-    "bdv": Reader("stereocell.read.bdv", "BigDataViewer's XML", has_series=True),
-    "nrrd": Reader("stereocell.read.nrrd", "NRRD"),
-    "metaimage": Reader("stereocell.read.metaimage", "MetaImage"),
-    "mrc": Reader("stereocell.read.mrc", "MRC"),
-    "czi": Reader("stereocell.read.czi", "CZI", has_series=True),
-    "lif": Reader("stereocell.read.lif", "LIF", has_series=True),
-    "nd2": Reader("stereocell.read.nd2", "ND2", has_series=True),
-}
-# a file that no reader above knows is given to this one, which takes what bioio's plugins do
-OTHER = Reader(
-    "stereocell.read.bioio_image", "a file for an installed plugin of bioio", has_series=True
-)
-
-
-def format_of(source: str | Path) -> str:
-    """Return the format of a source: a key of READERS, or `other`, by its name and first bytes."""
-    return Location.of(source).format or "other"
-
-
-def reader_of(source: str | Path) -> str:
-    """Return the dotted name of the module that reads a source."""
-    return module_of(format_of(source))
-
-
-def module_of(format: str) -> str:
-    """Return the dotted name of the module that reads a format, as `format_of` gives it."""
-    return READERS.get(format, OTHER).module
-
-
-def reader_version(source: str | Path) -> tuple[str, int]:
-    """Return the format of a source, as `format_of` does, and the version of its reader."""
-    format = format_of(source)
-    return format, READERS.get(format, OTHER).version
-
-
-def find_reader(source: str | Path) -> tuple[Location, Reader]:
-    """Return the place of a source that is there, and the reader of its format."""
+def find_reader(source: str | Path) -> tuple[Location, Format]:
+    """Return the place of a source that is there, and its format. Raises SourceError."""
     location = Location.of(source)
     if location.is_local and not Path(location.path).exists():
         if os.path.islink(location.path):
@@ -144,18 +55,17 @@ def find_reader(source: str | Path) -> tuple[Location, Reader]:
         raise SourceError(f"{location.shown}: not found, expected a file or a folder")
     if location.is_local and not Path(location.path).is_dir():
         require_own(location.path, [location.folder], named=location.shown)
-    named = location.format
     if location.is_local and (words := foreign_words(location.path, only_other=True)):
         raise SourceError(f"{location.shown}: found {words}, expected a format that is read")
-    if named in _FOLDERS:
+    format = find_format(location) or _other_format(location)
+    if location.inside and not format.has_parts:
+        raise SourceError(f"{location.shown}: not found, expected a file or a folder")
+    if not format.folder_endings and os.path.isdir(location.path):
         _require_no_result(location)
-    if named is None and not import_module(OTHER.module).can_read(location):
-        raise _unknown(location)
-    reader = READERS.get(named or "", OTHER)
-    require_kind(location, named or "", reader.name)
-    if not location.is_local and not reader.is_remote:
+    require_kind(location, format)
+    if not location.is_local and not format.is_remote:
         raise SourceError(
-            f"{location.shown}: {reader.title} at an address, expected a path on this machine: "
+            f"{location.shown}: {format.title} at an address, expected a path on this machine: "
             "copy it here first"
         )
     if not location.is_local:
@@ -165,7 +75,15 @@ def find_reader(source: str | Path) -> tuple[Location, Reader]:
             raise SourceError(
                 f"{location.shown}: no answer within {ANSWER_S:g} s, expected a store that is up"
             )
-    return location, reader
+    return location, format
+
+
+def _other_format(location: Location) -> Format:
+    """Return the format of other files, if it takes this one. Raises SourceError."""
+    other = known_formats()[OTHER]
+    if other.may_hold is None or not other.may_hold(location):
+        raise _unknown(location)
+    return other
 
 
 def _require_no_result(location: Location) -> None:
@@ -184,12 +102,12 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     A line holds modality, orientation, size and spacing, and no description from the files.
     Raises SourceError where the source can't be read, UsageError where it has another format.
     """
-    location, reader = find_reader(source)
-    if not reader.has_series:
-        raise _not_taken(location, reader, "series", "list")
-    with library_boundary(location.shown, f"{reader.name} that is whole"):
-        lines: tuple[str, ...] = import_module(reader.module).list_series(location)
-    return lines
+    location, format = find_reader(source)
+    if format.list_series is None:
+        raise _not_taken(location, format, "series", "list")
+    format.require_library(location)
+    with library_boundary(location.shown, f"{format.short_title} that is whole"):
+        return format.list_series(location)
 
 
 def series_order(source: str | Path) -> str:
@@ -215,19 +133,16 @@ def _unknown(location: Location) -> SourceError:
                 "folder of its planes"
             )
         found += f": found {content}"
-    if last.endswith(ARCHIVE_SUFFIXES) and zipfile.is_zipfile(location.path):
-        return SourceError(
-            f"{location.shown}: found a zip archive without a Zarr group, expected OME-Zarr: unzip "
-            "it, and name the file or folder in it"
-        )
-    formats = ", ".join(reader.title for reader in READERS.values())
+    formats = ", ".join(one.title for one in known_formats().values() if one.name != OTHER)
     if found.endswith(")"):  # the way out is the message, so the list would hide it
         formats = "OME-Zarr, TIFF, DICOM, NIfTI, HDF5 and others that are read"
-    return SourceError(f"{location.shown}: {found}; expected {formats}, or {OTHER.title}")
+    return SourceError(
+        f"{location.shown}: {found}; expected {formats}, or {known_formats()[OTHER].title}"
+    )
 
 
 def _words_of(path: Path) -> str:
-    """Return what a path of no known format holds: by its first bytes, else by its name."""
+    """Return words for a path of no known format: by its first bytes, else by its name."""
     content = contents_of(path).words
     if not path.is_file():
         return content
@@ -236,7 +151,9 @@ def _words_of(path: Path) -> str:
     if named and (not found.is_known or found.words in SHARED):
         return named
     is_bare = not found.is_known or found.words.startswith("zeros")
-    return (is_bare and bare_voxels_words(path)) or content
+    if words := is_bare and bare_voxels_words(path):
+        return words
+    return found.words if found.format or not found.is_known else content
 
 
 def _header_beside(location: Location) -> str:
@@ -248,10 +165,11 @@ def _header_beside(location: Location) -> str:
     return next((header.name for header in beside if header.is_file()), "")
 
 
-def _not_taken(location: Location, reader: Reader, option: str, value: str) -> UsageError:
+def _not_taken(location: Location, format: Format, option: str, value: str) -> UsageError:
     """Return the error of an option that a format doesn't take; it names those that do."""
-    takers = [one.title for one in (*READERS.values(), OTHER) if getattr(one, f"has_{option}")]
+    formats = sorted(known_formats().values(), key=lambda one: one.name == OTHER)
+    takers = [one.title for one in formats if getattr(one, f"has_{option}")]
     return UsageError(
-        f"{location.shown}: --{option} {value}: found {reader.title}, expected "
+        f"{location.shown}: --{option} {value}: found {format.title}, expected "
         f"{', '.join(takers)}, or no --{option}"
     )

@@ -9,16 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from stereocell.building.channels import Channel
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
 from stereocell.building.surface_cover import lifted_by_tile
-from stereocell.building.survey_file import Survey, TileIso, read_survey
-from stereocell.building.unit_files import cover_of, find_seconds, load_record, lod_file
+from stereocell.building.survey_file import read_survey
 from stereocell.isosurface.lifted_by_noise import Lifted
 from stereocell.model.tiling import Tile
 from stereocell.model.unit import Cover
-from stereocell.storage.workspace import sizes_below
+from stereocell.planning.channels import Channel
+from stereocell.planning.plan import Plan
+from stereocell.planning.survey import Survey, TileIso
+from stereocell.steps.unit_files import cover_of, find_seconds, load_record, lod_file
+from stereocell.storage.file_list import sizes_of
 
 PHASES = ("plan", "units", "stage", "bundle")
 
@@ -176,7 +177,7 @@ def _unit(
     for level, lod in enumerate(record["lods"]):
         glb = bundle / "channels" / channel.id / tile.id / f"lod{level}.glb"
         stored = record["files"][lod_file(directory, level).name]["bytes"]
-        size = sizes_below(glb).get(glb) or stored
+        size = out_folder.size(glb) or stored
         lods.append(_lod(lod, size))
     ktx2 = [bundle / "volumes" / tile.id / f"{channel.id}{end}.ktx2" for end in ("", "_bricks")]
     z, y, x = record["volume"]
@@ -191,7 +192,7 @@ def _unit(
         lods=tuple(lods),
         voxels=(x, y, z),
         volume_bytes=x * y * z,
-        ktx2_bytes=sum(size for file in ktx2 for size in sizes_below(file).values()),
+        ktx2_bytes=sum(map(out_folder.size, ktx2)),
         fragments_dropped=record["fragments_dropped"],
         cavities_filled=record["cavities_filled"],
         cover=cover_of(record),
@@ -280,9 +281,10 @@ def _files(out_folder: OutFolder) -> tuple[FileFacts, ...]:
     rows = []
     for part in (out_folder.out / "units", out_folder.stage_dir, out_folder.bundle_dir):
         sizes: dict[str, list[int]] = defaultdict(list)
-        for file, size in sizes_below(part).items():
-            if not file.name.startswith("."):
-                sizes[file.suffix.removeprefix(".") or file.name].append(size)
+        for path, size in sizes_of(part).items():
+            name = Path(path)
+            if not name.name.startswith("."):
+                sizes[name.suffix.removeprefix(".") or name.name].append(size)
         kinds = [FileFacts(part.name, suffix, len(n), sum(n)) for suffix, n in sizes.items()]
         rows += sorted(kinds, key=lambda kind: (-kind.bytes, kind.suffix))
     return tuple(rows)

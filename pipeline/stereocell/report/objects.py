@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.stopped_levels import told_of_stopped
-from stereocell.building.unit_files import load_objects, load_record
-from stereocell.storage.workspace import sizes_below
+from stereocell.planning.plan import Plan
+from stereocell.planning.stopped_levels import told_of_stopped
+from stereocell.steps.unit_files import load_objects, load_record
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +70,7 @@ def gather_labels(out_folder: OutFolder, plan: Plan) -> tuple[LabelFacts, ...]:
                     max(lod["distance_um"] for lod in lods.values()),
                     max(lod["farthest_um"] for lod in lods.values()),
                     max(facts[tile].bias[level] for tile in lods),
-                    sum(sizes_below(file).get(file, 0) for file in files),
+                    sum(map(out_folder.size, files)),
                 )
             )
         found.append(

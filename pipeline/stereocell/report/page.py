@@ -15,13 +15,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from numpy.typing import NDArray
 
-from stereocell.building.channels import Channel
-from stereocell.building.level_choice import given_level, highest_of
-from stereocell.building.other_levels import OtherLevel, ends_of, find_other_levels
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.survey_file import ChannelSurvey
-from stereocell.building.unit_files import load_lods, load_volume, lod_file
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.identifiers import from_identifier
 from stereocell.model.lattice_field import LatticeField
@@ -29,6 +23,11 @@ from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box, Tile
 from stereocell.model.version import GENERATOR
 from stereocell.model.volume import zyx_to_xyz
+from stereocell.planning.channels import Channel
+from stereocell.planning.level_choice import given_level, highest_of
+from stereocell.planning.other_levels import OtherLevel, ends_of, find_other_levels
+from stereocell.planning.plan import Plan
+from stereocell.planning.survey import ChannelSurvey
 from stereocell.preview.draw_slices import OUTLINE, Slice, cut_unit, draw_slices
 from stereocell.preview.views import View, views_of
 from stereocell.report import charts
@@ -41,6 +40,7 @@ from stereocell.report.texture_facts import compare, sum_up_maps
 from stereocell.report.texture_similarity import CLOSE_PX, ERROR_PX
 from stereocell.report.thresholds import draw_cut, draw_threshold
 from stereocell.report.tissue import TissueFacts, find_tissue
+from stereocell.steps.unit_files import load_lods, load_volume, lod_file
 from stereocell.storage.sealed_text import write_sealed_text
 from stereocell.textures.unwrap import mip_levels_apart
 

@@ -10,13 +10,13 @@ from stereocell.building.made_of import FIELD
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_report
 from stereocell.building.phase import digest_of_file, phase_of
-from stereocell.building.phases import provenance_record
-from stereocell.engine.step import Step
+from stereocell.engine.step import Keyed
+from stereocell.planning.provenance import provenance_record
 from stereocell.report.page import TEMPLATE, write_report
 
 
 @dataclass(frozen=True, slots=True)
-class WriteReport(Step[None]):
+class WriteReport(Keyed):
     """Write the report; the fields are the documents of OUT that it shows, and its template."""
 
     VERSION: ClassVar[int] = 1

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from stereocell.building.unit_files import load_lods, load_record
 from stereocell.report.facts import Facts, UnitFacts
 from stereocell.report.select_units import thin_out
 from stereocell.report.texture_similarity import find_close_likeness, find_likeness
+from stereocell.steps.unit_files import load_lods, load_record
 
 MAX_COMPARED = 3  # units whose levels are drawn and compared: 4 to 10 s each
 COMPARED = 2  # the compared level; the coarsest where there are fewer

@@ -26,8 +26,8 @@ from stereocell.model.errors import UsageError
 from stereocell.samples.head import HeadPhantom, make_head
 from stereocell.samples.place import EXPECTED, is_there
 from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.folder_names import names_in_folder
 from stereocell.storage.overwriting import require_free
-from stereocell.storage.workspace import names_in
 
 _UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # namespace of this sample's UIDs
 PATIENT = "Ovoidsen^Emmeline"
@@ -82,7 +82,7 @@ def _require_free(path: Path, seed: int) -> None:
 
     Each file tells its series, and the series its seed.
     """
-    names = names_in(path)
+    names = names_in_folder(path)
     is_ours = not path.is_file() and all(_FILE.fullmatch(name) for name in names)
     if is_ours and names:
         try:

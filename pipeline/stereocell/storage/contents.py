@@ -50,6 +50,7 @@ _MARKS: dict[str, bytes | tuple[bytes, ...]] = {
     ".usd": (_USDA, _USDC, _ZIP),
 }
 # files that belong to no one: locks and temporary files of StereoCell, and files of file managers
+_OTHER = "a file that StereoCell did not write"
 _IGNORED = re.compile(r"\.lock|\.writable\..*|\..+\.[0-9a-f]{8}\b.*|\.DS_Store|Thumbs\.db")
 _MAX_BYTES = 64 << 20  # bytes; StereoCell writes no larger JSON file
 _MAX_NAMED = 3  # most files of a folder that a message names
@@ -106,12 +107,12 @@ def _file_words(path: Path) -> str:
         return "the report of a build"
     head, ending = first_bytes(str(path)), path.suffix.lower()
     content = identify(head)
-    if content.format or not head:
+    if not head:
         return content.words
     if not head.startswith(_MARKS.get(ending, b"")):
         return f"a file that is named {ending} and has other content"
     named = (words for endings, words in _BY_ENDING.items() if ending in endings)
-    return next(named, content.words)
+    return next(named, content.words if content.is_known else _OTHER)
 
 
 def require_kind(path: Path, kinds: Collection[Kind]) -> Contents:

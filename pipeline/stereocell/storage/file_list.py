@@ -70,6 +70,12 @@ def is_same(file: Path, entry: Mapping[str, Any]) -> bool:
     return file.stat().st_size == entry["bytes"] and measure(file) == entry
 
 
+def sizes_of(root: Path) -> dict[str, int]:
+    """Return the bytes of all files below a folder, local or stored, by their paths from there."""
+    found = sizes_below(root).items()
+    return {file.relative_to(root).as_posix(): size for file, size in found if file != root}
+
+
 def find_faults(root: Path, listed: FileList, *, since: Path | None = None) -> dict[str, str]:
     """Return the fault of each file of a list that has one, by path: MISSING or DAMAGED.
 
@@ -80,7 +86,7 @@ def find_faults(root: Path, listed: FileList, *, since: Path | None = None) -> d
 
 
 def _faults(root: Path, listed: FileList, since: Path | None) -> Iterator[tuple[str, str]]:
-    sizes = {file.relative_to(root).as_posix(): size for file, size in sizes_below(root).items()}
+    sizes = sizes_of(root)
     newest = None if since is None or is_mirrored(root) else since.stat().st_mtime_ns
     hashed = faults = 0
     for path, entry in listed.items():

@@ -1,7 +1,12 @@
-"""What a file is by its first bytes, in words: for messages about files that are something else."""
+"""Words for a file by its first bytes, for messages about files of another kind than expected.
+
+This module knows containers and formats that are not read. A caller adds the marks of those that
+are.
+"""
 
 import re
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 _AGAIN = "copy or download it again"
@@ -11,14 +16,14 @@ _POINTERS = (
 )
 _AS_TIFF = "convert it to TIFF or PNG"
 BIOFORMATS = "Fiji opens it by Bio-Formats: save it there as OME-TIFF"
-_OLE, _XML, _TEXT = (
+_OLE, XML, TEXT = (
     "an OLE file (Olympus OIB, older Microsoft Office)",
     "an XML file",
     "a text file",
 )
 _ZIP = "a zip archive (unzip it, and name the file or folder in it)"
 _GUNZIP = "a gzip file (gunzip it)"
-SHARED = (_OLE, _XML, _TEXT, _ZIP, _GUNZIP)  # containers of many formats, which names tell apart
+SHARED = (_OLE, XML, TEXT, _ZIP, _GUNZIP)  # containers of many formats, which names tell apart
 # words for a page that holds a bundle, which `stereocell check` takes
 SCENE = "a scene in one file, written by `stereocell export` (name the OUT that it was made from)"
 _FRAMES = "extract its frames as PNG, as `ffmpeg -i FILE %05d.png` does"
@@ -30,7 +35,6 @@ _MAGIC = (
     (b"\0\x05\x16\x07", "a record of macOS beside a file (the file's own name has no `._`)"),
     (b"MATLAB 5.0", "a MATLAB file before 7.3 (save it in MATLAB with -v7.3)"),
     *((b"CDF" + mark, "a netCDF-3 file (`nccopy -k nc4 IN OUT` makes netCDF-4)") for mark in _CDF),
-    (b"\x93NUMPY", "a NumPy array (tifffile.imwrite makes a TIFF of it)"),
     (b"PK\x05\x06", "an empty zip archive"),
     (b"\x89PNG\r\n", "a PNG image"),
     (b"\xff\xd8\xff", "a JPEG image"),
@@ -78,33 +82,37 @@ _PATTERNS = (
 _COMPILED = tuple((re.compile(mark, re.DOTALL), words) for mark, words in _PATTERNS)
 _JSON = re.compile(rb"\{\s*[\"}]|\[\s*([\"{\[\d\]-]|true|false|null)")
 _SECTION = re.compile(rb"\[[^\]\r\n]+\]\s*\r?\n")
-# where a format's mark lies, the mark -> the format (readers.READERS), and words for it
-_READ = (
-    (128, b"DICM", "dicom", "a DICOM file"),  # goes first: its preamble may begin a TIFF
-    *((0, mark, "tiff", "a TIFF file") for mark in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
-    (0, b"\x89HDF\r\n\x1a\n", "hdf5", "an HDF5 file"),
-    (0, b"MATLAB 7.3", "hdf5", "a MATLAB 7.3 file"),  # HDF5 behind a block of 512 bytes
-    (0, b"NRRD0", "nrrd", "an NRRD file"),
-    (0, b"ZISRAWFILE", "czi", "a CZI file of Zeiss"),
-    (0, b"\xda\xce\xbe\x0a", "nd2", "an ND2 file of Nikon"),
-    *((344, mark, "nifti", "a NIfTI file") for mark in (b"n+1\0", b"ni1\0")),
-    *((4, mark, "nifti", "a NIfTI-2 file") for mark in (b"n+2\0\r\n", b"ni2\0\r\n")),
-    (208, b"MAP ", "mrc", "an MRC file"),
-)
-_LIF = re.compile(rb"\x70\0\0\0....\x2a", re.DOTALL)
-_METAIMAGE = re.compile(rb"\s*(ObjectType|Comment|NDims|ObjectSubType|TransformType)\s*=")
 _GZIP = b"\x1f\x8b"
 HEAD_BYTES = 512  # bytes that `identify` needs
-TIFF_MAGIC = tuple(mark for _, mark, name, _ in _READ if name == "tiff")
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Bytes by which files of a format are recognised.
+
+    words    words for such a file, with an article
+    pattern  a regular expression that matches the file's content from byte `at` on
+    """
+
+    words: str
+    pattern: bytes
+    at: int = 0
+
+    def is_in(self, head: bytes) -> bool:
+        """Return whether a file that begins with these bytes has the mark."""
+        return re.compile(self.pattern, re.DOTALL).match(head, self.at) is not None
+
+
+Marks = Sequence[tuple[str, Mark]]  # names of formats with their marks, in order of preference
 
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What a file is.
+    """The content of a file.
 
-    words     as `a zip archive (unzip it)`, with the way out where there is one
-    format    one that is read (readers.READERS); empty: none is known
-    is_known  False: the words only say how it begins
+    words     as `a zip archive (unzip it)`, with a remedy where there is one
+    format    the format whose mark it has; empty: it has no mark that was given
+    is_known  False: the words only quote the first bytes
     """
 
     words: str
@@ -113,7 +121,7 @@ class Content:
 
 
 def describe(head: bytes) -> str:
-    """Return what a file is that begins with these bytes, as `a zip archive (unzip it)`.
+    """Return words for a file that begins with these bytes, as `a zip archive (unzip it)`.
 
     >>> describe(b"<!DOCTYPE html>")
     'an HTML page (a download that failed, or asked for a login: download it again)'
@@ -121,17 +129,18 @@ def describe(head: bytes) -> str:
     return identify(head).words
 
 
-def identify(head: bytes) -> Content:
-    """Return what a file is that begins with these bytes."""
+def identify(head: bytes, marks: Marks = ()) -> Content:
+    """Return the content of a file that begins with these bytes.
+
+    marks  marks that go before those of this module
+    """
     if not head:
         return Content(f"an empty file ({_AGAIN})")
-    for place, mark, name, words in _READ:
-        if head[place : place + len(mark)] == mark:
-            return Content(words, name)
-    if _LIF.match(head):
-        return Content("a LIF file of Leica", "lif")
+    for name, mark in marks:
+        if mark.is_in(head):
+            return Content(mark.words, name)
     if head.startswith(_GZIP):
-        return _packed(head)
+        return _packed(head, marks)
     if head[257:262] == b"ustar":
         return Content("a tar archive (unpack it)")
     for magic, words in _MAGIC:
@@ -146,7 +155,7 @@ def identify(head: bytes) -> Content:
 
 
 def pointer_words(head: bytes) -> str:
-    """Return what a file is that stands for another one, in words; empty: it is its own content."""
+    """Return words for a file that stands for another one; empty: it is its own content."""
     return next((words for magic, words in _POINTERS if head.startswith(magic)), "")
 
 
@@ -159,27 +168,25 @@ def _text(head: bytes) -> Content:
     if text.startswith((b"<?xml", b"<ome", b"<error")):
         is_error = b"<error" in text
         return Content(
-            f"an XML error of a server (a download that failed: {_AGAIN})" if is_error else _XML
+            f"an XML error of a server (a download that failed: {_AGAIN})" if is_error else XML
         )
     if _SECTION.match(text):
         return Content("a text file of settings ([section] and key=value lines)")
-    if _METAIMAGE.match(head):
-        return Content("the header of a MetaImage", "metaimage")
     if head.isascii() and all(byte >= 32 or byte in b"\t\r\n\f" for byte in head):
         if _JSON.match(text):
             return Content(f"JSON (a server's error, if it was downloaded: {_AGAIN})")
-        return Content(_TEXT)
+        return Content(TEXT)
     return Content(f"other content (it begins with the bytes {head[:4].hex(' ')})", is_known=False)
 
 
-def _packed(head: bytes) -> Content:
-    """Return what a gzip file is, by the first bytes of what is packed in it."""
+def _packed(head: bytes, marks: Marks) -> Content:
+    """Return the content of a gzip file, by the first bytes of what is packed in it."""
     inside = unpacked(head)
     if inside is None:
         return Content(f"a gzip file that is damaged ({_AGAIN})")
     if not inside:
         return Content(f"a gzip file of nothing, or one that is cut short ({_AGAIN})")
-    within = identify(inside) if not inside.startswith(_GZIP) else Content("a gzip file")
+    within = identify(inside, marks) if not inside.startswith(_GZIP) else Content("a gzip file")
     if not within.is_known:
         return Content(_GUNZIP)
     if within.format:
@@ -188,7 +195,7 @@ def _packed(head: bytes) -> Content:
 
 
 def unpacked(head: bytes) -> bytes | None:
-    """Return the first bytes of what a gzip file begins to hold; None: it is damaged."""
+    """Return the first bytes that are packed in a gzip file; None: it is damaged."""
     try:
         return zlib.decompressobj(16 + zlib.MAX_WBITS).decompress(head, HEAD_BYTES)
     except zlib.error:

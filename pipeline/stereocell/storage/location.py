@@ -15,41 +15,9 @@ from fsspec.asyn import AsyncFileSystem, sync
 from fsspec.exceptions import FSTimeoutError
 
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
-from stereocell.storage.archives import ARCHIVE_SUFFIXES, ZARR_FILES, archive_in, has_zarr
-from stereocell.storage.first_bytes import HEAD_BYTES, identify
+from stereocell.storage.first_bytes import HEAD_BYTES
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
-_TIFF_SUFFIXES = (
-    *(".ome.tiff", ".ome.tif", ".ome.tf2", ".ome.tf8", ".ome.btf"),
-    *(".companion.ome", ".tiff", ".tif", ".tf2", ".tf8", ".btf", ".lsm", ".stk"),
-)
-_PLANE_SUFFIXES = (".tif", ".tiff", ".stk", ".lsm", ".png", ".jpg", ".jpeg", ".bmp")
-_MAX_OTHERS = 200  # files without an image's name that are looked into for DICOM
-_ZARR_SUFFIXES = (".ome.zarr", ".zarr")
-_NIFTI_SUFFIXES = (".nii", ".nii.gz")
-_DICOM_SUFFIXES = (".dcm", ".dicom", ".ima")
-_ANALYZE_SUFFIXES = (".hdr", ".img", ".hdr.gz", ".img.gz")  # also pairs of NIfTI
-# format -> endings of its files' names, in lower case
-_FILE_SUFFIXES = {
-    "tiff": _TIFF_SUFFIXES,
-    "nifti": _NIFTI_SUFFIXES,
-    "mgh": (".mgh", ".mgz", ".mgh.gz"),
-    "ims": (".ims",),
-    "hdf5": (".h5", ".hdf5", ".hdf", ".nc", ".nc4", ".mat", ".emd"),
-    "nrrd": (".nrrd", ".nhdr"),
-    "metaimage": (".mha", ".mhd"),
-    "mrc": tuple(
-        ending + packed
-        for ending in (".mrc", ".rec", ".map", ".mrcs", ".ccp4")
-        for packed in ("", ".gz", ".bz2")
-    ),
-    "czi": (".czi",),
-    "lif": (".lif",),
-    "nd2": (".nd2",),
-}
-# formats that are known by a file's first bytes, whatever its name (IMOD calls MRC .st, .ali, ...)
-_BY_CONTENT = ("dicom", "tiff", "hdf5", "nrrd", "czi", "nd2", "lif", "mrc")
-_KEYED = re.compile(r"(.*\.(?:h5|hdf5|hdf|nc|nc4|mat|emd)):(.*)", re.IGNORECASE | re.DOTALL)
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
 _CONNECT_S, SILENCE_S = 15.0, 30.0  # limits of one request; s3fs repeats it
 _AWS_CREDENTIALS = (
@@ -66,7 +34,7 @@ class Location:
     """One source.
 
     source    an absolute local path or an address, in the form of the format libraries; with
-              `:/KEY` where it names a dataset in an HDF5 file
+              `:/KEY` where it names a dataset in a file
     is_local  a path on this machine
     """
 
@@ -84,8 +52,8 @@ class Location:
         if not text:
             raise UsageError("an empty name, expected a path or an address (. is this folder)")
         if not _ADDRESS.match(text):
-            path, key = _split_key(text)
-            return cls(os.path.abspath(os.path.expanduser(path)) + key, True)
+            path, inside = _split(os.path.expanduser(text))
+            return cls(os.path.abspath(path) + inside, True)
         try:
             parts = urlsplit(text)
         except ValueError as error:
@@ -98,14 +66,22 @@ class Location:
 
     @property
     def path(self) -> str:
-        """The file or folder on this machine, without a dataset's key or a path in a zip file."""
-        path = _split_key(self.source)[0]
-        return archive_in(path) or path
+        """The file or folder on this machine, without `inside`."""
+        return _split(self.source)[0] if self.is_local else self.source
+
+    @property
+    def inside(self) -> str:
+        """The part of a file on this machine that is named; empty: all of it.
+
+        It is `:/KEY`, or the rest of a path that leads into the file, as `/0`.
+        """
+        return _split(self.source)[1] if self.is_local else ""
 
     @property
     def key(self) -> str:
-        """The dataset in an HDF5 file, as `/a/b`; empty where none is named."""
-        return _split_key(self.source)[1][1:]
+        """The dataset in a file, as `/a/b`; empty where none is named."""
+        inside = self.inside
+        return inside[1:] if inside.startswith(":") else ""
 
     @property
     def folder(self) -> Path:
@@ -125,70 +101,11 @@ class Location:
     @property
     def parts(self) -> tuple[str, ...]:
         """The names along the path."""
-        path = _split_key(self.source)[0] if self.is_local else self.shown.partition("://")[2]
+        path = self.shown.partition("://")[2]
+        if self.is_local:
+            file, inside = _split(self.source)
+            path = file if inside.startswith(":") else self.source
         return tuple(part for part in path.split("/") if part)
-
-    @property
-    def name(self) -> str:
-        """The file's name without its suffix, for display; `plate.zarr/0` becomes `plate-0`."""
-        parts = self.parts
-        whole = (".zarr", ".n5", *ARCHIVE_SUFFIXES)
-        outermost = (i for i, part in enumerate(parts) if part.endswith(whole))
-        first = next(outermost, len(parts) - 1)
-        return "-".join(_stem(part) for part in parts[first:]) or "dataset"
-
-    @property
-    def format(self) -> str | None:
-        """The name of the format (readers.READERS); None: neither name nor content fits one.
-
-        Planes are a folder of images without DICOM; DICOM is any other folder on this machine, and
-        a file with DICOM's first bytes.
-        """
-        if any(part.endswith(".zarr") for part in self.parts):
-            return "ome-zarr"
-        if self.is_zarr_archive:
-            return "ome-zarr"
-        if any(part.endswith(".n5") for part in self.parts) or self._is_n5():
-            return "n5"
-        if self.is_local and any(os.path.exists(f"{self.source}/{file}") for file in ZARR_FILES):
-            return "ome-zarr"
-        if self.is_local and _holds_planes(self.source):
-            return "planes"
-        if not self.parts:
-            return None
-        last = self.parts[-1].lower()
-        for name, endings in _FILE_SUFFIXES.items():
-            if last.endswith(endings):
-                return name
-        return self._format_by_content(last) if self.is_local else None
-
-    def _format_by_content(self, last: str) -> str | None:
-        """Return the format of a file whose name leaves it open; `last` is the name, lower case."""
-        found = identify(first_bytes(self.path)).format
-        if found in _BY_CONTENT:
-            return found
-        if last.endswith(_DICOM_SUFFIXES) or os.path.isdir(self.source):
-            return "dicom"
-        if last.endswith(_ANALYZE_SUFFIXES):
-            return "nifti"
-        return "bdv" if self._is_bdv() else None
-
-    @property
-    def is_zarr_archive(self) -> bool:
-        """Whether a source is a zip file of OME-Zarr or a group in one; at an address by name."""
-        if not self.is_local:
-            return bool(self.parts) and self.parts[-1].lower().endswith(ARCHIVE_SUFFIXES)
-        path = archive_in(self.source)
-        return bool(path) and has_zarr(path)
-
-    def _is_bdv(self) -> bool:
-        """Whether a file is the XML of BigDataViewer."""
-        is_named = self.source.lower().endswith(".xml")
-        return is_named and b"<SpimData" in first_bytes(self.source, count=1 << 16)
-
-    def _is_n5(self) -> bool:
-        """Whether a folder is a group or a dataset of N5: others have no `attributes.json`."""
-        return self.is_local and os.path.exists(f"{self.source}/attributes.json")
 
     @property
     def storage_options(self) -> dict[str, Any]:
@@ -292,53 +209,17 @@ def require_own_key(key: str, named: str) -> None:
         raise SourceError(f"{named}: leads out of the address, expected a key below it")
 
 
-def require_apart(source: str | Path, out: Path) -> None:
-    """Raise UsageError if OUT is a local source, or lies inside one (or inside its .zarr)."""
-    location = Location.of(source)
-    if not location.is_local:
-        return
-    path = Path(location.source)
-    outermost = next((p for p in [*reversed(path.parents), path] if p.suffix == ".zarr"), path)
-    # not Path.resolve, which raises its own error for a ring of links
-    if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(outermost)):
-        raise UsageError(
-            f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
-            "it would write into the data"
-        )
+def _split(text: str) -> tuple[str, str]:
+    """Return the file to which a local path leads, and the rest: `:/KEY`, or `/PATH` in the file.
 
-
-def _holds_planes(folder: str) -> bool:
-    """Return whether a folder holds images of planes, and no DICOM beside them."""
-    are_there, others = False, 0
-    for at, folders, names in os.walk(folder):
-        folders.sort()
-        for name in sorted(names):
-            lower = name.lower()
-            if lower.startswith("."):
-                continue
-            if lower.endswith(_PLANE_SUFFIXES):
-                are_there = True
-            elif lower.endswith(_DICOM_SUFFIXES):
-                return False
-            elif others < _MAX_OTHERS:
-                others += 1
-                if first_bytes(os.path.join(at, name))[128:132] == b"DICM":
-                    return False
-    return are_there
-
-
-def require_file(location: Location) -> None:
-    """Raise SourceError where a local source is a folder and its format's name says a file."""
-    if location.is_local and os.path.isdir(location.path):
-        raise SourceError(f"{location.shown}: is a folder, expected a file")
-
-
-def _split_key(text: str) -> tuple[str, str]:
-    """Return a path and the `:/KEY` behind it; a file whose own name holds that goes first."""
-    found = _KEYED.fullmatch(text)
-    if found is None or os.path.exists(text):
-        return text, ""
-    return found[1], f":/{found[2].lstrip('/')}"
+    A path that exists as a whole has no rest. Neither has one that leads to no file.
+    """
+    if not os.path.exists(text):
+        for at in (place.start() for place in reversed([*re.finditer("[:/]", text)])):
+            if os.path.isfile(text[:at]):
+                rest = text[at:]
+                return text[:at], f":/{rest[1:].lstrip('/')}" if rest[0] == ":" else rest
+    return text, ""
 
 
 def first_bytes(path: str, *, count: int = HEAD_BYTES) -> bytes:
@@ -350,12 +231,3 @@ def first_bytes(path: str, *, count: int = HEAD_BYTES) -> bytes:
             return file.read(count)
     except OSError:
         return b""
-
-
-def _stem(name: str) -> str:
-    files = (ending for endings in _FILE_SUFFIXES.values() for ending in endings)
-    endings = (*_ZARR_SUFFIXES, *ARCHIVE_SUFFIXES, ".zip", ".n5", ".xml", *files)
-    for suffix in sorted(endings, key=len, reverse=True):
-        if name.lower().endswith(suffix) and len(name) > len(suffix):
-            return name[: -len(suffix)]
-    return name

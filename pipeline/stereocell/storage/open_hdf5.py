@@ -1,4 +1,4 @@
-"""An open HDF5 file in a child process (read/hdf5_texts.py).
+"""An open HDF5 file in a child process (read/hdf5_file/texts.py).
 
 It is not in `read`, whose imports would double the time in which a child starts.
 """

@@ -8,7 +8,9 @@ machine:
   last. It then removes a large file here: the disk holds the work in progress, never the build.
 - `fetch` gets a file before it is read; small files that steer a build are fetched at the start.
 
-For any other folder these functions do nothing, so that readers and writers can always call them.
+For any other folder these functions do nothing. Few modules call them: the functions that read and
+write all documents (seals.py, atomic_write.py, file_list.py), the runner of steps for the inputs of
+each task, and `OutFolder` for phases and checks.
 """
 
 import os
@@ -20,7 +22,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-from stereocell.model.errors import OutputError, StereoCellError, UsageError
+from stereocell.model.errors import StereoCellError, UsageError
+from stereocell.storage.folder_names import names_in_folder
 from stereocell.storage.object_store import STEERING, Mirror, Place
 from stereocell.storage.processes import is_alive, machine
 
@@ -133,12 +136,7 @@ def names_in(folder: Path) -> list[str]:
     if mirror is not None:
         below = {file.relative_to(folder).parts for file in sizes_below(folder) if file != folder}
         return sorted({parts[0] for parts in below})
-    try:
-        return sorted(os.listdir(folder))
-    except (FileNotFoundError, NotADirectoryError):
-        return []
-    except OSError as error:
-        raise OutputError(f"{folder}: can't be listed ({error.strerror})") from None
+    return names_in_folder(folder)
 
 
 def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:

@@ -24,6 +24,7 @@ from pxr import Kind as Kinds
 
 from stereocell.formats.exr import write_atlas
 from stereocell.formats.vdb import GRID_NAME, MEASURED_NAME, write_vdb
+from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.model.color import to_srgb8
 from stereocell.model.errors import StageError
 from stereocell.model.identifiers import from_identifier
@@ -55,8 +56,10 @@ LAYER_NAME = "tile.usdc"
 _Types = Sdf.ValueTypeNames
 
 
-def write_tile(stage_dir: Path, tile: TileContent) -> FileList:
-    """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one; return its files.
+def write_tile(stage_dir: Path, tile: TileContent) -> tuple[FileList, int]:
+    """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one.
+
+    Returns its files, and the bytes of its voxels as measured.
 
     Tiles are independent. Raises OutputError where a file can't be written, ValueError (a bug)
     where a volume's shape doesn't fit its tile.
@@ -67,7 +70,10 @@ def write_tile(stage_dir: Path, tile: TileContent) -> FileList:
         for channel in tile.channels:
             _write_files(folder, tile, channel)
         export(_compose(tile), folder / LAYER_NAME)
-        return {file.name: measure(file) for file in sorted(folder.iterdir())}
+        files = {file.name: measure(file) for file in sorted(folder.iterdir())}
+        # here, since a stored folder's large files leave this machine
+        grids = [grid for file in folder.glob("*.vdb") for grid in read_vdb_head(file)]
+        return files, sum(grid.end - grid.start for grid in grids if grid.name == MEASURED_NAME)
 
 
 def closed_file(stage_dir: Path, tile_id: str, channel_id: str) -> Path:

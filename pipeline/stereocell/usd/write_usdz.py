@@ -29,7 +29,6 @@ from pxr import Kind as Kinds
 
 from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
-from stereocell.storage.workspace import fetch, remove
 from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
 from stereocell.usd.read_levels import ComposedLod, count_faces, mesh_at, read_lods
 from stereocell.usd.read_objects import read_columns
@@ -87,7 +86,6 @@ def write_usdz(
         if shown is not None and (found := list(_read_parts(stage, prims, some, shown))):
             break
     if shown is None or not found:
-        remove(path)
         return None
     boxes = [hinted_box(prim) for prim in prims]
     low = np.min([box[0] for box in boxes], axis=0)
@@ -246,7 +244,6 @@ def _pack(layer: Sdf.Layer, images: Mapping[str, Path], path: Path, as_written: 
     """
     with tempfile.TemporaryDirectory() as folder:
         export(layer, Path(folder) / _LAYER)
-        fetch(*images.values())
         files = {_LAYER: Path(folder) / _LAYER}
         files |= {name: as_written.require(file) for name, file in images.items()}
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:

@@ -96,7 +96,8 @@ class AsWritten:
     changed: set[Path] = field(default_factory=set)
 
     def require(self, file: Path) -> Path:
-        """Return a fetched file. Raises StageError where it is missing or damaged."""
+        """Fetch a file and return it. Raises StageError where it is missing or damaged."""
+        fetch(file)
         place = file.parent.resolve() / file.name
         folder, listed = self._list_over(place.parent)
         entry = listed.get(place.relative_to(folder).as_posix())
@@ -108,11 +109,10 @@ class AsWritten:
         """Raise StageError where a layer directly in a folder of a stage is missing or damaged."""
         folder = folder.resolve()
         root, listed = self._list_over(folder)
-        for path, entry in listed.items():
+        for path in listed:
             file = root / path
             if file.parent == folder and file.suffix in LAYER_SUFFIXES:
-                fetch(file)
-                self._require(file, entry)
+                self.require(file)
 
     def _list_over(self, folder: Path) -> tuple[Path, FileList]:
         """Return the folder of the list that covers `folder`, and the list; or an empty one."""

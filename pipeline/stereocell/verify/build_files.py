@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from stereocell.building import unit_files
 from stereocell.building.input_unchanged import require_added
 from stereocell.building.out_folder import INDEX, SURVEY, OutFolder
 from stereocell.building.sealed_documents import (
@@ -15,11 +14,11 @@ from stereocell.formats.exr import check_exr
 from stereocell.formats.stl import check_stl
 from stereocell.formats.vdb import check_vdb
 from stereocell.model.errors import CheckError, StereoCellError
+from stereocell.steps import unit_files
 from stereocell.storage.documents import schema_of
-from stereocell.storage.file_list import DAMAGED, MISSING
+from stereocell.storage.file_list import DAMAGED, MISSING, sizes_of
 from stereocell.storage.json_files import find_sealed, read_json
 from stereocell.storage.location import Location, require_own
-from stereocell.storage.workspace import is_file, sizes_below
 from stereocell.usd import written_files
 from stereocell.usd.stage_files import dependencies
 from stereocell.usd.validate import validate_stage, validate_usdz
@@ -44,7 +43,7 @@ def check_units(out_folder: OutFolder) -> str:
     index = find_sealed(out_folder.index_file, INDEX) or {}
     for name, key in index.items():
         folder = out_folder.unit_dir(name, key)
-        files += len(sizes_below(folder))
+        files += len(sizes_of(folder))
         problems += [
             f"{(folder / file).relative_to(out_folder.out).as_posix()}: {fault}"
             for file, fault in unit_files.find_damage(folder).items()
@@ -73,7 +72,7 @@ def _is_whole(file: Path) -> bool:
 
 def _fault_of(out_folder: OutFolder, file: Path) -> str:
     name = file.relative_to(out_folder.out).as_posix()
-    return f"{name}: {DAMAGED if is_file(file) else MISSING}"
+    return f"{name}: {DAMAGED if out_folder.has(file) else MISSING}"
 
 
 def check_stage_hashes(out_folder: OutFolder) -> str:

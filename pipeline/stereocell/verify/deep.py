@@ -4,18 +4,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from stereocell.building.channels import Channel
 from stereocell.building.input_unchanged import require_added, require_input, require_labels
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.passes import unit_steps
-from stereocell.building.plan import Plan
 from stereocell.building.surface_cover import SurfaceCover, lifted_by_tile, sum_lifted
 from stereocell.building.survey_file import read_survey
 from stereocell.bundle.manifest import MANIFEST
 from stereocell.engine.run import Engine
+from stereocell.engine.run_steps import with_inputs
 from stereocell.isosurface.lifted_by_noise import Lifted
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.unit import Cover
+from stereocell.planning.channels import Channel
+from stereocell.planning.plan import Plan
+from stereocell.planning.unit_steps import unit_steps
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import open_stage, tile_prims
@@ -61,7 +62,12 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
         require_added(plan)
         require_labels(plan)
         odd = list(_odd_values(out_folder, plan))
-        findings = engine.run("source", compare_unit, list(_source_tasks(out_folder, plan)))
+        findings = engine.run(
+            "source",
+            partial(with_inputs, compare_unit),
+            list(_source_tasks(out_folder, plan)),
+            needs=(compare_unit.__module__,),
+        )
     except StereoCellError as error:
         yield CheckLine("stage against source", False, _one_line(error))
     else:

@@ -14,7 +14,6 @@ from stereocell.bundle.manifest import FILES, MANIFEST, REMEDY, SCHEMA
 from stereocell.model.errors import OutputError, StereoCellError
 from stereocell.storage.contents import require_kind
 from stereocell.storage.kinds import Kind
-from stereocell.storage.workspace import is_file
 from stereocell.usd.write_usdz import USDZ_NAME
 from stereocell.verify.build_files import (
     check_stage,
@@ -69,7 +68,7 @@ def check(out: Path) -> Iterator[CheckLine]:
 
 def _checks_of_build(out: Path) -> list[_Check]:
     out_folder = OutFolder(out)
-    has_plan = is_file(out_folder.plan_file)
+    has_plan = out_folder.has(out_folder.plan_file)
     return [
         ("plan", lambda: check_plan(out_folder)),
         *([("records", lambda: check_records(out_folder))] if has_plan else []),

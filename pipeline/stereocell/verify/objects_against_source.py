@@ -15,15 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.building.label_maps import Labels
-from stereocell.building.located_objects import CUT, Located, TileGrid, locate, tile_boxes
-from stereocell.building.object_passes import images_of, read_notes
-from stereocell.building.object_tables import make_table, table_of
+from stereocell.building.object_records import read_notes
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.plan import Plan
-from stereocell.building.steps.build_objects import Image, read_on_labels
-from stereocell.building.steps.find_extents import FindExtents
-from stereocell.building.unit_files import load_objects
 from stereocell.engine.run import Engine
 from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import ObjectTable
@@ -31,6 +24,14 @@ from stereocell.model.tiling import Box
 from stereocell.objects.extents import Runs
 from stereocell.objects.intensities import PERCENTILE
 from stereocell.objects.table import MEAN, P95
+from stereocell.planning.located_objects import CUT, Located, TileGrid, locate, tile_boxes
+from stereocell.planning.object_steps import images_of
+from stereocell.planning.object_tables import make_table, table_of
+from stereocell.planning.plan import Plan
+from stereocell.steps.build_objects import Image, read_on_labels
+from stereocell.steps.find_extents import FindExtents
+from stereocell.steps.labels import Labels
+from stereocell.steps.unit_files import load_objects
 from stereocell.usd.read_levels import mesh_at, read_lods
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
 from stereocell.usd.read_stage import loaded, open_stage

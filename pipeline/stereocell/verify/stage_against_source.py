@@ -18,9 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.building.steps.build_unit import BuildUnit
-from stereocell.building.unit import UnitInput, cut_voxels, find_measured, find_surface
-from stereocell.building.unit_files import cover_of, load_lods, load_quality, load_record
 from stereocell.formats.exr import read_atlas
 from stereocell.formats.vdb import write_vdb
 from stereocell.meshes.distance import Nearest, measure_spread
@@ -31,7 +28,9 @@ from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.rigid_transform import Matrix
 from stereocell.model.tile_content import APRON
 from stereocell.model.unit import Cover
-from stereocell.storage.workspace import cached
+from stereocell.steps.build_unit import BuildUnit
+from stereocell.steps.unit import UnitInput, cut_voxels, find_measured, find_surface
+from stereocell.steps.unit_files import cover_of, load_lods, load_quality, load_record
 from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.usd.read_levels import ComposedLod, read_lods
 from stereocell.usd.read_stage import loaded, open_stage
@@ -66,6 +65,11 @@ class SourceTask:
     samples: int
     shares_volume: bool = False
 
+    @property
+    def inputs(self) -> list[Path]:
+        """The folder of the unit; that of the tile is fetched as its payload is loaded."""
+        return [self.directory]
+
 
 @dataclass(frozen=True, slots=True)
 class UnitFinding:
@@ -87,7 +91,7 @@ def compare_unit(task: SourceTask) -> UnitFinding:
     fine, cover = find_surface(volume, given)
     problems = []
     stage = open_stage(task.stage_file)
-    with cached(task.directory), loaded(stage, task.tile_id) as (tile, _):
+    with loaded(stage, task.tile_id) as (tile, _):
         lods = list(read_lods(tile, task.channel_id))
         composed = read_volume(tile, task.channel_id)
         record = load_record(task.directory)

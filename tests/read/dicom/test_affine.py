@@ -16,7 +16,7 @@ import SimpleITK as sitk
 from dicom2nifti import common
 from numpy.typing import NDArray
 
-from stereocell.read.dicom import _find
+from stereocell.read.formats.dicom.image import _find
 from stereocell.read.plane_stack import StackLayout
 from stereocell.storage.location import Location
 from support.dicom_series import grid, tilted, turn, write_enhanced, write_series

@@ -25,8 +25,8 @@ from pydicom.uid import (
 
 from stereocell import read
 from stereocell.model.errors import SourceError
-from stereocell.read.dicom import stored_values
-from stereocell.read.dicom.stored_values import plane_size
+from stereocell.read.formats.dicom import stored_values
+from stereocell.read.formats.dicom.stored_values import plane_size
 from support.dicom_reading import error, whole
 from support.dicom_series import compress, grid, image, save, write_enhanced, write_series
 

@@ -319,7 +319,8 @@ def test_no_pixels_are_read_before_they_are_asked_for(
     write_series(tmp_path / "s", grid())
     calls = []
     monkeypatch.setattr(
-        "stereocell.read.dicom.decode", lambda *a: calls.append(1) or np.zeros(SHAPE, np.int16)
+        "stereocell.read.formats.dicom.image.decode",
+        lambda *a: calls.append(1) or np.zeros(SHAPE, np.int16),
     )
     dataset = read.open(tmp_path / "s")
     assert calls == []

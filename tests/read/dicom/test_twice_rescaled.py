@@ -8,9 +8,9 @@ import pydicom
 import pytest
 
 from stereocell import read
-from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
-from stereocell.read.dicom.twice_rescaled import LEVEL_HU, WINDOW_HU
+from stereocell.planning.settings import load
+from stereocell.read.formats.dicom.twice_rescaled import LEVEL_HU, WINDOW_HU
 from support.dicom_series import grid, write_series
 
 SHAPE = (8, 40, 44)

@@ -8,10 +8,10 @@ import pydicom
 import pytest
 
 from stereocell import read
-from stereocell.building.hounsfield import without_hounsfield
-from stereocell.building.preset_choice import choose_preset
-from stereocell.building.settings import load
 from stereocell.cli.__main__ import main
+from stereocell.planning.hounsfield import without_hounsfield
+from stereocell.planning.preset_choice import choose_preset
+from stereocell.planning.settings import load
 from support.dicom_reading import whole
 from support.dicom_series import Change, grid, setting, write_series
 

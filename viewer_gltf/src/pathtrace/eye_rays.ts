@@ -65,3 +65,26 @@ function isNear(before: TraceView, now: TraceView, middle: Vector3): boolean {
     before.eye.distanceTo(now.eye) <= TREMBLE_SHARE * away
   );
 }
+
+/** Where the eyes were while earlier frames were gathered. */
+export type ViewsBefore = Readonly<{
+  /** From where the gathered paths begin. */
+  anchors: readonly TraceView[];
+  /** Where the eyes were in the frame before; none: that frame gathered too little. */
+  seen: readonly TraceView[];
+  /** The middle of the box, um. */
+  middle: Vector3;
+  /** Whether paths may begin where the eyes were, as long as they only tremble. */
+  mayTremble: boolean;
+}>;
+
+/** What earlier frames are worth to paths from the present views. */
+export function historyOf(
+  views: readonly TraceView[],
+  { anchors, seen, middle, mayTremble }: ViewsBefore,
+): History {
+  if (anchors.length !== views.length) return "none";
+  if (areSame(anchors, views)) return "same";
+  if (areNear(anchors, views, middle)) return mayTremble ? "same" : "aside";
+  return areNear(seen, views, middle) ? "aside" : "none"; // eyes also sway, slowly
+}

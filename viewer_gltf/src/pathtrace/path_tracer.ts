@@ -3,18 +3,9 @@
  * paths brought. A view that stays gathers on, one that trembles carries it along, a new one begins
  * anew.
  */
-import {
-  FloatType,
-  Matrix4,
-  type Texture,
-  type Vector3,
-  type WebGLRenderer,
-  type WebGLRenderTarget,
-} from "three";
+import type { Matrix4, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { Eyes } from "../gpu/eyes";
-import { floatTarget } from "../gpu/float_targets";
-import { drawEyes } from "../gpu/offscreen_target";
 import { GROUND, SKY } from "../gpu/room_light";
 import { ScreenPass } from "../gpu/screen_pass";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
@@ -22,16 +13,17 @@ import type { MarchLight } from "../volumes/march_frame";
 import { DenoiseAndTone, type Marched } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
 import type { MediumAppearance } from "./extinction";
-import { areNear, areSame, type History, type TraceView, viewOf } from "./eye_rays";
+import { type History, historyOf, type TraceView, viewOf } from "./eye_rays";
 import { LightProbe } from "./light_probe";
 import { type Hemispheres, hemispheresOf, lightMarch } from "./march_light";
 import type { MediumTexels } from "./medium_loader";
 import { MediumTextures } from "./medium_textures";
+import { PathSums } from "./path_sums";
 import { TRACE_FRAGMENT } from "./shaders/sources";
-import { NOISE_TILE, TileNoise } from "./tile_noise";
+import { NOISE_TILE } from "./tile_noise";
 import {
+  boxToWorld,
   keyOf,
-  lowCorner,
   matterOf,
   sceneInto,
   type TraceScene,
@@ -40,8 +32,6 @@ import {
   traceUniforms,
 } from "./uniforms";
 
-/** Samples between two looks at the noise of the tiles. */
-const NOISE_EVERY = 8;
 /** Noise at which a tile is as good as done. */
 const CALM = 0.004;
 /** Most samples that are kept of a view a little aside. */
@@ -64,16 +54,12 @@ export type Gathering = Readonly<{
   standIn?: Marched | null;
 }>;
 
+type Drawing = Pick<Gathering, "scale" | "isDraft">;
+
 /** Samples with which nothing stands in for any pixel: see tone_map.frag.glsl. */
 const STOOD_IN = 5;
 
 export class Tracer {
-  /** Samples of a pixel since the picture began anew; tiles that rest have fewer. */
-  samples = 0;
-  /** Those of them with paths from the present view. */
-  rested = 0;
-  private readonly sums = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
-  private readonly noise = new TileNoise();
   private readonly probe = new LightProbe();
   private readonly denoiseAndTone = new DenoiseAndTone(this.probe);
   private roomLight: readonly [number, number, number] = [0, 0, 0];
@@ -83,41 +69,42 @@ export class Tracer {
   private anchors: readonly TraceView[] = [];
   /** Where the eyes were in the frame before. */
   private seen: readonly TraceView[] = [];
-  /** Pictures of paths so far: their sums are drawn alternately into two targets. */
-  private drawn = 0;
-  /** The number that seeds the random numbers of a pass. */
-  private sample = 0;
   private shownWith: TraceSettings | null = null;
-  /** Where among the tiles the next turn begins, 0..1. */
-  private turn = 0;
   private key = "";
   private matter = "";
-  private gatheredScale = 1;
-  private isDraft = false;
+  private drawing: Drawing = { scale: 1, isDraft: false };
   /** Whether a marched picture stands in for pixels with few samples. */
   isStoodIn = false;
   private readonly pathPass: ScreenPass<TraceUniforms>;
+  private readonly sums: PathSums;
   private readonly textures: MediumTextures;
 
   /**
    * @param brick texels along an edge of a brick of majorants: SKIP_BRICK or a multiple
    * @param calm standard error of the luminance at which a tile rests more often; 0: none does
    */
-  constructor(
-    sceneDepth: { value: Texture },
-    brick = 2 * SKIP_BRICK,
-    private readonly calm = CALM,
-  ) {
+  constructor(sceneDepth: { value: Texture }, brick = 2 * SKIP_BRICK, calm = CALM) {
     this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth, MAX_ASIDE), {
       CHANNELS: 1,
       NOISE_TILE,
     });
+    this.sums = new PathSums(this.pathPass, calm);
     this.textures = new MediumTextures(this.pathPass, brick);
   }
 
   /** The picture, encoded and premultiplied. */
   get picture(): WebGLRenderTarget {
     return this.denoiseAndTone.picture;
+  }
+
+  /** Samples of a pixel since the picture began; tiles that rest have fewer. */
+  get samples(): number {
+    return this.sums.samples;
+  }
+
+  /** Those of them whose paths are from the present view. */
+  get rested(): number {
+    return this.sums.rested;
   }
 
   /** Pixels of the picture to one of the frame buffer. */
@@ -127,7 +114,7 @@ export class Tracer {
 
   /** Sums of colour and coverage, and of squared luminance, samples, distance and openness. */
   get gathered(): WebGLRenderTarget {
-    return this.sums[this.drawn % 2];
+    return this.sums.gathered;
   }
 
   get isReady(): boolean {
@@ -143,7 +130,7 @@ export class Tracer {
   /** Begin a picture of another view. */
   private begin(): void {
     this.anchors = [];
-    this.samples = this.rested = this.turn = 0;
+    this.sums.begin();
     this.shownWith = null;
   }
 
@@ -186,9 +173,8 @@ export class Tracer {
    */
   goesOn(eyes: Eyes, scene: TraceScene, mayTremble: boolean): boolean {
     if (this.texels === null) return false;
-    if (keyOf(eyes, scene, this.gatheredScale, this.isDraft) !== this.key) {
-      return false;
-    }
+    const { scale, isDraft } = this.drawing;
+    if (keyOf(eyes, scene, scale, isDraft) !== this.key) return false;
     const history = this.historyFor(this.viewsOf(eyes, scene), mayTremble);
     return history === "same" || (mayTremble && history === "aside");
   }
@@ -206,7 +192,7 @@ export class Tracer {
     marched: Marched,
   ): void {
     if (this.texels === null) return;
-    this.prepare(eyes, scene, settings, this.gatheredScale, false);
+    this.prepare(eyes, scene, settings, { ...this.drawing, isDraft: false });
     this.begin();
     const views = this.viewsOf(eyes, scene);
     this.probeLight(renderer, eyes, views, settings, marched);
@@ -226,30 +212,18 @@ export class Tracer {
     { scale, passes, mayTremble, isDraft, standIn = null }: Gathering,
   ): void {
     if (this.texels === null) return;
-    this.prepare(eyes, scene, settings, scale, isDraft);
+    this.prepare(eyes, scene, settings, { scale, isDraft });
     const views = this.viewsOf(eyes, scene);
-    let history = this.historyFor(views, mayTremble);
+    const history = this.historyFor(views, mayTremble);
     this.seen = views;
     if (history === "none") this.begin();
-    if (history === "aside") {
-      this.samples = Math.min(this.samples, MAX_ASIDE);
-      this.rested = 0;
-    }
+    if (history === "aside") this.sums.keepAside(MAX_ASIDE);
     const begins = history === "same" ? this.anchors : views;
-    const share = Math.min(1, passes);
     const started = this.samples;
-    for (let i = 0; i < Math.max(1, Math.floor(passes)); i++) {
-      if (this.samples >= ENOUGH_SAMPLES) break;
-      this.pathPass.uniforms.uTurn.value.set(this.turn, share);
-      this.gather(renderer, eyes, views, begins, history);
+    const { anchors } = this;
+    if (started < ENOUGH_SAMPLES) {
+      this.sums.gather(renderer, { eyes, views, begins, anchors, history }, passes, scale);
       this.anchors = begins;
-      history = "same";
-      const before = this.samples;
-      this.samples = Math.round(1e6 * (before + share)) / 1e6;
-      this.rested += share;
-      this.turn = (this.turn + share) % 1;
-      const isDue = Math.floor(before / NOISE_EVERY) < Math.floor(this.samples / NOISE_EVERY);
-      if (isDue) this.noise.judge(renderer, this.gathered);
     }
     const { denoiseAndTone } = this;
     this.isStoodIn = standIn !== null && this.samples < STOOD_IN;
@@ -272,13 +246,8 @@ export class Tracer {
   }
 
   /** Follow the scene; what was gathered of another one is dropped. */
-  private prepare(
-    eyes: Eyes,
-    scene: TraceScene,
-    settings: TraceSettings,
-    scale: number,
-    isDraft: boolean,
-  ): void {
+  private prepare(eyes: Eyes, scene: TraceScene, settings: TraceSettings, drawing: Drawing): void {
+    const { scale, isDraft } = drawing;
     if (this.texels === null) return;
     const box = this.boxMatrix(scene.specimen);
     const { uniforms } = this.pathPass;
@@ -289,8 +258,7 @@ export class Tracer {
     const key = keyOf(eyes, scene, scale, isDraft);
     if (key !== this.key) this.begin();
     this.key = key;
-    this.gatheredScale = scale;
-    this.isDraft = isDraft;
+    this.drawing = drawing;
   }
 
   /** Find how much light there is, by a few paths, for the stand-in. */
@@ -305,7 +273,13 @@ export class Tracer {
       const { uniforms } = this.pathPass;
       uniforms.uCalm.value = 0;
       uniforms.uTurn.value.set(0, 1);
-      this.drawPaths(renderer, eyes, views, views, "none", target, scale);
+      const begins = views;
+      this.sums.draw(
+        renderer,
+        { eyes, views, begins, anchors: [], history: "none" },
+        target,
+        scale,
+      );
     });
   }
 
@@ -314,87 +288,21 @@ export class Tracer {
     return eyes.all.map(({ camera }) => viewOf(camera, box));
   }
 
-  /** Of the box, um. */
-  private get middle(): Vector3 {
-    return this.pathPass.uniforms.uSize.value.clone().multiplyScalar(0.5);
-  }
-
-  /** What was gathered is worth to the paths that come. */
   private historyFor(views: readonly TraceView[], mayTremble: boolean): History {
-    const { anchors, seen, middle } = this;
-    if (anchors.length !== views.length) return "none";
-    if (areSame(anchors, views)) return "same";
-    if (areNear(anchors, views, middle)) return mayTremble ? "same" : "aside";
-    // eyes also sway, slowly
-    return this.rested >= 1 && areNear(seen, views, middle) ? "aside" : "none";
-  }
-
-  /**
-   * @param views where the eyes are
-   * @param begins where the paths begin
-   */
-  private gather(
-    renderer: WebGLRenderer,
-    eyes: Eyes,
-    views: readonly TraceView[],
-    begins: readonly TraceView[],
-    history: History,
-  ): void {
-    const { uniforms } = this.pathPass;
-    const before = this.gathered;
-    uniforms.uSums.value = before.textures[0];
-    uniforms.uMoments.value = before.textures[1];
-    uniforms.uNoisiness.value = this.noise.texture;
-    uniforms.uCalm.value = this.samples > NOISE_EVERY ? this.calm : 0;
-    this.drawn++;
-    const { gathered, gatheredScale } = this;
-    this.drawPaths(renderer, eyes, views, begins, history, gathered, gatheredScale);
-  }
-
-  private drawPaths(
-    renderer: WebGLRenderer,
-    eyes: Eyes,
-    views: readonly TraceView[],
-    begins: readonly TraceView[],
-    history: History,
-    target: WebGLRenderTarget,
-    scale: number,
-  ): void {
-    const { uniforms, uPart, scene } = this.pathPass;
-    uniforms.uSample.value = ++this.sample;
-    uniforms.uHistory.value = { none: 0, same: 1, aside: 2 }[history];
-    let k = 0;
-    drawEyes(renderer, scene, eyes, target, scale, ({ viewport }, part) => {
-      uPart.value.copy(part);
-      uniforms.uEye.value.copy(viewport);
-      uniforms.uSceneToBox.value.copy(views[k].toBox);
-      uniforms.uToBox.value.copy(begins[k].toBox);
-      uniforms.uEyeAt.value.copy(begins[k].eye);
-      if (history === "aside") {
-        uniforms.uToBefore.value.copy(this.anchors[k].fromBox);
-        uniforms.uEyeBefore.value.copy(this.anchors[k].eye);
-      }
-      k++;
-    });
+    const { anchors, seen, rested } = this;
+    const middle = this.pathPass.uniforms.uSize.value.clone().multiplyScalar(0.5);
+    return historyOf(views, { anchors, seen: rested >= 1 ? seen : [], middle, mayTremble });
   }
 
   /** From um of the box to the room. */
   private boxMatrix(specimen: Matrix4): Matrix4 {
     if (this.texels === null) throw new Error("there is nothing to trace");
-    const { frame } = this.texels;
-    return specimen
-      .clone()
-      .multiply(new Matrix4().fromArray([...frame.matrix]))
-      .multiply(lowCorner(frame.min));
+    return specimen.clone().multiply(boxToWorld(this.texels.frame));
   }
 
   dispose(): void {
-    for (const target of this.sums) target.dispose();
-    this.textures.dispose();
+    const { sums, textures, pathPass, probe, denoiseAndTone } = this;
+    for (const each of [sums, textures, pathPass, probe, denoiseAndTone]) each.dispose();
     this.texels?.release();
-    this.pathPass.dispose();
-    this.noise.dispose();
-    this.probe.dispose();
-    this.denoiseAndTone.dispose();
   }
 }

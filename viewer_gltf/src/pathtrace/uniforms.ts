@@ -110,9 +110,9 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
   };
 }
 
-/** From um of the box's low corner to the bundle's world. */
-export function lowCorner([x, y, z]: readonly [number, number, number]): Matrix4 {
-  return new Matrix4().makeTranslation(x, y, z);
+/** From the box's own coordinates, um from its low corner, to the bundle's world, um. */
+export function boxToWorld({ matrix, min }: BlockFrame): Matrix4 {
+  return new Matrix4().fromArray([...matrix]).multiply(new Matrix4().makeTranslation(...min));
 }
 
 /** The block of texels, its box and where that lies in them. */
@@ -147,7 +147,7 @@ export function sceneInto(
   isDraft: boolean,
   roomLight: readonly [number, number, number],
 ): void {
-  const toWorld = new Matrix4().fromArray([...frame.matrix]).multiply(lowCorner(frame.min));
+  const toWorld = boxToWorld(frame);
   const toBox = toWorld.clone().invert();
   clipInto(clip, toWorld, toBox, uniforms);
   const turn = new Matrix4().makeRotationY((settings.environmentTurn_deg * Math.PI) / 180);

@@ -200,7 +200,7 @@ export class Picture {
     if (isTraced) {
       const scene = { specimen, clip: this.cuts.march, bounds, solids };
       const standIn = isMarched || this.stoodIn !== "" ? this.march.marched : null;
-      traced.render(renderer, this.eyes, scene, resolution, isMoving, passes, standIn);
+      traced.render(renderer, this.eyes, scene, { resolution, isMoving, passes, standIn });
       if (traced.isOnScreen) this.march.hide();
     }
     this.show(isSmooth ? this.light : this.draft, isMixed);

@@ -5,11 +5,12 @@ import os
 from stereocell.model.errors import SourceError
 from stereocell.read.file_kind import require_kind
 from stereocell.read.foreign_files import foreign_words
+from stereocell.read.known_formats import identify, known_formats
 from stereocell.read.tables.delimited import read_delimited
 from stereocell.read.tables.parquet import read_parquet
 from stereocell.read.tables.table import KEYS, Table, TableColumn
 from stereocell.storage.file_states import unchanged_while_read
-from stereocell.storage.first_bytes import identify, pointer_words
+from stereocell.storage.first_bytes import pointer_words
 from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location, first_bytes
 
@@ -78,4 +79,4 @@ def _require_sound(location: Location, name: str) -> None:
     if name.endswith(".parquet") and head and not head.startswith(b"PAR1"):
         raise SourceError(f"{location.shown}: found {identify(head).words}, expected Parquet")
     if name.endswith(".h5ad"):
-        require_kind(location, "hdf5", "HDF5")
+        require_kind(location, known_formats()["hdf5"])

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
-from stereocell.read.hdf5_chunks import ChunkIndex
-from stereocell.read.hdf5_tree import Hdf5Tree, require_readable
+from stereocell.read.formats.ome_zarr.store import GuardedStore, open_array, open_store, quiet
+from stereocell.read.hdf5_file.chunks import ChunkIndex
+from stereocell.read.hdf5_file.tree import Hdf5Tree, require_readable
 from stereocell.read.tables.anndata import read_anndata
 from stereocell.read.tables.table import Table
-from stereocell.read.zarr_store import GuardedStore, open_array, open_store, quiet
 from stereocell.storage.child_process import Bounds, run_in_child
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location

@@ -1,0 +1,57 @@
+"""The inputs of a bundle: the composed stage, as it lies in OUT or as an artist edited it."""
+
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import no_layer
+from stereocell.building.phase import states_of
+from stereocell.bundle.manifest import MANIFEST
+from stereocell.steps.write_bundle import WriteBundle
+from stereocell.textures.map_packages import encoder_version, require_map_packages
+from stereocell.usd import written_files
+from stereocell.usd.stage_files import dependencies, may_be_image
+
+
+def require_stage(out_folder: OutFolder, layer: Path | None) -> Path:
+    """Return the path of the stage to export. Raises OutputError where that can't be begun."""
+    out_folder.require_finished("stage")
+    if out_folder.has(out_folder.plan_file):
+        plan = out_folder.plan()  # no phase goes on beside a plan that was changed by hand
+        if plan.settings.unwrap.maps:
+            require_map_packages()
+    path = layer if layer is not None else out_folder.stage_file
+    if not out_folder.has(path):
+        raise no_layer(path, is_given=layer is not None)
+    return path
+
+
+def require_kept_stage(out_folder: OutFolder) -> None:
+    """Raise StageError where a file that the stage's phase wrote is lost or damaged.
+
+    A layer that may have been edited in place passes, and the bundle's writer names it.
+    """
+    if out_folder.has_begun("stage"):  # otherwise this build did not write the stage
+        listed = written_files.read_stage_list(out_folder.stage_dir)
+        written_files.require_kept(out_folder.stage_dir, listed, out_folder.stage_list)
+
+
+def bundle_step(out_folder: OutFolder, path: Path, viewer: Path | None) -> WriteBundle:
+    """Return the step that writes the bundle. Raises StageError for foreign files.
+
+    path    the stage
+    viewer  the folder of the page; None: it is not built
+    """
+    kept = out_folder.marks(path.parent)
+    files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
+    made_of = (str(path.absolute()), *states_of(files)) if kept is None else tuple(kept)
+    # an image may feed a surface, and is encoded then: by this version, or not at all
+    encoder = encoder_version() if any(map(may_be_image, files)) else None
+    page = () if viewer is None else tuple(states_of(sorted(viewer.rglob("*"))))
+    return WriteBundle(made_of, page, encoder)
+
+
+def remove_half_bundle(out_folder: OutFolder) -> None:
+    """Remove a bundle whose command was killed while it stored the files, the manifest last."""
+    is_half = out_folder.is_stored and out_folder.is_begun("bundle")
+    if is_half and not out_folder.has(out_folder.bundle_dir / MANIFEST):
+        out_folder.remove(out_folder.bundle_dir)

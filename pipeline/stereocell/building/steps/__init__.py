@@ -1,1 +1,0 @@
-"""The tasks of workers. A result's key covers the code of the one module that makes it."""

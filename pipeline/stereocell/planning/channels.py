@@ -1,0 +1,255 @@
+"""The channels of a build, each of its surfaces one, and settings that are given by channel."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from stereocell.isosurface.options import NO_SURFACE, RUNGS, parse_level
+from stereocell.model.color import linear_color
+from stereocell.model.errors import UsageError
+from stereocell.model.identifiers import to_identifier
+from stereocell.planning.settings import Settings
+from stereocell.transfer.windows import NAMED
+
+T = TypeVar("T")
+ALL = "*"  # the key of settings by channel that stands for all that have none
+
+# Colours (linear RGB) of channels whose file names none, on a dark ground; blue stays nuclei's. Any
+# two differ by 10 (CIEDE2000, lightness for less: light changes it) to normal sight, without red
+# and without green; the first three by 23. None is a pure primary, which a screen can't shade.
+# Source of the colour blindness: Machado et al., IEEE TVCG 15(6), 2009. doi:10.1109/TVCG.2009.113
+PALETTE = tuple(
+    linear_color((code >> 16, code >> 8 & 255, code & 255))
+    for code in (0x4F70F5, 0xF0CD3C, 0xB4566E, 0x92ECF6, 0xF6F0DC, 0xA0562C, 0x3F8CA0, 0xB4C078)
+)
+
+
+_PALE = 0.6  # linear RGB: a colour whose least part is more has no lighter one beside it
+# Colours (linear RGB) of bone in CT: warm and neutral, as it is usually drawn ...
+FLESH = (0.78, 0.66, 0.55)
+# ... of a CT's skin. Light that is scattered many times in a paler one leaves no shade ...
+SKIN = (0.72, 0.5, 0.37)
+# ... and of the brightest tissue of an MR, which is nearly white in its slices.
+MR_GREY = (0.92, 0.88, 0.82)
+BODY_MODALITIES = ("MR", "CT")
+# Classes of tissue that an MR of a head is looked at for: skin, skull and fluid would hide them.
+GREY_MATTER, WHITE_MATTER = "grey matter", "white matter"
+BRAIN = frozenset({GREY_MATTER, WHITE_MATTER})
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A channel that is built. `index` counts in the source; `color` is linear RGB, 0..1.
+
+    source       a source for this channel alone, which a command added to the plan: one level, the
+                 planned one, and voxels uint8 with the window 0..255; empty: the plan's source
+    fingerprint  of that source
+    rung         which level of the ladder has the surface, or a voxel value, as 162 or 162+b;
+                 empty: the settings'
+    base         the name of the channel whose voxels these are, where it has several surfaces;
+                 empty: its own
+    """
+
+    index: int
+    name: str
+    color: tuple[float, float, float]
+    source: str = ""
+    fingerprint: str = ""
+    rung: str = ""
+    base: str = ""
+
+    @property
+    def voxels_id(self) -> str:
+        """The ID under which results of the voxels alone lie, whatever surface is made of them."""
+        return to_identifier(self.base or self.name)
+
+    @property
+    def id(self) -> str:
+        """The name as an identifier, for paths and prims."""
+        return to_identifier(self.name)
+
+
+def opens(channel: Channel, channels: Sequence[Channel]) -> bool:
+    """Return whether a channel shows when the specimen is opened.
+
+    Where classes of a brain are built, they alone show. A channel of autofluorescence shows the
+    same tissue as the others do. Its surface would hide theirs, or run through it.
+    """
+    if has_brain(channels):
+        return channel.name in BRAIN
+    names = [one.base or one.name for one in channels]
+    return not shows_own_light(channel.base or channel.name) or all(map(shows_own_light, names))
+
+
+def shows_own_light(name: str) -> bool:
+    """Return whether a channel's name says that it holds the tissue's own light, and no stain's."""
+    return re.search(r"auto.?fluo|^background$|^af$", name.strip(), re.IGNORECASE) is not None
+
+
+def has_brain(channels: Iterable[Channel]) -> bool:
+    """Return whether the classes of a brain are among the channels, as `tissue` learns them."""
+    return {channel.name for channel in channels if channel.source} >= BRAIN
+
+
+def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> list[Channel]:
+    """Return the channels, with one for each surface that the settings ask for.
+
+    wanted  `surfaces` of the settings: rungs or voxel values between commas, by name or index
+
+    Raises UsageError.
+    """
+    given = by_name("--surfaces", wanted, channels)
+    found: list[Channel] = []
+    for channel in channels:
+        if channel.name not in given:
+            found.append(channel)
+            continue
+        rungs = [part.strip() for part in given[channel.name].split(",")]
+        if rungs == [NO_SURFACE]:
+            found.append(replace(channel, rung=NO_SURFACE))
+            continue
+        for rung in rungs:
+            if rung not in RUNGS:
+                _require_level(channel.name, rung)
+        if len(set(rungs)) < len(rungs):
+            found_twice = ",".join(rungs)
+            raise UsageError(f"--surfaces {channel.name}: found {found_twice}, expected each once")
+        if len(rungs) == 1:
+            found.append(replace(channel, rung=rungs[0]))
+            continue
+        for place, rung in enumerate(rungs):
+            # towards white from surface to surface inwards, or towards black where it is white
+            share, end = place / len(rungs), float(min(channel.color) < _PALE)
+            red, green, blue = (part + share * (end - part) for part in channel.color)
+            found.append(
+                replace(
+                    channel,
+                    name=f"{channel.name} {rung}",
+                    color=(red, green, blue),
+                    rung=rung,
+                    base=channel.name,
+                )
+            )
+    return found
+
+
+def _require_level(name: str, rung: str) -> None:
+    """Raise UsageError where a surface is asked for neither by a rung nor by a voxel value."""
+    try:
+        parse_level("", rung)
+    except UsageError:
+        raise UsageError(
+            f"--surfaces {name}: found {rung!r:.40}, expected {', '.join(RUNGS)}, voxel values or "
+            f"values above the background as 162+b, between commas; or {NO_SURFACE}"
+        ) from None
+
+
+def by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> dict[str, T]:
+    """Return values by channel name; a key is a name, or an index where no name equals it.
+
+    The key ALL is for the channels that no other names; presets use it.
+    """
+    found: dict[str, T] = {}
+    for key, value in given.items():
+        if key == ALL:
+            continue
+        name = _name(flag, key, channels)
+        if name in found:
+            raise UsageError(f"{flag} names channel {name!r} by name and by index, expected one")
+        found[name] = value
+    if ALL in given:
+        # a surface that is chosen by its rung or value has its level from there
+        found = {one.name: given[ALL] for one in channels if not one.rung} | found
+    return found
+
+
+def require_no_background(settings: Settings, channels: Sequence[Channel], modality: str) -> None:
+    """Raise UsageError where a level is given above the background of what has none."""
+    if modality not in BODY_MODALITIES:
+        return
+    given = [(f"--iso-value {key}", value) for key, value in settings.iso_values.items()]
+    given += [
+        (f"--surfaces {channel.base or channel.name}", channel.rung)
+        for channel in channels
+        if channel.rung and channel.rung not in (*RUNGS, NO_SURFACE)
+    ]
+    for flag, value in given:
+        if parse_level(flag, value)[1]:
+            raise UsageError(
+                f"{flag}={value}: a level above the background, which is never "
+                f"subtracted of {modality}, expected a voxel value"
+            )
+
+
+def windows_of(
+    windows: Mapping[str, str], channels: Sequence[Channel], modality: str
+) -> dict[str, str]:
+    """Return windows by channel name; that of voxels with several surfaces goes to each."""
+    for key, window in windows.items():
+        if window in NAMED and modality != "CT":
+            kind = f"this is {modality}" if modality else "nothing says that this is one"
+            raise UsageError(
+                f"--window {key}={window}: a window in Hounsfield units, of CT, and {kind}: "
+                "expected LOW:HIGH in voxel values, or --preset ct"
+            )
+    found: dict[str, str] = {}
+    for key, window in windows.items():
+        if key == ALL:
+            continue
+        named = [channel.name for channel in channels if key in (channel.name, channel.base)]
+        names = named or [channel.name for channel in channels if key == str(channel.index)]
+        for name in names or [_name("--window", key, channels)]:
+            if name in found:
+                raise UsageError(f"--window names channel {name!r} twice, expected once")
+            found[name] = window
+    if ALL in windows:
+        found = {channel.name: windows[ALL] for channel in channels} | found
+    return found
+
+
+def painted(
+    paint: Mapping[str, str], channels: Sequence[Channel], *, labels: Sequence[str] = ()
+) -> dict[str, str]:
+    """Return channel name -> name of the channel that is sampled onto its surface.
+
+    labels  names of label maps, whose objects may be painted, too
+
+    Raises UsageError.
+    """
+    if paint and not channels:
+        raise UsageError("--paint: found no channel of an image, expected one beside the labels")
+    of_objects = {name: key for name, key in paint.items() if name in labels}
+    of_channels = {name: key for name, key in paint.items() if name not in labels}
+    given = by_name("--paint", of_channels, channels) | of_objects
+    names = [channel.name for channel in channels]
+    first = list({channel.index: channel for channel in reversed(channels)}.values())[::-1]
+    found = {
+        # of voxels with several surfaces any channel has the intensity
+        name: _name("--paint", key, channels if key in names else first)
+        for name, key in given.items()
+    }
+    for name, other in found.items():
+        if name == other:
+            raise UsageError(f"--paint {name}={other}: expected another channel than its own")
+    return found
+
+
+def _name(flag: str, key: str, channels: Sequence[Channel]) -> str:
+    names = [channel.name for channel in channels]
+    if key in names:
+        return key
+    found = [channel.name for channel in channels if key in (channel.base, str(channel.index))]
+    found = found or [channel.name for channel in channels if key == channel.id]
+    if len(found) > 1:
+        raise UsageError(
+            f"{flag} names channel {key!r}, which has several surfaces, expected one of "
+            f"{', '.join(found)}"
+        )
+    if not found:
+        indices = dict.fromkeys(str(channel.index) for channel in channels)
+        raise UsageError(
+            f"{flag} names channel {key!r}, expected one of {', '.join(names)}, or an index of "
+            f"{', '.join(indices)}"
+        )
+    return found[0]

@@ -1,0 +1,116 @@
+"""Notes on a label map's objects: how many, which ones are cut, doubts on their numbers."""
+
+from collections.abc import Iterator
+from math import prod
+
+import numpy as np
+
+from stereocell.model.counted import counted
+from stereocell.model.settings import MAX_COUNT
+from stereocell.planning.located_objects import (
+    AROUND,
+    CUT,
+    Located,
+    TileGrid,
+    locate,
+    tile_boxes,
+)
+from stereocell.planning.plan import Plan
+from stereocell.steps.find_extents import FindExtents
+from stereocell.steps.labels import Labels
+
+_COUNTED_AT_ONCE = 1 << 25  # voxels of a label map that `plan` counts: half a second
+_SIDES = 6  # sides of a volume, all of which a background touches
+_SIDES_OF_MOST_VOXELS = 3  # at least that many, where it has over half of the voxels
+
+
+def notes_on_numbers(labels: Labels, located: Located) -> Iterator[str]:
+    """Yield a sentence on each doubt about a label map's numbers. Raises SourceError."""
+    if len(located.extents.labels):
+        yield from filter(None, (_background(labels, located), _merged(labels, located)))
+
+
+def _background(labels: Labels, located: Located) -> str:
+    """Return the note on a largest object that touches most sides; empty: there is none."""
+    extents = located.extents
+    largest = int(np.argmax(extents.voxels))
+    start = [int(edges[0]) for edges in located.grid.edges]
+    stop = [int(edges[-1]) for edges in located.grid.edges]
+    sides = int((extents.low[largest] <= start).sum() + (extents.high[largest] >= stop).sum())
+    region = prod(high - low for low, high in zip(start, stop, strict=True))
+    share = int(extents.voxels[largest]) / region
+    if sides < (_SIDES_OF_MOST_VOXELS if share > 0.5 else _SIDES):
+        return ""
+    number = int(extents.labels[largest])
+    remedy = f"--background {number}" if number <= MAX_COUNT else "the number 0 in its place"
+    touched = "all six" if sides == _SIDES else f"{sides} of six"
+    return (
+        f"{labels.name}: object {number}, the largest, has {share:.1%} of the voxels and touches "
+        f"{touched} sides: it is probably the background; {remedy} leaves it out"
+    )
+
+
+def _merged(labels: Labels, located: Located) -> str:
+    """Return the note on numbers that the file's type can't tell apart; empty: it can."""
+    dtype, largest = labels.open().dataset.stored_dtype, int(located.extents.labels[-1])
+    if dtype.kind == "f":
+        exact = 2 ** (np.finfo(dtype).nmant + 1)
+        if largest <= exact:
+            return ""
+        return (
+            f"{labels.name}: found numbers up to {largest} in {dtype.name}, which rounds whole "
+            f"numbers beyond {exact:,}: objects with neighbouring numbers are one object there; "
+            f"save the labels as uint32"
+        )
+    count = len(located.extents.labels) + located.small
+    if dtype.kind == "u" and dtype.itemsize <= 2 and count == largest == np.iinfo(dtype).max:
+        return (
+            f"{labels.name}: all {count:,} numbers of {dtype.name} are in use: if there were more "
+            "objects, several of them share a number; save the labels as uint32"
+        )
+    return ""
+
+
+def notes_on_objects(labels: Labels, located: Located) -> Iterator[str]:
+    """Yield the number of objects, and the notes on their numbers if `plan` did not count them."""
+    yield describe_objects(labels, located)
+    if is_large(labels):
+        yield from notes_on_numbers(labels, located)
+
+
+def describe_objects(labels: Labels, located: Located) -> str:
+    """Return how many objects there are, which are cut, and how many are left out, in words."""
+    summary = counted(len(located.owners), "object")
+    cut = located.extents.labels[located.owners == CUT]
+    if len(cut):
+        shown = ", ".join(map(str, cut[:8].tolist())) + ", ..." * (len(cut) > 8)
+        summary += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
+    if located.small:
+        summary += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
+    return f"{labels.name}: {summary}"
+
+
+def is_large(labels: Labels) -> bool:
+    """Return whether a label map has too many voxels for `plan` to count its objects."""
+    return prod(labels.shape) > _COUNTED_AT_ONCE
+
+
+def notes_before_units(plan: Plan) -> Iterator[str]:
+    """Yield of each label map what its units will cut, from its voxels where these are few.
+
+    Raises SourceError where they are no labels.
+    """
+    for labels in plan.labels:
+        boxes = tile_boxes(TileGrid.of(plan, labels))
+        if not is_large(labels):
+            parts = {tile: FindExtents(labels.voxels, box).run() for tile, box in boxes.items()}
+            found = locate(plan, labels, parts, plan.settings.objects.smallest_voxels)
+            yield describe_objects(labels, found)
+            yield from notes_on_numbers(labels, found)
+        elif len(plan.tiles) > 1:
+            largest = np.max([box.shape for box in boxes.values()], axis=0) * labels.spacing_um
+            z, y, x = ((1 + 2 * AROUND) * largest).tolist()
+            yield (
+                f"{labels.name}: objects larger than a tile and half around it, {z:.4g} x {y:.4g} "
+                f"x {x:.4g} um (z, y, x), will be cut at the tiles' planes: `units` names them"
+            )

@@ -1,0 +1,403 @@
+"""The plan of a build: the voxels, the tiles, the units. Pure: it reads and runs nothing.
+
+It holds everything that later phases need, with every `auto` resolved; plan.json is its file
+(schemas/plan.schema.json).
+"""
+
+import math
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Protocol
+
+from stereocell.filters.denoise import SMOOTHING_REACH
+from stereocell.isosurface.repair import RepairOptions
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.rigid_transform import IDENTITY, Matrix
+from stereocell.model.settings import AUTO
+from stereocell.model.spacing import Point, Spacing
+from stereocell.model.tiling import Box, Tile, cut, cut_evenly
+from stereocell.planning.channels import (
+    Channel,
+    by_name,
+    has_brain,
+    painted,
+    require_no_background,
+    windows_of,
+)
+from stereocell.planning.settings import Settings
+from stereocell.steps.labels import Labels
+
+# Largest window of a unit, at about 30 bytes a voxel: UNIT_VOXELS, or UNIT_TILES times its tile.
+UNIT_VOXELS = 1 << 27  # voxels
+UNIT_TILES = 8  # tiles
+MIN_PLANES = 4  # smallest number of planes per axis of a tile that carry the surface
+
+
+class LevelLike(Protocol):
+    """One resolution level of a dataset."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]: ...
+    @property
+    def spacing_um(self) -> Spacing: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A build with all choices made. Boxes are voxels (z, y, x) of `level`.
+
+    spacing_um  (z, y, x), um
+    origin_um   centre of voxel (0, 0, 0), (z, y, x), um
+    halo        voxels (z, y, x) that a unit reads around its tile, so that neighbours agree
+    modality    DICOM's code of the modality: `MR`, `CT`, ...; empty: not known
+    placement   rows of a (4, 4) matrix for columns, um: from the world of the voxels
+                (volume.zyx_to_xyz) to the specimen's place
+    slice_axis  of z, y, x: the source's images lie across it (model/image_plane.py)
+    has_sides   whether the source states where the patient's left, back and head are: then the
+                specimen's place is the patient's world (read/anatomical_axes.py)
+    labels      label maps whose objects are built, channels beside `channels`
+    formats     which formats the source and the label maps have, sorted (known_formats.format_of)
+    notes       what was chosen, assumed or left out in reading the source, a sentence each
+    is_hounsfield  whether values may be compared with Hounsfield units, if it is a CT
+    """
+
+    source: str
+    name: str
+    fingerprint: str
+    level: int
+    level_reason: str
+    spacing_um: Spacing
+    origin_um: Point
+    region: Box
+    halo: tuple[int, int, int]
+    tiles: tuple[Tile, ...]
+    channels: tuple[Channel, ...]
+    settings: Settings
+    modality: str = ""
+    placement: Matrix = IDENTITY
+    slice_axis: int = 0
+    has_sides: bool = False
+    labels: tuple[Labels, ...] = ()
+    formats: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    is_hounsfield: bool = True
+
+    @property
+    def repair(self) -> RepairOptions:
+        """The largest repair of any channel; the halo covers it (per channel: repair_rules.py)."""
+        return _repair_options(self.settings)
+
+    @property
+    def step(self) -> tuple[int, int, int]:
+        """The step in voxels (z, y, x) between planes that carry the surface."""
+        return _step_of(self.settings.surface.grid_um, self.spacing_um)
+
+    def with_grid(self, grid_um: float) -> "Plan":
+        """Return the plan for surfaces that planes `grid_um` apart carry."""
+        if grid_um == self.settings.surface.grid_um:
+            return self
+        surface = replace(self.settings.surface, grid_um=grid_um)
+        settings = replace(self.settings, surface=surface)
+        return replace(self, settings=settings, halo=_halo(settings, self.spacing_um, self.region))
+
+    def grid_for(self, faces: int, thin: float) -> float:
+        """Return how far apart planes lie, um, that carry a surface of at most surface.max_faces.
+
+        All planes do at first where more than surface.max_thin is too thin for surface.grid_um.
+
+        Of a smooth surface every k-th plane along each axis leaves a k^2-th of the faces, of noise
+        less. Thinned are the axes whose planes lie nearest, as long as a tile keeps MIN_PLANES
+        and what a unit reads around it stays in proportion.
+
+        faces  of voxels, of the surface in one tile
+        thin   share of the channel's voxels above its level that are too thin for grid_um
+        """
+        surface = self.settings.surface
+        grid = 0.0 if thin > surface.max_thin else surface.grid_um
+        while faces / math.prod(_step_of(grid, self.spacing_um)) ** (2 / 3) > surface.max_faces:
+            step = _step_of(grid, self.spacing_um)
+            wider = min((k + 1) * h for k, h in zip(step, self.spacing_um, strict=True))
+            try:
+                thinner = self.with_grid(wider)
+                _require_planes(thinner.settings, self.spacing_um)
+            except UsageError:
+                break
+            grid = wider
+        return grid
+
+    @property
+    def shared_volumes(self) -> frozenset[str]:
+        """IDs of the channels whose volume is that of an earlier one: further surfaces of it."""
+        seen: set[str] = set()
+        shared = set()
+        for channel in self.channels:
+            if channel.base and channel.base in seen:
+                shared.add(channel.id)
+            seen.add(channel.base)
+        return frozenset(shared)
+
+    @property
+    def opens_cut(self) -> bool:
+        """Whether the specimen opens cut through its middle.
+
+        An MR is looked at for what lies inside. Classes of a brain are that already, and a cut
+        through objects would open them.
+        """
+        return self.modality == "MR" and not self.labels and not has_brain(self.channels)
+
+    def level_of(self, channel: Channel) -> int:
+        """Return the level of its source at which a channel is read."""
+        return 0 if channel.source else self.level
+
+    def painter(self, channel: Channel | Labels) -> Channel | None:
+        """Return the channel sampled onto a channel's surface, or objects'; None: none is."""
+        painted = self.settings.paint.get(channel.name)
+        return next((other for other in self.channels if other.name == painted), None)
+
+    def tile(self, tile_id: str) -> Tile:
+        """Return the tile with this ID; the plan must hold it."""
+        return next(tile for tile in self.tiles if tile.id == tile_id)
+
+    def position_um(self, index_zyx: Sequence[float]) -> Point:
+        """Return the place of a voxel's centre, (z, y, x) in um."""
+        z, y, x = (
+            float(o + i * s)
+            for o, i, s in zip(self.origin_um, index_zyx, self.spacing_um, strict=True)
+        )
+        return z, y, x
+
+
+def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings) -> tuple[int, str]:
+    """Return the level to build and the reason: the requested one, else the finest within limits.
+
+    The region counts voxels of the level that is built, so a level that is too small to hold it is
+    skipped. Raises UsageError where there is no such level.
+    """
+    wanted = settings.plan.level
+    if wanted != AUTO:
+        if not isinstance(wanted, int) or not 0 <= wanted < len(levels):
+            raise UsageError(
+                f"--level is {wanted}, expected 0 to {len(levels) - 1} (the source's levels)"
+            )
+        return wanted, "asked for"
+    region, limit = settings.plan.region, settings.plan.max_voxels
+    for index, level in enumerate(levels):
+        whole = Box((0, 0, 0), level.shape)
+        try:
+            box = parse_region(region, whole)
+        except UsageError:
+            if index == 0:
+                raise
+            break
+        voxels = channels * math.prod(box.shape)
+        if voxels <= limit:
+            what = "the finest" if index == 0 else "the finest within the limit"
+            if not channels:
+                return index, f"{what}, as label maps are built"
+            return index, f"{what}: {voxels:,} of at most {limit:,} voxels (plan.max_voxels)"
+    what = f"--region {region}" if region else "the coarsest level"
+    remedy = "a smaller --region" if region else "a --level"
+    raise UsageError(
+        f"{what} holds {voxels:,} voxels, more than plan.max_voxels = {limit:,}: "
+        f"name {remedy}, or fewer --channels"
+    )
+
+
+def make_plan(
+    source: str,
+    name: str,
+    *,
+    fingerprint: str,
+    levels: Sequence[LevelLike],
+    origin_um: Point,
+    channels: Sequence[Channel],
+    level: tuple[int, str],
+    settings: Settings,
+    formats: Collection[str],
+    modality: str = "",
+    placement: Matrix = IDENTITY,
+    slice_axis: int = 0,
+    has_sides: bool = False,
+    labels: Sequence[Labels] = (),
+) -> Plan:
+    """Return the plan for these channels at this level (index and reason).
+
+    origin_um  centre of voxel (0, 0, 0) of the level, (z, y, x), um
+
+    Raises UsageError for settings that don't fit the data, SourceError for data that can't be cut.
+    """
+    chosen = levels[level[0]]
+    whole = Box((0, 0, 0), chosen.shape)
+    region = parse_region(settings.plan.region, whole)
+    if min(region.shape) < 2:
+        raise SourceError(
+            f"{source}: {_by(region.shape)} voxels (z, y, x) to build, expected at least 2 each way"
+        )
+    tile_size, tiles = _tiles(settings, region)
+    if settings.surface.wrap == "alpha-wrap" and len(tiles) > 1:
+        raise UsageError(
+            f"surface.wrap is 'alpha-wrap', which closes each tile by itself, and there are "
+            f"{len(tiles)} tiles: expected one (--grid 1x1, or a --region of one tile)"
+        )
+    settings = replace(
+        settings,
+        surface=settings.surface.resolved(chosen.spacing_um, _longest_um(chosen)),
+        unwrap=settings.unwrap.resolved(chosen.spacing_um),
+        plan=replace(settings.plan, level=level[0], tile_size=tile_size),
+        iso_values=by_name("--iso-value", settings.iso_values, channels),
+        windows=windows_of(settings.windows, channels, modality),
+        paint=painted(settings.paint, channels, labels=[one.name for one in labels]),
+    )
+    _require_planes(settings, chosen.spacing_um)
+    require_no_background(settings, channels, modality)
+    return Plan(
+        source=source,
+        name=name,
+        fingerprint=fingerprint,
+        level=level[0],
+        level_reason=level[1],
+        spacing_um=chosen.spacing_um,
+        origin_um=origin_um,
+        region=region,
+        halo=_halo(settings, chosen.spacing_um, region),
+        tiles=tiles,
+        channels=tuple(channels),
+        settings=settings,
+        modality=modality,
+        placement=placement,
+        slice_axis=slice_axis,
+        has_sides=has_sides,
+        labels=tuple(labels),
+        formats=tuple(sorted(formats)),
+    )
+
+
+def _longest_um(level: LevelLike) -> float:
+    """Return the longest edge of the field of view, whichever region of it is built."""
+    return max(n * step for n, step in zip(level.shape, level.spacing_um, strict=True))
+
+
+def parse_region(text: str, whole: Box) -> Box:
+    """Return the box of `z0:z1,y0:y1,x0:x1` in voxels; an empty end means the data's own.
+
+    Raises UsageError where the text isn't a box inside `whole`.
+    """
+    if not text:
+        return whole
+    match = re.fullmatch(r"(\d*):(\d*),(\d*):(\d*),(\d*):(\d*)", text.replace(" ", ""))
+    if not match:
+        raise UsageError(f"--region is {text!r}, expected z0:z1,y0:y1,x0:x1 in voxels")
+    ends = [int(e) if e else None for e in match.groups()]
+    z0, y0, x0 = (e if e is not None else 0 for e in ends[::2])
+    z1, y1, x1 = (e if e is not None else n for e, n in zip(ends[1::2], whole.stop, strict=True))
+    box = Box((z0, y0, x0), (z1, y1, x1))
+    inside = all(a < b <= n for a, b, n in zip(box.start, box.stop, whole.stop, strict=True))
+    if not inside:
+        raise UsageError(f"--region is {text!r}, expected a box inside {_by(whole.stop)} (z, y, x)")
+    return box
+
+
+def _tiles(settings: Settings, region: Box) -> tuple[tuple[int, int, int], tuple[Tile, ...]]:
+    """Return the tile size (z, y, x) in voxels, with a grid that of the largest, and the tiles."""
+    options = settings.plan
+    if options.grid:
+        match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", options.grid)
+        if not match:
+            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
+        columns, rows = int(match[1]), int(match[2])
+        depth, height, width = region.shape
+        if height < 2 * rows or width < 2 * columns:
+            raise UsageError(
+                f"--grid {options.grid} makes more tiles than {_by((height, width))} voxels (y, x) "
+                "can fill, expected at least 2 voxels a tile each way"
+            )
+        size = (depth, -(-height // rows), -(-width // columns))
+        return size, cut_evenly(region, columns, rows)
+    if len(options.tile_size) != 3 or min(options.tile_size) < 2:
+        raise UsageError(
+            f"--tile-size is {list(options.tile_size)}, expected three numbers z,y,x of at least 2"
+        )
+    z, y, x = (min(a, b) for a, b in zip(options.tile_size, region.shape, strict=True))
+    return (z, y, x), cut(region, (z, y, x))
+
+
+def _halo(
+    settings: Settings,
+    spacing_um: Spacing,
+    region: Box,
+) -> tuple[int, int, int]:
+    """Return the voxels (z, y, x) that a unit reads around its tile, at most the region's.
+
+    Raises UsageError where these, and the voxels that closing and smoothing add at the ends, are
+    out of proportion to the tile: such lengths are meant for other voxels.
+    """
+    surface = settings.surface
+    smoothing = SMOOTHING_REACH * float(surface.smoothing_um)
+    every = _step_of(settings.surface.grid_um, spacing_um)
+    z, y, x = (step * n for step, n in zip(spacing_um, every, strict=True))
+    repair = _repair_options(settings)
+    reach = repair.reach_um((z, y, x)) + smoothing
+    padding = max(repair.alpha_um, smoothing)
+    tile_size = settings.plan.tile_size
+    limit = max(UNIT_VOXELS, UNIT_TILES * math.prod(tile_size))
+    z, y, x = (
+        min(size + 2 * (reach / step + 4 * k), n) + 2 * padding / step
+        for size, n, step, k in zip(tile_size, region.shape, spacing_um, every, strict=True)
+    )
+    if z * y * x > limit:
+        lengths = {f.name: getattr(surface, f.name) for f in fields(surface)}
+        found = ", ".join(
+            f"{name} = {length:g} um ({length / min(spacing_um):,.0f} voxels)"
+            for name, length in lengths.items()
+            if name.endswith("_um") and length != AUTO
+        )
+        raise UsageError(
+            f"the surface's lengths don't suit voxels of {_by(spacing_um)} um (z, y, x): {found} "
+            f"make a unit work on {z * y * x:.3g} voxels for a tile of "
+            f"{_by(tile_size)}, expected at most {limit:,}: "
+            "choose another --preset, smaller lengths or larger tiles"
+        )
+    # four more: one voxel for the median, one for the gradient, one because the tile's last plane
+    # is its neighbour's, one past the plane (surface._least_on_plane)
+    depth, height, width = (
+        math.ceil(min(reach / step, n)) + 4 * k
+        for n, step, k in zip(region.shape, spacing_um, every, strict=True)
+    )
+    return depth, height, width
+
+
+def _step_of(grid_um: float, spacing_um: Sequence[float]) -> tuple[int, int, int]:
+    # 0.01 for rounding: 0.42 um are three times 0.14 um
+    z, y, x = (max(1, int(grid_um / h + 0.01)) for h in spacing_um)
+    return z, y, x
+
+
+def _require_planes(settings: Settings, spacing_um: Sequence[float]) -> None:
+    """Raise UsageError where planes lie so far apart that a tile keeps hardly any."""
+    size = settings.plan.tile_size
+    steps = _step_of(settings.surface.grid_um, spacing_um)
+    for axis, n, k, h in zip("zyx", size, steps, spacing_um, strict=True):
+        planes = -(-n // k)
+        if k > 1 and planes < MIN_PLANES:
+            raise UsageError(
+                f"surface.grid_um is {settings.surface.grid_um:g}, which leaves {planes} of the "
+                f"{n} planes along {axis} of a tile, {h:g} um apart: expected {MIN_PLANES} or "
+                "more of them: choose another --preset, or a smaller surface.grid_um"
+            )
+
+
+def _repair_options(settings: Settings) -> RepairOptions:
+    surface = settings.surface
+    alpha = surface.max_alpha_um if surface.alpha_um == AUTO else surface.alpha_um
+    return RepairOptions(
+        alpha_um=float(alpha),
+        min_diagonal_um=float(surface.min_diagonal_um),
+        max_cavity_um=float(surface.max_cavity_um),
+        max_fragment_um=float(surface.max_fragment_um),
+        offset_um=0.0 if surface.offset_um == AUTO else float(surface.offset_um),
+    )
+
+
+def _by(numbers: Sequence[float]) -> str:
+    return " x ".join(f"{n:.15g}" for n in numbers)

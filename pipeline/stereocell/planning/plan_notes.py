@@ -1,0 +1,147 @@
+"""Notes beside a plan: gaps in the data, ignored settings, changes since the plan before."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from stereocell.engine.run import console
+from stereocell.isosurface.options import LADDER, NO_SURFACE, RUNGS
+from stereocell.model.counted import counted
+from stereocell.model.errors import SourceError
+from stereocell.model.spacing import Spacing
+from stereocell.model.tiling import Box
+from stereocell.planning.channels import ALL, Channel
+from stereocell.planning.input_files import first_states, open_watched
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_source import source_of
+from stereocell.planning.settings import Settings, to_dict
+from stereocell.read import Dataset
+from stereocell.read.absent_chunks import count_absent
+from stereocell.steps.open_source import SourceRef
+from stereocell.transfer.joint_histogram import sample_boxes
+
+_MAX_CHANGES = 4  # most changed settings that a line names
+_BODY_UM = 100.0  # um: finest spacings from here on are told in mm
+_LOOKED_AT = 16_000_000  # voxels of all channels that are looked at for NaN
+
+
+def told_of_gaps(dataset: Dataset, plan: Plan) -> list[str]:
+    """Return what is said of NaN and infinity; of much data some blocks are looked at.
+
+    Raises SourceError where a channel has nothing else.
+    """
+    indices = list(dict.fromkeys(channel.index for channel in plan.channels))
+    if not indices:
+        return []
+    boxes = sample_boxes(plan.region, max(1, _LOOKED_AT // len(indices)))
+    found = []
+    for index in indices:
+        share = dataset.share_of_gaps(index, boxes, plan.level)
+        if share == 1.0:
+            dataset.darkest(index)
+        if share > 0.0:
+            found.append(
+                f"{dataset.channels[index].name}: {max(share, 1e-4):.2%} of the voxels are NaN or "
+                "infinite: read as the smallest finite value"
+            )
+    return found
+
+
+def told_of_absent(dataset: Dataset, plan: Plan) -> list[str]:
+    """Return a note on the chunks that are not stored, for the image and for each label map.
+
+    Raises SourceError where no chunk is stored.
+    """
+    indices = list(dict.fromkeys(channel.index for channel in plan.channels if not channel.source))
+    found = _absent(dataset, source_of(plan), indices, plan.region, plan.level) if indices else []
+    for labels in plan.labels:
+        own, whole = open_watched(labels.ref), Box((0, 0, 0), labels.shape)
+        notes = _absent(own, labels.ref, [labels.channel], whole, 0)
+        found += [f"labels {labels.name!r}: {note}" for note in notes]
+    return found
+
+
+def _absent(
+    dataset: Dataset, ref: SourceRef, channels: Sequence[int], box: Box, level: int
+) -> list[str]:
+    states = first_states(ref)
+    absent = None if states is None else count_absent(dataset, channels, box, level, states)
+    if absent is None or not absent.count:
+        return []
+    nouns = f"{absent.noun}s"
+    if absent.count == absent.total:
+        raise SourceError(
+            f"{dataset.shown}: level {level}: found none of {absent.total} {nouns}, expected those "
+            "that hold voxels: copy the volume again, or take another --level"
+        )
+    share = max(absent.count / absent.total, 1e-4)
+    return [
+        f"{absent.count} of {absent.total} {nouns} of level {level} ({share:.2%}) are not stored: "
+        f"they are read as {absent.fill}, and the format does not state whether they are empty or "
+        "missing"
+    ]
+
+
+def summary_of(plan: Plan) -> str:
+    """Return one line on a plan: its level, voxels, tiles and channels."""
+    shape = " x ".join(str(n) for n in plan.region.shape)
+    return (
+        f"{plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x) of "
+        f"{words_of_spacing(plan.spacing_um)}, "
+        f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
+        + "".join(f", objects of {one.name}" for one in plan.labels)
+    )
+
+
+def print_notes(plan: Plan) -> None:
+    """Print the notes of a plan, a line each."""
+    for note in plan.notes:
+        console.print(f"plan: {note}", markup=False, soft_wrap=True)
+
+
+def words_of_spacing(spacing_um: Spacing) -> str:
+    """Return a voxel spacing for a reader: `1 x 0.5 x 0.5 um`, or in mm where it is a body's."""
+    unit_um, unit = (1000.0, "mm") if min(spacing_um) >= _BODY_UM else (1.0, "um")
+    return " x ".join(f"{along / unit_um:.4g}" for along in spacing_um) + f" {unit}"
+
+
+def ignored_notes(settings: Settings, channels: Sequence[Channel]) -> Iterator[str]:
+    """Yield a note on each setting that another one overrules."""
+    options = settings.isovalue
+    for channel in channels:
+        keys = (channel.name, str(channel.index), ALL)
+        given = next((settings.iso_values[k] for k in keys if k in settings.iso_values), None)
+        if channel.rung and given is not None and given != settings.iso_values.get(ALL):
+            yield f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
+        if channel.rung and options.criterion != LADDER:
+            yield f"{channel.name}: built where --surfaces says, not by {options.criterion}"
+        is_number = channel.rung not in (*RUNGS, NO_SURFACE) if channel.rung else given is not None
+        if is_number and options.scope == "tile":
+            yield (
+                f"{channel.name}: its level is given, so the same in all tiles: --iso-scope tile "
+                "is for levels that are found"
+            )
+
+
+def changes_of(there: Plan, plan: Plan) -> str:
+    """Return a line on the settings in which two plans of the same input differ; empty: none.
+
+    there  the plan in OUT, which `plan` replaces. Results that depend on the changes follow
+    """
+    if replace(there, notes=plan.notes) == plan:
+        return ""
+    old, new = to_dict(there.settings), to_dict(plan.settings)
+    changes = [
+        f"{section}.{key}: {old[section].get(key)!r:.40}, now {new[section].get(key)!r:.40}"
+        for section in new
+        for key in {**old[section], **new[section]}
+        if old[section].get(key) != new[section].get(key)
+    ]
+    names, now = (", ".join(one.name for one in each.channels) for each in (there, plan))
+    if names != now:
+        changes.insert(0, f"channels: {names:.80}, now {now:.80}")
+    more = len(changes) - _MAX_CHANGES
+    listed = "; ".join(changes[:_MAX_CHANGES]) + (f"; and {more} more" if more > 0 else "")
+    return (
+        f"OUT holds a build of this input with other settings, whose results are replaced: "
+        f"{listed or 'another path of the input'}"
+    )

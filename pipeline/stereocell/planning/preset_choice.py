@@ -1,0 +1,183 @@
+"""Choose the preset that suits a source, where the user names none."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from stereocell.engine.run import console
+from stereocell.model.errors import StereoCellError
+from stereocell.model.modality import TRACER_MODALITIES
+from stereocell.planning.channels import ALL
+from stereocell.planning.ct_evidence import (
+    LEVELS_HU,
+    NO_SCALE,
+    CtEvidence,
+    find_ct_evidence,
+    is_other_scale,
+)
+from stereocell.planning.input_files import as_asked
+from stereocell.planning.settings import HOUNSFIELD, NO_PRESET, Settings, load
+from stereocell.planning.tracer_name import tracer_word
+from stereocell.read import Dataset
+from stereocell.steps.open_source import open_source
+from stereocell.storage.location import Location
+
+_BY_MODALITY = {"MR": "mri", "CT": "ct", **dict.fromkeys(TRACER_MODALITIES, "pet")}
+_BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
+# um: finest spacings above the first, up to the second, are those of light sheets and confocal
+# overviews of thick tissue. Cells are a few voxels wide there, and tissue fills the field.
+_OVERVIEW_UM = (1.0, 10.0)
+_PATIENT_UM = 300.0  # um: an MR of a patient has no finer voxels; micro-CT and small animals do
+_AS_HEAT = "for a PET or SPECT --preset pet, which shows heat"
+_PART_UM = 20_000.0  # um: of what is smaller across, presets of patients drop pieces half as large
+
+
+def load_for(
+    source: str | Path,
+    preset: str | None,
+    config: Path | None,
+    *,
+    flags: Mapping[str, Any],
+    where: str = "command line",
+) -> tuple[Settings, tuple[str, ...]]:
+    """Return the settings of a build, by the preset that suits the source where none is given.
+
+    As `settings.load` otherwise. A file of settings, `config`, leaves no choice. The notes for the
+    plan are the choice with its reason, or a doubt about a preset of CT; none where there was no
+    choice. A source that can't be read is left to the next reader.
+    """
+    if preset is not None or config is not None:
+        settings = load(preset, config, flags=flags, where=where)
+        has_level = set(settings.iso_values) - {ALL} or settings.surfaces
+        doubts = preset in LEVELS_HU and config is None and not has_level
+        return settings, _doubts_of(source, preset or "", settings) if doubts else ()
+    settings = load(None, None, flags=flags, where=where)
+    options = settings.plan
+    try:
+        location = Location.of(source).source
+        dataset = open_source(as_asked(location, options))
+        if (
+            options.taken_as == HOUNSFIELD
+            and (dataset.modality or options.modality or "CT") == "CT"
+        ):
+            text = f"the values are taken for Hounsfield units (--as {HOUNSFIELD})"
+            return load("ct", None, flags=flags, where=where), _describe("ct", text)
+        word = tracer_word(location)
+        chosen, notes = choose_preset(dataset, modality=options.modality, tracer=word)
+    except StereoCellError:
+        return settings, ()
+    return (load(chosen, None, flags=flags, where=where) if chosen else settings), notes
+
+
+def _doubts_of(source: str | Path, preset: str, settings: Settings) -> tuple[str, ...]:
+    """Return the note on a preset of CT that the user names and that the voxels do not fit."""
+    try:
+        if settings.plan.taken_as == HOUNSFIELD:
+            return ()
+        dataset = open_source(as_asked(Location.of(source).source, settings.plan))
+        if dataset.modality and dataset.dtype.kind != "u":  # as the source states itself
+            return ()
+        doubt = _doubt(dataset, preset)
+    except StereoCellError:
+        return ()
+    return (f"preset {preset}: {doubt}",) if doubt else ()
+
+
+def _doubt(dataset: Dataset, preset: str) -> str:
+    """Return why a level in Hounsfield units does not fit the voxels; empty: it may fit.
+
+    A reader that knows the values to be no Hounsfield units has noted it already.
+    """
+    if not dataset.has_hounsfield_units:
+        return ""
+    evidence = find_ct_evidence(dataset)
+    if not evidence.has_no_air:
+        return ""
+    flags, level = evidence.flags, LEVELS_HU[preset]
+    if preset == "ct-bone":
+        flags = evidence.bone_flags or "--iso-value 0=VALUE sets one, a voxel value"
+    meant = f"{evidence.words}, and its level of {level:g} is meant for Hounsfield units"
+    if is_other_scale(dataset, level):
+        return f"{meant}: the level and its window are not used, others are found (or {flags})"
+    return f"{meant} ({flags})"
+
+
+def print_choice(choice: Sequence[str]) -> None:
+    """Print the choice of a preset, once the source proved to be one: errors stand alone."""
+    for note in choice:
+        console.print(f"plan: {note}", markup=False)
+
+
+def choose_preset(
+    dataset: Dataset, *, modality: str = "", tracer: str = ""
+) -> tuple[str | None, tuple[str, ...]]:
+    """Return the name of a preset, or None for the defaults, and the reasons, a sentence each.
+
+    modality  the settings', where the input says none
+    tracer    the word in the source's name that states PET or SPECT; empty: there is none
+    """
+    known = dataset.modality or modality
+    level = dataset.levels[0]
+    finest = min(level.spacing_um)
+    if not known and finest < _BODY_UM:
+        return _of_microscope(finest)
+    across = max(n * h for n, h in zip(level.shape, level.spacing_um, strict=True))
+    if across < _PART_UM:
+        return None, _describe(None, f"{across / 1000:.3g} mm across, too small for a patient")
+    if not dataset.has_hounsfield_units:
+        chosen = _BY_MODALITY["CT"]
+        return chosen, _describe(chosen, "the input is CT, though without Hounsfield units")
+    if known:
+        by_kind = _BY_MODALITY.get(known)
+        is_unsigned_ct = by_kind == "ct" and dataset.dtype.kind == "u"
+        doubt = _doubt(dataset, "ct") if is_unsigned_ct else ""
+        reasons = _describe(by_kind, f"the input is {known}")
+        return by_kind, (*reasons, f"preset {by_kind}: {doubt}") if doubt else reasons
+    return _by_values(find_ct_evidence(dataset), finest, tracer)
+
+
+def _of_microscope(finest_um: float) -> tuple[str | None, tuple[str, ...]]:
+    """Return the preset of a volume that a microscope took, and the reasons."""
+    over, up_to = _OVERVIEW_UM
+    voxels = f"voxels of {finest_um:.3g} um, as of a"
+    if over < finest_um <= up_to:
+        return "lightsheet", _describe(
+            "lightsheet", f"{voxels} light sheet in tissue: cells are looked for"
+        )
+    return None, _describe(None, f"{voxels} microscope")
+
+
+def _by_values(
+    evidence: CtEvidence, finest_um: float, tracer: str
+) -> tuple[str | None, tuple[str, ...]]:
+    """Return the preset of a body whose modality is not stated, and the reasons.
+
+    tracer  the word in the source's name that states PET or SPECT; empty: there is none
+    """
+    size = f"voxels of {finest_um / 1000:.3g} mm"
+    if evidence.is_hounsfield:
+        return "ct", _describe("ct", f"{size} and {evidence.words}")
+    if tracer:
+        text = f"{size}, and {tracer!r} in the source's name: PET is assumed, as heat"
+        return "pet", _describe("pet", text)
+    known = f"{size}, {evidence.words}" if evidence.basis else size
+    if finest_um < _PATIENT_UM:
+        text = f"{known}, and no modality is stated: finer than an MR of a patient"
+        return None, (*_describe(None, text), _advice(evidence))
+    assumed = f"{known}, and no modality is stated: MR is assumed"
+    return "mri", (*_describe("mri", assumed), f"{_advice(evidence)}; {_AS_HEAT}")
+
+
+def _advice(evidence: CtEvidence) -> str:
+    """Return the flags that build a volume as a CT after all, and where their level comes from."""
+    if not evidence.basis:
+        return f"{evidence.words} would be those of a CT: for a CT {evidence.flags}"
+    if evidence.basis == NO_SCALE:
+        return f"for a CT {evidence.flags}"
+    return f"for a CT {evidence.flags}; its level lies {evidence.basis}"
+
+
+def _describe(chosen: str | None, reason: str) -> tuple[str, ...]:
+    if chosen is None:
+        return (f"no preset: {reason}: lengths follow the voxel spacing (--preset names another)",)
+    return (f"preset {chosen}: {reason} (--preset {NO_PRESET}: the defaults)",)

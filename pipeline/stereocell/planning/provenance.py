@@ -1,0 +1,64 @@
+"""The provenance that results carry: settings and versions, no paths and no identities."""
+
+from typing import Any
+
+from stereocell.engine.step_record import libraries_of
+from stereocell.model.extra_packages import version_of
+from stereocell.model.version import GENERATOR
+from stereocell.planning.plan import Plan
+from stereocell.planning.settings import to_dict
+from stereocell.read.known_formats import format_of
+from stereocell.steps.build_unit import BuildUnit
+from stereocell.steps.find_window import FindWindow
+from stereocell.steps.gather_evidence import GatherEvidence
+from stereocell.steps.sum_components import SumComponents
+from stereocell.steps.write_stage_tile import WriteStageTile
+from stereocell.textures.map_packages import (
+    UNWRAPPER,
+)
+
+# the steps whose libraries stand in the provenance of a stage
+_STEPS = tuple(
+    step.__name__ for step in (FindWindow, GatherEvidence, SumComponents, BuildUnit, WriteStageTile)
+)
+
+
+def provenance(plan: Plan) -> dict[str, Any]:
+    """Return the provenance that results carry: settings and versions, no paths, no identities."""
+    settings = _without_places(to_dict(plan.settings))
+    # by the plan's formats, since the sources may be gone when a stage is written; an added
+    # channel's source lies in OUT
+    formats = {*plan.formats, *(format_of(c.source).name for c in plan.channels if c.source)}
+    return {
+        "generator": GENERATOR,
+        "fingerprint": plan.fingerprint,
+        "level": plan.level,
+        "spacing_um": list(plan.spacing_um),
+        "settings": settings,
+        "libraries": {
+            **libraries_of(*_STEPS, *sorted(formats)),
+            **({UNWRAPPER: version_of(UNWRAPPER)} if plan.settings.unwrap.maps else {}),
+        },
+        **_added(plan),
+    }
+
+
+def provenance_record(plan: Plan) -> dict[str, Any]:
+    """Return the content of provenance.json: the provenance, and the notes on reading the source.
+
+    The notes stay beside the plan, because some name the source's files.
+    """
+    return {**provenance(plan), "notes": list(plan.notes)}
+
+
+def _without_places(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return settings without the paths in them, which may name a patient or a person."""
+    labels = dict.fromkeys(settings["labels"], "")
+    objects = {**settings["objects"], "table": "table" if settings["objects"]["table"] else ""}
+    return {**settings, "labels": labels, "objects": objects}
+
+
+def _added(plan: Plan) -> dict[str, Any]:
+    """Return the channels with a source of their own, and that source's fingerprint."""
+    added = {c.name: c.fingerprint for c in plan.channels if c.source}
+    return {"added_channels": added} if added else {}

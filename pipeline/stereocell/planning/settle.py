@@ -1,0 +1,132 @@
+"""Settle the plan of a build from its source and settings. Nothing is written or printed."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from stereocell.meshes.alpha_wrap import find_wrapper
+from stereocell.model.errors import UsageError
+from stereocell.model.tiling import Box
+from stereocell.planning.channel_colors import choose_colors, is_lone, lies_at_bone, shows_stain
+from stereocell.planning.channels import PALETTE, Channel, with_surfaces
+from stereocell.planning.hounsfield import believe, settle_modality
+from stereocell.planning.input_files import as_asked, open_anew, watch_table
+from stereocell.planning.intensities import doubt_of, require_intensities
+from stereocell.planning.label_maps import are_alone, find_labels
+from stereocell.planning.label_numbers import notes_before_units
+from stereocell.planning.object_tables import (
+    require_color_by,
+    table_of,
+)
+from stereocell.planning.plan import Plan, choose_level, make_plan, parse_region
+from stereocell.planning.plan_notes import (
+    ignored_notes,
+    told_of_absent,
+    told_of_gaps,
+)
+from stereocell.planning.settings import INTENSITY, Settings
+from stereocell.read.known_formats import format_of
+from stereocell.read.remarks import CAST
+from stereocell.storage.location import Location
+from stereocell.textures.map_packages import (
+    require_map_packages,
+)
+
+
+def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
+    """Return the plan of a build, with its notes. Nothing is written or printed.
+
+    choice  notes on how the settings were chosen; see `load_for`
+
+    Raises StereoCellError where the source can't be read, or the settings don't fit it.
+    """
+    location = Location.of(source).source
+    options = settings.plan
+    if settings.surface.wrap == "alpha-wrap":
+        find_wrapper()
+    if settings.unwrap.maps:
+        require_map_packages()
+    _require_labels(settings)
+    dataset = believe(open_anew(as_asked(location, options)), options.taken_as)
+    alone = are_alone(settings.labels)
+    settings, modality = settle_modality(dataset, settings, are_labels=alone)
+    indices = dataset.find_channels(options.channels) if options.channels else None
+    chosen = range(0 if alone else len(dataset.channels)) if indices is None else indices
+    wanted = [dataset.channels[index] for index in chosen]
+    colors = choose_colors(
+        [(one.name, one.color) for one in wanted],
+        modality=modality.code,
+        is_alone=is_lone([one.name for one in dataset.channels]),
+        is_bone=lies_at_bone(settings.iso_values, is_hounsfield=modality.is_hounsfield),
+        is_stained=shows_stain(dataset.levels[0].spacing_um, is_dark=options.dark),
+    )
+    channels = [
+        Channel(index, one.name, color)
+        for index, one, color in zip(chosen, wanted, colors, strict=True)
+    ]
+    channels = with_surfaces(channels, settings.surfaces)
+    level = choose_level(dataset.levels, len(channels), settings)
+    found = find_labels(
+        dataset,
+        location,
+        settings.labels,
+        settings=settings,
+        colors=PALETTE[len(channels) :] + PALETTE[: len(channels)],
+        taken=[channel.name for channel in channels],
+    )
+    if options.taken_as != INTENSITY and channels:
+        whole = Box((0, 0, 0), dataset.levels[level[0]].shape)
+        require_intensities(dataset, chosen, parse_region(options.region, whole), level[0])
+    origin = dataset.levels[level[0]].origin_um
+    plan = make_plan(
+        location,
+        dataset.name,
+        fingerprint=dataset.fingerprint,
+        levels=dataset.levels,
+        origin_um=origin,
+        channels=channels,
+        level=level,
+        settings=settings,
+        modality=modality.code,
+        placement=dataset.placement,
+        slice_axis=dataset.slice_axis(level[0]),
+        has_sides=dataset.has_sides,
+        labels=found.labels,
+        formats={
+            format_of(one).name
+            for one in (location, *(labels.ref.source for labels in found.labels))
+        },
+    )
+    if settings.objects.table:
+        watch_table(settings.objects.table)
+    objects = list(found.notes)
+    for one in plan.labels:
+        # a table that can't be read, or lacks a column, ends the command before the build
+        table = table_of(plan, one)
+        require_color_by(plan, one, table)
+        objects += [f"table: {note}" for note in table.notes] if table else []
+    gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
+    objects += notes_before_units(plan)
+    objects += filter(None, map(doubt_of, plan.labels))
+    if settings.objects.table and len(plan.labels) > 1:
+        objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
+    # numbers of objects are read as they are
+    read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
+    kind = [modality.note] if modality.note else []
+    notes = (*read, *choice, *kind, *gaps, *objects, *ignored_notes(settings, channels))
+    return replace(plan, notes=notes, is_hounsfield=modality.is_hounsfield)
+
+
+def _require_labels(settings: Settings) -> None:
+    """Raise UsageError where something is said of objects that nobody asked for."""
+    options = settings.objects
+    for flag, value in {
+        "--table": options.table,
+        "--table-key": options.table_key,
+        "--columns": ",".join(options.columns),
+        "--color-by": options.color_by,
+        "--background": str(options.background or ""),
+    }.items():
+        if value and not settings.labels:
+            raise UsageError(f"{flag} is {value!r:.60}: of no objects, expected --labels with it")
+        if value and not options.table and flag in ("--table-key", "--columns"):
+            raise UsageError(f"{flag} is {value!r:.60}: of no table, expected --table with it")

@@ -1,0 +1,74 @@
+"""The steps that write a plan's stage, with all that they depend on."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from stereocell.model.channel import PaintColors
+from stereocell.model.object_table import ObjectTable
+from stereocell.model.tile_content import TileContent
+from stereocell.model.tiling import Tile
+from stereocell.planning.object_tables import appearance_of_labels
+from stereocell.planning.plan import Plan
+from stereocell.planning.provenance import provenance
+from stereocell.planning.survey import Survey
+from stereocell.steps.write_stage import Tables, WriteStage
+from stereocell.steps.write_stage_tile import TableOfTile, UnitPart, WriteStageTile
+
+
+def stage_tile_step(
+    plan: Plan, tile: Tile, units: Mapping[str, Path], tables: Mapping[str, ObjectTable]
+) -> WriteStageTile:
+    """Return the step of one tile.
+
+    units   the folder of each unit, by `<tile>/<channel>`
+    tables  of all objects, by the ID of their label map
+    """
+
+    def part(channel_id: str, paint: PaintColors | None = None) -> UnitPart:
+        return UnitPart(channel_id, units[f"{tile.id}/{channel_id}"], paint)
+
+    parts = [
+        part(channel.id, PaintColors(channel.color, painter.color) if painter else None)
+        for channel in plan.channels
+        for painter in [plan.painter(channel)]
+    ]
+    parts += [part(labels.id) for labels in plan.labels]
+    lattice = tile.lattice(plan.region)
+    content = TileContent(
+        id=tile.id,
+        spacing_um=plan.spacing_um,
+        first_um=plan.position_um(lattice.start),
+        last_um=plan.position_um([end - 1 for end in lattice.stop]),
+        own_shape=tile.box.shape,
+        channels=(),
+    )
+    own = tuple(
+        TableOfTile(id_, table.of_tile(tile.id), table.touching(tile.id))
+        for id_, table in tables.items()
+    )
+    return WriteStageTile(content, tuple(parts), plan.shared_volumes, own)
+
+
+def stage_step(
+    plan: Plan,
+    survey: Survey,
+    tiles: Sequence[WriteStageTile],
+    tables: Mapping[str, ObjectTable],
+) -> WriteStage:
+    """Return the step of the stage over its tiles."""
+    appearances = [survey[channel.id].appearance for channel in plan.channels]
+    for labels in plan.labels:
+        painter = plan.painter(labels)
+        appearances.append(appearance_of_labels(labels, painter=painter.id if painter else ""))
+    return WriteStage(
+        plan.name,
+        tuple(tiles),
+        plan.spacing_um,
+        tuple(appearances),
+        provenance(plan),
+        plan.modality,
+        plan.placement,
+        plan.has_sides,
+        plan.opens_cut and any(survey[one.id].is_body for one in plan.channels),
+        Tables(tables),
+    )

@@ -1,0 +1,60 @@
+"""Which chunks of an array a part of it touches, and how many of them are not stored."""
+
+import math
+from collections.abc import Iterator, Sequence, Set
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+MOST_COUNTED = 2_000_000  # most chunks that are looked for; a part with more is not counted
+Spans = Sequence[Sequence[range]]  # for each axis the ranges of indices that are read
+
+
+@dataclass(frozen=True, slots=True)
+class Absent:
+    """The number of chunks of a part of a level that are not stored.
+
+    count  chunks that are absent
+    total  all chunks of the part
+    noun   `chunk`, `shard` or `block`
+    fill   the value that is read for absent chunks
+    """
+
+    count: int
+    total: int
+    noun: str
+    fill: Any
+
+
+def touched_along(size: int, ranges: Sequence[range]) -> list[int]:
+    """Return the chunks along one axis, of `size` voxels each, that some ranges touch."""
+    return sorted({n for one in ranges for n in range(one.start // size, -(-one.stop // size))})
+
+
+def number_of(sizes: Sequence[int], spans: Spans) -> int:
+    """Return the number of chunks of some sizes that a part touches."""
+    return math.prod(_count(n, ranges) for n, ranges in zip(sizes, spans, strict=True))
+
+
+def _count(size: int, ranges: Sequence[range]) -> int:
+    """Return the number of chunks along one axis; without a list of them, which may be long."""
+    count, reached = 0, 0
+    for one in sorted(ranges, key=lambda one: one.start):
+        first, stop = max(one.start // size, reached), -(-one.stop // size)
+        if stop > first:
+            count, reached = count + stop - first, stop
+    return count
+
+
+def places_of(sizes: Sequence[int], spans: Spans) -> Iterator[tuple[int, ...]]:
+    """Return the indices of the chunks that a part touches."""
+    return product(*(touched_along(n, ranges) for n, ranges in zip(sizes, spans, strict=True)))
+
+
+def count_keys(keys: Iterator[str], names: Set[str], noun: str, fill: Any) -> Absent:
+    """Return how many keys of chunks are not among the names of a source's files."""
+    total = count = 0
+    for key in keys:
+        total += 1
+        count += key not in names
+    return Absent(count, total, noun, fill)

@@ -1,0 +1,103 @@
+"""The header of one plane of pixels, before decoding: how it is stored, where it lies."""
+
+from dataclasses import dataclass
+
+from stereocell.read.formats.dicom.frame_kind import FrameKind
+from stereocell.read.formats.dicom.modality_table import ModalityTable
+from stereocell.read.formats.dicom.origin import Origin
+from stereocell.read.formats.dicom.segmentation import Segmentation
+from stereocell.read.formats.dicom.stated import Stated
+from stereocell.read.formats.dicom.value_scale import ValueScale
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Encoding:
+    """The map from a stored to a grey value: bits, sign, then slope * value + intercept or a table.
+
+    bits, high_bit  of the value inside its container of `allocated` bits; 0 bits: floats
+    is_inverted     MONOCHROME1: the lowest value is the brightest
+    padding         lowest and highest stored value outside the image, before the inversion;
+                    None: the header names none
+    table           gives the grey values in place of slope and intercept; None: there is none
+
+    References: DICOM PS3.3 C.7.6.3 (Image Pixel module).
+    """
+
+    allocated: int
+    bits: int
+    high_bit: int
+    is_signed: bool
+    is_inverted: bool
+    slope: float = 1.0
+    intercept: float = 0.0
+    padding: tuple[int, int] | None = None
+    table: ModalityTable | None = None
+
+    @property
+    def grey_ends(self) -> tuple[float, float]:
+        """The grey values between which all lie that this many bits can become."""
+        if self.table is not None:
+            return self.table.grey_range(is_inverted=self.is_inverted)
+        low, high = (self.slope * value + self.intercept for value in self.stored_range)
+        return low, high
+
+    @property
+    def stored_range(self) -> tuple[int, int]:
+        """The lowest and highest stored value of this many bits."""
+        half = 1 << (self.bits - 1)
+        return (-half, half - 1) if self.is_signed else (0, 2 * half - 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One plane of pixels and its place in the patient (LPS, mm).
+
+    file, index        file in the order of names, frame in the file; both from 0
+    series, instance   digests of the UIDs of the series and of the image
+    reference          digest of the frame of reference
+    stack              digest of the stack ID in an enhanced image
+    position           centre of the first pixel
+    along_row          unit vector of growing column index; `along_column` of growing row index
+    rows, columns      pixels of the plane
+    spacing            mm between (rows, columns)
+    tile, corner       which slice of a mosaic, and its first pixel (row, column) in the image
+    segment            the number of the one that it shows, in a segmentation; 0: of none or all
+    segmentation       the file's; None: it is an image
+    is_quadruped       the axes of the place are those of an animal on four legs
+    parts              of an image that is stored in several files: a digest of its UID, and the
+                       number of files; 0: it is stored in one file, or the number isn't stated
+    kind               magnitude, projection, echo and the like; of a segmentation nothing
+    stated             values that repeat the geometry
+    scale              what is stated about the values
+    origin             study and series, beside their UIDs
+
+    References: DICOM PS3.3 C.7.6.2 (Image Plane module).
+    """
+
+    file: int
+    index: int
+    series: bytes
+    instance: bytes
+    reference: bytes
+    stack: bytes
+    number: int
+    modality: str
+    rows: int
+    columns: int
+    position: Vector
+    along_row: Vector
+    along_column: Vector
+    spacing: tuple[float, float]
+    encoding: Encoding
+    tile: int = 0
+    corner: tuple[int, int] = (0, 0)
+    segment: int = 0
+    segmentation: Segmentation | None = None
+    is_quadruped: bool = False
+    parts: tuple[bytes, int] = (b"", 0)
+    kind: FrameKind = FrameKind()  # noqa: RUF009  (frozen)
+    stated: Stated = Stated()  # noqa: RUF009  (frozen)
+    scale: ValueScale = ValueScale()  # noqa: RUF009  (frozen)
+    origin: Origin = Origin()  # noqa: RUF009  (frozen)

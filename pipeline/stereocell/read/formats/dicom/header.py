@@ -1,0 +1,341 @@
+"""The part of a DICOM file's header that is read: geometry, modality, storage of the pixels.
+
+Privacy begins here. pydicom reads the tags of `_TAGS` alone and skips the values of all others.
+UIDs, which identify series and copies, become digests. Logs, warnings and texts of exceptions of
+pydicom may quote values; they are discarded. A file is named by its number in the order of names,
+never by its name.
+"""
+
+import hashlib
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pydicom
+from pydicom.uid import DeflatedExplicitVRLittleEndian
+
+from stereocell.model.modality import MODALITIES
+from stereocell.read.formats.dicom.encoding import encoding_of
+from stereocell.read.formats.dicom.frame import Frame, Vector
+from stereocell.read.formats.dicom.frame_kind import KIND_TAGS, FrameKind, kind_of
+from stereocell.read.formats.dicom.frame_offsets import (
+    frame_offsets,
+    has_offsets,
+    place_first,
+)
+from stereocell.read.formats.dicom.header_values import find_value, first_item
+from stereocell.read.formats.dicom.modality_table import TABLE_TAGS
+from stereocell.read.formats.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
+from stereocell.read.formats.dicom.no_plane import NoPlaneError
+from stereocell.read.formats.dicom.origin import ORIGIN_TAGS, origin_of
+from stereocell.read.formats.dicom.segmentation import (
+    LABELMAP,
+    Segmentation,
+    segmentation_of,
+)
+from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS, quiet
+from stereocell.read.formats.dicom.stated import STATED_TAGS, count_frames, stated_of
+from stereocell.read.formats.dicom.stored_values import PLUGINS, is_compressed
+from stereocell.read.formats.dicom.value_scale import SCALE_TAGS, ValueScale, scale_of
+from stereocell.read.formats.dicom.ways_out import class_name, way_out
+
+_TAGS: list[Any] = [
+    "SOPClassUID",
+    "Modality",
+    "SeriesInstanceUID",
+    "SOPInstanceUID",
+    "FrameOfReferenceUID",
+    "InstanceNumber",
+    "NumberOfFrames",
+    "ConcatenationUID",
+    "InConcatenationTotalNumber",
+    "Rows",
+    "Columns",
+    "SamplesPerPixel",
+    "PhotometricInterpretation",
+    "BitsAllocated",
+    "BitsStored",
+    "HighBit",
+    "PixelRepresentation",
+    "PixelPaddingValue",
+    "PixelPaddingRangeLimit",
+    "PixelSpacing",
+    "ImagePositionPatient",
+    "ImageOrientationPatient",
+    "AnatomicalOrientationType",
+    "RescaleSlope",
+    "RescaleIntercept",
+    "SegmentSequence",
+    "SegmentationType",
+    "SegmentsOverlap",
+    "MaximumFractionalValue",
+    "DetectorInformationSequence",
+    "SliceVector",
+    "GridFrameOffsetVector",
+    "DoseGridScaling",
+    "SharedFunctionalGroupsSequence",
+    "PerFrameFunctionalGroupsSequence",
+    *KIND_TAGS,
+    *ORIGIN_TAGS,
+    *STATED_TAGS,
+    *SCALE_TAGS,
+    *TABLE_TAGS,
+]
+SEGMENTATION = "of a segmentation"  # how a reason begins
+_NO_PLACE = "without a place in the patient"
+_NO_SPACING = "without a PixelSpacing above 0"
+# smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
+_SPACINGS = (1e-6, 100.0)
+
+
+def is_dicom(path: Path) -> bool:
+    """Return whether a file is a regular one that begins like DICOM, with or without preamble."""
+    try:
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            head = file.read(132)
+    except OSError:
+        return False
+    return head[128:] == b"DICM" or _lacks_preamble(head)
+
+
+def _lacks_preamble(head: bytes) -> bool:
+    """Files without preamble begin with an element of group 2 or 8, little-endian, a low number."""
+    if len(head) < 8:
+        return False
+    group, element = struct.unpack_from("<HH", head)
+    return group in (0x0002, 0x0008) and element <= 0x0018
+
+
+def read_frames(path: Path, file: int) -> list[Frame]:
+    """Return the planes of a file, from its header alone.
+
+    file  the file's number in the order of names
+
+    Raises NoPlaneError, whose text holds no value of the file.
+    """
+    try:
+        with quiet(), path.open("rb") as opened:
+            head = opened.read(132)
+            if head[128:] == b"DICM":
+                _refuse_deflated(path)
+            elif not _lacks_preamble(head):
+                raise NoPlaneError("not DICOM")
+            opened.seek(0)
+            header = pydicom.dcmread(
+                opened, stop_before_pixels=True, force=True, specific_tags=_TAGS
+            )
+            segmentation = segmentation_of(header)
+            try:
+                return _frames(header, opened, path, file, segmentation)
+            except NoPlaneError as error:
+                raise _explained(error, header, segmentation) from None
+    except DICOM_FAULTS:
+        raise NoPlaneError("with a damaged header") from None
+
+
+def _explained(error: NoPlaneError, header: Any, segmentation: Segmentation | None) -> NoPlaneError:
+    """Return the error with the kind of the file, and a way out."""
+    if segmentation is not None:
+        return NoPlaneError(f"{SEGMENTATION} of {segmentation.words}, {error}")
+    found = NoPlaneError(f"{_NO_PLACE}{_kind(header)}") if str(error) == _NO_PLACE else error
+    found.way_out = way_out(header, kind_of(header, ()), str(found))
+    return found
+
+
+def _refuse_deflated(path: Path) -> None:
+    """Raise NoPlaneError for a deflated file: it would be unpacked whole, at any size."""
+    meta = pydicom.filereader.read_file_meta_info(path)
+    if meta.get("TransferSyntaxUID") == DeflatedExplicitVRLittleEndian:
+        raise NoPlaneError("deflated as a whole, which is not read")
+
+
+def _frames(
+    header: Any, opened: BinaryIO, path: Path, file: int, segmentation: Segmentation | None
+) -> list[Frame]:
+    rows, columns = int(header.get("Rows") or 0), int(header.get("Columns") or 0)
+    size = path.stat().st_size
+    if opened.tell() >= size or rows < 1 or columns < 1:
+        raise NoPlaneError(f"without pixels{_kind(header)}")
+    grey = ["MONOCHROME1", "MONOCHROME2"]
+    if segmentation is not None and segmentation.kind == LABELMAP:
+        grey.append("PALETTE COLOR")  # of numbers
+    colours = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
+    if int(header.get("SamplesPerPixel") or 1) != 1 or colours not in grey:
+        raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
+    shared = first_item(header.get("SharedFunctionalGroupsSequence"))
+    own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
+    is_mask = segmentation is not None
+    is_float, held = _check_pixels(header, opened, size, rows * columns, is_mask=is_mask)
+    count, count_notes = count_frames(int(header.get("NumberOfFrames") or 1), len(own), held)
+    if held is not None and held < count:
+        raise NoPlaneError("cut short")
+    place_first(header)
+    uids = "SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID", "ConcatenationUID"
+    series, instance, reference, whole = (
+        hashlib.sha256(str(header.get(key, "")).encode()).digest() for key in uids
+    )
+    parts = int(header.get("InConcatenationTotalNumber") or 0)
+    if "SOPInstanceUID" not in header:  # then nothing identifies copies
+        instance = f"{file}".encode()
+    modality = str(header.get("Modality", "")).strip()
+    is_quadruped = str(header.get("AnatomicalOrientationType", "")).strip() == "QUADRUPED"
+    origin = origin_of(header)
+    offsets = None
+    if (own or count > 1) and len(own) != count:
+        if has_offsets(header):
+            normal = np.cross(*np.array(_axes(header, [None])[0]))
+            offsets = frame_offsets(header, count, normal)
+        if offsets is None:
+            raise NoPlaneError(f"of several frames without a place for each{_kind(header)}")
+    frames = []
+    for index in range(count):
+        groups = [own[index] if own else None, shared]
+        stack = find_value({}, groups, "FrameContentSequence", "StackID")
+        segment = find_value({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
+        kind = FrameKind() if is_mask else kind_of(header, groups)
+        stated = stated_of(header, groups, count_notes)
+        scale = ValueScale() if is_mask else scale_of(header, groups)
+        directions, spacing = _axes(header, groups)
+        mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
+        if offsets is not None:
+            mosaic = _shifted(mosaic, offsets[index], directions)
+        frames += [
+            Frame(
+                file,
+                index,
+                series,
+                instance,
+                reference,
+                hashlib.sha256(str(stack).encode()).digest(),
+                int(header.get("InstanceNumber") or 0),
+                modality if modality in MODALITIES else "",
+                mosaic.rows,
+                mosaic.columns,
+                tile.position,
+                *directions,
+                spacing,
+                encoding_of(header, groups, colours == "MONOCHROME1", is_float, scale),
+                number,
+                tile.corner,
+                int(segment or 0) if is_mask else 0,
+                segmentation,
+                is_quadruped,
+                (whole, parts),
+                kind,
+                stated,
+                scale,
+                origin,
+            )
+            for number, tile in enumerate(mosaic.tiles)
+        ]
+    return frames
+
+
+def _mosaic(
+    header: Any,
+    path: Path,
+    groups: Sequence[Any],
+    shape: tuple[int, int],
+    directions: tuple[Vector, Vector],
+    spacing: tuple[float, float],
+) -> Mosaic:
+    """Return the slices of an image of pixels (rows, columns): most hold one."""
+    stated = find_value(header, groups, "PlanePositionSequence", "ImagePositionPatient")
+    position = None if stated is None else _vector(stated)
+    try:
+        found = find_mosaic(
+            path, header.get("ImageType") or (), shape, directions, spacing, position
+        )
+    except MosaicError as error:
+        raise NoPlaneError(str(error)) from None
+    if found is not None:
+        return found
+    if position is None:
+        raise NoPlaneError(_NO_PLACE)
+    return Mosaic(*shape, (Tile((0, 0), position),))
+
+
+def _shifted(mosaic: Mosaic, mm: float, directions: tuple[Vector, Vector]) -> Mosaic:
+    """Return an image's slices, moved along their normal."""
+    step = mm * np.cross(*np.array(directions))
+    tiles = tuple(
+        replace(tile, position=_vector(np.array(tile.position) + step)) for tile in mosaic.tiles
+    )
+    return replace(mosaic, tiles=tiles)
+
+
+def _vector(values: Any) -> Vector:
+    x, y, z = _numbers(values, 3)
+    return x, y, z
+
+
+def _kind(header: Any) -> str:
+    """Return the kind of a file without pixels, in the standard's words: " (...)", or nothing."""
+    name = class_name(header)
+    return f" ({name})" if name else ""
+
+
+def _check_pixels(
+    header: Any, opened: BinaryIO, size: int, pixels: int, *, is_mask: bool
+) -> tuple[bool, int | None]:
+    """Return whether the pixels are floats, and how many whole frames there are.
+
+    opened   stands at the element of the pixels: tag, (VR, 2 bytes,) length
+    size     of the file in bytes
+    pixels   of a frame
+    is_mask  a pixel may be one bit
+
+    The number of compressed frames is None: it takes a decoder. Raises NoPlaneError where the
+    pixels can't be read.
+    """
+    implicit, little = header.original_encoding
+    order = "<" if little else ">"
+    head = opened.read(12)
+    _, element = struct.unpack_from(f"{order}HH", head)
+    length = struct.unpack_from(f"{order}I", head, 4 if implicit else 8)[0]
+    bits = int(header.get("BitsAllocated") or 0)
+    is_float = element in (0x0008, 0x0009)
+    if bits not in (32, 64) if is_float else bits not in (1, 8, 16, 32)[not is_mask :]:
+        raise NoPlaneError(f"of {bits} bits a pixel, not of 8, 16 or 32")
+    syntax = header.file_meta.get("TransferSyntaxUID") if header.file_meta else None
+    if is_compressed(syntax):
+        if syntax not in PLUGINS:
+            raise NoPlaneError("compressed in a way that is not read")
+        return is_float, None
+    begin = opened.tell() - (4 if implicit else 0)
+    return is_float, 8 * min(length, size - begin) // (bits * pixels)
+
+
+def _numbers(value: Any, count: int, lacking: str = _NO_PLACE) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(v) for v in value)
+    except DICOM_FAULTS:
+        numbers = ()
+    if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
+        raise NoPlaneError(lacking)
+    return numbers
+
+
+def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tuple[float, float]]:
+    """Return unit vectors along a row and along a column, and mm between (rows, columns)."""
+    orientation = find_value(header, groups, "PlaneOrientationSequence", "ImageOrientationPatient")
+    spacing = find_value(header, groups, "PixelMeasuresSequence", "PixelSpacing")
+    cosines = np.array(_numbers(orientation, 6)).reshape(2, 3)
+    lengths = np.linalg.norm(cosines, axis=1)
+    is_frame = np.allclose(lengths, 1, atol=0.01) and abs(cosines[0] @ cosines[1]) < 0.01
+    if not is_frame:
+        raise NoPlaneError(_NO_PLACE)
+    between = _numbers(spacing, 2, _NO_SPACING)
+    if min(between) <= 0:
+        raise NoPlaneError(_NO_SPACING)
+    if not _SPACINGS[0] <= min(between) <= max(between) <= _SPACINGS[1]:
+        shown = " and ".join(f"{value:g}" for value in between)
+        raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
+    along_row, along_column = ((a, b, c) for a, b, c in (cosines / lengths[:, None]).tolist())
+    return (along_row, along_column), (between[0], between[1])

@@ -1,0 +1,231 @@
+"""Leica LIF, by liffile (BSD; the extra `lif`). A file holds several images: series.
+
+The images' names are what a person typed, and are not shown. Scan orders such as xzy are turned
+round by the axes' names. readlif, which bioio-lif stands on, is under GPL-3.0.
+"""
+
+import os
+import struct
+from contextlib import ExitStack
+from functools import partial
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.color import linear_color
+from stereocell.model.errors import SourceError
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.format import Format, Guide, Library
+from stereocell.read.image import MAX_CHANNELS, Color, Image
+from stereocell.read.plane_array import PlaneArray
+from stereocell.read.plane_positions import falling_notes
+from stereocell.read.series import Candidate, candidate, lines, read_chosen
+from stereocell.read.spacing import Grid, Triple
+from stereocell.storage.first_bytes import Mark
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location
+
+_BLOCK = struct.Struct("<2I")  # 0x70, and the length of the description behind it
+_ABOUT = struct.Struct("<BQBI")  # of a block: 0x2A, bytes of voxels, 0x2A, characters of its name
+_EARLY = struct.Struct("<BIBI")
+_MAX_NAME = 1000  # characters
+_AGAIN = "copy or download it again"
+_MARK, _TEST = 0x70, 0x2A
+_MAX_BLOCKS = 100_000
+_UM_PER_METER = 1e6
+_OTHERS = {
+    "\u03bb": "wavelengths (a lambda stack)",
+    "\u039b": "excitations (a lambda stack)",
+    "M": "tiles of a mosaic",
+    "S": "samples (RGB)",
+}
+_COLORS = {
+    "red": (255, 0, 0),
+    "green": (0, 255, 0),
+    "blue": (0, 0, 255),
+    "cyan": (0, 255, 255),
+    "magenta": (255, 0, 255),
+    "yellow": (255, 255, 0),
+    "gray": (255, 255, 255),
+    "grey": (255, 255, 255),
+}
+
+
+def read_image(location: Location, *, series: int = 0) -> Image:
+    """Return one image; 0 is the largest volume. Raises SourceError, UsageError for no such one."""
+    return read_chosen(
+        location.shown,
+        series,
+        partial(_images, location),
+        lambda images, index, notes, stack: _image(location.shown, images[index], notes, stack),
+    )
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each image. Raises SourceError."""
+    with ExitStack() as stack:
+        return lines(_images(location, stack)[1])
+
+
+def _images(location: Location, stack: ExitStack) -> tuple[list[Any], list[Candidate]]:
+    """Return the images of the file, and what a list says of each."""
+    import liffile as library
+
+    with one_line(location.shown, "a LIF file that is whole"):
+        path = os.path.realpath(location.path)
+        _require_whole(path, location.shown)
+        images = list(stack.enter_context(library.LifFile(path)).images)
+        candidates = [_candidate(image) for image in images]  # the library reads the XML here
+    if not images:
+        raise SourceError(f"{location.shown}: found no image, expected one")
+    return images, candidates
+
+
+def _require_whole(path: str, where: str) -> None:
+    """Raise SourceError where a block ends behind the end of the file, or two have the same name.
+
+    A file is a chain of blocks: first the XML, then voxels, each behind their length. The library
+    reads the last block of a name for all images that have it.
+    """
+    size, at = os.path.getsize(path), 0
+    names: set[bytes] = set()
+    with open(path, "rb") as file:
+        for _ in range(_MAX_BLOCKS):
+            file.seek(at)
+            head = file.read(_BLOCK.size)
+            if not head:
+                return
+            if len(head) < _BLOCK.size or int.from_bytes(head[:4], "little") != _MARK:
+                break
+            end = at + _BLOCK.size + _BLOCK.unpack(head)[1]
+            if at:
+                voxel_bytes, name = _named_block(file)
+                end += voxel_bytes
+                if name in names:
+                    raise SourceError(
+                        f"{where}: block of voxels at byte {at}: found the name of another block, "
+                        f"expected a name of its own: the file is damaged ({_AGAIN})"
+                    )
+                names |= {name} if name else set()
+            if end > size:
+                raise SourceError(
+                    f"{where}: cut short at byte {size} of {end} or more, expected a LIF file that "
+                    f"is whole ({_AGAIN})"
+                )
+            at = end
+
+
+def _named_block(file: BinaryIO) -> tuple[int, bytes]:
+    """Return the length of a block's voxels, and its name; of an early file it has 4 bytes."""
+    about = file.read(_ABOUT.size)
+    if len(about) < _EARLY.size:
+        return 0, b""
+    form = _EARLY if about[5] == _TEST else _ABOUT
+    _, voxel_bytes, _, count = form.unpack(about[: form.size].ljust(form.size, b"\0"))
+    name = about[form.size :] + file.read(2 * min(count, _MAX_NAME))
+    return voxel_bytes, name[: 2 * count]
+
+
+def _memory_notes(where: str, image: Any) -> tuple[str, ...]:
+    """Return a note where the file holds more of an image than the XML describes.
+
+    Raises SourceError where it holds less: the library would read on in the next image.
+    """
+    memory = image.xml_element.find("./Memory")
+    stated = image.memory_block.size if memory is None else int(memory.get("Size", 0))
+    held, described = image.memory_block.size, image.nbytes
+    if held < max(described, stated):
+        raise SourceError(
+            f"{where}: found {held} bytes of voxels, expected {max(described, stated)} as in the "
+            f"XML: the acquisition ended early, or the file is damaged ({_AGAIN}), or take "
+            "another --series (`--series list` shows them)"
+        )
+    if described == held:
+        return ()
+    return (
+        f"the XML describes {described} of {held} bytes of the image's voxels "
+        f"({described / held:.2%}): the others are left out",
+    )
+
+
+def _candidate(image: Any) -> Candidate:
+    sizes = dict(zip(image.dims, image.shape, strict=True))
+    z, y, x, channels, times = (int(sizes.get(axis, 1)) for axis in "ZYXCT")
+    others = [f"{size} {_OTHERS.get(axis, axis)}" for axis, size in _other_axes(image).items()]
+    return candidate(
+        (z, y, x), channels=channels, times=times, spacing_um=_spacing(image), others=others
+    )
+
+
+def _other_axes(image: Any) -> dict[str, int]:
+    sizes = zip(image.dims, image.shape, strict=True)
+    return {axis: int(size) for axis, size in sizes if axis not in "TCZYX" and size > 1}
+
+
+def _image(where: str, image: Any, notes: tuple[str, ...], stack: ExitStack) -> Image:
+    for axis, size in _other_axes(image).items():
+        raise SourceError(
+            f"{where}: found {size} {_OTHERS.get(axis, f'of axis {axis}')}, expected z, y, x, "
+            "channels and time: take another --series, or export it from LAS X"
+        )
+    missing = [axis for axis in "ZYX" if axis not in image.dims]
+    if missing:
+        raise SourceError(
+            f"{where}: a volume needs at least 2 planes: found axes {', '.join(image.dims)}, "
+            "expected Z, Y, X: take another --series (`--series list` shows them)"
+        )
+    dims = tuple(image.dims)
+
+    def read(place: tuple[int, ...], rows: slice, columns: slice) -> NDArray[Any]:
+        found = image.frame(**dict(zip(dims[:-2], place, strict=True)))
+        return np.asarray(found)[rows, columns]
+
+    axes = tuple(axis.lower() for axis in dims)
+    array = VoxelArray(PlaneArray(image.shape, np.dtype(image.dtype), read), axes)
+    with one_line(where, "a LIF file whose XML fits its voxels"):
+        notes = (*notes, *_memory_notes(where, image))
+    if (count := array.size("c")) > MAX_CHANNELS:
+        raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+    places = np.asarray(image.coords.get("Z", ()), float) * _UM_PER_METER
+    if len(places) > 1:
+        notes = (*notes, *falling_notes("place along z", float(places[0]), float(places[-1])))
+    names, colors = _channels(image, count)
+    grid = Grid(array.shape, _spacing(image))
+    return Image((array,), (grid,), names, colors, 1, stack.close, notes=notes)
+
+
+def _spacing(image: Any) -> Triple | None:
+    """Return the spacing (z, y, x), um, of the planes' places in m; None: not stated."""
+    found = []
+    for axis in "ZYX":
+        places = np.asarray(image.coords.get(axis, ()), float)
+        if len(places) > 1 and places[-1] != places[0]:
+            step = abs(float(places[-1] - places[0])) / (len(places) - 1)
+            found.append(step * _UM_PER_METER)
+    return (found[0], found[1], found[2]) if len(found) == 3 else None
+
+
+def _channels(image: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:
+    names: list[str | None] = []
+    colors: list[Color | None] = []
+    for node in list(image.xml_element.iter("ChannelDescription"))[:count]:
+        properties = {p.findtext("Key"): p.findtext("Value") for p in node.iter("ChannelProperty")}
+        names.append((properties.get("DyeName") or "").strip() or None)
+        rgb = _COLORS.get(node.get("LUTName", "").lower())
+        colors.append(linear_color(rgb) if rgb else None)
+    lacking = [None] * (count - len(names))
+    return (*names, *lacking), (*colors, *lacking)
+
+
+FORMAT = Format(
+    title="LIF",
+    open=read_image,
+    list_series=list_series,
+    library=Library("liffile", extra="lif"),
+    endings=(".lif",),
+    marks=(Mark("a LIF file of Leica", rb"\x70\0\0\0....\x2a"),),
+    guides=(
+        Guide("Leica LIF", "`NAME.lif`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
+    ),
+)

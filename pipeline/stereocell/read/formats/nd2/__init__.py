@@ -1,0 +1,37 @@
+"""ND2 of Nikon."""
+
+from stereocell.read.format import Format, Guide, Library
+from stereocell.read.image import Image
+from stereocell.storage.first_bytes import Mark
+from stereocell.storage.location import Location
+
+
+def _open(location: Location, *, series: int = 0) -> Image:
+    from stereocell.read.formats.nd2.image import read_image
+
+    return read_image(location, series=series)
+
+
+def _list_series(location: Location) -> tuple[str, ...]:
+    from stereocell.read.formats.nd2.image import list_series
+
+    return list_series(location)
+
+
+def _is_old(_path: str, head: bytes) -> bool:
+    """Before 2006 the format was JPEG 2000."""
+    return head.startswith(b"\0\0\0\x0cjP  ")
+
+
+FORMAT = Format(
+    title="ND2",
+    open=_open,
+    list_series=_list_series,
+    library=Library("nd2", extra="nd2"),
+    endings=(".nd2",),
+    marks=(Mark("an ND2 file of Nikon", rb"\xda\xce\xbe\x0a"),),
+    is_unmarked=_is_old,
+    guides=(
+        Guide("Nikon ND2", "`NAME.nd2`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
+    ),
+)

@@ -1,0 +1,125 @@
+"""Any other format, through bioio and those of its plugins that are installed beside StereoCell.
+
+bioio is no dependency: it takes 2 s to import, and most of its plugins need libraries of their own.
+A plugin may open files beside the source, so this runs only for files that no other format takes.
+
+References: https://bioio-devs.github.io/bioio/
+"""
+
+import os
+import re
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.errors import SourceError
+from stereocell.read.dataset import VoxelArray
+from stereocell.read.format import Format
+from stereocell.read.image import MAX_CHANNELS, Image
+from stereocell.read.series import Candidate, candidate, choose, lines
+from stereocell.read.spacing import Grid, Triple
+from stereocell.storage.library_errors import one_line
+from stereocell.storage.location import Location
+
+_MADE_UP = re.compile(r"Channel:\d+(:\d+)*")  # bioio's name where the file has none
+
+
+class _DaskArray:
+    """bioio's voxels (t, c, z, y, x); the chunks that a window touches are read."""
+
+    def __init__(self, array: Any) -> None:
+        self.shape: tuple[int, ...] = tuple(int(n) for n in array.shape)
+        self.chunks: tuple[int, ...] = tuple(int(n) for n in array.chunksize)
+        self.dtype = np.dtype(array.dtype)
+        self._array = array
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        return np.asarray(self._array[key].compute(scheduler="synchronous"))
+
+
+def can_read(location: Location) -> bool:
+    """Whether bioio is installed, and one of its plugins takes a file on this machine."""
+    if not location.is_local or find_spec("bioio") is None or not os.path.isfile(location.path):
+        return False
+    from bioio_base.exceptions import UnsupportedFileFormatError
+
+    with one_line(location.shown, "a file that a plugin of bioio reads"):
+        try:
+            _open(location)
+        except UnsupportedFileFormatError:
+            return False
+    return True
+
+
+def read_image(location: Location, *, series: int = 0) -> Image:
+    """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
+    where = location.shown
+    with one_line(where, "a file that a plugin of bioio reads whole"):
+        image = _open(location)
+        candidates = _candidates(image)
+    index, notes = choose(where, candidates, series)
+    with one_line(where, "a file that a plugin of bioio reads whole"):
+        image.set_scene(index)
+        array = VoxelArray(_DaskArray(image.dask_data), tuple(image.dims.order.lower()))
+        names = [None if _MADE_UP.fullmatch(name) else name for name in image.channel_names or ()]
+    if (count := array.size("c")) > MAX_CHANNELS:
+        raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+    named = (*names[:count], *[None] * (count - len(names)))
+    grid = Grid(array.shape, _spacing(image))
+    title, notes = Path(location.path).stem, ("read by bioio", *notes, *_sign_notes(image))
+    return Image((array,), (grid,), named, (None,) * count, 1, title=title, notes=notes)
+
+
+def _sign_notes(image: Any) -> tuple[str, ...]:
+    """Return a note for each axis along which the voxel size is negative."""
+    sizes = [(axis, getattr(image.physical_pixel_sizes, axis)) for axis in "ZYX"]
+    return tuple(
+        f"voxel size along {axis.lower()}: found {size:g} um: its size is taken and the voxels "
+        "stay as stored, so the volume may be mirrored"
+        for axis, size in sizes
+        if size is not None and size < 0
+    )
+
+
+def list_series(location: Location) -> tuple[str, ...]:
+    """Return a line for each scene. Raises SourceError."""
+    with one_line(location.shown, "a file that a plugin of bioio reads whole"):
+        return lines(_candidates(_open(location)))
+
+
+def _open(location: Location) -> Any:
+    import bioio
+
+    return bioio.BioImage(location.path)
+
+
+def _candidates(image: Any) -> list[Candidate]:
+    found = []
+    for index in range(len(image.scenes)):
+        image.set_scene(index)
+        sizes = {axis: int(getattr(image.dims, axis, 1)) for axis in "TCZYX"}
+        z, y, x = (sizes[axis] for axis in "ZYX")
+        found.append(
+            candidate((z, y, x), channels=sizes["C"], times=sizes["T"], spacing_um=_spacing(image))
+        )
+    return found
+
+
+def _spacing(image: Any) -> Triple | None:
+    """Return the spacing (z, y, x), um, as bioio's plugins have it; None: not stated."""
+    sizes = [getattr(image.physical_pixel_sizes, axis) for axis in "ZYX"]
+    if any(size is None for size in sizes):
+        return None
+    z, y, x = (abs(float(size)) for size in sizes)
+    return z, y, x
+
+
+FORMAT = Format(
+    title="a file for an installed plugin of bioio",
+    open=read_image,
+    list_series=list_series,
+    may_hold=can_read,
+)

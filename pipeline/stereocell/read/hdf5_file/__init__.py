@@ -1,0 +1,1 @@
+"""HDF5 files, opened safely, for the formats that are built on them."""

@@ -1,0 +1,90 @@
+"""The formats that are read, and the one of a source.
+
+They are the modules of `read/formats`, in the order of their names. No list of them has to be kept.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+from stereocell.read.format import Format
+from stereocell.storage import first_bytes
+from stereocell.storage.first_bytes import Content, Marks
+from stereocell.storage.location import Location
+from stereocell.storage.location import first_bytes as head_of
+
+OTHER = "other"  # takes files that no other format recognises
+_PACKAGE = "stereocell.read.formats"
+
+
+@cache
+def known_formats() -> Mapping[str, Format]:
+    """Return all formats by their names."""
+    found = {}
+    for one in sorted(iter_modules(import_module(_PACKAGE).__path__), key=lambda one: one.name):
+        module = f"{_PACKAGE}.{one.name}"
+        name = one.name.replace("_", "-")
+        row: Format = import_module(module).FORMAT
+        found[name] = replace(row, name=name, module=module)
+    return found
+
+
+def format_of(source: str | Path) -> Format:
+    """Return the format of a source by its name and its content, or the one of other files."""
+    return find_format(Location.of(source)) or known_formats()[OTHER]
+
+
+def find_format(location: Location) -> Format | None:
+    """Return the format of a source by its name and its content; None: neither has one.
+
+    The order is: a folder's name, a look into the source, the ending of a file's name, its first
+    bytes, and at last a format that takes what is left, as DICOM takes folders.
+    """
+    formats = [one for one in known_formats().values() if one.name != OTHER]
+    for part in reversed(location.parts):
+        for one in formats:
+            if part.endswith(one.folder_endings):
+                return one
+    last = location.parts[-1].lower() if location.parts else ""
+    named = (one for one in formats if last.endswith(one.endings))
+    if not location.is_local:
+        return next(named, None)
+    looking = (one for one in formats if one.holds is not None and one.holds(location))
+    named = (one for one in named if one.holds is None)
+    loosely = (one for one in formats if last.endswith(one.loose_endings))
+    lasting = (one for one in formats if one.may_hold is not None and one.may_hold(location))
+    return (
+        next(looking, None)
+        or next(named, None)
+        or _by_marks(location)
+        or next(loosely, None)
+        or next(lasting, None)
+    )
+
+
+def _by_marks(location: Location) -> Format | None:
+    found = known_formats().get(identify(head_of(location.path)).format)
+    return None if found is None or found.needs_ending else found
+
+
+def is_unknown(_path: str, head: bytes) -> bool:
+    """Return whether a file begins as no known format or container does."""
+    return not identify(head).is_known
+
+
+def identify(head: bytes) -> Content:
+    """Return the content of a file that begins with these bytes: of a format, or words alone."""
+    return first_bytes.identify(head, _marks())
+
+
+@cache
+def _marks() -> Marks:
+    """Return all marks. Those at the first byte go first, then those farther inside.
+
+    The bytes before a mark are free text in some formats, which may hold another format's mark.
+    """
+    marks = [(one.name, mark) for one in known_formats().values() for mark in one.marks]
+    return sorted(marks, key=lambda pair: (pair[1].at > 0, -pair[1].at))

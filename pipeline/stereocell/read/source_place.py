@@ -1,0 +1,49 @@
+"""The name of a source, and the folder that belongs to it, by the endings of formats."""
+
+import os
+from pathlib import Path
+
+from stereocell.model.errors import UsageError
+from stereocell.read.known_formats import known_formats
+from stereocell.storage.location import Location
+
+_OTHERS = (".zip",)  # endings that are no format's own
+
+
+def name_of(location: Location) -> str:
+    """Return a source's name without its ending, for display; `plate.zarr/0` becomes `plate-0`."""
+    parts = location.parts
+    whole = tuple(
+        ending
+        for one in known_formats().values()
+        if one.folder_endings
+        for ending in (*one.folder_endings, *one.endings)
+    )
+    outermost = (i for i, part in enumerate(parts) if part.endswith(whole))
+    first = next(outermost, len(parts) - 1)
+    return "-".join(_stem(part) for part in parts[first:]) or "dataset"
+
+
+def _stem(name: str) -> str:
+    formats = known_formats().values()
+    own = (ending for one in formats for ending in (*one.endings, *one.folder_endings))
+    for ending in sorted((*own, *_OTHERS), key=len, reverse=True):
+        if name.lower().endswith(ending) and len(name) > len(ending):
+            return name[: -len(ending)]
+    return name
+
+
+def require_apart(source: str | Path, out: Path) -> None:
+    """Raise UsageError if OUT is a local source, or lies inside one (or a folder around it)."""
+    location = Location.of(source)
+    if not location.is_local:
+        return
+    path = Path(location.source)
+    whole = tuple(ending for one in known_formats().values() for ending in one.folder_endings)
+    outermost = next((p for p in [*reversed(path.parents), path] if p.name.endswith(whole)), path)
+    # not Path.resolve, which raises its own error for a ring of links
+    if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(outermost)):
+        raise UsageError(
+            f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
+            "it would write into the data"
+        )

@@ -1,0 +1,83 @@
+"""Open the source in a worker again: by its address, once per process."""
+
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from pathlib import Path
+
+from stereocell import read
+from stereocell.model.spacing import Point, Spacing
+from stereocell.model.tiling import Box
+from stereocell.model.volume import Volume
+from stereocell.read.known_formats import format_of
+from stereocell.storage.workspace import fetch
+
+
+@dataclass(frozen=True, slots=True)
+class SourceRef:
+    """An address and the options of `read.open`.
+
+    spacing_um   (z, y, x), um, or empty for the file's own
+    series       of a source of several images, from 1; 0: the largest
+    pattern      of the names of planes, or empty
+    axes         letters of an array whose format leaves them open, as `czyx`, or empty
+    dark         whether structures are dark, so that values are inverted
+    fingerprint  the planned one, since the address may hold another volume now; empty: any volume
+    """
+
+    source: str
+    time: int
+    spacing_um: tuple[float, ...]
+    series: int = 0
+    fingerprint: str = ""
+    pattern: str = ""
+    axes: str = ""
+    dark: bool = False
+
+    def key_content(self) -> list[object]:
+        """Return what counts in a key: the volume and its reader, never the address."""
+        own = [getattr(self, one.name) for one in fields(self) if one.name != "source"]
+        format = format_of(self.source)
+        return [*own, format.name, format.version]
+
+
+@dataclass(frozen=True, slots=True)
+class Voxels:
+    """One channel of a source, at one level of its pyramid.
+
+    spacing_um  (z, y, x), um, between voxels of that level, as the plan says
+    origin_um   (z, y, x), um: centre of that level's voxel (0, 0, 0)
+    """
+
+    ref: SourceRef
+    channel: int
+    level: int
+    spacing_um: Spacing
+    origin_um: Point
+
+    def read(self, box: Box) -> Volume:
+        """Return the voxels of a box. Raises SourceError."""
+        return open_source(self.ref).read(self.channel, box, self.level)
+
+
+@lru_cache(maxsize=2)
+def open_source(ref: SourceRef) -> read.Dataset:
+    """Return the dataset, opened once for all calls with the same reference."""
+    return open_afresh(ref)
+
+
+def open_afresh(ref: SourceRef) -> read.Dataset:
+    """Return the dataset as the files are now, even if this process opened it before."""
+    fetch(Path(ref.source))  # an added channel's source lies in OUT
+    given = None
+    if ref.spacing_um:
+        z, y, x = ref.spacing_um
+        given = (z, y, x)
+    return read.open(
+        ref.source,
+        time=ref.time,
+        spacing_um=given,
+        series=ref.series,
+        pattern=ref.pattern,
+        axes=ref.axes,
+        dark=ref.dark,
+    )

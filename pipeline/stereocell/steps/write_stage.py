@@ -1,0 +1,70 @@
+"""The step that writes the stage over its tiles. The stage's phase runs it: see phases.py."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from stereocell.engine.step import Keyed
+from stereocell.model.channel import Appearance
+from stereocell.model.object_table import ObjectTable
+from stereocell.model.spacing import Spacing
+from stereocell.steps.write_stage_tile import WriteStageTile, digest_of_table
+from stereocell.storage.file_list import FileList
+from stereocell.usd.write_stage import TileExtent, write_stage
+from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
+from stereocell.usd.written_files import STAGE_NAME, AsWritten, write_list
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """The tables of objects, by the ID of their label map."""
+
+    of_labels: Mapping[str, ObjectTable]
+
+    def key_content(self) -> dict[str, str]:
+        """Return what counts in a key: a digest of each."""
+        return {id_: digest_of_table(table) for id_, table in self.of_labels.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class WriteStage(Keyed):
+    """Write what the tiles of a stage share; the fields are those of `usd.write_stage`."""
+
+    VERSION: ClassVar[int] = 1
+
+    name: str
+    tiles: tuple[WriteStageTile, ...]
+    spacing_um: Spacing
+    appearances: tuple[Appearance, ...]
+    provenance: Mapping[str, Any]
+    modality: str
+    placement: tuple[tuple[float, ...], ...]
+    has_sides: bool
+    opens_cut: bool
+    tables: Tables
+
+    def write(self, stage_dir: Path) -> None:
+        """Write stage.usda and looks/ beside the tiles, which are there."""
+        extents = [
+            TileExtent(tile.id, tile.first_um, tile.last_um, self.spacing_um)
+            for tile in (step.content for step in self.tiles)
+        ]
+        write_stage(
+            stage_dir,
+            self.name,
+            appearances=self.appearances,
+            tiles=extents,
+            provenance=dict(self.provenance),
+            modality=self.modality,
+            placement=self.placement,
+            has_sides=self.has_sides,
+            opens_cut=self.opens_cut,
+            tables=self.tables.of_labels,
+        )
+
+    def write_list(self, stage_dir: Path, tiles: FileList) -> None:
+        """Write specimen.usdz, and last the list of all files; `tiles`: those of the tiles."""
+        stage, small = stage_dir / STAGE_NAME, stage_dir / USDZ_NAME
+        write_usdz(stage, small, as_written=AsWritten({stage_dir.resolve(): tiles}))
+        write_list(stage_dir, tiles, stage_dir / "looks", stage, small)

@@ -1,0 +1,108 @@
+"""Every field of every step changes its key, at any depth, and no place on a disk does."""
+
+import copy
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stereocell.cli.__main__ import main
+from stereocell.engine.step import Keyed
+from stereocell.model.object_table import ObjectTable, SharedWalls
+from stereocell.steps.learn_tissue import LearnTissue
+from support import phantoms
+from support.step_record import find_steps
+
+SHAPE = (16, 24, 48)
+# fields that count by another one, or only name a place
+PLACES = {("SourceRef", "source"), ("Labels", "name"), ("Labels", "shape"), ("Labels", "color")}
+
+
+@pytest.fixture(scope="module")
+def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Keyed]:
+    """One step of each class, of a build of two tiles, two channels and objects."""
+    folder = tmp_path_factory.mktemp("build")
+    field = phantoms.blurred_ball(SHAPE, (1, 1, 1), (8, 12, 24), 6.0, 1.0)
+    counts = phantoms.as_counts(field, 100, 1100, noise=5.0)
+    image, labels = folder / "i.ome.tif", folder / "l.ome.tif"
+    phantoms.write_ome_tiff(image, np.stack([counts, counts[:, ::-1]]), "CZYX")
+    phantoms.write_ome_tiff(labels, (field > 0.5).astype(np.uint16), "ZYX")
+    found: dict[str, Keyed] = {}
+    right = Keyed.key.fget
+    assert right is not None
+
+    def key(self: Keyed) -> str:
+        found[type(self).__name__] = self
+        return str(right(self))
+
+    flags = ["--grid", "2x1", "--labels", f"cells={labels}", "--workers", "0"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Keyed, "key", property(key))
+        assert main(["build", str(image), "-o", str(folder / "out"), *flags]) == 0
+    window = found["FindWindow"]
+    found["LearnTissue"] = LearnTissue(window.voxels, window.region, "MR", {"classes": 3})  # type: ignore[attr-defined]
+    return found
+
+
+def test_the_build_has_a_step_of_each_class(steps: dict[str, Keyed]) -> None:
+    assert steps.keys() == {step.__name__ for step in find_steps()}
+
+
+@pytest.mark.parametrize("name", [step.__name__ for step in find_steps()])
+def test_every_field_changes_the_key_and_no_place_does(steps: dict[str, Keyed], name: str) -> None:
+    step = steps[name]
+    changed = 0
+    for path, other in variants(step):
+        if path[-1] in PLACES:
+            assert other.key == step.key, path
+        else:
+            assert other.key != step.key, path
+            changed += 1
+    assert changed >= len(fields(step))  # type: ignore[arg-type]
+
+
+Path_ = tuple[tuple[str, str], ...]  # of class and field, from the step inwards
+
+
+def variants(value: Any) -> Iterator[tuple[Path_, Any]]:
+    """Yield a copy of a dataclass for each of its values, at any depth, with that one changed."""
+    for one in fields(value):
+        here = (type(value).__name__, one.name)
+        for path, other in _others(getattr(value, one.name)):
+            changed = copy.copy(value)
+            object.__setattr__(changed, one.name, other)
+            yield (here, *path), changed
+
+
+def _others(value: Any) -> Iterator[tuple[Path_, Any]]:
+    if isinstance(value, ObjectTable):
+        yield (), replace(value, labels=np.append(value.labels, np.uint64(7)))
+    elif isinstance(value, SharedWalls):
+        yield (), replace(value, area_um2=np.append(value.area_um2, 1.0))
+    elif is_dataclass(value) and fields(value):
+        yield from variants(value)
+    elif isinstance(value, np.ndarray):
+        yield (), np.append(value, np.ones(1, value.dtype))
+    elif isinstance(value, Mapping):
+        yield (), {**value, "another": next(iter(value.values()), 1)}
+        for name, one in value.items():
+            for path, other in _others(one):
+                yield path, {**value, name: other}
+    elif isinstance(value, tuple):
+        yield (), (*value, value[-1] if value else 7)
+        for place, one in enumerate(value[:2]):
+            for path, other in _others(one):
+                yield path, (*value[:place], other, *value[place + 1 :])
+    elif isinstance(value, frozenset):
+        yield (), value | {"another"}
+    elif isinstance(value, Path):
+        yield (), value / "another"
+    elif isinstance(value, bool):
+        yield (), not value
+    elif isinstance(value, int | float):
+        yield (), value + 1
+    else:
+        yield (), f"another {value}"
