@@ -1,10 +1,8 @@
 """Builds of label maps from end to end: which tile has which object, the table, edits, resuming."""
 
 import json
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,37 +14,21 @@ from stereocell import samples
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import Passes
 from stereocell.bundle.write import write_bundle
-from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
-from stereocell.objects import build_objects as building
-from stereocell.objects.build_objects import BuiltObjects
-from stereocell.objects.intensities import Measured
-from stereocell.objects.walls import Walls
 from stereocell.planning import label_numbers
 from stereocell.planning.located_objects import CUT
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
-from stereocell.steps import build_objects as objects_maker
 from stereocell.steps.unit_files import load_objects
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
 from support.dicom_series import sample as scene_on
 from support.digests import digests_of
 from support.exhaustive import sweep
+from support.label_builds import PHASES, boxes, build, column_of, labels_of, objects_of, run, said
 from support.phantoms import write_ome_tiff
 
 SHAPE = (24, 48, 96)
-PHASES = ("plan", "units", "stage", "bundle")
-
-
-def run(*arguments: object) -> int:
-    return main([str(argument) for argument in arguments])
-
-
-def build(source: Path, out: Path, *flags: object) -> None:
-    assert run("plan", source, "-o", out, *flags) == 0
-    for phase in PHASES[1:]:
-        assert run(phase, out, "--workers", 0) == 0
 
 
 @pytest.fixture(scope="module")
@@ -72,23 +54,6 @@ def out(sample: Path) -> Path:
         *("--labels", "cells", "--table", table),
     )
     return out
-
-
-def said(capsys: pytest.CaptureFixture[str]) -> str:
-    return "".join(capsys.readouterr())
-
-
-def objects_of(out: Path) -> dict:
-    return json.loads((out / "bundle/channels/cells/objects.json").read_text("utf-8"))
-
-
-def column_of(out: Path, column_id: str) -> np.ndarray:
-    entry = next(one for one in objects_of(out)["columns"] if one["id"] == column_id)
-    return np.fromfile(out / "bundle" / entry["exact"]["path"], "<f4")
-
-
-def labels_of(out: Path) -> np.ndarray:
-    return np.fromfile(out / "bundle" / objects_of(out)["labels"]["path"], "<u4")
 
 
 @pytest.mark.slow
@@ -168,7 +133,7 @@ def test_classes_of_other_names_reach_the_bundle(out: Path, tmp_path: Path) -> N
     kinds.SetCustomDataByKey("categories", Vt.StringArray(names))
     layer.Save()
     write_bundle(out / "stage/names.usda", tmp_path / "bundle", None, run=Engine(0).run)
-    content = json.loads((tmp_path / "bundle/channels/cells/objects.json").read_text("utf-8"))
+    content = objects_of(tmp_path)
     (column,) = (one for one in content["columns"] if one["id"] == "cell_type")
     assert column["categories"] == names
     assert len(column["colors"]) == len(names)
@@ -302,20 +267,18 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
     assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
     assert "organs: objects larger than a tile and half around it, 40 x 80 x 80 um" in said(capsys)
     folder = out / "bundle/channels/organs"
-    content = json.loads((folder / "objects.json").read_text("utf-8"))
+    content = objects_of(out, "organs")
     assert content["count"] == 2
-    labels_there = np.fromfile(out / "bundle" / content["labels"]["path"], "<u4").tolist()
-    row = labels_there.index(5)
+    row = labels_of(out, "organs").tolist().index(5)
     assert row == 1  # what is in several tiles comes last
     held = [
         [*range(tile["first"], tile["first"] + tile["count"]), *tile.get("more", [])]
         for tile in content["tiles"].values()
     ]
     assert [row in rows for rows in held] == [True, True, True]
-    by_id = {one["id"]: one for one in content["columns"]}
-    volume = np.fromfile(out / "bundle" / by_id["volume_um3"]["exact"]["path"], "<f4")[row]
+    volume = column_of(out, "volume_um3", "organs")[row]
     assert volume == (labels == 5).sum()
-    area = np.fromfile(out / "bundle" / by_id["area_um2"]["exact"]["path"], "<f4")[row]
+    area = column_of(out, "area_um2", "organs")[row]
     radius = np.sqrt(volume / 120 / np.pi)
     assert area == pytest.approx(2 * np.pi * radius * (radius + 120), rel=0.05)  # no caps inside
     # the pieces meet: what one ends with, the next begins with
@@ -333,8 +296,7 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
 
 @pytest.mark.slow
 def test_an_object_in_pieces_has_the_percentile_of_all_its_voxels(tmp_path: Path) -> None:
-    labels = np.zeros((16, 24, 90), np.uint16)
-    labels[3:13, 4:20, 2:88] = 7
+    labels = boxes((7, 2, 88), shape=(16, 24, 90))
     rng = np.random.default_rng(3)
     image = (1000 * rng.gamma(2.0, 1 + np.arange(90) / 20, labels.shape)).astype(np.uint16)
     tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
@@ -431,8 +393,7 @@ def test_of_two_label_maps_the_first_one_has_the_table(
     out, flags = tmp_path / "small", (*flags, *more, "--color-by", "score", "--grid", "2x1")
     build(sample, out, *flags)
     assert objects_of(out)["default"] == "score"
-    again_there = json.loads((out / "bundle/channels/again/objects.json").read_text("utf-8"))
-    assert again_there["default"] != "score"
+    assert objects_of(out, "again")["default"] != "score"
     said(capsys)
     told = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
     assert "--color-by is 'scores', expected one of volume, area, " in told
@@ -502,54 +463,18 @@ def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> 
     path = write_segmentation(tmp_path, "BINARY", voxels, omit_empty=omit_empty)
     out = tmp_path / "out"
     build(tmp_path / "images", out, "--labels", f"organs={path}")
-    content = json.loads((out / "bundle/channels/organs/objects.json").read_text("utf-8"))
-    by_id = {one["id"]: one for one in content["columns"]}
-
-    def exact(column_id: str) -> np.ndarray:
-        return np.fromfile(out / "bundle" / by_id[column_id]["exact"]["path"], "<f4")
-
-    labels = np.fromfile(out / "bundle" / content["labels"]["path"], "<u4").tolist()
+    labels = labels_of(out, "organs").tolist()
     order = [labels.index(number) for number in (1, 2)]
     voxel = float(np.prod(SPACING)) * 1e9
-    assert exact("volume_um3")[order] == pytest.approx([240 * voxel, 125 * voxel], rel=1e-6)
-    means = next(name for name in by_id if name.startswith("mean"))
+    assert column_of(out, "volume_um3", "organs")[order] == pytest.approx(
+        [240 * voxel, 125 * voxel], rel=1e-6
+    )
+    ids = [one["id"] for one in objects_of(out, "organs")["columns"]]
+    means = next(name for name in ids if name.startswith("mean"))
     affine = grid(shape=voxels.shape[:3], spacing=SPACING)
     image = np.rint(scene_on(affine, voxels.shape[:3]))
     expected = [image[voxels[..., i] > 0].mean() for i in (0, 1)]
-    assert exact(means)[order] == pytest.approx(expected, rel=1e-5)
-
-
-@pytest.mark.slow
-def test_the_report_and_the_deep_check_tell_of_objects(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    labels = make_tissue(SHAPE, 3).labels
-    source, out = tmp_path / "mask.tif", tmp_path / "out"
-    tifffile.imwrite(source, labels.astype(np.uint16), metadata={"axes": "ZYX"})
-    build(source, out, "--labels", "cells=.", "--spacing-um", "1,0.5,0.5", "--grid", "2x1")
-    count = len(labels_of(out))
-    assert run("report", out) == 0
-    page = (out / "report/index.html").read_text("utf-8")
-    assert f"cells: {count} objects</h3>" in page
-    said(capsys)
-    assert run("check", out, "--deep", "--workers", 0) == 0
-    told = said(capsys)
-    assert f"ok   cells against source: {count} objects" in told
-    assert "ok   bundle against stage: 8 surfaces" in told
-
-    # a value that nobody counted, in one tile and level, and a surface that is too small
-    layer = Sdf.Layer.FindOrOpen(str(out / "stage/tiles/r0_c0/tile.usdc"))
-    stage = Usd.Stage.Open(layer)
-    stage.GetDefaultPrim().GetVariantSet("lod").SetVariantSelection("lod0")
-    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/r0_c0/cells/cells_r0_c0"))
-    with stage.GetDefaultPrim().GetVariantSet("lod").GetVariantEditContext():
-        areas = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("area_um2")
-        areas.Set(Vt.FloatArray([2.0, *list(areas.Get())[1:]]))
-    layer.Save()
-    assert run("check", out, "--deep", "--workers", 0) == 1
-    first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
-    wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
-    assert wanted in said(capsys)
+    assert column_of(out, means, "organs")[order] == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.slow
@@ -575,136 +500,6 @@ def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: st
     assert set(found) == {(3, 5), (5, 3), (5, 8), (8, 5)}
     for one, other, area in ((3, 5, 160), (5, 8, 80)):
         assert found[one, other] == found[other, one] == pytest.approx(0.1 * area, rel=0.05)
-
-
-@pytest.mark.slow
-def test_levels_that_stop_early_are_told_of(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    labels = np.zeros((16, 24, 24), np.uint16)
-    labels[3:13, 4:20, 4:20] = 3
-    write_ome_tiff(tmp_path / "l.ome.tif", labels)
-    right = building.simplify_walls
-
-    def simplify_walls(walls: Walls, error: float, *given: Any, **named: Any) -> Any:
-        return (walls, False) if error > 0.2 else right(walls, error, *given, **named)
-
-    monkeypatch.setattr(building, "simplify_walls", simplify_walls)
-    build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".")
-    wanted = "l: lod3 has more triangles or other volumes than are asked for in r0_c0: triangles"
-    told = said(capsys)
-    assert wanted in told
-    assert "lod2 has" not in told
-    assert run("report", tmp_path / "out") == 0
-    assert wanted in (tmp_path / "out/report/index.html").read_text("utf-8")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("measure_of", sweep(["mean", "p95"], kept=["p95"]))
-def test_the_deep_check_measures_the_image_anew(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    measure_of: str,
-) -> None:
-    """A unit that counted wrong: the stage has what it said, the voxels have not."""
-    labels = np.zeros((16, 24, 60), np.uint16)
-    labels[3:13, 4:20, 4:20], labels[3:13, 4:20, 24:36], labels[3:13, 4:20, 40:56] = 3, 5, 8
-    image = np.random.default_rng(3).poisson(300, labels.shape).astype(np.uint16)
-    tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
-    write_ome_tiff(tmp_path / "i.ome.tif", image, names=["DNA"])
-    flags = ("--labels", f"cells={tmp_path / 'l.tif'}", "--grid", "2x1")
-    build(tmp_path / "i.ome.tif", tmp_path / "right", *flags)
-    assert run("check", tmp_path / "right", "--deep", "--workers", 0) == 0
-    right = objects_maker.measure_intensities
-
-    def measure(*given: Any, **named: Any) -> Measured:
-        found = right(*given, **named)
-        getattr(found, measure_of)[-1] += 30
-        return found
-
-    monkeypatch.setattr(objects_maker, "measure_intensities", measure)
-    build(tmp_path / "i.ome.tif", tmp_path / "wrong", *flags)
-    said(capsys)
-    assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
-    told = said(capsys)  # of the last object of each tile
-    assert f"cells: column {measure_of}_DNA is not the voxels' {measure_of} of 3, 8" in told
-    assert told.count("voxels'") == 1
-
-
-@pytest.mark.slow
-def test_the_deep_check_measures_the_surfaces_anew(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    labels = np.zeros((16, 24, 24), np.uint16)
-    labels[3:13, 4:20, 4:20] = 3
-    write_ome_tiff(tmp_path / "l.ome.tif", labels)
-    right = objects_maker.build_objects
-
-    def build_objects(*given: Any, **named: Any) -> BuiltObjects:
-        built = right(*given, **named)
-        return replace(built, areas_um2=1.1 * built.areas_um2)
-
-    monkeypatch.setattr(objects_maker, "build_objects", build_objects)
-    build(tmp_path / "l.ome.tif", tmp_path / "wrong", "--labels", ".")
-    said(capsys)
-    assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
-    assert "column area_um2 is not that of the surface of 3" in said(capsys)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "fault",
-    sweep(
-        ["none", "a wall too many", "a wall that is missing", "smaller"],
-        kept=["a wall too many", "a wall that is missing", "smaller"],
-    ),
-)
-@pytest.mark.parametrize("grid", sweep(["1x1", "2x1"], kept=["2x1"]))
-def test_the_deep_check_finds_shared_walls_anew(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    grid: str,
-    fault: str,
-) -> None:
-    """Two boxes that touch, in one tile or at the plane between two, and one by itself."""
-    labels = np.zeros((16, 24, 72), np.uint16)
-    labels[3:13, 4:20, 22:36], labels[3:13, 4:20, 36:50], labels[3:13, 4:20, 54:66] = 3, 5, 8
-    write_ome_tiff(tmp_path / "l.ome.tif", labels)
-    right = objects_maker.build_objects
-
-    def build_objects(labels: np.ndarray, owned: np.ndarray, **named: Any) -> BuiltObjects:
-        built = right(labels, owned, **named)
-        walls, areas = built.walls, built.wall_um2
-        if fault == "a wall too many":
-            walls = np.concatenate([walls, [[0, walls[0, 1] + 1]]]).astype(np.int32)
-            areas = np.append(areas, 0.01)
-        elif fault == "a wall that is missing":
-            walls, areas = walls[1:], areas[1:]
-        elif fault == "smaller":
-            areas = 0.7 * areas
-        return replace(built, walls=walls, wall_um2=areas)
-
-    monkeypatch.setattr(objects_maker, "build_objects", build_objects)
-    build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".", "--grid", grid)
-    said(capsys)
-    assert run("check", tmp_path / "out", "--deep", "--workers", 0) == (fault != "none")
-    told = said(capsys)
-    odd = {
-        column
-        for column in ("neighbours", "contact")
-        if f"column {column} is not that of the surface of" in told
-    }
-    assert (
-        odd
-        == {
-            "none": set(),
-            "a wall too many": {"neighbours"},
-            "a wall that is missing": {"neighbours", "contact"},
-            "smaller": {"contact"},
-        }[fault]
-    )
 
 
 @pytest.mark.slow

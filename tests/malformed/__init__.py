@@ -6,7 +6,8 @@ base.py         the sound files that are spoilt
 trial.py        one case in a process of its own, and what is wrong with how it ended
 __main__.py     `python tests/malformed`: all of them, and a table
 
-Beside these hand-written cases there are small random changes, repeatable by their seeds:
+Beside these hand-written cases there are small random changes of every format (flipped bits, cuts,
+zeros, other numbers), repeatable by their seeds. A format of subjects.py has no such cases above:
 
 subjects.py        an intact source of every format
 mutations.py       kinds of changes

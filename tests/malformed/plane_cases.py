@@ -62,9 +62,6 @@ def _described() -> Iterator[Case]:
 
 def _spoilt() -> Iterator[Case]:
     writers: dict[str, Callable[[Path], Any]] = {
-        "imagej": lambda path: tifffile.imwrite(
-            path, _VOXELS, imagej=True, metadata={"axes": "ZYX", "Labels": ["a"] * 6}
-        ),
         "lsm": lambda path: write_lsm(path, _VOXELS[:, None], (2, 1, 1), {"A": (255, 0, 0)}),
         "stk": lambda path: write_stk(path, _VOXELS, (2, 1, 1)),
         "ndtiff": lambda path: write_ndtiff(path, _VOXELS[None], ["A"]),

@@ -1,9 +1,8 @@
 """The websocket `/bricks`: order, windows, budgets, caches, and what is closed with which code."""
 
 import json
-import time
 from contextlib import contextmanager, suppress
-from threading import Event, Thread
+from threading import Event
 
 import numpy as np
 import pytest
@@ -11,9 +10,9 @@ from websockets.exceptions import ConnectionClosed
 
 from stereocell.formats import voxel_bvh
 from stereocell.serve import brick_library, brick_session
-from stereocell.serve.server import BundleServer
 from support.server.brick_bundles import phantom, replace_volume, write_out
 from support.server.brick_client import BrickClient, look_at, psnr, reconstruct
+from support.server.running import serving
 from support.server.timeouts import PATIENCE_S, connect
 
 VOLUME = phantom()
@@ -31,24 +30,10 @@ def out(tmp_path_factory):
     return folder
 
 
-@contextmanager
-def serving(out):
-    server = BundleServer(out, 0, lan=False)
-    thread = Thread(target=server.run)
-    thread.start()
-    try:
-        while not server.has_started:
-            time.sleep(0.01)
-        yield server.port
-    finally:
-        server.stop()
-        thread.join()
-
-
 @pytest.fixture(scope="module")
 def port(out):
-    with serving(out) as found:
-        yield found
+    with serving(out) as server:
+        yield server.port
 
 
 class Talk:
@@ -364,7 +349,7 @@ def test_unknown_volumes_are_told_and_the_connection_goes_on(port):
 def test_a_damaged_volume_is_told_here_in_full_and_there_without_folders(tmp_path, caplog):
     out = write_out(tmp_path / "out", VOLUME)
     (out / "bundle/volumes/r0_c0/CD31.ktx2").write_bytes(b"spoilt")
-    with serving(out) as port, talk(port) as t:
+    with serving(out) as server, talk(server.port) as t:
         t.say({"type": "open", "volumes": [CD31]})
         error = t.until("error")
         assert error["code"] == "damaged"
@@ -387,7 +372,7 @@ def test_two_trees_in_a_view_are_both_sent(port):
 
 def test_a_bundle_written_anew_ends_the_connection(tmp_path):
     out = write_out(tmp_path / "out", VOLUME)
-    with serving(out) as port, talk(port) as t:
+    with serving(out) as server, talk(server.port) as t:
         t.open()
         replace_volume(out / "bundle", 255 - VOLUME)
         t.look()

@@ -5,10 +5,9 @@ import json
 import socket
 import ssl
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from threading import Thread
 
 import pytest
 
@@ -17,25 +16,12 @@ from stereocell.serve.deadline import HeadDeadline
 from stereocell.serve.lifetime import Lifetime
 from stereocell.serve.limits import HEAD_S
 from stereocell.serve.server import BundleServer
+from support.server.running import serving
 from support.server.timeouts import PATIENCE_S, connect
 
 GET = b"GET /index.html HTTP/1.1\r\nHost: localhost\r\n"
 DEADLINE_S = 0.5
 Opener = Callable[[BundleServer], socket.socket]
-
-
-@contextmanager
-def serving(out: Path, lan: bool) -> Iterator[BundleServer]:
-    server = BundleServer(out, 0, lan)
-    thread = Thread(target=server.run)
-    thread.start()
-    while not server.has_started:
-        time.sleep(0.01)
-    try:
-        yield server
-    finally:
-        server.stop()
-        thread.join()
 
 
 @pytest.fixture

@@ -9,10 +9,8 @@ import socket
 import ssl
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from subprocess import PIPE
-from threading import Thread
 from urllib.request import urlopen
 
 import pytest
@@ -28,6 +26,7 @@ from stereocell.serve.lan import draw_qr, find_addresses, find_names, make_certi
 from stereocell.serve.server import BundleServer
 from support import plain_bundle
 from support.exhaustive import sweep
+from support.server.running import serving
 from support.server.timeouts import PATIENCE_S, connect
 
 
@@ -45,14 +44,8 @@ def server(tmp_path, monkeypatch):
     (folder / "manifest.json").write_text("{}")
     (folder / "index.html").write_text("<!doctype html>")
     monkeypatch.setattr(serve_module, "find_addresses", lambda: ["127.0.0.1"])
-    found = BundleServer(tmp_path, 0, lan=True)
-    thread = Thread(target=found.run)
-    thread.start()
-    while not found.has_started:
-        time.sleep(0.01)
-    yield found
-    found.stop()
-    thread.join()
+    with serving(tmp_path, lan=True) as found:
+        yield found
 
 
 @pytest.fixture
@@ -249,7 +242,7 @@ def test_the_code_is_drawn_without_blocks_where_the_terminal_has_none():
 
 
 @contextmanager
-def serving(arguments, encoding):
+def serving_command(arguments, encoding):
     command = [sys.executable, "-m", "stereocell.cli", "serve", *arguments, "--port", "0"]
     environment = {**os.environ, "PYTHONIOENCODING": encoding}
     with subprocess.Popen(
@@ -267,12 +260,12 @@ def serving(arguments, encoding):
 def test_a_program_is_told_the_address_in_json_and_a_person_in_any_encoding(tmp_path, encoding):
     bundle = tmp_path / "\u00fc\u4e2d" / "bundle"
     plain_bundle.write(bundle.parent, plain_bundle.FILES)
-    with serving([str(bundle.parent)], encoding) as process:
+    with serving_command([str(bundle.parent)], encoding) as process:
         line = process.stdout.readline()
         assert line.startswith("http://localhost:")
         shown = str(bundle).encode(encoding, "backslashreplace").decode(encoding)
         assert f" shows {shown}; Ctrl+C ends it" in line
-    with serving([str(bundle.parent), "--json"], encoding) as process:
+    with serving_command([str(bundle.parent), "--json"], encoding) as process:
         told = json.loads(process.stdout.readline())
         assert told["bundle"] == str(bundle)
         assert (told["bricks"], told["fingerprint"]) == (True, "")

@@ -8,16 +8,15 @@ import socket
 import struct
 import time
 from contextlib import contextmanager, suppress
-from threading import Thread
 
 import pytest
 from websockets.exceptions import ConnectionClosed
 
 from stereocell.serve.limits import MESSAGE_BYTES
-from stereocell.serve.server import BundleServer
 from support.exhaustive import examples
 from support.server.brick_bundles import phantom, write_out
 from support.server.brick_client import BrickClient, look_at
+from support.server.running import serving
 from support.server.timeouts import PATIENCE_S, connect
 
 CAMERA = look_at((44, -36, 300), (44, -36, 29))
@@ -120,14 +119,8 @@ def raw_frames():
 @pytest.fixture(scope="module")
 def port(tmp_path_factory):
     out = write_out(tmp_path_factory.mktemp("malformed") / "out", phantom())
-    server = BundleServer(out, 0, lan=False)
-    thread = Thread(target=server.run)
-    thread.start()
-    while not server.has_started:
-        time.sleep(0.01)
-    yield server.port
-    server.stop()
-    thread.join()
+    with serving(out) as server:
+        yield server.port
 
 
 def is_well(port):

@@ -2,11 +2,7 @@
 
 import json
 import shutil
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from threading import Thread
 from typing import Any
 from urllib.parse import quote
 
@@ -14,9 +10,9 @@ import numpy as np
 import pytest
 
 from stereocell.serve.measured_values import parse_place
-from stereocell.serve.server import BundleServer
 from support.phantoms import write_ome_tiff
 from support.server.requests import ask
+from support.server.running import serving
 from support.validators import make_assets
 
 SPACING_UM = (0.5, 0.25, 0.25)
@@ -41,20 +37,6 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build(tmp_path_factory.mktemp("values"))
 
 
-@contextmanager
-def served(out: Path) -> Iterator[int]:
-    server = BundleServer(out, 0, lan=False)
-    thread = Thread(target=server.run)
-    thread.start()
-    while not server.has_started:
-        time.sleep(0.01)
-    try:
-        yield server.port
-    finally:
-        server.stop()
-        thread.join()
-
-
 def value(port: int, place: str, at: str) -> float | None:
     response, body = ask(port, f"/values/{place}?at={quote(at)}")
     assert response.status == 200
@@ -69,7 +51,8 @@ def at_voxel(z: float, y: float, x: float) -> str:
 @pytest.mark.slow
 def test_every_voxel_has_the_value_that_was_measured(out: Path) -> None:
     rng = np.random.default_rng(0)
-    with served(out) as port:
+    with serving(out) as server:
+        port = server.port
         response, _ = ask(port, "/manifest.json")
         assert response.headers["Stereocell-Values"] == "version=1"
         for _ in range(40):
@@ -84,7 +67,8 @@ def test_every_voxel_has_the_value_that_was_measured(out: Path) -> None:
 
 @pytest.mark.slow
 def test_what_lies_elsewhere_has_no_value(out: Path) -> None:
-    with served(out) as port:
+    with serving(out) as server:
+        port = server.port
         for place, at in (
             ("r0_c0/F", at_voxel(3, 4, 20)),
             ("r0_c0/F", at_voxel(-1, 4, 3)),
@@ -100,7 +84,8 @@ def test_what_lies_elsewhere_has_no_value(out: Path) -> None:
 @pytest.mark.parametrize("at", ["", "1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", "1," * 200])
 def test_a_place_that_is_none_is_refused(out: Path, at: str) -> None:
     assert parse_place(at) is None
-    with served(out) as port:
+    with serving(out) as server:
+        port = server.port
         response, body = ask(port, f"/values/r0_c0/F?at={at}")
         assert (response.status, body) == (400, b"at: expected x,y,z in um")
 
@@ -109,16 +94,19 @@ def test_a_place_that_is_none_is_refused(out: Path, at: str) -> None:
 def test_a_stage_that_is_not_the_bundle_s_any_more_tells_nothing(out: Path, tmp_path: Path) -> None:
     at = at_voxel(3, 4, 5)
     other = build(tmp_path, "--window", "F=-500:0")
-    with served(other) as port:
+    with serving(other) as server:
+        port = server.port
         assert value(port, "r0_c0/F", at) == counts()[3, 4, 5]
     shutil.rmtree(other / "bundle")
     shutil.copytree(out / "bundle", other / "bundle")
-    with served(other) as port:
+    with serving(other) as server:
+        port = server.port
         assert value(port, "r0_c0/F", at) is None
 
 
 def test_without_a_stage_there_is_nothing_to_ask(out: Path, tmp_path: Path) -> None:
-    with served(shutil.copytree(out / "bundle", tmp_path / "alone")) as port:
+    with serving(shutil.copytree(out / "bundle", tmp_path / "alone")) as server:
+        port = server.port
         response, _ = ask(port, "/manifest.json")
         assert "Stereocell-Values" not in response.headers
         response, _ = ask(port, f"/values/r0_c0/F?at={at_voxel(1, 1, 1)}")

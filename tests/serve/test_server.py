@@ -2,10 +2,8 @@
 
 import gzip
 import socket
-import time
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Thread
 
 import pytest
 from websockets.exceptions import InvalidStatus
@@ -16,6 +14,7 @@ from stereocell.serve import server as serve_module
 from stereocell.serve.server import LOCALHOST, BundleServer
 from stereocell.serve.static_files import accepted_encodings, parse_range
 from support.server.requests import ask
+from support.server.running import running, serving
 from support.server.timeouts import PATIENCE_S, connect
 
 DATA = bytes(range(256)) * 1000
@@ -40,20 +39,10 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def running(server: BundleServer) -> Iterator[int]:
-    """Run a server in a thread, and give its port until it is not needed any more."""
-    thread = Thread(target=server.run)
-    thread.start()
-    while not server.has_started:
-        time.sleep(0.01)
-    yield server.port
-    server.stop()
-    thread.join()
-
-
 @pytest.fixture(scope="module")
 def port(bundle: Path) -> Iterator[int]:
-    yield from running(BundleServer(bundle.parent, 0, lan=False))
+    with serving(bundle.parent) as server:
+        yield server.port
 
 
 def test_a_range_is_answered_with_its_bytes(port: int) -> None:
@@ -299,7 +288,8 @@ def test_pages_of_other_sites_may_lead_here_and_no_more(
 @pytest.fixture(scope="module")
 def framed(bundle: Path) -> Iterator[int]:
     server = BundleServer(bundle.parent, 0, lan=False, frames=("https://lab.example",))
-    yield from running(server)
+    with running(server):
+        yield server.port
 
 
 def test_a_page_that_is_allowed_may_hold_the_viewer_in_a_frame(framed: int) -> None:
@@ -393,21 +383,13 @@ def test_a_bundle_is_served_by_its_own_folder_with_bricks_where_it_is_a_builds(
     (tmp_path / "out" / "plan.json").write_text("{}")
     monkeypatch.chdir(of_build)
     for folder, has_bricks in ((of_build, True), (Path(), True), (by_itself, False)):
-        server = BundleServer(folder, 0, lan=False)
-        thread = Thread(target=server.run)
-        thread.start()
-        while not server.has_started:
-            time.sleep(0.01)
-        try:
+        with serving(folder) as server:
             response, body = ask(server.port, "/manifest.json")
             assert (response.status, body) == (200, b"{}")
             assert ("Stereocell-Bricks" in response.headers) == has_bricks
             if not has_bricks:
                 with pytest.raises(InvalidStatus), connect(f"ws://localhost:{server.port}/bricks"):
                     pass
-        finally:
-            server.stop()
-            thread.join()
 
 
 def test_a_taken_port_is_named(bundle: Path) -> None:

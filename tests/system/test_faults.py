@@ -25,6 +25,7 @@ from stereocell.model.errors import SourceError
 from stereocell.storage import location
 from stereocell.storage.location import Location
 from support import phantoms
+from support.error_lines import error_line
 from support.faulty_object_store import FAULTS, Faults, before
 from support.object_store import ObjectStore, serving
 from support.torture import asset_digests
@@ -52,13 +53,6 @@ def assets(digests: dict[str, str]) -> dict[str, str]:
     return {name: digest for name, digest in digests.items() if not name.startswith("units/")}
 
 
-def only_line(capsys: pytest.CaptureFixture[str]) -> str:
-    printed = capsys.readouterr().err
-    assert "Traceback" not in printed
-    (line,) = [line for line in printed.splitlines() if line.startswith("stereocell: ")]
-    return line
-
-
 @pytest.mark.slow
 def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
     volume: Path,
@@ -76,7 +70,7 @@ def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
 
     monkeypatch.setattr(phases, "save_survey", vanish)
     assert make_assets(volume, out, GRID, "--workers", "0") == 1
-    assert "f.ome.zarr: " in only_line(capsys)
+    assert "f.ome.zarr: " in error_line(capsys)
     assert not list(out.rglob("unit.json"))
     monkeypatch.undo()
     away.rename(volume)
@@ -125,7 +119,7 @@ def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
     for phase in (["plan", str(volume), "-o", str(out), "--grid", GRID], ["units", str(out)]):
         remount("ro")
         assert main(phase) == 1
-        line = only_line(capsys)
+        line = error_line(capsys)
         assert str(out) in line
         assert "Read-only file system" in line
         remount("rw")
@@ -289,7 +283,7 @@ def test_a_store_that_is_down_is_named_and_the_build_goes_on_when_it_is_up(
             assert main(["units", out, "--workers", "0"]) == 1
         finally:
             faults.rate, faults.only = 0, FAULTS
-        assert "s3://bucket/" in only_line(capsys)
+        assert "s3://bucket/" in error_line(capsys)
     assert make_assets(source, out, GRID, "--workers", "0") == 0
     assert kept(files, "bucket/down", tmp_path / "down") == undisturbed
 
@@ -320,7 +314,7 @@ def test_a_silent_store_is_told_in_a_line(
     out = tmp_path / "out" if source else "s3://b/out"
     assert main(["plan", source or str(volume), "-o", str(out)]) == 1
     where = source or out
-    assert only_line(capsys).startswith(f"stereocell: {where}: no answer within ")
+    assert error_line(capsys).startswith(f"stereocell: {where}: no answer within ")
 
 
 class Moody(SimpleHTTPRequestHandler):

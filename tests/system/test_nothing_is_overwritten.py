@@ -12,6 +12,7 @@ from stereocell.cli.__main__ import main
 from stereocell.cli.places import PLACES
 from stereocell.export.write import ENDINGS
 from support.digests import digests_of
+from support.error_lines import error_line
 from support.outputs import make_build, make_source
 
 Given = Callable[[Path, Path, Path], list[object]]  # source, its build, the place of the result
@@ -114,13 +115,6 @@ def _lay(kind: str, place: Path, other: Path) -> None:
         shutil.copytree(other, place)
 
 
-def _line(capfd: pytest.CaptureFixture[str]) -> str:
-    said = capfd.readouterr().err
-    assert "Traceback" not in said
-    (line,) = [line for line in said.splitlines() if line.startswith("stereocell: ")]
-    return line
-
-
 def _run(trial: str, builds: tuple[Path, Path], place: Path, *more: str) -> int:
     one, _ = builds
     source = one.parent / "f.ome.tif"
@@ -156,7 +150,7 @@ def test_what_others_put_there_stays_and_is_named_before_any_work(
     before = digests_of(tmp_path)
     capfd.readouterr()
     assert _run(trial, builds, place) == 1
-    line = _line(capfd)
+    line = error_line(capfd)
     assert str(place) in line
     assert "expected" in line or "choose another OUT" in line
     assert ("--force" in line) == (trial not in OF_A_BUILD and (trial, kind) not in NOT_FORCED)
@@ -225,7 +219,7 @@ def test_sample_of_another_seed_is_refused_before_it_is_made(
     capfd.readouterr()
     monkeypatch.setattr(f"stereocell.samples.{work}", lambda *_, **__: pytest.fail("it is made"))
     assert main(["sample", *words, "--seed", "7"]) == 1
-    assert "expected nothing or this very sample" in _line(capfd)
+    assert "expected nothing or this very sample" in error_line(capfd)
     assert digests_of(tmp_path) == before
 
 
@@ -244,7 +238,7 @@ def test_text_beside_exported_voxels_is_guarded_before_the_work(
     (tmp_path / beside).write_bytes(WORK)
     monkeypatch.setattr("stereocell.export.write.Chosen", lambda *_: pytest.fail("it is made"))
     assert main(words) == 1
-    assert beside in _line(capfd)
+    assert beside in error_line(capfd)
     assert (tmp_path / beside).read_bytes() == WORK
 
 
@@ -259,5 +253,5 @@ def test_tissue_is_not_learned_where_the_bundle_is_of_somebody_else(
     before = digests_of(out)
     monkeypatch.setattr("stereocell.building.tissue._learn", lambda *_: pytest.fail("it learns"))
     assert main(["tissue", str(out), "--classes", "2"]) == 1
-    assert "thesis.tex" in _line(capfd)
+    assert "thesis.tex" in error_line(capfd)
     assert digests_of(out) == before

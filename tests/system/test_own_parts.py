@@ -11,6 +11,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.errors import OutputError
 from stereocell.verify.formats import check
 from support.digests import digests_of
+from support.error_lines import error_line
 from support.outputs import make_build, make_source
 
 WORK = "years of work"
@@ -31,13 +32,6 @@ def out(builds: Path, tmp_path: Path) -> Path:
     return shutil.copytree(builds / "f", tmp_path / "out")
 
 
-def _line(capfd: pytest.CaptureFixture[str]) -> str:
-    said = capfd.readouterr().err
-    assert "Traceback" not in said
-    (line,) = [line for line in said.splitlines() if line.startswith("stereocell: ")]
-    return line
-
-
 def _results(out: Path) -> dict[str, str]:
     parts = ("stage/", "bundle/")
     return {name: digest for name, digest in digests_of(out).items() if name.startswith(parts)}
@@ -52,13 +46,13 @@ def test_another_input_takes_an_out_by_force_alone_and_leaves_nothing_of_the_fir
     before = digests_of(out)
     words = [str(builds / "g.ome.tif"), "-o", str(out), *FLAGS, "--grid", "1x1"]
     assert main(["build", *words]) == 1
-    line = _line(capfd)
+    line = error_line(capfd)
     assert f"{out}: holds a build of 'f' (fingerprint " in line
     assert "not of 'g'" in line
     assert "choose another OUT, or --force replaces it" in line
     (out / "plan.json").unlink()  # what it was made of is known all the same
     assert main(["build", *words]) == 1
-    assert "holds a build of another input (fingerprint" in _line(capfd)
+    assert "holds a build of another input (fingerprint" in error_line(capfd)
     shutil.copy(builds / "f" / "plan.json", out)
     assert digests_of(out) == before
     with pytest.raises(OutputError, match="force=True replaces it"):
@@ -91,7 +85,7 @@ def test_settings_of_a_person_in_out_are_not_replaced(
     file.write_text(own)
     plan = ["plan", str(builds / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
     assert main(plan) == 1
-    line = _line(capfd)
+    line = error_line(capfd)
     assert f"{file}: was written or changed by hand" in line
     assert "give it by --config, or --force replaces it" in line
     assert file.read_text("utf-8") == own
@@ -123,7 +117,7 @@ def test_part_that_somebody_else_wrote_stays_without_force(
     own.write_text(WORK)
     flags = [] if phase == "report" else FLAGS
     assert main([phase, str(out), *flags]) == 1
-    line = _line(capfd)
+    line = error_line(capfd)
     assert own.name in line or "is no bundle" in line
     assert own.read_text("utf-8") == WORK
     if phase != "tissue":
@@ -144,7 +138,7 @@ def test_layer_that_was_edited_in_place_is_not_written_anew_without_force(
     assert main(["units", str(out), *FLAGS]) == 0
     capfd.readouterr()
     assert main(["stage", str(out), *FLAGS]) == 1
-    line = _line(capfd)
+    line = error_line(capfd)
     assert "looks/channels.usda: changed since it was written: edited in place" in line
     assert "or --force replaces it" in line
     assert looks.read_bytes() == edited
@@ -162,7 +156,7 @@ def test_page_of_another_specimen_is_not_replaced_without_force(
     assert main(["publish", str(builds / "f"), str(site)]) == 0
     there = digests_of(site)
     assert main(["publish", str(builds / "g"), str(site)]) == 1
-    line = _line(capfd)
+    line = error_line(capfd)
     assert f"{site}: holds a published page of 'f' (" in line
     assert "expected one of 'g' (" in line
     assert digests_of(site) == there
@@ -180,7 +174,7 @@ def test_folder_in_use_is_not_filled_with_a_page(
     (tmp_path / "thesis.tex").write_text(WORK)
     monkeypatch.chdir(tmp_path)
     assert main(["publish", str(builds / "f"), "."]) == 1
-    assert "holds something else (thesis.tex), expected nothing or a pub" in _line(capfd)
+    assert "holds something else (thesis.tex), expected nothing or a pub" in error_line(capfd)
     assert [file.name for file in tmp_path.iterdir()] == ["thesis.tex"]
 
 
@@ -205,11 +199,13 @@ def test_export_replaces_its_own_file_until_somebody_edits_it(
     assert [line for line in check(out) if not line.ok] == []
     capfd.readouterr()
     assert main(["export", str(builds / "g"), str(file)]) == 1  # it is of another specimen
-    assert "expected nothing or an earlier export of this build, as it was writ" in _line(capfd)
+    assert "expected nothing or an earlier export of this build, as it was writ" in error_line(
+        capfd
+    )
     file.write_bytes(file.read_bytes() + b"\n")
     edited = file.read_bytes()
     assert main(["export", str(out), str(file)]) == 1
-    assert "or --force replaces it" in _line(capfd)
+    assert "or --force replaces it" in error_line(capfd)
     assert file.read_bytes() == edited
     assert main(["export", str(out), str(file), "--force"]) == 0
     assert main(["export", str(out), str(file)]) == 0
@@ -225,11 +221,11 @@ def test_pictures_are_replaced_by_those_of_the_same_source_alone(
         capfd.readouterr()
         words = [command, str(builds / f"{name}.ome.tif"), "-o", str(place), *more]
         assert main(words) == code
-    assert "of the same source: choose another place, or --force replaces it" in _line(capfd)
+    assert "of the same source: choose another place, or --force replaces it" in error_line(capfd)
     if command == "slices":
         (place / "notes.txt").write_text(WORK)
         assert main([command, str(builds / "f.ome.tif"), "-o", str(place)]) == 1
-        assert "holds something else (notes.txt), expected slices and no other" in _line(capfd)
+        assert "holds something else (notes.txt), expected slices and no other" in error_line(capfd)
 
 
 # --- a rebuild that is stopped between two phases
@@ -248,7 +244,7 @@ def test_rebuild_is_refused_before_its_first_phase_writes(
     own.write_text(f"{there}\n# mine\n", "utf-8")
     before = digests_of(out)
     assert main(_rebuild(builds, out)) == 1
-    assert "--force replaces it" in _line(capfd)
+    assert "--force replaces it" in error_line(capfd)
     with pytest.raises(OutputError, match="force=True replaces it"):
         stereocell.build(builds / "f.ome.tif", out, settings={"plan": {"grid": "2x1"}})
     assert digests_of(out) == before
@@ -272,7 +268,7 @@ def test_results_of_two_plans_pass_neither_check_nor_publish(
         capfd.readouterr()
         for source in (out, out / "bundle"):
             assert main(["publish", str(source), str(site)]) == 1
-            line = _line(capfd)
+            line = error_line(capfd)
             assert f"{stale}: made of another " in line
             assert f"run `stereocell {stale} {out}" in line  # the build around the bundle, too
             assert line.endswith(f"stereocell report {out}`")
@@ -298,5 +294,5 @@ def test_no_file_is_written_where_no_scheduler_answers(
     out = tmp_path / "out"
     words = ["build", str(builds / "f.ome.tif"), "-o", str(out)]
     assert main([*words, "--scheduler", "tcp://127.0.0.1:1"]) == 1
-    assert "--scheduler tcp://127.0.0.1:1" in _line(capfd)
+    assert "--scheduler tcp://127.0.0.1:1" in error_line(capfd)
     assert not digests_of(out)

@@ -16,6 +16,7 @@ from stereocell.storage.documents import SCHEMAS, SETTINGS, schema_of
 from stereocell.storage.json_files import write_json
 from stereocell.verify.formats import check
 from support import phantoms
+from support.error_lines import error_line
 from support.sealed_files import edit_sealed
 
 RECORDS = ("plan.json", "provenance.json", SETTINGS, "phases.json", "report/index.html")
@@ -72,13 +73,6 @@ def _is_json(data: bytearray) -> bool:
     return True
 
 
-def _answer(capfd: pytest.CaptureFixture[str]) -> str:
-    said = capfd.readouterr().err
-    assert "Traceback" not in said
-    (line,) = [line for line in said.splitlines() if line.startswith("stereocell: ")]
-    return line
-
-
 def test_a_change_of_any_file_of_a_build_is_found_by_check(built: Path, tmp_path: Path) -> None:
     names = {f.relative_to(built).as_posix() for f in built.rglob("*") if f.is_file()}
     # No result depends on these two: the second only records which tiles of the stage are done.
@@ -117,7 +111,7 @@ def test_no_phase_builds_from_a_plan_that_was_edited_by_hand(
     _thicker(out / "plan.json")
     before = {f: f.read_bytes() for f in out.rglob("*") if f.is_file()}
     assert main([command[0], str(out), *command[1:]]) == 1
-    line = _answer(capfd)
+    line = error_line(capfd)
     assert f"{out / 'plan.json'}: damaged or changed by hand" in line
     assert f"remove it and run `stereocell plan INPUT -o {out}`" in line
     assert {f: f.read_bytes() for f in out.rglob("*") if f.is_file()} == before
@@ -131,7 +125,7 @@ def test_plan_of_an_earlier_version_is_answered_by_the_remedy(
     del plan["sha256"]
     (out / "plan.json").write_text(json.dumps(plan))
     assert main([command[0], str(out), *command[1:]]) == 1
-    line = _answer(capfd)
+    line = error_line(capfd)
     assert "plan.json: has no hash of its content" in line
     assert "of an earlier version" in line
     (out / "plan.json").unlink()  # the remedy
@@ -153,7 +147,7 @@ def test_whole_build_of_an_earlier_version_goes_on_after_the_remedy(
     assert "is of an earlier version" in _faults(out)
     build = ["build", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
     assert main([*build, "--workers", "0"]) == 1
-    assert f"remove it and run `stereocell plan {build[1]} -o {out}`" in _answer(capfd)
+    assert f"remove it and run `stereocell plan {build[1]} -o {out}`" in error_line(capfd)
     (out / "plan.json").unlink()
     assert main([*build, "--workers", "0"]) == 0
     assert _faults(out) == ""
@@ -164,7 +158,7 @@ def test_phases_that_were_changed_by_hand_are_named_and_done_again(
 ) -> None:
     _change(out / "phases.json")
     assert main(["bundle", str(out), "--workers", "0"]) == 1
-    assert f"run `stereocell units {out} && stereocell stage {out} && " in _answer(capfd)
+    assert f"run `stereocell units {out} && stereocell stage {out} && " in error_line(capfd)
     assert main(["stage", str(out), "--workers", "0"]) == 0
     assert "phases.json: damaged or changed by hand" in capfd.readouterr().err
     assert main(["bundle", str(out), "--workers", "0"]) == 0
@@ -176,7 +170,7 @@ def test_units_of_another_plan_are_not_taken_for_those_of_this_one(
 ) -> None:
     edit_sealed(OutFolder(out).units_plan_file, lambda signed: signed.update(key="0123abcd"))
     assert main(["stage", str(out), "--workers", "0"]) == 1
-    assert f"not built for the plan in plan.json: run `stereocell units {out}`" in _answer(capfd)
+    assert f"not built for the plan in plan.json: run `stereocell units {out}`" in error_line(capfd)
 
 
 @pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])
