@@ -55,7 +55,7 @@ PARSED = {
     "build stack.tif": "masks of another program: building/test_objects.py",
     "build store.zarr": "the same: read/tables/test_tables.py",
     "build ct.nii.gz": "the same: planning/test_label_maps.py",
-    "build CT_FOLDER": "the same: read/dicom/test_segmentation.py",
+    "build CT_FOLDER": "the same: read/formats/dicom/test_segmentation.py",
     "build seg.dcm": "the same",
 }
 # ... and run, but on less

@@ -122,7 +122,7 @@ def test_a_preset_of_ct_for_other_values_is_doubted_with_the_flags_that_fit(
 def test_a_preset_of_ct_gives_no_level_to_values_that_are_no_hounsfield_units(
     tmp_path: Path, preset: str, voxels: NDArray[np.generic]
 ) -> None:
-    """NIfTI answers as DICOM does in tests/read/dicom/test_value_scales.py."""
+    """NIfTI answers as DICOM does in tests/read/formats/dicom/test_value_scales.py."""
     out = tmp_path / "out"
     source = _nifti(tmp_path / "a.nii", voxels)
     assert main(["plan", str(source), "-o", str(out), "--preset", preset]) == 0
