@@ -2,7 +2,7 @@
 
 Every level of a ladder gets six features; a logistic function of them is its probability to be
 right. It is fitted on the volumes of all other sources, so that no volume is judged by itself.
-docs/decisions.md says what came of it.
+docs/decisions/levels.md has the results.
 """
 
 import os

@@ -19,22 +19,8 @@ from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.mesh import Baked
 from stereocell.storage.assets import schema_path
 from support import spheres
-from support.bundles import TILES, channel, files, load, volumes, write_tiles
+from support.bundles import TILES, channel, files, load, volumes, write, write_tiles
 from support.glbs import decoded_colors, decoded_positions_m, read
-
-
-@pytest.fixture(scope="module")
-def stage(tmp_path_factory):
-    """The two tiles' stage, to be read only."""
-    return write_tiles(tmp_path_factory.mktemp("stage"))
-
-
-@pytest.fixture(scope="module")
-def bundle(stage, tmp_path_factory):
-    """Its bundle, to be read only."""
-    out = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_bundle(stage, out, None, run=Engine(0).run)
-    return out
 
 
 def schema(name):
@@ -179,7 +165,7 @@ def test_coarsest_keeps_the_occlusion_of_its_map_at_its_vertices(tmp_path):
     baked = Baked(left_is_hidden, texel_um=0.5, charts=1)
     lods = (*red.lods[:-1], replace(red.lods[-1], baked=baked))
     tile = replace(tile, channels=(replace(red, lods=lods), *others))
-    write_bundle(write_tiles(tmp_path / "s", [tile]), tmp_path / "b", None, run=Engine(0).run)
+    write(write_tiles(tmp_path / "s", [tile]), tmp_path / "b")
 
     data = (tmp_path / "b/channels/CD31/r0_c0/lod2.glb").read_bytes()
     document, _ = read(data)
@@ -209,7 +195,7 @@ def test_cut_volume_is_one_line(tmp_path, capfd):
     with pytest.raises(
         StereoCellError, match=r"CD31\.exr: can't be read as OpenEXR: it ends at byte"
     ):
-        write_bundle(stage, tmp_path / "bundle", None, run=Engine(0).run)
+        write(stage, tmp_path / "bundle")
     for line in capfd.readouterr().err.splitlines():  # OpenEXR's own words would come on top
         assert line.startswith("bundle: ")
 
@@ -228,7 +214,7 @@ def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
     stage = write_tiles(tmp_path / "stage")
     (tmp_path / "stage" / lost).unlink()
     with pytest.raises(StereoCellError, match=words) as caught:
-        write_bundle(stage, tmp_path / "bundle", None, run=Engine(0).run)
+        write(stage, tmp_path / "bundle")
     assert "\n" not in str(caught.value)
     for line in capfd.readouterr().err.splitlines():  # USD's own warnings would come on top
         assert line.startswith("bundle: ")
@@ -237,12 +223,12 @@ def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
 
 def test_old_bundle_is_replaced_as_a_whole_and_kept_if_the_new_one_fails(stage, bundle, tmp_path):
     place = tmp_path / "bundle"
-    write_bundle(stage, place, None, run=Engine(0).run)
+    write(stage, place)
     (place / "left over").write_text("from an older build")
     with pytest.raises(StageError):
-        write_bundle(tmp_path / "none.usda", place, None, run=Engine(0).run)
+        write(tmp_path / "none.usda", place)
     assert (place / "left over").exists()
-    write_bundle(stage, place, None, run=Engine(0).run)
+    write(stage, place)
     assert files(place) == files(bundle)
     assert [p.name for p in tmp_path.iterdir()] == ["bundle"]
 
@@ -252,7 +238,7 @@ def test_folder_that_is_no_bundle_is_left_alone(stage, tmp_path):
     with pytest.raises(
         OutputError, match=r"is no bundle: found something else \(thesis\.tex\), and no m"
     ):
-        write_bundle(stage, tmp_path, None, run=Engine(0).run)
+        write(stage, tmp_path)
     assert (tmp_path / "thesis.tex").exists()
 
 

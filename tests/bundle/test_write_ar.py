@@ -2,35 +2,17 @@
 
 import hashlib
 
-import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.bundle import write_ar
-from stereocell.bundle.write import write_bundle
-from stereocell.engine.run import Engine
-from support.bundles import load, write_tiles
-from support.stages import layer_over
-
-
-@pytest.fixture(scope="module")
-def stage(tmp_path_factory):
-    """The two tiles' stage, to be read only."""
-    return write_tiles(tmp_path_factory.mktemp("stage"))
+from support.bundles import load, write
+from support.stages import edit_over
 
 
 def export(stage, folder, change=None):
     """Write the bundle of a stage, or of a layer with a change over it; return it and its lines."""
-    path = stage
-    if change is not None:
-        path = folder / "edited.usda"
-        layer = layer_over(path, str(stage))
-        over = Usd.Stage.Open(layer)
-        change(over)
-        layer.Save()
-        del over
-    lines = []
-    write_bundle(path, folder / "bundle", None, run=Engine(0).run, report_line=lines.append)
-    return folder / "bundle", lines
+    path = edit_over(folder / "edited.usda", stage, change) if change else stage
+    return folder / "bundle", write(path, folder / "bundle")
 
 
 def colors_of(bundle):

@@ -1,6 +1,7 @@
 """The stage that exports are made from: two tiles, a sphere across their border."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ from pxr import Usd
 
 from stereocell.storage.overwriting import forcing
 from support.bundles import write_tiles
-from support.stages import layer_over
+from support.stages import edit_over
 
 
 @pytest.fixture(autouse=True)
@@ -28,10 +29,4 @@ def sphere_stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def edited(sphere_stage: Path, tmp_path: Path) -> Callable[[Callable[[Usd.Stage], object]], Path]:
     """Write a layer over the stage: `edited(lambda stage: ...)`."""
 
-    def write(change: Callable[[Usd.Stage], object]) -> Path:
-        layer = layer_over(tmp_path / "edited.usda", str(sphere_stage))
-        change(Usd.Stage.Open(layer))
-        layer.Save()
-        return tmp_path / "edited.usda"
-
-    return write
+    return partial(edit_over, tmp_path / "edited.usda", sphere_stage)

@@ -150,7 +150,7 @@ CASES: dict[str, tuple[Maker, str]] = {
         r"found a file \(a text file\), expected a folder of OME-Zarr",
     ),
     "empty folder as Zarr": (folder_named("bad.zarr"), "zarr.json"),
-    "folder as TIFF": (folder_named("bad.ome.tif"), "directory"),
+    "folder as TIFF": (folder_named("bad.ome.tif"), "is a folder, expected a file"),
     "TIFF without spacing": (plain_tiff, "voxel size: not found.*--spacing-um z,y,x"),
     "flat RGB TIFF": (rgb_tiff, r"at least 2 planes.*a flat image of 3 channels\)"),
     "TIFF with missing planes": (incomplete_tiff, "found 6 planes, expected 8"),

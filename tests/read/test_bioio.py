@@ -66,6 +66,15 @@ def test_a_plugin_s_format_is_read_with_its_scenes(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("_bioio")
+def test_a_negative_voxel_size_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(BioImage, "physical_pixel_sizes", SimpleNamespace(Z=0.5, Y=-0.2, X=0.25))
+    (tmp_path / "a.dv").write_bytes(b"DV")
+    dataset = read.open(tmp_path / "a.dv")
+    assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.25)
+    assert [note for note in dataset.notes if note.startswith("voxel size along y: found -0.2 um")]
+
+
+@pytest.mark.usefixtures("_bioio")
 def test_what_no_plugin_takes_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.dv").write_bytes(b"other")
     (tmp_path / "a.xyz").write_bytes(b"other")

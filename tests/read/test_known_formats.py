@@ -10,6 +10,7 @@ import pytest
 
 import stereocell
 from stereocell.model.errors import SourceError
+from stereocell.read import extras, list_series
 from stereocell.read import open as open_source
 from stereocell.read.known_formats import format_of, identify, known_formats
 
@@ -87,3 +88,21 @@ def test_a_file_whose_name_looks_like_a_part_is_a_file(tmp_path: Path, name: str
     assert format_of(path).name == "tiff"
     with pytest.raises(SourceError, match="TIFF"):
         open_source(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "extra"),
+    [
+        ("a.czi", b"ZISRAWFILE", "czi"),
+        ("a.lif", b"\x70\0\0\0\1\1\1\1\x2a", "lif"),
+        ("a.nd2", b"\xda\xce\xbe\x0a", "nd2"),
+    ],
+)
+def test_a_missing_library_is_named_with_the_command_that_installs_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, head: bytes, extra: str
+) -> None:
+    (tmp_path / name).write_bytes(head + bytes(600))
+    monkeypatch.setattr(extras, "find_spec", lambda library: None)
+    for act in (open_source, list_series):
+        with pytest.raises(SourceError, match=rf'expected: pip install "stereocell\[{extra}\]"'):
+            act(tmp_path / name)

@@ -2,6 +2,8 @@
 
 import json
 
+from stereocell.bundle.write import write_bundle
+from stereocell.engine.run import Engine
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support import spheres
 from support.glbs import read
@@ -43,3 +45,28 @@ def factor(bundle, tile="r0_c0"):
 
 def files(folder):
     return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def write(stage, folder):
+    """Write the bundle of a stage; return the lines that were reported."""
+    lines: list[str] = []
+    write_bundle(stage, folder, None, run=Engine(0).run, report_line=lines.append)
+    return lines
+
+
+def chain(bundle, tile):
+    """Return the levels of detail of a tile in the tileset of CD31, coarsest first."""
+    root = load(bundle / channel(bundle)["tileset"]["path"])["root"]
+    found = []
+    for entry in root["children"]:
+        levels = []
+        while True:
+            folder, level = entry["content"]["uri"].split("/")
+            levels.append(level)
+            if "children" not in entry:
+                break
+            (entry,) = entry["children"]
+        assert entry["geometricError"] == 0  # nothing finer: a reader stops there
+        found += [levels] * (folder == tile)
+    (levels,) = found
+    return levels

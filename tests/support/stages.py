@@ -4,6 +4,7 @@ The first channel, with a Greek letter in its name, is the F; `Hoechst 33342` is
 `1st` is empty and has no surface.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -90,11 +91,13 @@ def write_whole(folder: Path) -> Path:
     return folder / "stage.usda"
 
 
-def layer_over(path: Path, sublayer: str) -> Sdf.Layer:
-    """Return a new layer over a stage, which states the stage's units."""
+def edit_over(path: Path, sublayer: Path | str, change: Callable[[Usd.Stage], object]) -> Path:
+    """Write a new layer over a stage, with the stage's units and a change; return its path."""
     layer = Sdf.Layer.CreateNew(str(path))
     layer.ImportFromString(f"{HEAD}subLayers = [@{sublayer}@])\n")
-    return layer
+    change(Usd.Stage.Open(layer))
+    layer.Save()
+    return path
 
 
 def _make_volume(field: NDArray[np.float32], start: int, end: int) -> NDArray[np.uint8]:

@@ -10,8 +10,8 @@
 import { readFile } from "node:fs/promises";
 import { join, resolve } from "node:path";
 import { parseArgs } from "node:util";
-import type { Snapshot } from "../src/app/automation_api";
 import type { Manifest } from "../src/bundle/generated/bundle";
+import type { Snapshot } from "../src/host/snapshot";
 import { enter, startChromium } from "../test/support/browser/chromium";
 import { Host } from "../test/support/browser/host";
 import { ViewerPage } from "../test/support/browser/page";

@@ -9,7 +9,7 @@ see the same value at the same place.
 Where the background rises within a block, a low percentile is that of its dark side. So what is
 found is subtracted, and the same is done again with what remains. Bodies on a ground that rises to
 three times their height: Dice .37 where the field was constant beyond the outermost centres, .93 on
-to the ends; with three passes in place of six it was .14 (`make bench-iso`; docs/decisions.md).
+to the ends; with three passes in place of six it was .14 (docs/decisions/levels.md).
 """
 
 from itertools import pairwise, product

@@ -30,7 +30,7 @@ A smooth background is subtracted where the field alone shows no valley and edge
 background are steeper, and never of CT or MR, whose values mean something as they are. Padding,
 runs of a darkest value that nothing else comes near, takes no part; in MR it is air.
 
-Measured on the volumes of `make bench-iso`; see docs/decisions.md.
+Measured on the volumes of `make bench-iso`; see docs/decisions/levels.md.
 
 References
 N. Otsu, IEEE Trans. Systems, Man, and Cybernetics 9, 1979. doi:10.1109/TSMC.1979.4310076

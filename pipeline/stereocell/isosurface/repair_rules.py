@@ -17,6 +17,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import cc3d
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -117,7 +118,7 @@ def _added(
     """Return `new_voxels` and `apart_voxels` of ComponentSums."""
     above = find_components(higher, spacing_um, 26)
     before, main = above.mask_of(_is_main(above)), components.mask_of(_is_main(components))
-    labels, count = ndimage.label(main, np.ones((3, 3, 3)))
+    labels, count = cc3d.connected_components(main, connectivity=26, return_N=True)
     touches = np.zeros(count + 1, bool)
     touches[labels[before & main]] = True
     hangs = touches[labels]

@@ -10,8 +10,7 @@ import numpy as np
 
 from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
-from stereocell.kernels.collapse import collapse
-from stereocell.kernels.collapse_walls import collapse_walls, find_orders
+from stereocell.kernels.collapse import collapse, collapse_interfaces
 from stereocell.kernels.critical import find_critical
 from stereocell.kernels.crossings import find_doubtful, find_maybe_flat, find_spread
 from stereocell.kernels.depth_buffer import find_visible
@@ -35,6 +34,7 @@ from stereocell.kernels.half_edges import (
     sum_gains,
     sum_normals,
 )
+from stereocell.kernels.interface_rings import find_orders
 from stereocell.kernels.level_sums import count_differences, sum_by_value
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.nearest import find_nearest, find_sides
@@ -42,6 +42,7 @@ from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
+from stereocell.kernels.union_find import label_pairs
 from stereocell.kernels.visibility import cast_rays
 from stereocell.kernels.walls import (
     bound_objects,
@@ -75,6 +76,7 @@ def compile_of_meshes() -> None:
     twins = match_twins(triangles, 4)
     count_fans(triangles, twins, 4)
     labels, bodies = label_bodies(triangles, 4)
+    label_pairs(np.arange(2), np.arange(2), 2)
     measure_volumes(at, triangles, labels, bodies)
     measure_areas(at, triangles, twins, labels, bodies)
     measure_boxes(at, labels, bodies)
@@ -92,7 +94,7 @@ def compile_of_meshes() -> None:
     left, _, _ = collapse(at, triangles, flags, bits, errors, 3.0, 0.9, nothing)
     flip_edges(at, left, flags, bits, errors, 0.9)
     orders = find_orders(triangles, 4)
-    collapse_walls(at, triangles, flags, errors, 3.0, 0.9, orders, nothing)
+    collapse_interfaces(at, triangles, flags, errors, 3.0, 0.9, orders, nothing)
     thin_rim(at, triangles, np.zeros(4, np.int8), np.zeros(4, np.uint8), flags, 0.1, 0.9)
 
 

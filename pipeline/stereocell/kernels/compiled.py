@@ -23,7 +23,24 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wra
 
 def kernel(function: F) -> F:
     """Compile a function at its first call, or take it from the cache."""
-    compiled = numba.njit(**_OPTIONS)(function)
+    return _cached(numba.njit(**_OPTIONS)(function), function)
+
+
+def in_place(function: F) -> F:
+    """Compile a kernel that makes no array, so that numba need not count references to arrays.
+
+    Its arrays may come in a NamedTuple. Each access to one would be counted otherwise, by atomic
+    operations, and the collapse would take twice the time.
+    """
+    return _cached(numba.njit(_nrt=False, **_OPTIONS)(function), function)
+
+
+def step(function: F) -> F:
+    """Compile a small function into each kernel that calls it, as `in_place` does."""
+    return numba.njit(forceinline=True, _nrt=False, **_OPTIONS)(function)
+
+
+def _cached(compiled: Any, function: F) -> F:
     folder = cache_folder(function.__module__)
     if folder is not None:
         past = _CONFIG.CACHE_DIR

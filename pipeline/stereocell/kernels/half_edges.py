@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_cosine
+from stereocell.kernels.union_find import link, number_components
 
 Ints = NDArray[np.int32]
 BORDER, CROWDED = -1, -2  # no twin: none is there; several are, or one that is wound alike
@@ -89,14 +90,6 @@ def count_fans(triangles: Ints, twins: Ints, count: int) -> tuple[Ints, Ints]:
 
 
 @part
-def _find_root(parent: Ints, v: int) -> int:
-    while parent[v] != v:
-        parent[v] = parent[parent[v]]
-        v = parent[v]
-    return v
-
-
-@part
 def find_fixed(
     locked: NDArray[np.bool_], corner: Ints, twins: Ints, valence: Ints
 ) -> NDArray[np.bool_]:
@@ -116,23 +109,9 @@ def label_bodies(triangles: Ints, count: int) -> tuple[Ints, int]:
     """
     parent = np.arange(count).astype(np.int32)
     for t in range(len(triangles)):
-        a = _find_root(parent, triangles[t, 0])
-        for k in range(1, 3):
-            b = _find_root(parent, triangles[t, k])
-            if a < b:
-                parent[b] = a
-            elif b < a:
-                parent[a] = b
-                a = b
-    labels, bodies = np.empty(count, np.int32), 0
-    for v in range(count):
-        root = _find_root(parent, v)
-        if root == v:
-            labels[v] = bodies
-            bodies += 1
-        else:
-            labels[v] = labels[root]
-    return labels, bodies
+        link(parent, triangles[t, 0], triangles[t, 1])
+        link(parent, triangles[t, 0], triangles[t, 2])
+    return number_components(parent)
 
 
 @kernel

@@ -7,19 +7,19 @@ along the curve in which the plane cuts the surface: each side by itself is as s
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.collapse import MAX_NEIGHBOURS, VALENCE, keeps_form
-from stereocell.kernels.compiled import kernel, part
-from stereocell.kernels.edge_records import (
-    RECORD,
-    TWIN,
-    ahead,
-    behind,
-    count_common,
-    fill_records,
-    join,
+from stereocell.kernels.compiled import in_place, part, step
+from stereocell.kernels.edge_records import RECORD, TWIN, ahead, behind
+from stereocell.kernels.half_edges import Ints
+from stereocell.kernels.ring_checks import check_normals, measure_ring
+from stereocell.kernels.rings import TRIANGLES, Mesh, Ring, make_mesh, make_ring
+from stereocell.kernels.surface_rings import (
+    check_fan_link,
+    collect_fan,
+    fill_fans,
+    join_fans,
+    stamp_fan,
 )
-from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_twins
-from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_cosine
+from stereocell.kernels.triangles import Points
 
 STEPS = 4  # steps in which the error grows up to its bound: flat parts go first
 PASSES = 6  # passes over one step
@@ -67,7 +67,6 @@ def _farthest(at: Points, u: int, p: int, q: int, curves: Ints, leaving: Ints) -
     return most
 
 
-@kernel
 def thin_rim(
     at: Points,
     triangles: Ints,
@@ -88,73 +87,87 @@ def thin_rim(
     sharpest   cosine of the smallest angle that a triangle may get, unless those around are sharper
     """
     n = len(at)
-    twins = match_twins(triangles, n)
-    leaving, valence = count_fans(triangles, twins, n)
-    stays = find_fixed(locked, triangles.ravel(), twins, valence)
-    edges = np.empty(RECORD * len(triangles), np.int32)
-    fill_records(triangles, twins, leaving, edges)
-    for v in range(n):
-        stays[v] |= sides[v] != 0
-    curves = np.full((n, 2), -1, np.int32)
-    for t in range(len(triangles)):
-        for h in range(RECORD * t, RECORD * t + 3):
-            u = edges[h]
-            if sides[u] == 0 and _is_on_curve(h, edges, sides):
-                if curves[u, 0] >= 0 and curves[u, 1] >= 0:
-                    stays[u] = True  # several curves meet
-                curves[u, 1], curves[u, 0] = curves[u, 0], edges[ahead(h)]
-    target = np.arange(n).astype(np.int32)
-    touched, turn = np.zeros(n, np.int32), 0
-    stamp, tick = np.zeros(n, np.int32), 0
-    ring, out = np.empty(MAX_NEIGHBOURS, np.int32), np.empty(MAX_NEIGHBOURS, np.int32)
-    onward = np.empty(MAX_NEIGHBOURS, np.int32)
-    for step in range(1, STEPS + 1):
-        bound = error * step / STEPS
+    mesh = make_mesh(n, len(triangles), planes=planes)
+    mesh.at[:, :3] = at
+    fill_fans(mesh, triangles, locked | (sides != 0))
+    curves, target = np.full((n, 2), -1, np.int32), np.arange(n, dtype=np.int32)
+    ring, touched = make_ring(n, is_surface=True), np.zeros(n, np.int32)
+    thin_in_place(mesh, ring, sides, curves, target, touched, error, sharpest)
+    return target
+
+
+@in_place
+def thin_in_place(
+    mesh: Mesh,
+    ring: Ring,
+    sides: NDArray[np.int8],
+    curves: Ints,
+    target: Ints,
+    touched: Ints,
+    error: float,
+    sharpest: float,
+) -> None:
+    """Write the vertex onto which each vertex moves; see `thin_rim`.
+
+    curves   int32 (n, 2), written: the two neighbours that each vertex had along the curve
+    touched  int32 (n,), of zeros: the last pass in which a vertex's ring has changed
+    """
+    find_curves(mesh, sides, curves)
+    turn = 0
+    for number in range(1, STEPS + 1):
+        bound = error * number / STEPS
         for _ in range(PASSES):
             turn, done = turn + 1, 0
-            for u in range(n):
-                if stays[u] or leaving[u] < 0 or touched[u] == turn:
+            for u in range(len(mesh.at)):
+                if mesh.stays[u] or mesh.start[u] < 0 or touched[u] == turn:
                     continue
-                size, h, worst, curve = 0, leaving[u], 0.0, 0
-                bx, by, bz = 0.0, 0.0, 0.0
-                first, second = -1, -1  # half-edges along the curve
-                while size < MAX_NEIGHBOURS:
-                    v, last = edges[ahead(h)], edges[behind(h)]
-                    ring[size], onward[size], out[size] = v, last, h
-                    worst = max(worst, smallest_angle_cosine(at, u, v, last))
-                    x, y, z = doubled_area(at, u, v, last)
-                    bx, by, bz = bx + x, by + y, bz + z
-                    if _is_on_curve(h, edges, sides):
-                        curve += 1
-                        first, second = h, first
-                    size += 1
-                    h = edges[behind(h) + TWIN]
-                    if h == leaving[u]:
-                        break
-                if h != leaving[u] or curve != 2:
+                before, after = find_on_curve(u, mesh, ring, sides)
+                if before < 0:
                     continue
-                p, q = edges[ahead(first)], edges[ahead(second)]
-                if _farthest(at, u, p, q, curves, leaving) > bound:
+                p, q = ring.first[after], ring.first[before]
+                if _farthest(mesh.at, u, p, q, curves, mesh.start) > bound:
                     continue
+                mean, worst = measure_ring(u, mesh, ring, by_area=True)
                 allowed = max(sharpest, 1 - SHARPER * (1 - worst))
-                tick += 1
-                for j in range(size):
-                    stamp[ring[j]] = tick
-                for h in (first, second):
-                    v = edges[ahead(h)]
-                    common, others = count_common(h, edges, stamp, tick)
-                    if common != 2 or not 7 <= others + size <= VALENCE:
+                stamp_fan(ring)
+                for chosen in (after, before):
+                    v = ring.first[chosen]
+                    if not check_fan_link(mesh, ring, chosen):
                         continue
-                    if not keeps_form(at, u, v, ring, onward, size, (bx, by, bz), allowed, planes):
+                    if not check_normals(u, v, mesh, ring, (mean, allowed)):
                         continue
                     touched[p] = touched[q] = turn
-                    join(h, v, out, size, edges, leaving)
-                    leaving[u], target[u] = -1, v
+                    join_fans(mesh, ring, chosen)
+                    mesh.start[u], target[u] = -1, v
                     done += 1
                     break
             if done == 0:
                 break
-    for v in range(n):
+    for v in range(len(target)):
         while target[target[v]] != target[v]:
             target[v] = target[target[v]]
-    return target
+
+
+@step
+def find_curves(mesh: Mesh, sides: NDArray[np.int8], curves: Ints) -> None:
+    """Write each vertex's two neighbours along the curve; where several curves meet it stays."""
+    for t in range(len(mesh.is_left)):
+        for h in range(RECORD * t, RECORD * t + 3):
+            u = mesh.edges[h]
+            if sides[u] == 0 and _is_on_curve(h, mesh.edges, sides):
+                if curves[u, 0] >= 0 and curves[u, 1] >= 0:
+                    mesh.stays[u] = True
+                curves[u, 1], curves[u, 0] = curves[u, 0], mesh.edges[ahead(h)]
+
+
+@step
+def find_on_curve(u: int, mesh: Mesh, ring: Ring, sides: NDArray[np.int8]) -> tuple[int, int]:
+    """Write the ring of u; return the places of its two neighbours on the curve, or (-1, -1)."""
+    if not collect_fan(u, mesh, ring):
+        return -1, -1
+    count, first, second = 0, -1, -1
+    for k in range(ring.sizes[TRIANGLES]):
+        if _is_on_curve(ring.out[k], mesh.edges, sides):
+            count += 1
+            first, second = second, k
+    return (first, second) if count == 2 else (-1, -1)

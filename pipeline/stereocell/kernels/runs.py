@@ -7,7 +7,8 @@ Analysis and Applications 12, 2009. doi:10.1007/s10044-008-0109-y
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.compiled import kernel, part
+from stereocell.kernels.compiled import kernel
+from stereocell.kernels.union_find import link, number_components
 
 Ints = NDArray[np.int32]
 Mask = NDArray[np.bool_]
@@ -50,14 +51,6 @@ def find_runs(mask: Mask) -> tuple[NDArray[np.int64], Ints, Ints]:
     return first, start, stop
 
 
-@part
-def _find_root(parent: Ints, i: int) -> int:
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
-
-
 @kernel
 def join_runs(
     first: NDArray[np.int64], start: Ints, stop: Ints, height: int, by_corners: bool
@@ -82,25 +75,14 @@ def join_runs(
             i, j = first[row], first[other]
             while i < first[row + 1] and j < first[other + 1]:
                 if start[i] < stop[j] + reach and start[j] < stop[i] + reach:
-                    a, b = _find_root(parent, i), _find_root(parent, j)
-                    if a < b:
-                        parent[b] = a
-                    elif b < a:
-                        parent[a] = b
+                    link(parent, i, j)
                     if k < 2:
                         touching[i] += max(0, min(stop[i], stop[j]) - max(start[i], start[j]))
                 if stop[i] < stop[j]:
                     i += 1
                 else:
                     j += 1
-    labels, count = np.empty(len(start), np.int32), 0
-    for i in range(len(start)):
-        root = _find_root(parent, i)
-        if root == i:
-            labels[i] = count
-            count += 1
-        else:
-            labels[i] = labels[root]
+    labels, count = number_components(parent)
     return labels, touching, count
 
 

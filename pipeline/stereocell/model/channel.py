@@ -10,7 +10,7 @@ from stereocell.model.identifiers import to_identifier
 from stereocell.model.lattice_field import LatticeField
 
 SurfaceConfidence = Literal["clear", "unsure", "none"]
-LOW_CONFIDENCE = 0.6  # 0..1; below it about half of the surfaces were right (docs/decisions.md)
+LOW_CONFIDENCE = 0.6  # 0..1; half of the surfaces below were right (docs/decisions/levels.md)
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 ShapeKind = Literal["rectangle", "triangle"]
 

@@ -1,6 +1,6 @@
 """Fewer triangles for walls: each object stays closed, valid and as large as its voxels.
 
-All walls are simplified at once (kernels/collapse_walls.py), so that neighbours share every
+All walls are simplified at once (kernels/collapse.py), so that neighbours share every
 triangle. Where triangles come to meet beside their corners, the vertices around stay as they are,
 and it is done again. Then each object gets its voxels' volume back, by the least shift of the
 vertices.
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from stereocell.kernels.collapse_walls import collapse_walls, find_orders
+from stereocell.kernels.collapse import collapse_interfaces
+from stereocell.kernels.interface_rings import find_orders
 from stereocell.kernels.walls import (
     bound_objects,
     couple,
@@ -59,7 +60,7 @@ def simplify_walls(
     sharpest = float(np.cos(np.radians(SHARPEST_DEG)))
     orders, made = find_orders(walls.triangles, len(stays)), np.zeros((0, 2), np.int32)
     for _ in range(_ROUNDS):
-        triangles, gone, made = collapse_walls(
+        triangles, is_left, made = collapse_interfaces(
             walls.positions - centre,
             walls.triangles,
             stays,
@@ -69,9 +70,9 @@ def simplify_walls(
             orders,
             made,
         )
-        fewer = Walls(walls.positions, triangles[~gone], walls.sides[~gone])
+        fewer = Walls(walls.positions, triangles[is_left], walls.sides[is_left])
         # triangles that are as they were don't meet one another
-        at_fault = find_faults(fewer, fresh=(triangles != walls.triangles).any(axis=1)[~gone])
+        at_fault = find_faults(fewer, fresh=(triangles != walls.triangles).any(axis=1)[is_left])
         if not len(at_fault):
             fewer, used = _compact(fewer)
             # twice: what smoothing took of objects of a few voxels comes back, too

@@ -24,9 +24,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from stereocell.kernels.union_find import label_pairs
 from stereocell.model.mesh import Mesh
 from stereocell.textures.map_packages import import_unwrapper
 from stereocell.textures.options import UnwrapOptions
@@ -137,8 +136,7 @@ def split_sharp_edges(
     one, two = one[is_smooth], two[is_smooth]
     # two triangles have their common edge in opposite directions
     joined = np.concatenate([one, after[one]]), np.concatenate([after[two], two])
-    links = coo_matrix((np.ones(len(joined[0]), np.int8), joined), (start.size, start.size))
-    count, label = connected_components(links, directed=False)
+    label, count = label_pairs(*joined, start.size)
     _, first = np.unique(label, return_index=True)
     total = [np.bincount(label, np.repeat(facing[:, k], 3), count) for k in range(3)]
     normals = np.stack(total, axis=1).astype(np.float64)

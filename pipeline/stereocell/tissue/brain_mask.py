@@ -14,6 +14,7 @@ Cybernetics 9, 1979. doi:10.1109/TSMC.1979.4310076
 
 from typing import Any
 
+import cc3d
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -180,7 +181,7 @@ def _shape(field: NDArray[Any]) -> tuple[int, int, int]:
 
 
 def _largest(mask: Mask) -> Mask:
-    labels, count = ndimage.label(mask)
+    labels, count = cc3d.connected_components(mask, connectivity=6, return_N=True)
     if count < 2:
         return mask
     sizes = np.bincount(labels.ravel())
@@ -189,7 +190,7 @@ def _largest(mask: Mask) -> Mask:
 
 
 def _touching(mask: Mask, seed: Mask) -> Mask:
-    labels, count = ndimage.label(mask | seed)
+    labels, count = cc3d.connected_components(mask | seed, connectivity=6, return_N=True)
     hit = np.zeros(count + 1, np.bool_)
     hit[np.unique(labels[seed])] = True
     hit[0] = False

@@ -2,15 +2,9 @@
  * All that is drawn on the specimen and is no part of it: handles of the clip and of the lamps,
  * measured points, scale bar, orientation, names. And what a ray means among them.
  */
-import { Matrix4, Object3D, type PerspectiveCamera, Vector3 } from "three";
-import type { Box } from "../math/box";
-import type { Clip } from "../math/clip";
-import { shownBox } from "../math/pick";
-import type { Ray } from "../math/vec3";
-import type { Action } from "../state/actions";
-import { tileName } from "../state/tile_name";
-import type { ViewerState } from "../state/viewer_state";
-import { ClipMark } from "./clip_gizmo";
+import { Object3D } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
+import type { FlatScreen, FrameView } from "../host/part";
 import {
   dragHandle,
   type HandleId,
@@ -19,59 +13,44 @@ import {
   type Pointing,
   pickHandle,
   TOLERANCE_RAD,
-} from "./clip_handles";
+} from "../marks/clip_handles";
+import { dragLamp, isLampHandle, lampHandles } from "../marks/lamp_handles";
+import { NO_SIGHT } from "../marks/sight";
+import { umPerPixelAt } from "../marks/um_per_pixel";
+import type { Box } from "../math/box";
+import type { Clip } from "../math/clip";
+import { shownBox } from "../math/pick";
+import type { Ray } from "../math/vec3";
+import type { Reading } from "../probe/probe_reader";
+import type { Action } from "../state/actions";
+import type { ShownSurface } from "../state/on_screen";
+import { tileName } from "../state/tile_name";
+import type { ViewerState } from "../state/viewer_state";
+import { ClipMark } from "./clip_gizmo";
 import { HandleTarget } from "./handle_target";
 import { type Named, NameMark } from "./hover_name";
 import { LampMark } from "./lamp_gizmo";
-import { dragLamp, isLampHandle, lampHandles } from "./lamp_handles";
 import { MeasureMark } from "./measurement";
 import { Axes, OrientationMark } from "./orientation_axes";
-import type { Cone, Probed } from "./probe";
-import { Reading, type ReadingOptions } from "./probe_reader";
 import { Ruler } from "./ruler";
-import { ScaleBarMark, umPerPixelAt } from "./scale_bar";
-import { type Sight, STEREO_TEXT, screenZoom } from "./style";
+import { ScaleBarMark } from "./scale_bar";
 
 /** Why no point is set. */
 const NOTHING_MET = "There is nothing to measure there: no surface, no volume and no slice.";
 /** Largest move of a head at rest, m. */
 const TREMBLE_M = 0.03;
 
-export type MarksOptions = ReadingOptions &
-  Readonly<{
-    dispatch: (action: Action) => void;
-    /** Say why nothing has come of it. */
-    announce: (text: string) => void;
-    /** The picture differs now. */
-    onChange: () => void;
-  }>;
-
-/** A flat picture. */
-export type MarksScreen = Readonly<{
-  camera: PerspectiveCamera;
-  /** CSS pixels. */
-  height_px: number;
-  /** What is looked at, room: the scale bar is true there. */
-  focus: Vector3;
-}>;
-
-/** From where the marks are seen in a frame. */
-export type MarksView = Readonly<{
-  /** Pose of the head or of the mono camera, room. */
-  head: Matrix4;
-  /** From um to the room. */
-  specimen: Matrix4;
-  /** null in stereo. */
-  screen: MarksScreen | null;
-  /** Straight ahead, um. */
-  gaze: Ray;
-  /** Where volumes show in disc mode. */
-  disc: Cone | null;
-  /** The panel lies beside the specimen, and ruler and axes would lie across it. */
-  isPanelOpen: boolean;
-  /** The bar of stereo hangs below the specimen. */
-  isBarBelow: boolean;
-  dt_s: number;
+export type MarksOptions = Readonly<{
+  manifest: Manifest;
+  /** Finds what rays meet, and the values at points. */
+  reading: Reading;
+  /** Surfaces on screen now. */
+  surfaces: () => readonly ShownSurface[];
+  dispatch: (action: Action) => void;
+  /** Say why nothing has come of it. */
+  announce: (text: string) => void;
+  /** The picture differs now. */
+  onChange: () => void;
 }>;
 
 export class Marks {
@@ -87,10 +66,8 @@ export class Marks {
   readonly name = new NameMark();
   readonly ruler = new Ruler();
   readonly axes: Axes;
-  private readonly reading: Reading;
-  private readonly toSpecimen = new Matrix4();
   /** From where the last frame was seen. */
-  sight: Sight = { eye_um: new Vector3(), up: new Vector3(0, 1, 0), zoom: 1, textZoom: 1 };
+  private sight = NO_SIGHT;
   /** The lamp that the ray which drags it has lost over its rim. */
   private beside: HandleId | null = null;
   /** The clip that the page opens with. */
@@ -111,9 +88,8 @@ export class Marks {
     const { sides } = options.manifest.specimen;
     this.orientation = new OrientationMark(sides);
     this.axes = new Axes(sides);
-    this.reading = new Reading(options, state);
     this.target = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
-    this.measured = new MeasureMark((point) => this.reading.valuesAt(point), options.onChange);
+    this.measured = new MeasureMark((point) => options.reading.valuesAt(point), options.onChange);
     const { handles, lamps, measured, ruler, axes, name } = this;
     this.group.name = "marks";
     this.group.add(handles.group, lamps.group, measured.group);
@@ -133,7 +109,6 @@ export class Marks {
 
   follow(state: ViewerState): void {
     this.state = state;
-    this.reading.state = state;
     this.handles.show(markedClip(state.clip, this.opening, this.isPointedAt), this.shown);
     this.lamps.show(state, this.specimen);
     const cuts = handlesOf(state.clip, this.shown);
@@ -143,18 +118,11 @@ export class Marks {
   }
 
   /** Before every frame, drawn or not. */
-  update(view: MarksView): void {
-    const { eye_um, up } = this.sight;
-    this.toSpecimen.copy(view.specimen).invert();
-    eye_um.setFromMatrixPosition(view.head).applyMatrix4(this.toSpecimen);
-    up.setFromMatrixColumn(view.head, 1).transformDirection(this.toSpecimen);
-    const zoom = view.screen === null ? 1 : screenZoom(pxPerRad(view.screen));
-    this.sight = { eye_um, up, zoom, textZoom: view.screen === null ? STEREO_TEXT : zoom };
+  update(view: FrameView): void {
+    this.sight = view.sight;
     this.target.specimen = view.specimen;
     this.cutAtEntry = view.screen === null ? (this.cutAtEntry ?? this.state.clip) : null;
     this.target.isCutAsleep = this.cutAtEntry === this.state.clip;
-    this.reading.specimen = view.specimen;
-    this.reading.disc = view.disc;
     const m_per_um = view.specimen.getMaxScaleOnAxis();
     const surfaces = this.options.surfaces().length;
     if (surfaces !== this.surfaces) this.name.ask(); // they come and refine, too
@@ -204,24 +172,19 @@ export class Marks {
   }
 
   /** Light up what is pointed at, or held. */
-  mean(id: HandleId | null): void {
-    if (!this.handles.mean(id)) return;
-    this.lamps.mean(id);
+  highlight(id: HandleId | null): void {
+    if (!this.handles.highlight(id)) return;
+    this.lamps.highlight(id);
     this.lamps.show(this.state, this.specimen);
     this.options.onChange();
   }
 
   /** Measure from or to what a ray (um) means: a point of the newest measurement, or of another. */
   async measure(ray: Ray): Promise<void> {
-    const found = await this.reading.probe(ray);
+    const found = await this.options.reading.probe(ray);
     if (this.isDisposed) return;
     if (found === null) this.options.announce(NOTHING_MET);
     else this.options.dispatch({ type: "add-point", point: found.point });
-  }
-
-  /** What a ray (um) means; null: it meets nothing that shows. */
-  probe(ray: Ray): Promise<Probed | null> {
-    return this.reading.probe(ray);
   }
 
   /** Shows the handles of the opening cut from the first time that somebody points: see `markedClip`. */
@@ -242,10 +205,10 @@ export class Marks {
     return this.options.manifest.specimen.bounds_um;
   }
 
-  private updateInRoom({ isPanelOpen, isBarBelow }: MarksView): void {
+  private updateInRoom({ isPanelOpen, isBarBelow }: FrameView): void {
     const { sight, shown } = this;
     this.showHandles();
-    this.mean(this.target.takeSeen());
+    this.highlight(this.target.takeSeen());
     this.scaleBar.update(null);
     this.orientation.root.style.display = "none";
     this.ruler.update(shown, sight, isBarBelow);
@@ -256,8 +219,8 @@ export class Marks {
   }
 
   private updateOnScreen(
-    { head, specimen }: MarksView,
-    screen: MarksScreen,
+    { head, specimen }: FrameView,
+    screen: FlatScreen,
     m_per_um: number,
   ): void {
     const { camera, height_px, focus } = screen;
@@ -271,12 +234,12 @@ export class Marks {
 
   private showMeasured(): void {
     const { measured, measuredAs, measurements } = this.state;
-    this.measured.show(measured, measuredAs, this.reading.sourcesKey(measured));
+    this.measured.show(measured, measuredAs, this.options.reading.sourcesKey(measured));
     this.measured.list(measurements);
   }
 
   private nameOf(gaze: Ray): Named | null {
-    const probed = this.reading.glance(gaze);
+    const probed = this.options.reading.glance(gaze);
     if (probed === null) return null;
     const channel = this.state.channels.find(({ id }) => id === probed.channel);
     const { length } = this.options.manifest.tiles;
@@ -287,7 +250,6 @@ export class Marks {
 
   dispose(): void {
     this.isDisposed = true;
-    this.reading.dispose();
     this.handles.dispose();
     this.lamps.dispose();
     this.measured.dispose();
@@ -298,9 +260,4 @@ export class Marks {
     this.axes.dispose();
     this.group.removeFromParent();
   }
-}
-
-/** In the middle of a flat picture. */
-function pxPerRad({ camera, height_px }: MarksScreen): number {
-  return (camera.projectionMatrix.elements[5] * height_px) / 2;
 }

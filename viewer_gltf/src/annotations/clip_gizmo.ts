@@ -11,10 +11,6 @@ import {
   SphereGeometry,
   Vector3,
 } from "three";
-import type { Box } from "../math/box";
-import type { Clip, ClipPlane } from "../math/clip";
-import { MAX_CORNERS, planeSection } from "../math/plane_box_section";
-import type { Vec3 } from "../math/vec3";
 import {
   BOX_HANDLES,
   boxWithin,
@@ -22,7 +18,7 @@ import {
   type HandleId,
   handlesOf,
   PLANE_HANDLES,
-} from "./clip_handles";
+} from "../marks/clip_handles";
 import {
   ACCENT,
   BRIGHT,
@@ -38,7 +34,11 @@ import {
   PLANE,
   rimmed,
   type Sight,
-} from "./style";
+} from "../marks/style";
+import type { Box } from "../math/box";
+import type { Clip, ClipPlane } from "../math/clip";
+import { MAX_CORNERS, planeSection } from "../math/plane_box_section";
+import type { Vec3 } from "../math/vec3";
 
 const UP = new Vector3(0, 1, 0);
 
@@ -96,7 +96,7 @@ export class ClipMark {
   }
 
   /** Which handle is pointed at, or held; whether it is another than before. */
-  mean(id: HandleId | null): boolean {
+  highlight(id: HandleId | null): boolean {
     if (id === this.meant) return false;
     this.meant = id;
     this.sheet.visible = this.isSheetShown;

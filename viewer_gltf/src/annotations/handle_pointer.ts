@@ -1,13 +1,13 @@
 /** Handles under a mouse or a finger: they are dragged, and the camera stays where it is. */
 import { Vector2 } from "three";
-import type { HandleId, Pointing } from "./clip_handles";
+import type { HandleId, Pointing } from "../marks/clip_handles";
 
 export type HandleTarget = Readonly<{
   /** Place in -1..1 of the picture, y up. */
   pick: (point: Vector2, pointing: Pointing) => HandleId | null;
   drag: (id: HandleId, point: Vector2) => void;
   /** The handle that is pointed at or held. */
-  mean: (id: HandleId | null) => void;
+  highlight: (id: HandleId | null) => void;
 }>;
 
 /**
@@ -17,7 +17,7 @@ export type HandleTarget = Readonly<{
 export function listenForHandles(
   stage: HTMLElement,
   canvas: HTMLCanvasElement,
-  { pick, drag, mean }: HandleTarget,
+  { pick, drag, highlight }: HandleTarget,
   signal: AbortSignal,
 ): void {
   let held: { id: HandleId; pointer: number } | null = null;
@@ -43,7 +43,7 @@ export function listenForHandles(
     event.stopPropagation();
     if (event.pointerId !== held.pointer) return;
     held = null;
-    mean(null);
+    highlight(null);
   };
 
   listen("pointerdown", (event) => {
@@ -57,11 +57,11 @@ export function listenForHandles(
     event.stopPropagation();
     canvas.setPointerCapture(event.pointerId);
     held = { id, pointer: event.pointerId };
-    mean(id);
+    highlight(id);
   });
   listen("pointermove", (event) => {
     if (held === null) {
-      if (event.buttons === 0) mean(pick(pointAt(event), pointingOf(event)));
+      if (event.buttons === 0) highlight(pick(pointAt(event), pointingOf(event)));
       return;
     }
     event.stopPropagation();

@@ -3,8 +3,8 @@ import { Matrix4, Vector3 } from "three";
 import type { Hit, RoomRay, Target } from "../interaction/ray_pointer";
 import { rayAlong } from "../interaction/rays";
 import { placeText } from "../interaction/tile_target";
-import { type Handle, type HandleId, pickHandle } from "./clip_handles";
-import { isLampHandle } from "./lamp_handles";
+import { type Handle, type HandleId, pickHandle } from "../marks/clip_handles";
+import { isLampHandle } from "../marks/lamp_handles";
 
 const HANDLE = "handle:";
 

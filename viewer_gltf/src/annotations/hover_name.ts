@@ -6,10 +6,10 @@
 import { Object3D, Vector3 } from "three";
 import { element } from "../dom/element";
 import { advanceRest, type Rest } from "../interaction/ray_at_rest";
+import { Label } from "../marks/label";
+import type { Sight } from "../marks/style";
 import type { Ray } from "../math/vec3";
-import { Label } from "./label";
-import type { Probed } from "./probe";
-import type { Sight } from "./style";
+import type { Probed } from "../probe/probe";
 
 /** Time for which the gaze rests before the name comes, s. */
 export const NAME_S = 0.4;

@@ -1,9 +1,8 @@
 /** The lamps of the path-traced picture in the scene, to be taken hold of. um, world. */
 import { Object3D, SphereGeometry, Vector3 } from "three";
-import { type Box, boxSpan } from "../math/box";
-import type { HandleId } from "./clip_handles";
-import { Label } from "./label";
-import { LAMP_HANDLES, type LampHandleId, type LitState, lampHandles } from "./lamp_handles";
+import type { HandleId } from "../marks/clip_handles";
+import { Label } from "../marks/label";
+import { LAMP_HANDLES, type LampHandleId, type LitState, lampHandles } from "../marks/lamp_handles";
 import {
   BRIGHT,
   disposeMarks,
@@ -14,7 +13,8 @@ import {
   markMesh,
   rimmed,
   type Sight,
-} from "./style";
+} from "../marks/style";
+import { type Box, boxSpan } from "../math/box";
 
 /** Opacity of a lamp behind the specimen: paths of light leave no depth to be hidden by. */
 const BEHIND = 0.4;
@@ -56,7 +56,7 @@ export class LampMark {
   }
 
   /** Which handle is pointed at, or held: seen as that from the next `show` on. */
-  mean(id: HandleId | null): void {
+  highlight(id: HandleId | null): void {
     this.meant = id;
   }
 

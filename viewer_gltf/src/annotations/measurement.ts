@@ -1,11 +1,7 @@
 /** Measurements in the scene: points, the stretches between them, what they come to, and the channels' values. */
 import { CylinderGeometry, Object3D, SphereGeometry, Vector3 } from "three";
-import type { Vec3 } from "../math/vec3";
-import { type Measurement, missing } from "../state/measurements";
-import type { MeasureKind } from "../state/parameters/tools";
-import { keepApart } from "./keep_apart";
-import { Label } from "./label";
-import { measurementText } from "./measure";
+import { keepApart } from "../marks/keep_apart";
+import { Label } from "../marks/label";
 import {
   disposeMarks,
   LINE_RADIUS,
@@ -16,7 +12,11 @@ import {
   POINT_RADIUS,
   rimmed,
   type Sight,
-} from "./style";
+} from "../marks/style";
+import type { Vec3 } from "../math/vec3";
+import { measurementText } from "../probe/measure";
+import { type Measurement, missing } from "../state/measurements";
+import type { MeasureKind } from "../state/parameters/tools";
 
 const UP = new Vector3(0, 1, 0);
 /** Colour of points and labels, as hex. */

@@ -1,8 +1,8 @@
 import { Matrix4, PerspectiveCamera, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { axesOf, axesSeen } from "./orientation_axes";
+import { axesOf, axesSeen } from "../marks/axes";
+import { umPerPixelAt } from "../marks/um_per_pixel";
 import { rulerLength } from "./ruler";
-import { umPerPixelAt } from "./scale_bar";
 
 const scaled = new Matrix4().makeScale(1e-3, 1e-3, 1e-3);
 

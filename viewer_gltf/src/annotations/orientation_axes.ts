@@ -5,9 +5,8 @@
  */
 import { ConeGeometry, CylinderGeometry, type Matrix4, Object3D, Quaternion, Vector3 } from "three";
 import type { Sides } from "../bundle/generated/bundle";
-import type { Box } from "../math/box";
-import { type Vec3, withPart } from "../math/vec3";
-import { Label } from "./label";
+import { type Axis, axesOf, axesSeen } from "../marks/axes";
+import { Label } from "../marks/label";
 import {
   AXIS_COLORS,
   disposeMarks,
@@ -16,32 +15,8 @@ import {
   markOf,
   type Piece,
   type Sight,
-} from "./style";
-
-/** A line through the specimen: `ends` are the letters where `direction` leads to, and opposite. */
-export type Axis = Readonly<{
-  direction: Vec3;
-  ends: readonly [string, string | null];
-  /** Where `direction` leads, for a screen reader. */
-  word: string;
-}>;
-
-/** The lattice's axes, or where a patient's sides are; in the colours' order. */
-export function axesOf(sides: Sides | undefined): readonly Axis[] {
-  if (sides === undefined) {
-    return (["x", "y", "z"] as const).map((name, i) => ({
-      direction: withPart([0, 0, 0], i as 0 | 1 | 2, 1),
-      ends: [name, null],
-      word: name,
-    }));
-  }
-  const [x, y, z] = sides.posterior;
-  return [
-    { direction: sides.left, ends: ["L", "R"], word: "the patient's left" },
-    { direction: sides.superior, ends: ["S", "I"], word: "the head" },
-    { direction: [-x, -y, -z], ends: ["A", "P"], word: "the front" },
-  ];
-}
+} from "../marks/style";
+import type { Box } from "../math/box";
 
 const SVG = "http://www.w3.org/2000/svg";
 /** Half the drawing's edge, in its own units. */
@@ -50,23 +25,6 @@ const LENGTH = 26;
 const LETTER = 33;
 /** An axis that leads so far to the eye or away (of 1) has one letter: the other would lie under it. */
 const END_ON = 0.9;
-
-/**
- * The specimen's axes as the eye sees them: unit vectors, x to the right, y up, z to the eye. Pure.
- *
- * @param head from the eye to the room
- * @param specimen from um to the room
- */
-export function axesSeen(
-  head: Matrix4,
-  specimen: Matrix4,
-  axes = axesOf(undefined),
-): readonly Vector3[] {
-  const toEye = head.clone().invert();
-  return axes.map(({ direction }) =>
-    new Vector3(...direction).transformDirection(specimen).transformDirection(toEye),
-  );
-}
 
 /** One end of an axis: the line from the middle, and its letter. */
 class End {

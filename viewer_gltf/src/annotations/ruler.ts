@@ -3,10 +3,18 @@
  * grows with it. um, world.
  */
 import { BoxGeometry, Object3D, Vector3 } from "three";
+import { Label } from "../marks/label";
+import {
+  BRIGHT,
+  DIM,
+  disposeMarks,
+  lengthAt,
+  markOf,
+  type Piece,
+  type Sight,
+} from "../marks/style";
 import type { Box } from "../math/box";
 import { chooseScaleBar, LONGEST_PX } from "../math/round_length";
-import { Label } from "./label";
-import { BRIGHT, DIM, disposeMarks, lengthAt, markOf, type Piece, type Sight } from "./style";
 
 /** Angle under which the user sees the longest ruler, radians. */
 const LONGEST_RAD = (16 * Math.PI) / 180;

@@ -2,25 +2,8 @@
  * The scale bar of a flat screen, over the picture's lower left corner. It is true in the plane
  * through the point that is looked at: nearer things are larger, as a picture in perspective has it.
  */
-import type { PerspectiveCamera, Vector3 } from "three";
 import { element } from "../dom/element";
-import { chooseScaleBar, type ScaleBar, umPerPixel } from "../math/round_length";
-
-/**
- * Um to a CSS pixel at the depth of a point of the room.
- *
- * @param height_px of the picture
- */
-export function umPerPixelAt(
-  focus: Vector3,
-  camera: PerspectiveCamera,
-  height_px: number,
-  m_per_um: number,
-): number {
-  const depth_m = -focus.clone().applyMatrix4(camera.matrixWorldInverse).z;
-  const fov_rad = 2 * Math.atan(1 / camera.projectionMatrix.elements[5]);
-  return umPerPixel(depth_m, fov_rad, height_px, m_per_um);
-}
+import { chooseScaleBar, type ScaleBar } from "../math/round_length";
 
 export class ScaleBarMark {
   private readonly bar = element("div", { className: "bar" });

@@ -1,9 +1,9 @@
 /** Parts of the page that nobody needs before the first picture. */
 import { hasAddress } from "../bundle/address";
+import type { PartHost } from "../host/part";
+import { OfflinePart } from "../offline/part";
 import { pixelShare } from "../render/pixel_share";
-import { AddressBar, follows, type Opened } from "./address_bar";
-import { OfflinePart } from "./offline_part";
-import type { Viewer } from "./viewer";
+import { AddressBar, follows, type Opened } from "../share/address_bar";
 
 const FEWER_PIXELS = "Drawn with fewer pixels until this tab is closed.";
 
@@ -17,13 +17,13 @@ export type Later = Readonly<{
  * @param keptToo addresses of files that are kept for a visit without a network, though the page does not fetch them
  */
 export function startLater(
-  viewer: Viewer,
+  host: PartHost,
   opened: Opened,
   say: (text: string) => void,
   keptToo: readonly string[],
 ): Later {
   if (pixelShare() < 1) say(FEWER_PIXELS);
-  void OfflinePart.start(viewer, say, keptToo);
+  void OfflinePart.start(host, say, keptToo);
   const isFollowed = hasAddress() && follows(location.search, window.parent !== window);
-  return { addressBar: isFollowed ? new AddressBar(viewer, opened) : null };
+  return { addressBar: isFollowed ? new AddressBar(host, opened) : null };
 }

@@ -5,8 +5,6 @@ import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../panel/html/forced_colors.css";
-import "../annotations/annotations.css";
-import { sizeText } from "../annotations/measure";
 import { bundleAddress, pageAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import { fileAddress } from "../bundle/fetch";
@@ -15,22 +13,26 @@ import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { hasFullScreen } from "../dom/full_screen";
+import { Host } from "../host/host";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
 import { isKept } from "../offline/request_plan";
+import { Page } from "../page/page";
 import { FirstHint, Notices, ProgressBar, Said, showFatal, WayBack } from "../panel/html/overlays";
 import { opensAr, WaysIn } from "../panel/html/ways_in";
+import { sizeText } from "../probe/measure";
 import type { Theme } from "../render/theme";
+import { withTyped } from "../share/address";
+import type { Opened } from "../share/address_bar";
 import { flightAsked } from "../share/bench_parameter";
+import { loadLink, openAddress } from "../share/open_address";
 import { isLight, isPlain, panelOf } from "../share/page_parameters";
+import type { XrSupport } from "../state/stereo";
+import { startSplit } from "../stereo/start_split";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
-import type { ImmersiveMode } from "../xr/session";
 import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
-import type { Opened } from "./address_bar";
 import type { StereoCellApi } from "./automation_api";
-import { Controller } from "./controller";
 import type { Later } from "./later_parts";
-import type { NotebookPart } from "./notebook_part";
-import { Viewer } from "./viewer";
+import * as parts from "./parts";
 
 /** Time after the first picture until stereo is prepared, where the browser does not report idle time, ms. */
 const AFTER_PICTURE_MS = 2000;
@@ -76,14 +78,15 @@ function usdzFor({ base, manifest }: Bundle): string | null {
   return usdz !== null && opensAr() ? fileAddress(base, usdz.path) : null;
 }
 
-/** What is kept for a visit without a network, though the page itself does not fetch it. */
-function alsoKept({ bundle }: Viewer): readonly string[] {
+/** Files that are kept for a visit without a network, though the page itself does not fetch them. */
+function alsoKept({ bundle }: Host): readonly string[] {
   const usdz = usdzFor(bundle);
   return usdz !== null && isKept(bundle.manifest.usdz ?? null) ? [usdz] : [];
 }
 
 const LIGHT = matchMedia("(prefers-color-scheme: light)");
 const CONTRAST = matchMedia("(prefers-contrast: more)");
+const IS_TOUCH = matchMedia("(pointer: coarse)").matches;
 
 /** The page's colours, as the address or the system has them. */
 function dressPage(): Theme {
@@ -93,120 +96,126 @@ function dressPage(): Theme {
 }
 
 /** The background of the picture, too; a system's colours may change by night. */
-function followSystem(viewer: Viewer, search: string): void {
-  const dress = () => viewer.dress(dressPage(), isPlain(search, CONTRAST.matches));
+function followSystem(host: Host, search: string): void {
+  const dress = () => host.dress(dressPage(), isPlain(search, CONTRAST.matches));
   for (const query of [LIGHT, CONTRAST]) query.addEventListener("change", dress);
   dress();
 }
 
-async function open(parent: HTMLElement): Promise<Viewer> {
+async function open(parent: HTMLElement): Promise<Host> {
   dressPage();
   checkWebGl2();
   sayAtStart("Reading the bundle");
   const page = pageAddress();
-  const bundle = await loadBundle(bundleAddress(page));
-  const { manifest } = bundle;
-  document.title = `${manifest.specimen.name} · StereoCell`;
+  const { search, hash } = new URL(page);
+  const [bundle, readLink] = await Promise.all([
+    loadBundle(bundleAddress(page)),
+    loadLink(withTyped(hash)),
+  ]);
+  document.title = `${bundle.manifest.specimen.name} · StereoCell`;
+  const isFramed = window.parent !== window;
+  document.documentElement.dataset.panel = panelOf(search);
 
+  const { host, waysIn, hint } = makeHost(parent, bundle, isFramed);
+  followSystem(host, search);
+  host.panel.learn({ subtitle: describeSize(bundle.manifest) });
+  const ofPage = new Page(host, parent, said);
+  host.add(ofPage);
+  openAddress(host, search, readLink);
+  const { viewpoint, renderer } = host.display;
+  openedAs = { state: host.state, camera: viewpoint.cameraView };
+  renderer.domElement.addEventListener("webglcontextlost", () => {
+    void import("../page/lost_context").then(({ offerReload }) =>
+      offerReload(host, () => later?.addressBar?.write()),
+    );
+  });
+  hint.update(host.state);
+  whenTouched(() => {
+    viewpoint.stopTurning();
+    hint.leave();
+  });
+  const support = await offerWaysIn(host, waysIn, ofPage);
+  await addHolder(host, search, isFramed);
+  const flight_s = flightAsked(search);
+  if (flight_s !== null) await offerBench(host, parent, flight_s, support.isAvailable);
+  return host;
+}
+
+/** The host, with the picture and all that lies over it. */
+function makeHost(parent: HTMLElement, bundle: Bundle, isFramed: boolean) {
   const stage = element("div", { className: "stage" });
   stage.ariaLabel = "The specimen: the arrow keys turn it, ? lists all keys";
   stage.role = "group"; // an image would hide the marks and the buttons in it from screen readers
   const progress = new ProgressBar();
   const notices = new Notices(
-    (texts) => viewer.dispatch({ type: "dismiss", texts }),
-    () => viewer.run("retry"),
+    (texts) => host.dispatch({ type: "dismiss", texts }),
+    () => host.run("retry"),
   );
   const waysIn = new WaysIn();
-  const isTouch = matchMedia("(pointer: coarse)").matches;
-  const isFramed = window.parent !== window;
-  const hint = new FirstHint(isTouch, isFramed);
-  const wayBack = new WayBack(() => viewer.run("back"));
+  const hint = new FirstHint(IS_TOUCH, isFramed);
+  const wayBack = new WayBack(() => host.run("back"));
   const over = [hint.root, progress.root, said.root, notices.root, waysIn.root, wayBack.root];
-  parent.replaceChildren(element("main", { className: "view" }, {}, stage, ...over));
-  let controller: Controller | null = null;
-  let notebook: NotebookPart | null = null;
+  const view = element("main", { className: "view" }, {}, stage, ...over);
+  parent.replaceChildren(view);
   if (isFramed) leaveWheelToHolder(stage);
-  const { search, hash } = new URL(page);
-  document.documentElement.dataset.panel = panelOf(search);
-  const viewer: Viewer = new Viewer(
-    bundle,
-    stage,
-    (state) => {
-      controller?.refresh();
-      notices.update(state);
-      hint.update(state);
-      wayBack.update(state);
-      notebook?.note();
-    },
-    () => {
-      progress.update(viewer.snapshot().overview);
-      controller?.refreshSoon();
-      notebook?.note();
-    },
-  );
-  followSystem(viewer, search);
-  controller = new Controller(viewer, parent, said, {
-    subtitle: describeSize(manifest),
-    onStereo: () => void enterStereo(viewer, "immersive-vr"),
-    onRoom: () => void enterStereo(viewer, "immersive-ar"),
-    onSplit: (lenses) => void viewer.startSplit(lenses).catch((error) => viewer.report(error)),
+  const host: Host = new Host(bundle, stage, view, Object.values(parts));
+  host.changed.subscribe((state) => {
+    for (const each of [notices, hint, wayBack]) each.update(state);
   });
-  const { layOut } = controller;
-  viewer.layOut = layOut.bind(controller);
-  notices.update(viewer.state);
-  controller.followAddress(search, hash);
-  openedAs = { state: viewer.state, camera: viewer.cameraView };
-  viewer.renderer.domElement.addEventListener("webglcontextlost", () => {
-    void import("./lost_context").then(({ offerReload }) =>
-      offerReload(viewer, () => later?.addressBar?.write()),
-    );
-  });
-  hint.update(viewer.state);
-  whenTouched(() => {
-    viewer.stopTurning();
-    hint.leave();
-  });
+  host.drawn.subscribe(() => progress.update(host.display.snapshot().overview));
+  notices.update(host.state);
+  return { host, waysIn, hint };
+}
+
+/** Offers the ways into stereo, the user's room and the full screen that this device has. */
+async function offerWaysIn(host: Host, waysIn: WaysIn, page: Page): Promise<XrSupport> {
   const support = await findXrSupport(navigator.xr, isSecureContext);
   const hasRoom = await showsUsersRoom(navigator.xr, isSecureContext);
-  controller.setStereo(support, hasRoom);
-  const way = wayToStereo(support, isTouch);
-  waysIn.offerStereo(way, () => way && controller.perform(way));
-  if (way !== null || hasRoom) void prepareStereo(viewer);
-  if (hasFullScreen()) waysIn.offerFullScreen(() => controller.perform("full-screen"));
-  if (hasRoom) waysIn.offerRoom(() => controller.perform("room"));
-  const usdz = usdzFor(bundle);
+  host.panel.learn({ stereo: support, hasRoom });
+  const way = wayToStereo(support, IS_TOUCH);
+  waysIn.offerStereo(way, () => way && page.perform(way));
+  if (way !== null || hasRoom) void prepareStereo(host);
+  if (hasFullScreen()) waysIn.offerFullScreen(() => page.perform("full-screen"));
+  if (hasRoom) waysIn.offerRoom(() => page.perform("room"));
+  const usdz = usdzFor(host.bundle);
   if (usdz !== null) waysIn.offerLink(usdz);
+  return support;
+}
+
+/** Shares the view with the notebook, or with the page that holds this one in a frame. */
+async function addHolder(host: Host, search: string, isFramed: boolean): Promise<void> {
   const port = globalThis.stereocellHost?.port;
   if (port !== undefined) {
-    const part = await import("./notebook_part");
-    notebook = new part.NotebookPart(viewer, port);
+    const { NotebookPart } = await import("../notebook/notebook_part");
+    host.add(new NotebookPart(host, port));
   } else if (isFramed && new URLSearchParams(search).has("embed")) {
-    const [part, way] = await Promise.all([import("./notebook_part"), import("./frame_port")]);
-    const port = way.portToHolder(search, manifest);
-    if (port !== null) notebook = new part.NotebookPart(viewer, port);
+    const [{ NotebookPart }, way] = await Promise.all([
+      import("../notebook/notebook_part"),
+      import("../notebook/frame_port"),
+    ]);
+    const port = way.portToHolder(search, host.bundle.manifest);
+    if (port !== null) host.add(new NotebookPart(host, port));
   }
-  const flight_s = flightAsked(search);
-  if (flight_s !== null) await offerBench(viewer, parent, flight_s, support.isAvailable);
-  return viewer;
 }
 
 /** The benchmark, a part of the page that few ask for. */
 async function offerBench(
-  viewer: Viewer,
+  host: Host,
   parent: HTMLElement,
   flight_s: number,
   hasHeadset: boolean,
 ): Promise<void> {
   const [{ benchCard }, { subjectOf }] = await Promise.all([
     import("../bench/bench_card"),
-    import("./bench_subject"),
+    import("../bench/bench_subject"),
   ]);
+  const { stereo } = host.display;
   const card = benchCard(flight_s, {
-    subject: subjectOf(viewer),
+    subject: subjectOf(host),
     stereo: hasHeadset ? ["headset", "split"] : ["split"],
     startStereo: async (kind) => {
-      if (kind === "split") await viewer.startSplit(CARDBOARD_V2);
-      else if (navigator.xr !== undefined) await viewer.stereo.startHeadset(navigator.xr);
+      if (kind === "split") await startSplit(host, CARDBOARD_V2);
+      else if (navigator.xr !== undefined) await stereo.startHeadset(navigator.xr);
     },
     onReport: (report) => {
       api.bench = report;
@@ -215,29 +224,19 @@ async function offerBench(
   parent.append(card);
 }
 
-async function enterStereo(viewer: Viewer, mode: ImmersiveMode): Promise<void> {
-  if (navigator.xr === undefined) return;
-  try {
-    await viewer.stereo.startHeadset(navigator.xr, mode);
-  } catch (error) {
-    if (!(error instanceof DOMException || error instanceof BundleError)) throw error;
-    viewer.dispatch({ type: "notify", text: `Stereo could not start: ${error.message}` });
-  }
-}
-
 /** Load the part of the page that shows stereo, once there is a picture and the page has nothing else to do. */
-async function prepareStereo(viewer: Viewer): Promise<void> {
-  await overviewShown(viewer);
-  const prepare = () => void viewer.stereo.prepare().catch(() => undefined); // a start reports it
+async function prepareStereo({ display }: Host): Promise<void> {
+  await overviewShown(display);
+  const prepare = () => void display.stereo.prepare().catch(() => undefined); // a start reports it
   if (typeof requestIdleCallback === "function") requestIdleCallback(prepare);
   else setTimeout(prepare, AFTER_PICTURE_MS);
 }
 
 /** Resolves once every shown channel's overview is on screen. */
-async function overviewShown(viewer: Viewer): Promise<void> {
+async function overviewShown(display: Host["display"]): Promise<void> {
   for (;;) {
-    const before = viewer.frames;
-    if (viewer.snapshot().overview.isComplete && before > 0) return;
+    const before = display.frames;
+    if (display.snapshot().overview.isComplete && before > 0) return;
     await new Promise((resolve) => requestAnimationFrame(resolve));
   }
 }
@@ -245,7 +244,7 @@ async function overviewShown(viewer: Viewer): Promise<void> {
 const app = document.getElementById("app");
 if (app === null) throw new Error("the page has no #app");
 const opened = open(app);
-const ready = opened.then(overviewShown);
+const ready = opened.then(({ display }) => overviewShown(display));
 opened.catch((error: unknown) => {
   if (!(error instanceof BundleError)) {
     showFatal(app, "The viewer failed", String(error));
@@ -253,28 +252,28 @@ opened.catch((error: unknown) => {
   }
   showFatal(app, "This bundle can't be shown", error.message);
 });
-let viewer: Viewer | null = null;
+let host: Host | null = null;
 let later: Later | null = null;
 void opened.then(
   (made) => {
-    viewer = made;
+    host = made;
   },
   () => undefined, // reported above
 );
 void ready
   .then(async () => {
     const { startLater } = await import("./later_parts");
-    if (viewer === null || openedAs === null) return;
-    later = startLater(viewer, openedAs, (text) => said.say(text), alsoKept(viewer));
+    if (host === null || openedAs === null) return;
+    later = startLater(host, openedAs, (text) => said.say(text), alsoKept(host));
   })
   .catch(() => undefined); // without these parts the page shows all the same
-watchWaiting((jobs) => viewer?.noteWaiting(jobs));
+watchWaiting((jobs) => host?.noteWaiting(jobs));
 ready.catch(() => undefined); // reported above; a caller that awaits `ready` still sees it
 
 /** Bugs: the console has the details, the page reports that something is amiss. */
 function reportBug(error: unknown): void {
   if (!(error instanceof Error)) return; // such as a ResizeObserver's harmless message
-  viewer?.dispatch({ type: "notify", text: `Something in the viewer failed: ${error.message}` });
+  host?.dispatch({ type: "notify", text: `Something in the viewer failed: ${error.message}` });
 }
 addEventListener("error", (event) => reportBug(event.error));
 addEventListener("unhandledrejection", (event) => reportBug(event.reason));
@@ -284,12 +283,12 @@ const api: StereoCellApi = {
   bench: null,
   ready,
   get frames() {
-    return viewer?.frames ?? 0;
+    return host?.display.frames ?? 0;
   },
-  settled: async () => (await opened).settled(),
+  settled: async () => (await opened).display.settled(),
   snapshot() {
-    if (viewer === null) throw new Error("nothing is open yet: await ready");
-    return viewer.snapshot();
+    if (host === null) throw new Error("nothing is open yet: await ready");
+    return host.display.snapshot();
   },
 };
 window.stereocell = api;

@@ -1,8 +1,8 @@
 /** Scale bar, legend and orientation on a saved picture, as they lie over the stage. */
 
 import type { Matrix4 } from "three";
-import { type Axis, axesSeen } from "../annotations/orientation_axes";
-import { AXIS_COLORS } from "../annotations/style";
+import { type Axis, axesSeen } from "../marks/axes";
+import { AXIS_COLORS } from "../marks/style";
 import { chooseScaleBar } from "../math/round_length";
 import { type Corner, clearestOf, inCorners, type Rect } from "./label_boxes";
 

@@ -1,8 +1,9 @@
 /** The shown channels, for a picture: name, colour, and the values that the window spans. Pure. */
-import { unitOf, valueText } from "../annotations/measure";
+
 import type { Manifest } from "../bundle/generated/bundle";
+import type { ColorLegend } from "../host/services";
 import { toHex } from "../math/color";
-import type { ColorLegend } from "../objects/legend";
+import { unitOf, valueText } from "../probe/measure";
 import type { ViewerState } from "../state/viewer_state";
 import type { LegendEntry } from "./caption";
 

@@ -138,3 +138,8 @@ export class Pointer {
     this.lastPress = null;
   }
 }
+
+/** The place where a ray meets a target. */
+export function pointOn({ ray, distance_m }: Pick<Met, "ray" | "distance_m">): Vector3 {
+  return ray.direction.clone().multiplyScalar(distance_m).add(ray.origin);
+}

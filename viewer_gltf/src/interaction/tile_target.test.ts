@@ -33,13 +33,17 @@ describe("the tile along a ray", () => {
 it("an object in a tile is met before its tile, and is of that tile", () => {
   const specimen = new Group();
   const chosen: unknown[][] = [];
-  const target = new TileTarget(specimen, (...given) => chosen.push(given));
+  let hasObject = true;
+  const target = new TileTarget(
+    specimen,
+    (...given) => chosen.push(given),
+    ({ direction }) => (hasObject ? { id: "cells/7", distance: 1.5 * -direction[2] } : null),
+  );
   target.tiles = [{ id: "r0_c0", bounds_um: { min: [-1, -1, -2], max: [1, 1, -1] } }];
   const ray = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
-  target.objectAlong = ({ direction }) => ({ id: "cells/7", distance: 1.5 * -direction[2] });
   expect(target.meet(ray)).toMatchObject({ key: "tile:r0_c0/cells/7", distance_m: 1.5 });
   target.choose({ key: "tile:r0_c0/cells/7", distance_m: 1.5 }, ray, true);
   expect(chosen.map(([, tile, isByGaze]) => [tile, isByGaze])).toEqual([["r0_c0", true]]);
-  target.objectAlong = () => null;
+  hasObject = false;
   expect(target.meet(ray)?.key).toBe("tile:r0_c0");
 });

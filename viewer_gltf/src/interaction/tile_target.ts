@@ -24,14 +24,18 @@ export class TileTarget implements Target {
   private changes = 0;
   /** Points are measured, so that each point of a tile is another choice. */
   private isMeasuring = false;
-  /** The object along a ray, in um of the specimen: its name, and where; null: none. */
-  objectAlong: (ray: Ray) => Readonly<{ id: string; distance: number }> | null = () => null;
   private readonly toSpecimen = new Matrix4();
 
-  /** @param onChoose the ray is in um of the specimen */
+  /**
+   * @param onChoose the ray is in um of the specimen
+   * @param objectAlong finds the object along a ray, in um of the specimen: its name, and where; null: none
+   */
   constructor(
     private readonly specimen: Object3D,
     private readonly onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void,
+    private readonly objectAlong: (
+      ray: Ray,
+    ) => Readonly<{ id: string; distance: number }> | null = () => null,
   ) {}
 
   /** The tiles that are shown. */

@@ -1,15 +1,10 @@
 /** What the colours of objects mean, for a picture that has no panel beside it. Pure. */
 import type { ObjectColumn } from "../bundle/generated/objects";
+import type { ColorLegend } from "../host/services";
 import { toHex } from "../math/color";
 import type { ObjectView } from "../state/objects";
 import { byteValue, categoryColor, colorAt, isLogarithmic, MISSING } from "./palettes";
 import { countBytes, NO_CATEGORY, numberText, ROWS_OF_LEGEND, unitText } from "./pictures";
-
-/** `column`: the name of the one that colours. Of a row, one colour, or a palette's from end to end; none: words alone. */
-export type ColorLegend = Readonly<{
-  column: string;
-  rows: readonly Readonly<{ colors: readonly string[]; text: string }>[];
-}>;
 
 /** Colours that a palette is drawn by. */
 const PALETTE_COLORS = 17;

@@ -1,6 +1,7 @@
 /** The objects of one label map: their table, how their surfaces look, and who is met by a ray. */
 import { Matrix4, Mesh, type Object3D } from "three";
 import type { FileRef, Manifest } from "../bundle/generated/bundle";
+import type { ColorLegend } from "../host/services";
 import { type Box, centerOf } from "../math/box";
 import type { Clip } from "../math/clip";
 import type { Rgb } from "../math/color";
@@ -11,7 +12,7 @@ import type { SurfaceSet } from "../surfaces/surface_set";
 import { objectsCsv } from "./csv";
 import { filtered, flag, GONE } from "./flags";
 import { middleOf } from "./gap";
-import { type ColorLegend, colorLegend } from "./legend";
+import { colorLegend } from "./legend";
 import { readLinked, writeLinked } from "./linked";
 import { ObjectMaterial } from "./object_material";
 import { tableOf } from "./palettes";

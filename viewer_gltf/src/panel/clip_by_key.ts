@@ -9,11 +9,11 @@ import {
   changePlane,
   faceOf,
   type HandleId,
-} from "../annotations/clip_handles";
-import { distanceText } from "../annotations/measure";
+} from "../marks/clip_handles";
 import type { Box } from "../math/box";
 import { type Clip, moveFace, movePlane, spinPlane } from "../math/clip";
 import { AXES } from "../math/vec3";
+import { distanceText } from "../probe/measure";
 import type { Action } from "../state/actions";
 
 const TURNS = ["turn-x", "turn-y", "turn-z"] as const;

@@ -278,6 +278,15 @@ export type Section = Readonly<{
   items: readonly (Control | Group)[];
 }>;
 
+/** A section as the panel's own lists and the parts have it. */
+export type PartSection = Pick<Section, "id" | "label" | "items"> &
+  Readonly<{
+    /** Place among the others: the panel's own have tens. */
+    rank: number;
+    /** Absent: it is listed with the first ones. */
+    isDeeper?: boolean;
+  }>;
+
 export type Layout = Readonly<{
   title: string;
   subtitle: string;

@@ -2,6 +2,7 @@ import { readdirSync, readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 import { FLAT_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
+import { KEYS, layOut } from "../../test/support/panel/whole_panel";
 import { STAYS } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
@@ -11,8 +12,6 @@ import type { ViewerState } from "../state/viewer_state";
 import { type Control, START_VIEW } from "./controls";
 import { EXPLAINED, isExplained } from "./explained";
 import { CHOICES, EXPLANATIONS, explanationOf, explanationOfChoice } from "./explanations";
-import { KEYS } from "./keys";
-import { layOut } from "./layout";
 import { titleOf } from "./transfer_titles";
 
 const start = initialState(sampleManifest(3));
@@ -94,7 +93,10 @@ describe("the words of the panel", () => {
         .concat(control.kind === "choice" ? control.options.map(({ label }) => label) : [])
         .filter((text) => text !== undefined),
     );
-    const ofKeys = KEYS.flatMap(({ name, keys }) => [name, ...keys.map(({ label }) => label)]);
+    const ofKeys = KEYS.groups.flatMap(({ name, keys }) => [
+      name,
+      ...keys.map(({ label }) => label),
+    ]);
     const others = [EXPLANATIONS, ...Object.values(CHOICES), REFUSED, STAYS].flatMap((table) =>
       Object.values(table),
     );

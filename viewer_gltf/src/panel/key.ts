@@ -20,7 +20,14 @@ export type Key = Readonly<{
   /** @param name which of its keys it was */
   to: (context: KeyContext, name: string) => Wish | Refusal;
 }>;
-export type KeyGroup = Readonly<{ name: string; keys: readonly Key[] }>;
+export type KeyGroup = Readonly<{
+  name: string;
+  /** Place in the list of keys; groups of one name are joined. */
+  rank: number;
+  keys: readonly Key[];
+  /** Whether its keys do nothing for a specimen without volumes; absent: they always do something. */
+  needsVolumes?: boolean;
+}>;
 
 export function no(refusal: string): Refusal {
   return { refusal };

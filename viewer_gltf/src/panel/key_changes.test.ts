@@ -1,22 +1,23 @@
 import { describe, expect, it } from "vitest";
+import { KEYS } from "../../test/support/panel/whole_panel";
 import { changeKey, keyNow } from "./key_changes";
-import { KEYS, type KeyChanges, standsFor, withKeys } from "./keys";
+import { type KeyChanges, withKeys } from "./keys";
 
 const changed = (changes: KeyChanges, name: string, pressed: string): KeyChanges => {
-  const answer = changeKey(changes, name, pressed);
+  const answer = changeKey(KEYS, changes, name, pressed);
   if ("refusal" in answer) throw new Error(answer.refusal);
   return answer.changes;
 };
 const refusal = (changes: KeyChanges, name: string, pressed: string) =>
-  expect(changeKey(changes, name, pressed)).toEqual({
+  expect(changeKey(KEYS, changes, name, pressed)).toEqual({
     refusal: expect.stringMatching(/^[A-Z][^.]*\.$/),
   });
 
 describe("a key that a reader changes", () => {
   it("does what the old one did, which does nothing then", () => {
     const changes = changed({}, "o", "é");
-    expect(standsFor("é", changes)).toBe("o");
-    expect(standsFor("o", changes)).toBeNull();
+    expect(KEYS.standsFor("é", changes)).toBe("o");
+    expect(KEYS.standsFor("o", changes)).toBeNull();
     expect(keyNow("o", changes)).toBe("é");
     expect(keyNow("m", changes)).toBe("m");
   });
@@ -24,7 +25,7 @@ describe("a key that a reader changes", () => {
   it("leaves its old key to another action, and gets it back when that one leaves it", () => {
     const first = changed({}, "o", "é");
     const second = changed(first, "m", "o");
-    expect(standsFor("o", second)).toBe("m");
+    expect(KEYS.standsFor("o", second)).toBe("m");
     refusal(second, "o", "o");
     const third = changed(second, "m", "m");
     expect(changed(third, "o", "o")).toEqual({});
@@ -37,10 +38,10 @@ describe("a key that a reader changes", () => {
   });
 
   it("keeps each key of the tables for one action, whatever is swapped", () => {
-    const names = KEYS.flatMap(({ keys }) => keys.flatMap(({ keys }) => keys));
+    const names = KEYS.groups.flatMap(({ keys }) => keys.flatMap(({ keys }) => keys));
     let changes: KeyChanges = changed(changed({}, "a", "é"), "b", "a");
     changes = changed(changes, "a", "b");
-    const done = names.map((name) => standsFor(keyNow(name, changes), changes));
+    const done = names.map((name) => KEYS.standsFor(keyNow(name, changes), changes));
     expect(done).toEqual(names);
   });
 
@@ -51,7 +52,7 @@ describe("a key that a reader changes", () => {
   });
 
   it("does nothing by a name that every object has", () => {
-    expect(standsFor("constructor", {})).toBeNull();
-    expect(standsFor("toString", {})).toBeNull();
+    expect(KEYS.standsFor("constructor", {})).toBeNull();
+    expect(KEYS.standsFor("toString", {})).toBeNull();
   });
 });

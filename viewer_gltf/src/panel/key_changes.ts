@@ -1,7 +1,7 @@
 /** Changing the keys: which key may do what. Pure; it comes with the list of keys. */
 import type { Refusal } from "./controls";
 import { no } from "./key";
-import { type KeyChanges, labelOf, standsFor } from "./keys";
+import type { KeyChanges, KeyTable } from "./keys";
 
 /** The key of this list stays, so that everybody finds the way back. */
 export const FIXED = "?";
@@ -15,13 +15,16 @@ export function keyNow(name: string, changes: KeyChanges): string {
 
 /** Let `pressed` do what `name` does in the tables; a refusal says why it can't. */
 export function changeKey(
+  table: KeyTable,
   changes: KeyChanges,
   name: string,
   pressed: string,
 ): Readonly<{ changes: KeyChanges }> | Refusal {
-  const owner = standsFor(pressed, changes);
+  const owner = table.standsFor(pressed, changes);
   if (owner !== null && owner !== name) {
-    return no(`That key does “${labelOf(owner)}”: press another one, or change that one first.`);
+    return no(
+      `That key does “${table.labelOf(owner)}”: press another one, or change that one first.`,
+    );
   }
   const { [name]: _, ...others } = changes;
   if (pressed === name) return { changes: others };

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
+import { KEYS } from "../../test/support/panel/whole_panel";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
@@ -13,10 +14,9 @@ import { REFUSED as REASONS } from "../state/refusals";
 import { makeShape } from "../state/transfer_shapes";
 import { type PanelChange, START_VIEW } from "./controls";
 import { isRefusal, type KeyContext } from "./key";
-import { KEYS, wishOf } from "./keys";
 import { spokenFeedback } from "./spoken_feedback";
 
-const ALL = KEYS.flatMap(({ keys }) => keys);
+const ALL = KEYS.groups.flatMap(({ keys }) => keys);
 const CONTEXT: KeyContext = {
   state: [
     {
@@ -200,60 +200,60 @@ describe("the keys", () => {
   });
 
   it("move the part of the cuts that is meant", () => {
-    expect(wishOf("N", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "x-min" });
-    expect(wishOf("B", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "z-max" });
+    expect(KEYS.wishOf("N", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "x-min" });
+    expect(KEYS.wishOf("B", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "z-max" });
     const { min, max } = SPECIMEN_BOX;
     const cut = (box: typeof SPECIMEN_BOX | object) => ({
       type: "set-clip",
       clip: { box, plane: null },
     });
-    expect(wishOf(".", CONTEXT)).toEqual(cut({ min: [1, min[1], min[2]], max }));
+    expect(KEYS.wishOf(".", CONTEXT)).toEqual(cut({ min: [1, min[1], min[2]], max }));
     const view = { ...START_VIEW, clipPart: "y-max" } as const;
-    const inside = wishOf(",", { ...CONTEXT, view });
+    const inside = KEYS.wishOf(",", { ...CONTEXT, view });
     expect(inside).toEqual(cut({ min, max: [max[0], -0.4, max[2]] }));
-    expect(wishOf(".", { ...CONTEXT, view })).toEqual(REFUSED); // there the specimen ends
+    expect(KEYS.wishOf(".", { ...CONTEXT, view })).toEqual(REFUSED); // there the specimen ends
     const whole = reduce(CONTEXT.state, { type: "set-clip", clip: { box: null, plane: null } });
-    expect(wishOf(".", { ...CONTEXT, state: whole })).toEqual(REFUSED);
-    expect(wishOf("N", { ...CONTEXT, state: whole })).toEqual(REFUSED);
+    expect(KEYS.wishOf(".", { ...CONTEXT, state: whole })).toEqual(REFUSED);
+    expect(KEYS.wishOf("N", { ...CONTEXT, state: whole })).toEqual(REFUSED);
   });
 
   it("mean the channel with the open card, or the first one shown", () => {
-    expect(wishOf("o", CONTEXT)).toEqual({
+    expect(KEYS.wishOf("o", CONTEXT)).toEqual({
       type: "set",
       id: "opacity",
       channel: "c0",
       value: 0.95,
     });
     const view = { ...START_VIEW, picked: "c2" };
-    expect(wishOf("o", { ...CONTEXT, view })).toEqual({
+    expect(KEYS.wishOf("o", { ...CONTEXT, view })).toEqual({
       type: "set",
       id: "opacity",
       channel: "c2",
       value: 0.95,
     });
-    expect(wishOf("c", { ...CONTEXT, view })).toEqual({ panel: "pick", channel: "c3" });
-    expect(wishOf("C", { ...CONTEXT, view: { ...view, picked: "c0" } })).toEqual({
+    expect(KEYS.wishOf("c", { ...CONTEXT, view })).toEqual({ panel: "pick", channel: "c3" });
+    expect(KEYS.wishOf("C", { ...CONTEXT, view: { ...view, picked: "c0" } })).toEqual({
       panel: "pick",
       channel: "c3",
     });
   });
 
   it("show the lamps where they light something", () => {
-    expect(wishOf("$", CONTEXT)).toEqual({ type: "set", id: "trace/lamps", value: true });
+    expect(KEYS.wishOf("$", CONTEXT)).toEqual({ type: "set", id: "trace/lamps", value: true });
     const shown = reduce(CONTEXT.state, { type: "set", id: "trace/lamps", value: true });
-    expect(wishOf("$", { ...CONTEXT, state: shown })).toEqual({
+    expect(KEYS.wishOf("$", { ...CONTEXT, state: shown })).toEqual({
       type: "set",
       id: "trace/lamps",
       value: false,
     });
     const marched = reduce(shown, { type: "set", id: "mode", value: "all" });
-    expect(wishOf("$", { ...CONTEXT, state: marched })).toEqual(REFUSED);
+    expect(KEYS.wishOf("$", { ...CONTEXT, state: marched })).toEqual(REFUSED);
   });
 
   it("do nothing where there is nothing to do", () => {
-    expect(wishOf("F9", CONTEXT)).toBeNull();
-    expect(wishOf("F12", CONTEXT)).toBeNull();
-    expect(wishOf("g", { ...CONTEXT, focusTile: null })).toEqual(REFUSED);
+    expect(KEYS.wishOf("F9", CONTEXT)).toBeNull();
+    expect(KEYS.wishOf("F12", CONTEXT)).toBeNull();
+    expect(KEYS.wishOf("g", { ...CONTEXT, focusTile: null })).toEqual(REFUSED);
   });
 
   it("change the state, or say why they don't", () => {
@@ -277,7 +277,7 @@ describe("the keys", () => {
     const silent: string[] = [];
     for (const [where, context] of Object.entries(contexts)) {
       for (const name of ALL.flatMap(({ keys }) => keys)) {
-        const wish = wishOf(name, context);
+        const wish = KEYS.wishOf(name, context);
         if (wish === null) throw new Error(name);
         if (isRefusal(wish)) {
           if (!/^[A-Z].*\.$/.test(wish.refusal)) silent.push(`${where} ${name}: ${wish.refusal}`);
@@ -297,9 +297,9 @@ describe("the keys", () => {
       }
     }
     expect(silent).toEqual([]);
-    expect(wishOf("}", contexts.bare)).toEqual({ refusal: REASONS.slices });
+    expect(KEYS.wishOf("}", contexts.bare)).toEqual({ refusal: REASONS.slices });
     const said = (name: string) => {
-      const wish = wishOf(name, contexts.atEnd);
+      const wish = KEYS.wishOf(name, contexts.atEnd);
       if (wish === null || isRefusal(wish)) throw new Error(name);
       return spokenFeedback(wish, atEnd, atEnd, new Map());
     };
@@ -308,16 +308,16 @@ describe("the keys", () => {
   });
 
   it("go to the next tile, also of those that are shown alone", () => {
-    expect(wishOf("t", CONTEXT)).toEqual({ type: "select", tile: "r0_c0" });
+    expect(KEYS.wishOf("t", CONTEXT)).toEqual({ type: "select", tile: "r0_c0" });
     const state = reduce(CONTEXT.state, { type: "isolate", tile: "r1_c4" });
-    expect(wishOf("t", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: "r0_c0" });
-    expect(wishOf("i", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: null });
+    expect(KEYS.wishOf("t", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: "r0_c0" });
+    expect(KEYS.wishOf("i", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: null });
   });
 
   it("cut what is shown, also of a tile that is shown alone", () => {
     const shown = { min: [0, -10, 0], max: [10, 0, 8] } as const;
     const state = initialState(sampleManifest(1));
-    const clipOf = (name: string) => wishOf(name, { ...CONTEXT, state, shown });
+    const clipOf = (name: string) => KEYS.wishOf(name, { ...CONTEXT, state, shown });
     expect(clipOf("b")).toMatchObject({
       clip: { box: { min: [2.5, -7.5, 2], max: [7.5, -2.5, 6] } },
     });
@@ -327,7 +327,7 @@ describe("the keys", () => {
   it("are announced in words that name the new value", () => {
     const ranges = new Map([["c0", [100, 1120] as const]]);
     const after = (name: string) => {
-      const wish = wishOf(name, MARCHED);
+      const wish = KEYS.wishOf(name, MARCHED);
       if (wish === null || typeof wish === "string" || "panel" in wish || isRefusal(wish)) {
         throw new Error(name);
       }
@@ -346,11 +346,11 @@ describe("the keys", () => {
     const channels = MARCHED.state.channels.map((one) => ({ ...one, hasObjects: true }));
     const objects = { ...MARCHED, state: { ...MARCHED.state, channels } };
     for (const name of ["m", "D", "%"]) {
-      expect(wishOf(name, objects)).toEqual({
+      expect(KEYS.wishOf(name, objects)).toEqual({
         refusal: REASONS.volumes,
       });
-      expect(wishOf(name, MARCHED)).not.toHaveProperty("refusal");
+      expect(KEYS.wishOf(name, MARCHED)).not.toHaveProperty("refusal");
     }
-    expect(wishOf("b", objects)).not.toHaveProperty("refusal");
+    expect(KEYS.wishOf("b", objects)).not.toHaveProperty("refusal");
   });
 });

@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { FLAT_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
+import { type Facts, layOut } from "../../test/support/panel/whole_panel";
 import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
 import { DISC_RADIUS, SWITCH_DISTANCE } from "../state/parameters/volumes";
@@ -15,7 +16,6 @@ import {
   START_VIEW,
   type Wish,
 } from "./controls";
-import { type Facts, layOut } from "./layout";
 import { PALETTES } from "./palettes";
 import { PAGE } from "./sections/channels";
 
@@ -265,15 +265,15 @@ describe("the panel's layout", () => {
     const ids = (objects: Facts["objects"]) =>
       laid(ofObjects(start(1)), START_VIEW, { ...FACTS, objects }).sections.map(({ id }) => id);
     const items = [{ kind: "text", id: "objects-count", label: "Objects", value: "3" } as const];
-    expect(ids([])).toEqual(ids([{ id: "c0", name: "Cells", colors: [], items }]));
+    expect(ids([])).toEqual(ids([{ id: "c0", items }]));
     expect(ids([])).toContain("objects");
   });
 
   it("shows the objects' own colours beside a label map's name, and one colour where they have that", () => {
     const state = ofObjects(start());
     const shows = (colors: readonly string[]) => {
-      const objects = [{ id: "c0", name: "Cells", colors, items: [] }];
-      const layout = laid(state, START_VIEW, { ...FACTS, objects });
+      const objectColors = new Map([["c0", colors]]);
+      const layout = laid(state, START_VIEW, { ...FACTS, objectColors });
       return ["c0/color", "c1/color"].map((id) => find(layout, "colour", id).shows);
     };
     expect(shows(["#112233", "#445566"])).toEqual([["#112233", "#445566"], []]);

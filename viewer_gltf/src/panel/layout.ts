@@ -6,24 +6,20 @@ import { QUALITY_PARAMETERS } from "../state/parameters/tools";
 import { DISC_RADIUS, MODE, VOLUMES } from "../state/parameters/volumes";
 import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import type { QualitySettings } from "../state/quality_controller";
+import { REFUSED } from "../state/refusals";
 import type { StereoSupport } from "../state/stereo";
 import { tileName } from "../state/tile_name";
 import { hasVolumes, type ViewerState } from "../state/viewer_state";
 import type { Histogram } from "../volumes/transfer_functions_loader";
 import { command, controlOf, controlsOf } from "./control_templates";
-import type { Control, Layout, PanelView, Section } from "./controls";
+import type { Control, Layout, PanelView, PartSection, Section } from "./controls";
 import { channelItems, type Ranges } from "./sections/channels";
-import { measureItems } from "./sections/measure";
 import { MOVES } from "./sections/move";
 import { lightItems } from "./sections/path_trace";
-import { saveItems } from "./sections/save";
-import { sliceItems } from "./sections/slices";
 import { stereoItems } from "./sections/stereo";
 import { tileItems } from "./sections/tiles";
 
 export { chosenTile } from "./sections/tiles";
-
-import { REFUSED } from "../state/refusals";
 
 /** Facts outside the state. */
 export type Facts = StereoSupport &
@@ -40,8 +36,6 @@ export type Facts = StereoSupport &
     /** Where the limit of tiles in the disc ends it; null or absent: it covers no more. */
     discLimit_deg?: number | null;
     isStereo: boolean;
-    /** Whether the specimen is a patient, whose slices most people look for first. */
-    isPatient?: boolean;
     /** null: not known yet. */
     frame_ms: number | null;
     settings: QualitySettings | null;
@@ -51,27 +45,12 @@ export type Facts = StereoSupport &
     /** Of the path-traced picture, for each pixel; null: it is none. */
     samples: number | null;
     isLoading: boolean;
-    /** Of each measured point: the channels' values there, as `DAPI 1210`. */
-    values: readonly (readonly string[])[];
-    /** The channels' values where the slices meet. */
-    sliceValues: readonly string[];
-    /** Of the label maps that are shown. */
-    objects?: readonly ObjectsFacts[];
-    /** Whether a video is being made. */
-    isFilming: boolean;
+    /** Some of the objects' colours, by label map that is shown. */
+    objectColors?: ReadonlyMap<string, readonly string[]>;
     /** What undoing and redoing would change, in words; null: there is nothing. */
     undo: string | null;
     redo: string | null;
   }>;
-
-/** What the panel has of one label map: its channel, and the controls that its table asks for. */
-export type ObjectsFacts = Readonly<{
-  id: string;
-  name: string;
-  /** Some of its objects' colours; none: all have the channel's. */
-  colors: readonly string[];
-  items: Section["items"];
-}>;
 
 /** Most notices on the panel: the newest few are enough. */
 const MAX_NOTICES = 3;
@@ -94,33 +73,39 @@ export function middlePlane({ min, max }: Box): ClipPlane {
 export const MORE = "more";
 
 /**
- * The whole panel. A flat screen lists the sections that most people come for, and the others under *More*; for a
- * patient the slices come first.
+ * The whole panel. A flat screen lists the sections that most people come for, and the others under *More*.
+ *
+ * @param contributed the sections of the parts
  */
-export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layout {
-  const make = (isDeeper: boolean) => (id: string, label: string, items: Section["items"]) => ({
-    ...{ id, label, items, isDeeper },
-    isOpen: view.open.includes(id),
-    opener: { panel: "unfold", section: id } as const,
-  });
-  const sections = [
-    ...firstSections(make(false), state, facts, view),
-    ...deeperSections(make(true), state, facts, view),
-  ];
+export function layOut(
+  state: ViewerState,
+  facts: Facts,
+  view: PanelView,
+  contributed: readonly PartSection[],
+): Layout {
+  const all = [...firstSections(state, facts, view), ...deeperSections(state, facts, view)];
+  const sections = [...all, ...contributed]
+    .filter(({ items }) => items.length > 0)
+    .toSorted((a, b) => placeOf(a) - placeOf(b))
+    .map(({ id, label, items, isDeeper = false }): Section => {
+      const opener = { panel: "unfold", section: id } as const;
+      return { id, label, items, isDeeper, isOpen: view.open.includes(id), opener };
+    });
   return {
     title: facts.title,
     subtitle: facts.subtitle,
     isHidden: view.isHidden,
-    sections: sections.filter(({ items }) => items.length > 0),
+    sections,
     more: { isOpen: view.open.includes(MORE), opener: { panel: "unfold", section: MORE } },
     status: statusOf(state, facts),
   };
 }
 
-/** A label map that is shown has its section from the start, so that no row moves when its table has come. */
-const LOADING: Section["items"] = [
-  { kind: "text", id: "objects-loading", label: "Objects", value: "loading …" },
-];
+const DEEPER_FROM = 1000;
+
+function placeOf({ rank, isDeeper }: PartSection): number {
+  return isDeeper ? DEEPER_FROM + rank : rank;
+}
 
 /** The ID of the section of a label map, where so many are shown. */
 export function objectsSection(channel: string, count: number): string {
@@ -130,74 +115,65 @@ export function objectsSection(channel: string, count: number): string {
 export const labelMapsOf = ({ channels }: ViewerState) =>
   channels.filter(({ shown, hasObjects }) => shown && hasObjects);
 
-type Make = (id: string, label: string, items: Section["items"]) => Section;
-
-function firstSections(
-  section: Make,
-  state: ViewerState,
-  facts: Facts,
-  view: PanelView,
-): readonly Section[] {
-  const hasAny = hasVolumes(state);
-  const slices = section("slices", "Slices", hasAny ? sliceItems(state, facts.sliceValues) : []);
-  const { isStereo, isPatient = false } = facts;
+function firstSections(state: ViewerState, facts: Facts, view: PanelView): readonly PartSection[] {
+  const mode = hasVolumes(state) ? [controlOf(MODE, state)] : [];
+  // a specimen of one tile leaves nothing to choose, and has an empty section
+  const tiles = state.tiles.length < 2 ? [] : tileItems(state, facts.focusTile);
   return [
-    section("notices", "Notices", isStereo ? noticeItems(state) : []),
-    ...(isPatient && !isStereo ? [slices] : []),
-    section("channels", "Channels", channelItems(state, facts, view)),
-    ...labelMapsOf(state).map(({ id, name }, _, { length }) => {
-      const ofMap = facts.objects?.find((each) => each.id === id)?.items;
-      const label = length === 1 ? "Objects" : `Objects: ${name}`;
-      return section(objectsSection(id, length), label, ofMap ?? (isStereo ? [] : LOADING));
-    }),
-    section("volumes", "Surfaces and volumes", hasAny ? [controlOf(MODE, state)] : []),
-    // a specimen of one tile leaves nothing to choose, and has an empty section
-    section("tiles", "Tiles", state.tiles.length < 2 ? [] : tileItems(state, facts.focusTile)),
-    section("cut", "Cut open", cutItems(state, facts.shown)),
-    ...(isPatient && !isStereo ? [] : [slices]),
-    section("save", "Pictures and video", saveItems(state, facts.isFilming)),
-    section("stereo", "Stereo", stereoItems(state, facts, view)),
+    { rank: 0, id: "notices", label: "Notices", items: facts.isStereo ? noticeItems(state) : [] },
+    { rank: 10, id: "channels", label: "Channels", items: channelItems(state, facts, view) },
+    { rank: 30, id: "volumes", label: "Surfaces and volumes", items: mode },
+    { rank: 40, id: "tiles", label: "Tiles", items: tiles },
+    { rank: 50, id: "cut", label: "Cut open", items: cutItems(state, facts.shown) },
+    { rank: 80, id: "stereo", label: "Stereo", items: stereoItems(state, facts, view) },
   ];
 }
 
-function deeperSections(
-  section: Make,
-  state: ViewerState,
-  facts: Facts,
-  view: PanelView,
-): readonly Section[] {
+function deeperSections(state: ViewerState, facts: Facts, view: PanelView): readonly PartSection[] {
   const ofVolumes = (items: Section["items"]) => (hasVolumes(state) ? items : []);
-  const settings = VOLUMES.filter((row) => row !== MODE);
-  return [
-    section("view", "View", [
-      command("front", "Front"),
-      command("side", "Side"),
-      command("top", "Top"),
-      command("reset", "Reset"),
-      ...historyItems(facts),
-    ]),
+  const settings = controlsOf(
+    VOLUMES.filter((row) => row !== MODE),
+    state,
+  ).map((item) => discItem(item, state, facts));
+  const quality = [
+    ...controlsOf(QUALITY_PARAMETERS, state),
+    ...(facts.isStereo ? aboutItems(facts) : []), // there a page of texts alone would lead nowhere
+  ];
+  const about = facts.isStereo ? [] : aboutItems(facts);
+  const sections = [
+    { rank: 10, id: "view", label: "View", items: viewItems(facts) },
     // a screen has fingers, wheel and arrow keys for it
-    section("move", "Move", facts.isStereo ? MOVES : []),
-    section("measure", "Measure", measureItems(state, facts.values)),
-    section(
-      "volume-settings",
-      "Volume settings",
-      ofVolumes(controlsOf(settings, state).map((item) => discItem(item, state, facts))),
-    ),
-    section("light", "Path tracing", ofVolumes(lightItems(state, view, facts.isStereo))),
-    section("share", "Share and keys", [
-      command("share", "Copy a link to this view"),
-      ...(view.link === ""
-        ? []
-        : [{ kind: "link", id: "link", label: "Link", value: view.link } as const]),
-      { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
-      ...(facts.isStereo ? [] : [lettersToggle(view)]),
-    ]),
-    section("quality", "Quality", [
-      ...controlsOf(QUALITY_PARAMETERS, state),
-      ...(facts.isStereo ? aboutItems(facts) : []), // there a page of texts alone would lead nowhere
-    ]),
-    section("about", "About this view", facts.isStereo ? [] : aboutItems(facts)),
+    { rank: 20, id: "move", label: "Move", items: facts.isStereo ? MOVES : [] },
+    { rank: 40, id: "volume-settings", label: "Volume settings", items: ofVolumes(settings) },
+    {
+      ...{ rank: 50, id: "light", label: "Path tracing" },
+      items: ofVolumes(lightItems(state, view, facts.isStereo)),
+    },
+    { rank: 60, id: "share", label: "Share and keys", items: shareItems(facts, view) },
+    { rank: 70, id: "quality", label: "Quality", items: quality },
+    { rank: 80, id: "about", label: "About this view", items: about },
+  ];
+  return sections.map((each) => ({ ...each, isDeeper: true }));
+}
+
+function viewItems(facts: Facts): readonly Control[] {
+  return [
+    command("front", "Front"),
+    command("side", "Side"),
+    command("top", "Top"),
+    command("reset", "Reset"),
+    ...historyItems(facts),
+  ];
+}
+
+function shareItems({ isStereo }: Facts, view: PanelView): readonly Control[] {
+  return [
+    command("share", "Copy a link to this view"),
+    ...(view.link === ""
+      ? []
+      : [{ kind: "link", id: "link", label: "Link", value: view.link } as const]),
+    { kind: "button", id: "help", label: "All keys (?)", to: () => ({ panel: "help" }) },
+    ...(isStereo ? [] : [lettersToggle(view)]),
   ];
 }
 

@@ -1,6 +1,6 @@
 /** The effect of a key, in words: the user may not see the control that it stands for. Pure. */
 
-import { measurementText } from "../annotations/measure";
+import { measurementText } from "../probe/measure";
 import type { Action } from "../state/actions";
 import type { SetAction } from "../state/parameters/kinds";
 import { channelParameterOf, parameterOf } from "../state/parameters/table";
@@ -11,8 +11,8 @@ import type { ViewerState } from "../state/viewer_state";
 import { clipPartName, cutText } from "./clip_by_key";
 import type { Wish } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
+import { measuredText } from "./measured";
 import { type Ranges, windowTexts } from "./sections/channels";
-import { measuredText } from "./sections/measure";
 import { LENS_NAMES } from "./sections/stereo";
 import { transferTitle } from "./transfer_titles";
 

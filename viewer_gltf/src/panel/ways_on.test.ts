@@ -48,11 +48,16 @@ describe("a refusal", () => {
     }
   });
 
-  it("for want of a tile, a cut, a kept view or selected objects has a button, too", () => {
+  it("for want of a tile, a cut or selected objects has a button, too", () => {
     expect(led(start, REFUSED.tile).isolated).toBe(start.middle);
     expect(led(start, REFUSED.cut).clip.plane).not.toBeNull();
     expect(led(start, REFUSED.objects).objects.c0.selected).toEqual([1, 2]);
-    expect(offerFor(REFUSED.views, NOW)?.to).toEqual(["keep-view"]);
     expect(offerFor("Something else.", NOW)).toBeNull();
+  });
+
+  it("has the button of the part that refuses, if there is such a part", () => {
+    const ofParts = { [REFUSED.views]: () => ({ label: "Undo", to: ["undo"] }) as const };
+    expect(offerFor(REFUSED.views, NOW, ofParts)?.to).toEqual(["undo"]);
+    expect(offerFor(REFUSED.views, NOW)).toBeNull();
   });
 });

@@ -23,7 +23,10 @@ const mode = (label: string, value: Mode) => (): Offer => ({ label, to: [setTo(M
 const EVERYWHERE = mode("Show volumes everywhere", "all");
 const measure = (): Offer => ({ label: "Measure", to: [setTo(TOOL, "measure")] });
 
-const WAYS: Readonly<Record<string, (now: WayOn) => Offer>> = {
+/** Buttons by the refusal that they lead on from. */
+export type WaysOn = Readonly<Record<string, (now: WayOn) => Offer>>;
+
+const WAYS: WaysOn = {
   [REFUSED.tile]: ({ state: { middle } }) => ({
     label: `Only ${tileName(middle)}`,
     to: [{ type: "isolate", tile: middle }],
@@ -41,7 +44,6 @@ const WAYS: Readonly<Record<string, (now: WayOn) => Offer>> = {
     label: "Cut by a plane",
     to: [{ type: "set-clip", clip: { ...clip, plane: middlePlane(shown) } }],
   }),
-  [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }),
   [REFUSED.objects]: ({ objects }) => ({
     label: "Select all that show",
     to: [...objects].map(([channel, selected]) => ({
@@ -50,7 +52,7 @@ const WAYS: Readonly<Record<string, (now: WayOn) => Offer>> = {
   }),
 };
 
-/** null: nothing leads on but what the sentence says. */
-export function offerFor(refusal: string, now: WayOn): Offer | null {
-  return WAYS[refusal]?.(now) ?? null;
+/** @param ofParts those of the parts; null: nothing leads on but what the sentence says */
+export function offerFor(refusal: string, now: WayOn, ofParts: WaysOn = {}): Offer | null {
+  return (WAYS[refusal] ?? ofParts[refusal])?.(now) ?? null;
 }

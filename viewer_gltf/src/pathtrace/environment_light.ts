@@ -1,9 +1,9 @@
 /** The environment that lights what is traced: a built-in one or the user's, loaded when it is first wanted. */
 import { viewerAddress } from "../bundle/address";
-import { BundleError } from "../bundle/errors";
-import { loadEnvironment, readEnvironment } from "./environment_file";
+import { BundleError, TemporaryError } from "../bundle/errors";
 import type { EnvironmentTables } from "./environment_sampling";
 
+export const PATHS_NOT_LOADED = "The part of the page that follows light could not be had.";
 /** The name of an environment out of a file of the user's. */
 const OWN = "own";
 
@@ -26,6 +26,7 @@ export class EnvironmentLight {
 
   /** Light by a file of the user's. Throws BundleError. */
   async lightBy(file: File): Promise<void> {
+    const { readEnvironment } = await loadLightReader();
     this.onTables(await readEnvironment(file));
     this.name = OWN;
   }
@@ -44,6 +45,7 @@ export class EnvironmentLight {
     this.hasFailed = false;
     this.isLoading = true;
     try {
+      const { loadEnvironment } = await loadLightReader();
       const tables = await loadEnvironment(viewerAddress(), name);
       if (this.name === name) this.onTables(tables);
     } catch (error) {
@@ -55,4 +57,11 @@ export class EnvironmentLight {
       this.onChange();
     }
   }
+}
+
+/** Fetch the code that reads files of light. Rejects with a TemporaryError. */
+function loadLightReader() {
+  return import("./environment_file").catch((cause) => {
+    throw new TemporaryError(PATHS_NOT_LOADED, { cause });
+  });
 }

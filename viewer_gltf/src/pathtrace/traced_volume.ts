@@ -13,7 +13,7 @@ import type { Appearance } from "../volumes/march_tables";
 import type { VolumeLimits } from "../volumes/mip_levels";
 import type { VolumeSource } from "../volumes/volume_source";
 import type { Marched } from "./denoise_and_tone";
-import { EnvironmentLight } from "./environment_light";
+import { EnvironmentLight, PATHS_NOT_LOADED } from "./environment_light";
 import type { EnvironmentTables } from "./environment_sampling";
 import { MediumChanges } from "./medium_changes";
 import type { MediumTexels } from "./medium_loader";
@@ -22,7 +22,6 @@ import { PictureScale } from "./picture_scale";
 import { TracedMedium } from "./traced_medium";
 import type { TraceScene } from "./uniforms";
 
-const NOT_LOADED = "The part of the page that follows light could not be had.";
 const FIRST_SAMPLES = 6;
 
 /** The part of the volumes that the tracer uses. */
@@ -218,7 +217,7 @@ export class TracedVolume {
     this.coming ??= import("./path_tracer")
       .catch((cause) => {
         this.coming = null;
-        throw new TemporaryError(NOT_LOADED, { cause });
+        throw new TemporaryError(PATHS_NOT_LOADED, { cause });
       })
       .then(({ Tracer }) => {
         const tracer = new Tracer(this.sceneDepth);

@@ -1,23 +1,8 @@
 /** From where the specimen is seen, in an address. Metres of the room. Pure. */
 
 import { LARGEST_SCALE, SMALLEST_SCALE } from "../math/grab";
-import type { Vec3 } from "../math/vec3";
+import type { CameraView, SpecimenLook } from "../state/camera_view";
 import { readNumbers, written } from "./numbers";
-
-/** The specimen's centre, its turn (a quaternion x, y, z, w), a multiple of its usual size. */
-export type SpecimenLook = Readonly<{
-  position: Vec3;
-  orientation: readonly [number, number, number, number];
-  scale: number;
-}>;
-
-export type CameraView = Readonly<{
-  /** The camera, and the point that it is turned about. */
-  position: Vec3;
-  target: Vec3;
-  /** null: where it opens. */
-  specimen: SpecimenLook | null;
-}>;
 
 /** Farthest place in the room, m: the user finds nothing beyond it. */
 const FARTHEST_M = 100;

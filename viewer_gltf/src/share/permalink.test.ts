@@ -3,10 +3,10 @@ import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifes
 import { seeded } from "../../test/support/seeded";
 import { fromHex } from "../math/color";
 import type { Action } from "../state/actions";
+import type { CameraView } from "../state/camera_view";
 import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import { MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
-import type { CameraView } from "./camera_link";
 import { readLink, writeLink } from "./permalink";
 
 const start = (channels = 6) => initialState(sampleManifest(channels));

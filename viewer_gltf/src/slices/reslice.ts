@@ -3,10 +3,10 @@
  * a row of pixels is a straight line through each texture, of which only the part inside is walked. Pure.
  */
 import { Matrix4, Vector3 } from "three";
-import type { VolumeLevel } from "../annotations/measure";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Rgb } from "../math/color";
 import type { SliceFrame } from "../math/slice_frame";
+import type { VolumeLevel } from "../probe/measure";
 import { textureCorners } from "../volumes/texture_space";
 
 /** One tile's texels of a channel. */

@@ -3,14 +3,14 @@
  * first, resampled and coloured. Page and scene show the same canvases.
  */
 
-import { measuredText, unitOf, valueAt, valueText, voxelAt } from "../annotations/measure";
-import { TexelCache } from "../annotations/texel_cache";
 import type { Manifest } from "../bundle/generated/bundle";
 import type { ValuesHost } from "../bundle/values_host";
 import type { Box } from "../math/box";
 import { shownBox, shownTiles } from "../math/pick";
 import { outlineOf, pointAt, type SliceFrame, sliceFrames } from "../math/slice_frame";
 import { AXES, type Vec3 } from "../math/vec3";
+import { measuredText, unitOf, valueAt, valueText, voxelAt } from "../probe/measure";
+import { TexelCache } from "../probe/texel_cache";
 import type { LevelSource } from "../state/on_screen";
 import { isSliced } from "../state/parameters/slices";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
@@ -34,6 +34,8 @@ export type SlicesOptions = Readonly<{
   /** The pictures differ now. */
   onChange: () => void;
   onError: (error: unknown) => void;
+  /** Called with every new picture. */
+  onPaint: () => void;
 }>;
 
 export type SliceImage = Readonly<{ canvas: HTMLCanvasElement; size: Size }>;
@@ -48,8 +50,6 @@ export class SliceImages {
   /** What they are cut from: the specimen, or the only tile. */
   box: Box;
   readonly canvases = AXES.map(() => document.createElement("canvas"));
-  /** Called with every new picture. */
-  onPaint: () => void = () => undefined;
   /** Changes with every picture. */
   version = 0;
   isLoading = false;
@@ -203,7 +203,7 @@ export class SliceImages {
       paint(canvas, sizes[i], shown);
     });
     this.version++;
-    this.onPaint();
+    this.options.onPaint();
     this.options.onChange();
   }
 

@@ -13,9 +13,9 @@ import {
   SRGBColorSpace,
   Vector3,
 } from "three";
-import { Label } from "../annotations/label";
-import type { Sight } from "../annotations/style";
 import { leaveUncut } from "../gpu/unclipped_material";
+import { Label } from "../marks/label";
+import type { Sight } from "../marks/style";
 import { AHEAD, type Box, boxSpan } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { MAX_CORNERS } from "../math/plane_box_section";

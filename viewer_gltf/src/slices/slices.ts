@@ -1,6 +1,6 @@
 /** All of the slices: their pictures, in the page and as planes in the scene. A part of the code by itself. */
 import "./slices.css";
-import type { Sight } from "../annotations/style";
+import type { Sight } from "../marks/style";
 import { sharesOf, turnedBy } from "../math/slice_frame";
 import type { Action } from "../state/actions";
 import type { ViewerState } from "../state/viewer_state";
@@ -8,7 +8,7 @@ import { type SlicesOptions as ImagesOptions, SliceImages } from "./slice_images
 import { SlicePlanes } from "./slice_planes";
 import { SliceView } from "./slice_view";
 
-export type SlicesOptions = ImagesOptions &
+export type SlicesOptions = Omit<ImagesOptions, "onPaint"> &
   Readonly<{
     /** The part of the page with the stage, which makes room. */
     view: HTMLElement;
@@ -24,7 +24,7 @@ export class Slices {
 
   constructor(private readonly options: SlicesOptions) {
     this.state = options.state;
-    this.images = new SliceImages(options);
+    this.images = new SliceImages({ ...options, onPaint: () => this.show() });
     this.planes = new SlicePlanes(this.images);
     const { bounds_um } = options.manifest.specimen;
     this.pictures = new SliceView(options.view, this.images, {
@@ -36,7 +36,6 @@ export class Slices {
       },
       window: (wider, higher) => this.shiftWindow(wider, higher),
     });
-    this.images.onPaint = () => this.show();
   }
 
   follow(state: ViewerState): void {

@@ -1,56 +1,52 @@
-/** The requests of a panel or a key that are no change of the state. */
-export type Command =
+/**
+ * The names of the requests of a panel or a key that are no change of the state. A part adds its own names by
+ * `declare module`.
+ */
+export interface CommandNames {
   /** The whole specimen from the front again, and no tile isolated. */
-  | "reset"
+  reset: true;
   /** One step out: from an isolated tile to all, from a selected one to none. */
-  | "back"
-  | "stereo"
-  /** The page on the full screen, or back in its window. */
-  | "full-screen"
-  /** Stereo, or one picture on a phone, with the user's own room behind the specimen. */
-  | "room"
+  back: true;
   /** One step of the history back, or on again. */
-  | "undo"
-  | "redo"
-  /** Split screen for a phone in a viewer without WebXR. */
-  | "split"
-  /** Read the phone viewer's code by the camera. */
-  | "scan"
-  | "share"
-  /** The measurements as a file. */
-  | "save-csv"
-  /** The objects of a label map that are selected, or that show, as a file. */
-  | "save-objects"
-  /** What the screen shows, as large as is chosen. */
-  | "save-picture"
-  /** Once round, or through the views that were kept; once more: leave it. */
-  | "save-video"
-  | "keep-view"
-  | "next-view"
-  | "forget-views"
-  /** Ask again for all that has failed. */
-  | "retry"
+  undo: true;
+  redo: true;
+  /** Asks again for all that has failed. */
+  retry: true;
   /** A tap in the middle of the view: for hands that have only keys. */
-  | "press"
+  press: true;
+  /** Stereo in a headset, or back to the page. */
+  stereo: true;
+  /** Stereo, or one picture on a phone, with the user's own room behind the specimen. */
+  room: true;
+  /** Split screen for a phone in a viewer without WebXR. */
+  split: true;
+  /** Reads the phone viewer's code by the camera. */
+  scan: true;
+  /** Measures how large the screen is, by a card that is held to it. */
+  "measure-screen": true;
+  /** The page on the full screen, or back in its window. */
+  "full-screen": true;
+  share: true;
   /** To the panel's search among the channels that are not shown. */
-  | "find"
-  /** How large the screen is, by a card that is held to it. */
-  | "measure-screen"
-  /** Light the traced picture by a .hdr or .exr file. */
-  | "own-light"
-  | "front"
-  | "side"
-  | "top"
-  | "zoom-in"
-  | "zoom-out"
-  | "turn-left"
-  | "turn-right"
-  | "turn-up"
-  | "turn-down"
-  | "pan-left"
-  | "pan-right"
-  | "pan-up"
-  | "pan-down";
+  find: true;
+  /** Lights the traced picture by a .hdr or .exr file. */
+  "own-light": true;
+  front: true;
+  side: true;
+  top: true;
+  "zoom-in": true;
+  "zoom-out": true;
+  "turn-left": true;
+  "turn-right": true;
+  "turn-up": true;
+  "turn-down": true;
+  "pan-left": true;
+  "pan-right": true;
+  "pan-up": true;
+  "pan-down": true;
+}
+
+export type Command = keyof CommandNames;
 
 /** Why a command of the flat view has left it as it was. */
 export const STAYS: Partial<Record<Command, string>> = {
@@ -66,7 +62,6 @@ export const STAYS: Partial<Record<Command, string>> = {
   "pan-right": "The view moves no further: its middle stays in the specimen.",
   "pan-up": "The view moves no further: its middle stays in the specimen.",
   "pan-down": "The view moves no further: its middle stays in the specimen.",
-  "next-view": "That is the only kept view.",
 };
 
 /** The announcement where the viewer can't do what was asked for. */

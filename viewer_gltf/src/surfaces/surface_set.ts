@@ -13,6 +13,7 @@ import {
   takenFrom,
   wantsSurface,
 } from "../state/representation";
+import { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
 import type { BlendedScene, SurfaceFrame } from "./blend_material";
 import type { SurfaceLoader } from "./gltf_loader";
@@ -42,7 +43,7 @@ export class SurfaceSet {
   /** Since a device draws no more triangles in time. */
   private coarser = FINEST;
   /** A surface has come. */
-  onSurface: (channel: string, surface: Surface) => void = () => undefined;
+  readonly surfaceLoaded = new Signal<Readonly<{ channel: string; surface: Surface }>>();
 
   constructor(
     private readonly bundle: Bundle,
@@ -169,7 +170,7 @@ export class SurfaceSet {
       this.budget.surfaces,
       (surface) => {
         this.dress(id, surface);
-        this.onSurface(id, surface);
+        this.surfaceLoaded.emit({ channel: id, surface });
       },
       this.onChange,
       this.onError,

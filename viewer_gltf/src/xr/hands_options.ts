@@ -14,7 +14,7 @@ export type HandsOptions = Readonly<{
   specimen: Specimen;
   tiles: readonly BoxedTile[];
   /** Targets between the panel and the tiles that can be dragged, such as a cut's handles. */
-  handles?: readonly Target[];
+  handles?: () => readonly Target[];
   layOut: (view: PanelView) => Layout;
   onAction: (action: Action) => void;
   onCommand: (command: Command) => void;

@@ -9,28 +9,22 @@ import {
   type Met,
   meetFirst,
   Pointer,
+  pointOn,
   type RoomRay,
   type Target,
 } from "../interaction/ray_pointer";
-import { TILE, TileTarget } from "../interaction/tile_target";
-import type { HandPose } from "../math/grab";
+import { TileTarget } from "../interaction/tile_target";
 import { shownTiles } from "../math/pick";
 import type { Command } from "../state/commands";
 import { DWELL } from "../state/parameters/tools";
 import type { ViewerState } from "../state/viewer_state";
 import type { Gesture } from "./cardboard/fingers";
 import { GazeCarry } from "./carry_handle";
-import { Controllers, type Hand, type HandEvent } from "./controllers";
+import { Controllers } from "./controllers";
+import { Grips, type TimedGesture } from "./grips";
 import { Ground } from "./ground";
 import type { HandsOptions } from "./hands_options";
-import {
-  type HeadHold,
-  moveByGaze,
-  moveByHead,
-  moveByHolders,
-  moveByStick,
-  STEPS_PER_S,
-} from "./hold_specimen";
+import { type HeadHold, moveByGaze } from "./hold_specimen";
 import { howItWorks, isToBeTold } from "./how_it_works";
 import { LastChoice } from "./last_choice";
 import { type MenuEntry, menuEntries } from "./panel/menu_entries";
@@ -38,12 +32,6 @@ import { RoomNotice } from "./panel/notice";
 import { PANEL, RoomPanel } from "./panel/panel";
 import type { Setting } from "./panel/placement";
 import { SpecimenMover } from "./specimen_mover";
-
-/** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
-const HOLD_S = 0.35;
-const HOLD_M = 0.02;
-/** Time for which a Cardboard's button is held before the head holds the specimen by it, s: a thumb is slow. */
-const HEAD_HOLD_S = 0.6;
 
 /** By gaze alone it is not switched off: nothing would be left to switch it on by. */
 const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
@@ -54,23 +42,6 @@ const CARRY = "It moves with your gaze. Rest to put it down.";
 const UNDO = `${PANEL}undo-choice`;
 /** The bar's button by which the gaze takes the specimen. */
 const CARRY_BUTTON = `${PANEL}bar-move`;
-
-/** A trigger that is down. */
-type Press = {
-  /** Where it went down. */
-  readonly met: Met | null;
-  readonly at: Vector3 | null;
-  elapsed_s: number;
-  /** It drags or holds something: letting go of it chooses nothing. */
-  isUsed: boolean;
-};
-
-/** `source`: of the button that is held; null: the gaze stays. */
-type GoesOn = {
-  readonly met: Met;
-  readonly source: XRInputSource | "finger" | null;
-  elapsed_s: number;
-};
 
 export class Hands {
   readonly panel: RoomPanel;
@@ -83,27 +54,20 @@ export class Hands {
   readonly tiles: TileTarget;
   private readonly targets: readonly Target[];
   private readonly carry = new GazeCarry();
-  private readonly presses = new Map<XRInputSource, Press>();
-  /** The hands that hold the specimen, and their places in the frame before. */
-  private held = new Map<XRInputSource, HandPose | null>();
+  private readonly grips: Grips;
+  private gestures: TimedGesture[] = [];
   private gaze: RoomRay = gazeOf(new Matrix4());
   /** Times at which the button was pressed since the previous frame, ms. */
   private taps: number[] = [];
   private isRunning = false;
   private shown = "";
-  private gestures: (readonly [Gesture, time_ms: number])[] = [];
-  /** A finger that rests on the split screen; `met`: what was gazed at when it came. */
-  private touched: { met: Met | null; isUsed: boolean; elapsed_s: number } | null = null;
-  /** The head holds the specimen by a button that is down. */
-  private headHold: HeadHold | null = null;
-  /** What is gone on with. */
-  private goesOn: GoesOn | null = null;
   private readonly lastChoice = new LastChoice();
   /** The specimen as it was taken by the bar. */
   private barHold: HeadHold | null = null;
   private state: ViewerState | null = null;
+
   constructor(private readonly options: HandsOptions) {
-    const { scene, specimen, handles = [], layOut, onLeave } = options;
+    const { scene, specimen, handles = () => [], layOut, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
     this.mover = new SpecimenMover(specimen, options.tiles);
     this.notice = new RoomNotice(isPainted);
@@ -120,9 +84,16 @@ export class Hands {
         else options.onAction(wish);
       },
     });
-    this.tiles = new TileTarget(specimen.group, options.onChoose);
-    if (options.objectAlong !== undefined) this.tiles.objectAlong = options.objectAlong;
-    this.targets = [...this.panel.targets, ...handles, this.tiles];
+    this.tiles = new TileTarget(specimen.group, options.onChoose, options.objectAlong);
+    this.grips = new Grips({
+      ...{ controllers: this.controllers, pointer: this.pointer },
+      ...{ mover: this.mover, tiles: this.tiles },
+      aim: () => ({ gaze: this.gaze, free: this.free }),
+      run: (command, state, share) => this.run(command, state, share),
+      onPress: (ray, time_ms) => this.press(ray, time_ms),
+      onTap: (time_ms) => this.tap(time_ms),
+    });
+    this.targets = [...this.panel.targets, ...handles(), this.tiles];
     scene.add(...this.overlays);
   }
 
@@ -151,11 +122,7 @@ export class Hands {
   private get isCarryingInScene(): boolean {
     const { key } = this.carry;
     const isOfMenu = key?.startsWith(PANEL) === true && key !== CARRY_BUTTON;
-    return this.headHold !== null || (key !== null && !isOfMenu);
-  }
-
-  get isHolding(): boolean {
-    return this.held.size > 0;
+    return this.grips.headHold !== null || (key !== null && !isOfMenu);
   }
 
   /** @param session null: split screen, without any controllers */
@@ -184,13 +151,9 @@ export class Hands {
     this.controllers.end();
     this.pointer.reset();
     this.carry.drop();
-    this.presses.clear();
-    this.held.clear();
+    this.grips.drop();
     this.taps = [];
     this.gestures = [];
-    this.touched = null;
-    this.goesOn = null;
-    this.headHold = null;
     this.lastChoice.take();
     this.panel.setShown(false);
     this.notice.clear();
@@ -236,28 +199,28 @@ export class Hands {
     this.tiles.tiles = shownTiles(this.options.tiles, state.isolated);
     this.tiles.follow(state);
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
-    for (const event of this.controllers.take()) this.handle(event);
-    const hasTouched = this.followFingers(state);
+    for (const event of this.controllers.take()) this.grips.handle(event);
+    const hasTouched = this.grips.followFingers(this.gestures.splice(0), state);
     for (const time_ms of this.taps.splice(0)) this.press(this.gaze, time_ms);
-    this.forgetTheLost();
-    const hasHeld = this.hold(dt_s);
-    const hasFollowed = this.followHead(dt_s, state);
-    const hasMoved = this.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
-    const isGoingOn = this.goesOn !== null || this.carry.isCarrying;
+    this.grips.forgetTheLost();
+    const hasHeld = this.grips.hold(dt_s);
+    const hasFollowed = this.grips.followHead(dt_s, state);
+    const hasMoved = this.grips.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
+    const isGoingOn = this.grips.isGoingOn || this.carry.isCarrying;
     const now = { state, pose: this.mover.pose };
     const isAsked = this.pointer.gaze?.key === UNDO;
     this.panel.canUndo = this.lastChoice.advance(dt_s, now, isGoingOn, isAsked);
     this.panel.isCarrying = this.isCarryingInScene;
     const isRepainted = this.panel.update(dt_s, head, state);
     const isNoticeNew = this.notice.update(read_s, head, this.panel.upperEdge);
-    const rays = this.carry.isCarrying ? [] : this.tracked.map(({ ray }) => ray);
+    const rays = this.carry.isCarrying ? [] : this.grips.tracked.map(({ ray }) => ray);
     const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
     if (fired?.key === GAZE_SWITCH && state.isDwellOn) this.announce(KEEPS_GAZE);
     else if (fired !== null) {
       this.choose(fired, this.now_ms(), true);
-      if (fired.repeats !== undefined) this.goesOn = { met: fired, source: null, elapsed_s: 0 };
+      this.grips.goOnWith(fired);
     }
-    const hasGone = this.goOn(dt_s, state);
+    const hasGone = this.grips.goOn(dt_s, state);
     const hasCarried = this.carry.follow(this.gaze);
     return this.draw(head) || hasMoved || isRepainted || isNoticeNew || hasGone || hasCarried;
   }
@@ -277,70 +240,10 @@ export class Hands {
     return (this.options.now_ms ?? (() => performance.now()))();
   }
 
-  private get tracked(): readonly Hand[] {
-    return this.controllers.hands.filter(({ isTracked }) => isTracked);
-  }
-
   /** A carried thing covers all else until the gaze puts it down. */
   private get free(): readonly Target[] {
-    if (this.headHold !== null) return []; // nothing is chosen on the way
+    if (this.grips.headHold !== null) return []; // nothing is chosen on the way
     return this.carry.isCarrying ? [this.carry] : this.targets;
-  }
-
-  private handOf(source: XRInputSource): Hand | undefined {
-    return this.controllers.hands.find((hand) => hand.source === source);
-  }
-
-  private handle({ kind, source, ray, time_ms }: HandEvent): void {
-    const press = this.presses.get(source);
-    switch (kind) {
-      case "press":
-        this.presses.set(source, this.begin(source, ray, time_ms));
-        break;
-      case "select":
-        if (!press?.isUsed) this.press(ray ?? this.gaze, time_ms);
-        break;
-      case "release":
-        this.presses.delete(source);
-        if (press?.isUsed) this.held.delete(source);
-        break;
-      case "squeeze":
-        this.held.set(source, null);
-        break;
-      case "let-go":
-        this.held.delete(source);
-        break;
-    }
-  }
-
-  private begin(source: XRInputSource, ray: RoomRay | null, time_ms: number): Press {
-    const met = meetFirst(ray ?? this.gaze, this.free);
-    // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
-    const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
-    if (met !== null && isUsed && this.pointer.press(met, this.free, time_ms)) {
-      met.target.choose(met, met.ray, false);
-    }
-    if (met?.repeats !== undefined) this.goesOn = { met, source, elapsed_s: 0 };
-    const at = this.handOf(source)?.pose?.position ?? null;
-    return { met, at, elapsed_s: 0, isUsed };
-  }
-
-  /** What fingers on the split screen have done since the frame before; whether anything has moved. */
-  private followFingers(state: ViewerState): boolean {
-    const before = this.mover.pose;
-    for (const [gesture, time_ms] of this.gestures.splice(0)) {
-      if (gesture.kind === "press") {
-        const met = meetFirst(this.gaze, this.free);
-        this.touched = { met, isUsed: false, elapsed_s: 0 };
-        if (met?.repeats !== undefined) this.goesOn = { met, source: "finger", elapsed_s: 0 };
-      } else if (gesture.kind === "release") this.touched = null;
-      else if (gesture.kind === "tap") {
-        if (this.touched?.isUsed === false) this.tap(time_ms);
-      } else {
-        this.mover.byFingers(gesture, state, this.gaze.origin);
-      }
-    }
-    return this.mover.pose !== before;
   }
 
   /** The button: what the ray meets, or if that is nothing, what is gazed at. */
@@ -376,102 +279,9 @@ export class Hands {
     }
   }
 
-  /** Input sources come and go, also while they hold something. */
-  private forgetTheLost(): void {
-    for (const map of [this.presses, this.held]) {
-      for (const source of [...map.keys()]) {
-        if (this.handOf(source) === undefined) map.delete(source);
-      }
-    }
-  }
-
-  /** What the buttons that are down drag and hold; whether anything has moved. */
-  private hold(dt_s: number): boolean {
-    for (const [source, press] of this.presses) this.advance(source, press, dt_s);
-    const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
-    const pose = moveByHolders(this.mover.pose, this.held, now);
-    this.held = now;
-    return this.mover.to(pose, this.gaze.origin);
-  }
-
-  private advance(source: XRInputSource, press: Press, dt_s: number): void {
-    const hand = this.handOf(source);
-    press.elapsed_s += dt_s;
-    const { met } = press;
-    if (met?.key == null) return;
-    if (met.hold !== undefined) {
-      if (press.isUsed) met.target.drag?.(met.key, hand?.ray ?? this.gaze);
-      return;
-    }
-    const mayHold = hand?.pose && !hand.canSqueeze && met.key.startsWith(TILE);
-    if (press.isUsed || !mayHold || !hand?.pose) return;
-    const isFar = press.at !== null && press.at.distanceTo(hand.pose.position) > HOLD_M;
-    if (!isFar && press.elapsed_s < HOLD_S) return;
-    press.isUsed = true;
-    this.held.set(source, null);
-  }
-
-  /** What was chosen by a gaze that stays, or a button that is held, goes on; whether it has moved. */
-  private goOn(dt_s: number, state: ViewerState): boolean {
-    const { goesOn } = this;
-    if (goesOn === null) return false;
-    const { met, source } = goesOn;
-    const press = typeof source === "object" ? source && this.presses.get(source) : this.touched;
-    const isHeld = source === null || press != null;
-    const ray = (typeof source === "object" && source && this.handOf(source)?.ray) || this.gaze;
-    if (!isHeld || meetFirst(ray, this.free)?.key !== met.key || met.repeats === undefined) {
-      this.goesOn = null;
-      return false;
-    }
-    goesOn.elapsed_s += dt_s;
-    if (goesOn.elapsed_s < HOLD_S) return false;
-    if (press != null) press.isUsed = true; // letting go of it is no further step
-    return this.run(met.repeats, state, STEPS_PER_S * dt_s);
-  }
-
-  /**
-   * A button that is held where no control is takes the specimen along with the head, if no hand is there to
-   * do it; whether it has moved.
-   */
-  private followHead(dt_s: number, state: ViewerState): boolean {
-    if (this.touched !== null) this.touched.elapsed_s += dt_s;
-    const handless = [...this.presses].filter(([source]) => this.handOf(source)?.pose == null);
-    const press = [this.touched, ...handless.map(([, each]) => each)].find(
-      (each) => each != null && (each.isUsed ? this.headHold !== null : mayFollow(each.met)),
-    );
-    if (press == null || press.elapsed_s < HEAD_HOLD_S) {
-      this.headHold = null;
-      return false;
-    }
-    const { gaze } = this;
-    press.isUsed = true; // letting go of it chooses nothing
-    if (this.headHold === null) {
-      this.headHold = this.mover.holdBy(gaze, state);
-      return false;
-    }
-    this.mover.to(moveByHead(this.headHold, gaze), gaze.origin);
-    return true;
-  }
-
-  private moveBySticks(dt_s: number, state: ViewerState): boolean {
-    if (this.isHolding) return false;
-    let { pose } = this.mover;
-    for (const { stick, ray } of this.tracked) {
-      if (stick.x === 0 && stick.y === 0) continue;
-      const met = this.tileAlong(ray) ?? this.tileAlong(this.gaze);
-      pose = moveByStick(pose, stick, met ?? this.mover.middle(state), dt_s);
-    }
-    return this.mover.to(pose, this.gaze.origin);
-  }
-
-  private tileAlong(ray: RoomRay | null): Vector3 | null {
-    const hit = ray && this.tiles.meet(ray);
-    return hit && pointOn({ ...hit, ray });
-  }
-
   /** Ring, rays, and the light on what is pointed at. */
   private draw(head: Matrix4): boolean {
-    this.tracked.forEach((hand, i) => {
+    this.grips.tracked.forEach((hand, i) => {
       this.controllers.draw(hand, this.pointer.hands[i]?.distance_m ?? null);
     });
     const { leading, progress } = this.pointer;
@@ -482,15 +292,6 @@ export class Hands {
     const shown = `${leading?.key} ${leading?.distance_m} ${progress}`;
     const isChanged = shown !== this.shown;
     this.shown = shown;
-    return isChanged || this.tracked.length > 0;
+    return isChanged || this.grips.tracked.length > 0;
   }
-}
-
-/** Of what was met when the button went down: a control has its own use for it. */
-function mayFollow(met: Met | null): boolean {
-  return met === null || met.key?.startsWith(TILE) === true;
-}
-
-function pointOn({ ray, distance_m }: Pick<Met, "ray" | "distance_m">): Vector3 {
-  return ray.direction.clone().multiplyScalar(distance_m).add(ray.origin);
 }

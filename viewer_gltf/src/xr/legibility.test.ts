@@ -5,6 +5,7 @@
 import { afterAll, describe, expect, it } from "vitest";
 import { STEREO_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
+import { layOut } from "../../test/support/panel/whole_panel";
 import { writeTable } from "../../test/support/table";
 import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../panel/canvas/bar";
 import type { Mark, Rect } from "../panel/canvas/draw_list";
@@ -18,7 +19,6 @@ import {
   WIDTH,
 } from "../panel/canvas/page";
 import { START_VIEW } from "../panel/controls";
-import { layOut } from "../panel/layout";
 import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import { type Screen, toScreen } from "./cardboard/lens";

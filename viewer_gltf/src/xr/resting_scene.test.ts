@@ -95,7 +95,7 @@ describe("a point to measure under a gaze that rests", () => {
 
 describe("an object under a gaze that rests", () => {
   const showing = (person: LookingPerson, object: string | null) => {
-    person.hands.tiles.objectAlong = () => (object === null ? null : { id: object, distance: 0.9 });
+    person.objectAlong = () => (object === null ? null : { id: object, distance: 0.9 });
     const { objects } = person.state;
     person.state = { ...person.state, objects: { ...objects } };
   };

@@ -269,6 +269,16 @@ export class Stereo {
     void this.headset.end();
   }
 
+  /** Once a frame of stereo, before it is drawn; see `Hands.update`. */
+  update(dt_s: number, head: Matrix4, state: ViewerState, read_s: number): void {
+    this.hands?.update(dt_s, head, state, read_s);
+  }
+
+  /** The notices before the eyes now. */
+  get notices(): readonly string[] {
+    return this.hands?.notice.texts ?? [];
+  }
+
   /** Say something before the eyes; nothing where there is no stereo. */
   announce(text: string): void {
     this.hands?.announce(text);

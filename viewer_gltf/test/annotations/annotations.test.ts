@@ -2,7 +2,7 @@
 import { readFile } from "node:fs/promises";
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
-import { LABEL_HEIGHT, LABEL_PX, STEREO_TEXT } from "../../src/annotations/style";
+import { LABEL_HEIGHT, LABEL_PX, STEREO_TEXT } from "../../src/marks/style";
 import type { Vec3 } from "../../src/math/vec3";
 import { bundled } from "../support/browser/bundled";
 import type { Browser } from "../support/browser/chromium";

@@ -11,7 +11,7 @@ import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "../support/browser/stand";
 
 const CODE_GZIP_BYTES = 380_000;
-const TOLD_IN = ["docs/viewer.md", "docs/decisions.md", "CHANGELOG.md"];
+const TOLD_IN = ["docs/viewer.md", "docs/decisions/static-bundle.md", "CHANGELOG.md"];
 /** Page, code, style and bundle, from a host that compresses nothing. */
 const ON_THE_WIRE_BYTES = 430_000;
 /** Of ten tiles, as the demo has. */
@@ -24,9 +24,10 @@ const OPTIONAL = new RegExp(
     "backdrop",
     "basis",
     "bench",
-    "capture",
+    "save_picture",
     "card_measure",
     "client_worker",
+    "environment_file",
     "explanations",
     "EXRLoader",
     "fflate",
@@ -35,18 +36,21 @@ const OPTIONAL = new RegExp(
     "interaction",
     "key_list",
     "later_parts",
+    "lens",
     "lost_context",
     "notebook_part",
     "objects",
+    "link_of",
     "path_tracer",
+    "permalink",
     "qr_scanner",
     "screen_stereo",
     "shading",
     "slices",
     "split_session",
-    "tap_part",
+    "placed_card",
     "unclipped",
-    "view_message_part",
+    "picture_message",
   ].join("|"),
 );
 const CODE = /\.(js|css|wasm|html)$/;

@@ -1,15 +1,15 @@
 /** Keys that are pressed by accident can be taken back, and keys can be changed. */
 import { expect, it } from "vitest";
 import { isWritten } from "../../src/panel/key_events";
-import { KEYS } from "../../src/panel/keys";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
+import { KEYS } from "../support/panel/whole_panel";
 
 /** They open a dialog, a file chooser or stereo, write a file or the clipboard: each is its own answer. */
 const OWN_ANSWER = ["?", "V", "P", "K", ":", "U", "l", "(", ")", '"', "R"];
-const WRITTEN = KEYS.flatMap(({ keys }) => keys.flatMap(({ keys }) => keys)).filter(
-  (name) => isWritten(name) && !OWN_ANSWER.includes(name),
-);
+const WRITTEN = KEYS.groups
+  .flatMap(({ keys }) => keys.flatMap(({ keys }) => keys))
+  .filter((name) => isWritten(name) && !OWN_ANSWER.includes(name));
 /** Keys that bring the page into the states in which the others are tried. */
 const STATES: Readonly<Record<string, readonly string[]>> = {
   "as it opens": [],

@@ -1,18 +1,18 @@
 /** Every key in headless Chromium, in several states: something is seen to change, or is said. */
 import { expect, it } from "vitest";
-import { KEYS } from "../../src/panel/keys";
 import { STAYS } from "../../src/state/commands";
 import { REFUSED } from "../../src/state/refusals";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { sweep } from "../support/exhaustive";
+import { KEYS } from "../support/panel/whole_panel";
 
 const SCREEN = { viewport: { width: 320, height: 240 }, isBlind: true };
 /** They open a dialog of the browser's own, fill the screen, save a file or take long: tests of their own have them. */
 const LEFT_OUT: readonly string[] = ["Shift+Enter", "U", "K", "(", "Insert", '"', ")", "l", "P"];
-const NAMES = KEYS.flatMap(({ keys }) => keys.flatMap(({ keys }) => keys)).filter(
-  (name) => !LEFT_OUT.includes(name),
-);
+const NAMES = KEYS.groups
+  .flatMap(({ keys }) => keys.flatMap(({ keys }) => keys))
+  .filter((name) => !LEFT_OUT.includes(name));
 
 const OPENED = "as it opens";
 const STATES: Readonly<Record<string, readonly string[]>> = {

@@ -1,6 +1,6 @@
 /** The page's address follows the view in headless Chromium: a reload brings the view back. */
 import { expect, it } from "vitest";
-import type { Snapshot } from "../../src/app/automation_api";
+import type { Snapshot } from "../../src/host/snapshot";
 import { difference, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";

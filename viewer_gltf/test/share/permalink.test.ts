@@ -1,6 +1,6 @@
 /** The share link in headless Chromium: opening it shows the same view. */
 import { expect, it } from "vitest";
-import type { Snapshot } from "../../src/app/automation_api";
+import type { Snapshot } from "../../src/host/snapshot";
 import { START_VOLUMES } from "../../src/state/parameters/volumes";
 import { addHeadset } from "../support/browser/chromium";
 import { difference, takePicture } from "../support/browser/picture";

@@ -102,12 +102,7 @@ FORMAT = Format(
     count_absent=_count_absent_in_views,
     guides=(
         Guide(
-            "BigDataViewer",
-            "`NAME.xml`, or its `.h5` or `.n5`",
-            (
-                "levels, time, channels; tiles, angles and illuminations by `--series` (of the "
-                "XML). [Registrations](#bigdataviewer)"
-            ),
+            "BigDataViewer", "`NAME.xml`, or its `.h5` or `.n5`", "[BigDataViewer](#bigdataviewer)"
         ),
     ),
 )

@@ -226,13 +226,6 @@ FORMAT = Format(
     endings=(".lif",),
     marks=(Mark("a LIF file of Leica", rb"\x70\0\0\0....\x2a"),),
     guides=(
-        Guide(
-            "Leica LIF",
-            "`NAME.lif`",
-            (
-                "images by `--series`, the largest volume by default; any scan order (xyz, xzy), "
-                "time, channels. A lambda stack, or an unmerged mosaic, is refused"
-            ),
-        ),
+        Guide("Leica LIF", "`NAME.lif`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
     ),
 )

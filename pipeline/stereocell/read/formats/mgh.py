@@ -25,11 +25,5 @@ FORMAT = Format(
     endings=(".mgh", ".mgz", ".mgh.gz"),
     packed_endings=(".mgz", ".mgh.gz"),
     is_unmarked=is_unknown,  # MGH has no mark
-    guides=(
-        Guide(
-            "MGH (FreeSurfer)",
-            "`NAME.mgz`, `NAME.mgh`",
-            "as NIfTI; the command lines behind the voxels are not read",
-        ),
-    ),
+    guides=(Guide("MGH (FreeSurfer)", "`NAME.mgz`, `NAME.mgh`", "as NIfTI"),),
 )

@@ -78,15 +78,5 @@ FORMAT = Format(
     has_axes=True,
     endings=(".npy",),
     marks=(Mark("a NumPy array", rb"\x93NUMPY"),),
-    guides=(
-        Guide(
-            "NumPy",
-            "`NAME.npy`",
-            (
-                "integers and floats of either byte order, C or Fortran order. Three axes are z, y,"
-                " x and four c, z, y, x, unless `--axes` names others; `--spacing-um` gives the "
-                "voxel spacing"
-            ),
-        ),
-    ),
+    guides=(Guide("NumPy", "`NAME.npy`", "three axes are z, y, x and four are c, z, y, x"),),
 )

@@ -69,8 +69,19 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
     named = (*names[:count], *[None] * (count - len(names)))
     grid = Grid(array.shape, _spacing(image))
-    title, notes = Path(location.path).stem, ("read by bioio", *notes)
+    title, notes = Path(location.path).stem, ("read by bioio", *notes, *_sign_notes(image))
     return Image((array,), (grid,), named, (None,) * count, 1, title=title, notes=notes)
+
+
+def _sign_notes(image: Any) -> tuple[str, ...]:
+    """Return a note for each axis along which the voxel size is negative."""
+    sizes = [(axis, getattr(image.physical_pixel_sizes, axis)) for axis in "ZYX"]
+    return tuple(
+        f"voxel size along {axis.lower()}: found {size:g} um: its size is taken and the voxels "
+        "stay as stored, so the volume may be mirrored"
+        for axis, size in sizes
+        if size is not None and size < 0
+    )
 
 
 def list_series(location: Location) -> tuple[str, ...]:

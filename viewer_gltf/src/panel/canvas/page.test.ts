@@ -1,12 +1,12 @@
 import { describe, expect, it } from "vitest";
 import { STEREO_FACTS } from "../../../test/support/fixture/facts";
 import { sampleManifest } from "../../../test/support/fixture/manifest";
+import { layOut } from "../../../test/support/panel/whole_panel";
 import { initialState } from "../../state/initial_state";
 import { reduce } from "../../state/reduce";
 import { REFUSED } from "../../state/refusals";
 import type { ViewerState } from "../../state/viewer_state";
 import { type Layout, type PanelView, START_VIEW } from "../controls";
-import { layOut } from "../layout";
 import { blocksOf } from "./controls";
 import { type Region, ROW } from "./draw_list";
 import { type CanvasView, MAX_TARGETS, type Page, pageOf, paginate, START_CANVAS } from "./page";

@@ -8,7 +8,7 @@ import { RovingTabindex } from "../../dom/roving_tabindex";
 import type { Key } from "../key";
 import { changeKey, FIXED, keyNow } from "../key_changes";
 import { keyName } from "../key_events";
-import { KEYS, type KeyChanges, labelOf } from "../keys";
+import type { KeyChanges, KeyTable } from "../keys";
 
 const NAMES: Readonly<Record<string, string>> = {
   ArrowLeft: "←",
@@ -76,10 +76,11 @@ export class Help {
   /** @param onClose called when the user wants it closed, at times once more than needed */
   constructor(
     parent: HTMLElement,
+    private readonly table: KeyTable,
     private readonly onClose: () => void,
     private readonly onChange: (changes: KeyChanges) => void,
   ) {
-    const sections = KEYS.map(({ name, keys }) => this.sectionOf(name, keys));
+    const sections = table.groups.map(({ name, keys }) => this.sectionOf(name, keys));
     this.rows = sections.flatMap(({ rows }) => rows);
     this.find.addEventListener("input", () => this.show(this.find.value));
     const title = element("h1", { id: "help-title", textContent: "Keys" });
@@ -150,7 +151,8 @@ export class Help {
   /** Let the next key that is pressed take the place of this one; null: none. */
   private ask(name: string | null, words = ""): void {
     this.asked = name;
-    const press = name === null ? HOW : `Press the new key for “${labelOf(name)}”; Esc leaves it.`;
+    const press =
+      name === null ? HOW : `Press the new key for “${this.table.labelOf(name)}”; Esc leaves it.`;
     this.write();
     setText(this.line, words || press);
   }
@@ -163,13 +165,16 @@ export class Help {
       this.ask(null);
       return;
     }
-    const answer = changeKey(this.changes, asked, keyName(event));
+    const answer = changeKey(this.table, this.changes, asked, keyName(event));
     if ("refusal" in answer) {
       setText(this.line, answer.refusal);
       return;
     }
     this.changes = answer.changes;
-    this.ask(null, `${textOf(keyNow(asked, this.changes))} does “${labelOf(asked)}” now.`);
+    this.ask(
+      null,
+      `${textOf(keyNow(asked, this.changes))} does “${this.table.labelOf(asked)}” now.`,
+    );
     this.onChange(this.changes);
   }
 

@@ -5,8 +5,8 @@
  * row would slide under the pointer or the gaze. Pure.
  */
 
-import { valueText } from "../../annotations/measure";
 import { toHex } from "../../math/color";
+import { valueText } from "../../probe/measure";
 import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel";
 import { REFUSED } from "../../state/refusals";
 import type { ChannelState, ViewerState } from "../../state/viewer_state";
@@ -34,7 +34,7 @@ type ChannelFacts = Readonly<{
   ranges: Ranges;
   histogram?: Histogram | null;
   /** Some colours of each label map's objects. */
-  objects?: readonly Readonly<{ id: string; colors: readonly string[] }>[];
+  objectColors?: ReadonlyMap<string, readonly string[]>;
 }>;
 
 function tagsOf({ hasSurface, surfaceReason }: ChannelState): string[] {
@@ -78,7 +78,7 @@ function ownColour(channel: ChannelState, channels: readonly ChannelState[]): Co
 function cardOf(
   channel: ChannelState,
   { channels }: ViewerState,
-  { ranges, histogram = null, objects = [] }: ChannelFacts,
+  { ranges, histogram = null, objectColors = new Map() }: ChannelFacts,
   view: PanelView,
 ): Group {
   const { id, name } = channel;
@@ -97,7 +97,7 @@ function cardOf(
     opener: { panel: "pick", channel: isOpen ? null : id },
   } as const;
   if (channel.hasObjects) {
-    const shows = objects.find((each) => each.id === id)?.colors ?? [];
+    const shows = objectColors.get(id) ?? [];
     const controls = [colourOf(COLOR, channel, id, shows), shownToggle(channel)];
     const opacity = controlOf(OPACITY, channel, id);
     return { ...head, controls, more: [opacity, paletteOf(COLOR, channel, `${id}/palette`, id)] };

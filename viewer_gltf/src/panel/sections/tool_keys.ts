@@ -1,16 +1,12 @@
-/** The keys of measuring, cutting open, sharing and of the panel itself. Pure. */
+/** The keys of cutting open, sharing and of the panel itself. Pure. */
 
-import { allOf, missing } from "../../state/measurements";
 import { groupNotices } from "../../state/notice_groups";
-import { MEASURE_PARAMETERS } from "../../state/parameters/tools";
 import { REFUSED } from "../../state/refusals";
 import { chosenClipPart, clipPartName, clipPartsOf, moveClipPart } from "../clip_by_key";
-import { type Key, key, keysOf, neighbour, no } from "../key";
+import { type Key, key, neighbour, no } from "../key";
 import { middleBox, middlePlane } from "../layout";
-import { clearMeasured } from "./measure";
 
 const NOT_CUT = no(REFUSED.cut);
-const NOT_MEASURED = no(REFUSED.measured);
 
 function nextClipPart(by: number): Key["to"] {
   return ({ state: { clip }, view }) => {
@@ -31,18 +27,7 @@ function push(steps: number): Key["to"] {
 }
 
 export const TOOL_KEYS: readonly Key[] = [
-  ...MEASURE_PARAMETERS.flatMap(keysOf),
   key("Enter", "Tap in the middle of the view", "press"),
-  key("_", "The measurement is done: it goes to the list", ({ state }) => {
-    if (state.measured.length === 0) return NOT_MEASURED;
-    if (missing(state.measuredAs, state.measured) > 0) return no(REFUSED.points);
-    return { type: "finish-measuring" };
-  }),
-  key("u", "Clear the newest measurement", ({ state }) => clearMeasured(state) ?? NOT_MEASURED),
-  key("(", "Save the measurements as CSV", ({ state }) =>
-    allOf(state).length === 0 ? NOT_MEASURED : "save-csv",
-  ),
-  key("Insert", "Save the objects that are selected, or that show, as CSV", "save-objects"),
   key("b", "Cut by a box: on or off", ({ state: { clip }, shown }) => ({
     type: "set-clip",
     clip: { ...clip, box: clip.box === null ? middleBox(shown) : null },

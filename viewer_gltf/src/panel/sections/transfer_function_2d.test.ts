@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../../test/support/fixture/manifest";
+import { KEYS } from "../../../test/support/panel/whole_panel";
 import { MAX_SHAPES } from "../../bundle/transfer_2d";
 import type { Action } from "../../state/actions";
 import { initialState } from "../../state/initial_state";
@@ -16,7 +17,6 @@ import {
   type Wish,
 } from "../controls";
 import { isRefusal } from "../key";
-import { wishOf } from "../keys";
 import { spokenFeedback } from "../spoken_feedback";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
@@ -79,7 +79,7 @@ class Controller {
 
   press(name: string): void {
     const { state, view } = this;
-    const wish = wishOf(name, { state, view, shown: SPECIMEN_BOX, focusTile: null });
+    const wish = KEYS.wishOf(name, { state, view, shown: SPECIMEN_BOX, focusTile: null });
     this.grant(wish === null || isRefusal(wish) ? null : wish);
   }
 }

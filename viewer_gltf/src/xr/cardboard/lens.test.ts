@@ -1,15 +1,14 @@
 import { describe, expect, it } from "vitest";
 import {
   cssPixelsPerInch,
-  distort,
   eyeTangents,
-  isIncreasing,
   lensCentre,
   type Screen,
   screenOf,
   toScreen,
   undistort,
 } from "./lens";
+import { distort, isIncreasing } from "./lens_model";
 import { CARDBOARD_V1, CARDBOARD_V2, type Profile } from "./viewer_profile";
 
 const PHONE: Screen = { width_m: 0.14, height_m: 0.065, border_m: 0.003 };

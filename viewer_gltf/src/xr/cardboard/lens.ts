@@ -5,21 +5,7 @@
  * r (1 + k1 r^2 + k2 r^4 + ...). Each eye's picture is drawn undistorted, by these tangents, and
  * put on the screen through the inverse, so that the lens makes it straight again.
  */
-/** Where the phone rests. */
-export type Alignment = "bottom" | "center" | "top";
-
-/** The two lenses and how they lie before the screen. */
-export type LensModel = Readonly<{
-  screenToLens_m: number;
-  interLens_m: number;
-  /** How far the left lens lets the eye see to each side; the right one mirrors it. */
-  fov_deg: Readonly<{ outer: number; inner: number; bottom: number; top: number }>;
-  alignment: Alignment;
-  /** From where the phone rests to the lenses' centres. */
-  trayToLens_m: number;
-  /** k1, k2, ... of r (1 + k1 r^2 + k2 r^4 + ...), r in tangents of the angle. */
-  distortion: readonly number[];
-}>;
+import { distort, type LensModel } from "./lens_model";
 
 export type Side = "left" | "right";
 
@@ -58,12 +44,6 @@ export function screenOf(width: number, height: number, perInch: number): Screen
   return { width_m: width * pixel_m, height_m: height * pixel_m, border_m: BORDER_m };
 }
 
-/** Tangent at which the eye sees what is at tangent `r` of the screen. */
-export function distort(k: readonly number[], r: number): number {
-  const r2 = r * r;
-  return r * (1 + k.reduceRight((sum, each) => r2 * (each + sum), 0));
-}
-
 /** Where on the screen the eye sees tangent `r`: the inverse, by halving an interval around it. */
 export function undistort(k: readonly number[], r: number): number {
   let low = 0;
@@ -75,18 +55,6 @@ export function undistort(k: readonly number[], r: number): number {
     else high = middle;
   }
   return (low + high) / 2;
-}
-
-/** Whether every tangent up to `most` is seen at one place of the screen only. */
-export function isIncreasing(k: readonly number[], most: number): boolean {
-  const STEP = 0.01;
-  let seen = 0;
-  for (let r = STEP; seen < most; r += STEP) {
-    const next = distort(k, r);
-    if (!(next > seen)) return false; // not a number neither
-    seen = next;
-  }
-  return true;
 }
 
 /** Where the axis of an eye's lens meets the screen, in metres from its lower left corner. */

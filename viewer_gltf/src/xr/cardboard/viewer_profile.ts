@@ -4,7 +4,7 @@
  * the field numbers of Google's Cardboard SDK (proto/cardboard_device.proto, Apache-2.0).
  */
 import { BundleError } from "../../bundle/errors";
-import { type Alignment, isIncreasing, type LensModel } from "./lens";
+import { type Alignment, isIncreasing, type LensModel } from "./lens_model";
 import { type Fields, readFields } from "./protobuf";
 
 export type Button = "none" | "magnet" | "touch" | "indirect-touch";

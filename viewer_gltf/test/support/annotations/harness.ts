@@ -17,13 +17,15 @@ import {
 } from "three";
 import { Marks } from "../../../src/annotations/annotations";
 import { listenForHandles } from "../../../src/annotations/handle_pointer";
-import type { Label } from "../../../src/annotations/label";
 import type { DecodeAnswer, DecodeRequest } from "../../../src/bundle/decode";
 import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { labelBoxes } from "../../../src/capture/label_boxes";
 import { gazeOf, type Hit } from "../../../src/interaction/ray_pointer";
 import { rayAhead, rayUnder } from "../../../src/interaction/rays";
+import type { Label } from "../../../src/marks/label";
+import { sightOf } from "../../../src/marks/sight";
 import type { Vec3 } from "../../../src/math/vec3";
+import { Reading } from "../../../src/probe/probe_reader";
 import { Specimen } from "../../../src/render/specimen_pose";
 import type { Action } from "../../../src/state/actions";
 import { initialState } from "../../../src/state/initial_state";
@@ -114,6 +116,7 @@ class Bench {
   private readonly camera = new PerspectiveCamera(40, 1, 0.01, 20);
   private readonly specimen = new Specimen(BOUNDS);
   private readonly focus = new Vector3();
+  private readonly reading: Reading;
   private readonly marks: Marks;
   private view: View = { position: [0, 0, 2], target: [0, 0, 0] };
   state = initialState(MANIFEST);
@@ -139,11 +142,13 @@ class Bench {
     const surfaces = this.addSurfaces();
     const dispatch = (action: Action) => {
       this.state = reduce(this.state, action);
+      this.reading.state = this.state;
       this.marks.follow(this.state);
       this.draw();
     };
-    const options = {
-      manifest: { ...MANIFEST, specimen: { ...MANIFEST.specimen, sides } },
+    const manifest = { ...MANIFEST, specimen: { ...MANIFEST.specimen, sides } };
+    const reading = {
+      manifest,
       base: location.href,
       values: null,
       surfaces: () => surfaces,
@@ -153,14 +158,20 @@ class Bench {
         this.isKnown = true;
         return tile === "r0_c1" ? VOLUME : null;
       },
+      onError: (error: unknown) => {
+        throw error;
+      },
+    };
+    this.reading = new Reading(reading, this.state);
+    const options = {
+      manifest,
+      reading: this.reading,
+      surfaces: () => surfaces,
       dispatch,
       announce: (text: string) => {
         this.announced = text;
       },
       onChange: () => this.draw(),
-      onError: (error: unknown) => {
-        throw error;
-      },
     };
     this.marks = new Marks(options, this.state);
     this.specimen.group.add(this.marks.group);
@@ -173,7 +184,7 @@ class Bench {
       {
         pick: (point, pointing) => this.marks.pick(rayAt(point), pointing),
         drag: (id, point) => this.marks.drag(id, rayAt(point)),
-        mean: (id) => this.marks.mean(id),
+        highlight: (id) => this.marks.highlight(id),
       },
       new AbortController().signal,
     );
@@ -188,6 +199,7 @@ class Bench {
 
   dispatch(action: Action): void {
     this.state = reduce(this.state, action);
+    this.reading.state = this.state;
     this.marks.follow(this.state);
     this.draw();
   }
@@ -209,10 +221,13 @@ class Bench {
     camera.lookAt(this.focus.set(...view.target));
     camera.updateMatrixWorld();
     const screen = { camera, height_px: this.stage.clientHeight, focus: this.focus };
+    const shown = view.isStereo ? null : screen;
+    this.reading.specimen = specimen.group.matrixWorld;
     this.marks.update({
       head: camera.matrixWorld,
       specimen: specimen.group.matrixWorld,
-      screen: view.isStereo ? null : screen,
+      screen: shown,
+      sight: sightOf(camera.matrixWorld, specimen.group.matrixWorld, shown),
       gaze: rayAhead(camera.matrixWorld, specimen.group),
       disc: null,
       isPanelOpen: view.isPanelOpen ?? false,

@@ -1,6 +1,6 @@
 /** Drive the viewer's page as a person does: by its controls. */
 import type { Page } from "playwright-core";
-import type { Snapshot } from "../../../src/app/automation_api";
+import type { Snapshot } from "../../../src/host/snapshot";
 import type { Mode } from "../../../src/state/parameters/volumes";
 
 /** Time after which a click is no second one of a double click. */

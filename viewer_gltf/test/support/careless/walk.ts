@@ -3,7 +3,7 @@
  * it asked for.
  */
 import type { Page } from "playwright-core";
-import type { Snapshot } from "../../../src/app/automation_api";
+import type { Snapshot } from "../../../src/host/snapshot";
 import type { ViewerPage } from "../browser/page";
 
 /** Parts of the state that an act may change; "look": from where the specimen is seen; "any": whatever a control sets. */

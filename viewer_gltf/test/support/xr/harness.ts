@@ -20,7 +20,7 @@ import { Cuts } from "../../../src/gpu/clip_planes";
 import { leaveUncut } from "../../../src/gpu/unclipped_material";
 import type { Target } from "../../../src/interaction/ray_pointer";
 import type { Ray } from "../../../src/math/vec3";
-import { chosenTile, type Facts, layOut } from "../../../src/panel/layout";
+import { chosenTile } from "../../../src/panel/layout";
 import { XR_DISTANCE_M } from "../../../src/render/placement";
 import { Specimen } from "../../../src/render/specimen_pose";
 import type { Action } from "../../../src/state/actions";
@@ -32,6 +32,7 @@ import { Hands } from "../../../src/xr/interaction";
 import { XrSession } from "../../../src/xr/session";
 import { STEREO_FACTS } from "../fixture/facts";
 import { sampleManifest } from "../fixture/manifest";
+import { type Facts, layOut } from "../panel/whole_panel";
 
 type At = readonly [number, number, number];
 type Side = "left" | "right";
@@ -105,7 +106,7 @@ class Stand {
       scene: this.scene,
       specimen: this.specimen,
       tiles: sampleManifest(6).tiles,
-      handles: [this.handle],
+      handles: () => [this.handle],
       layOut: (view) => layOut(this.state, FACTS, view),
       onAction: (action) => this.dispatch(action),
       onCommand: (command) => {

@@ -1,18 +1,18 @@
 /** A person in stereo who looks, rests and presses, without a browser: the hands as they are, nothing painted. */
 import { Euler, Matrix4, Quaternion, Scene, Vector3 } from "three";
+import { HandleTarget } from "../../../src/annotations/handle_target";
 import {
   dragHandle,
   type HandleId,
   handlesOf,
   TOLERANCE_RAD,
-} from "../../../src/annotations/clip_handles";
-import { HandleTarget } from "../../../src/annotations/handle_target";
-import { dragLamp, isLampHandle, lampHandles } from "../../../src/annotations/lamp_handles";
+} from "../../../src/marks/clip_handles";
+import { dragLamp, isLampHandle, lampHandles } from "../../../src/marks/lamp_handles";
 import type { Box } from "../../../src/math/box";
 import type { Ray } from "../../../src/math/vec3";
 import type { Region } from "../../../src/panel/canvas/draw_list";
 import { type PanelView, START_VIEW } from "../../../src/panel/controls";
-import { chosenTile, type Facts, layOut } from "../../../src/panel/layout";
+import { chosenTile } from "../../../src/panel/layout";
 import { XR_DISTANCE_M } from "../../../src/render/placement";
 import { Specimen } from "../../../src/render/specimen_pose";
 import { initialState } from "../../../src/state/initial_state";
@@ -21,6 +21,7 @@ import type { ViewerState } from "../../../src/state/viewer_state";
 import { Hands } from "../../../src/xr/interaction";
 import { STEREO_FACTS } from "../fixture/facts";
 import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
+import { type Facts, layOut } from "../panel/whole_panel";
 import { tremble } from "./tremble";
 
 /** Longest time that a frame counts, s. */
@@ -59,6 +60,8 @@ export class LookingPerson {
   readonly wishes: unknown[] = [];
   /** How often anything has changed, the panel's own pages too; what follows in the next frame is the same change. */
   changes = 0;
+  /** The object that every ray meets; null: none. */
+  objectAlong: () => Readonly<{ id: string; distance: number }> | null = () => null;
   readonly hands: Hands;
   /** The handles of the cut and of the lamps. */
   readonly handles = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
@@ -90,7 +93,8 @@ export class LookingPerson {
       scene: new Scene(),
       specimen,
       tiles: manifest.tiles,
-      handles: [this.handles],
+      handles: () => [this.handles],
+      objectAlong: () => this.objectAlong(),
       isPainted: false,
       now_ms: () => this.now_ms,
       layOut: (view) => layOut(this.state, FACTS, view),

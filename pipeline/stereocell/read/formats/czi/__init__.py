@@ -26,15 +26,6 @@ FORMAT = Format(
     endings=(".czi",),
     marks=(Mark("a CZI file of Zeiss", rb"ZISRAWFILE"),),
     guides=(
-        Guide(
-            "Zeiss CZI",
-            "`NAME.czi`",
-            (
-                "channels with names and colours, time, spacing; tiles of a mosaic composed; "
-                "scenes by `--series`; the finest level alone. Sizes that the metadata and the "
-                "tiles state otherwise, and an interval of the planes that contradicts the "
-                "scaling, are noted. pylibCZIrw is under LGPL-3.0"
-            ),
-        ),
+        Guide("Zeiss CZI", "`NAME.czi`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
     ),
 )

@@ -45,11 +45,5 @@ FORMAT = Format(
     marks=(Mark("a DICOM file", rb"DICM", at=128),),
     is_unmarked=is_unknown,  # files of before 1993 have no mark
     read_free_labels=_read_free_labels,
-    guides=(
-        Guide(
-            "DICOM",
-            "a folder or a file",
-            "[DICOM and NIfTI](dicom.md)",
-        ),
-    ),
+    guides=(Guide("DICOM", "a folder or a file", "[DICOM and NIfTI](dicom.md)"),),
 )

@@ -18,13 +18,6 @@ FORMAT = Format(
     endings=(".ims",),
     is_unmarked=is_hdf5,
     guides=(
-        Guide(
-            "Imaris 5.5",
-            "`NAME.ims`",
-            (
-                "levels, channels' names and colours, time, spacing; the padding of its arrays is"
-                " left out"
-            ),
-        ),
+        Guide("Imaris 5.5", "`NAME.ims`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
     ),
 )

@@ -31,14 +31,6 @@ FORMAT = Format(
     needs_ending=True,
     is_unmarked=_may_be_text,
     guides=(
-        Guide(
-            "MetaImage",
-            "`NAME.mha`, `NAME.mhd`",
-            (
-                "raw and zlib; in the patient by `Offset` and `TransformMatrix`, as ITK has it, "
-                "in `DistanceUnits`; the synonyms that ITK prefers, and the last line of a field "
-                "that is there twice; channels, time"
-            ),
-        ),
+        Guide("MetaImage", "`NAME.mha`, `NAME.mhd`", "[NRRD and MetaImage](#nrrd-and-metaimage)"),
     ),
 )

@@ -32,14 +32,8 @@ FORMAT = Format(
     guides=(
         Guide(
             "MRC, CCP4",
-            (
-                "`NAME.mrc`, `.rec`, `.map`, also `.gz`, `.bz2`; unpacked under any ending "
-                "(`.st`, `.ali`)"
-            ),
-            (
-                "voxel size in Angstrom; axes by MAPC, MAPR, MAPS. The first row is the lowest "
-                "one, so a molecule keeps its hand"
-            ),
+            "`NAME.mrc`, `.rec`, `.map`, also `.gz`, `.bz2`",
+            "[MRC and CCP4](#mrc-and-ccp4)",
         ),
     ),
 )

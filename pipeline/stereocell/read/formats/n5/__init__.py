@@ -37,17 +37,6 @@ FORMAT = Format(
     holds=_holds,
     count_absent=_count_absent,
     guides=(
-        Guide(
-            "N5",
-            "`NAME.n5`, or a folder in it",
-            (
-                "a dataset, a pyramid `s0`, `s1`, ..., or a container of BigDataViewer, whose "
-                "setups become channels, with the names and voxel sizes of the XML beside it. "
-                "Spacing: `pixelResolution`, `resolution` with `units`, or COSEM's `transform`; "
-                "axes: `axes` (fastest first), `transform` or Python's `axis_names` (slowest "
-                "first), `--axes`, else three are z, y, x; values by `scale_factor`, `add_offset`"
-                " and `_FillValue`. Blocks: raw, gzip, bzip2, xz, zstd, Blosc, LZ4"
-            ),
-        ),
+        Guide("N5", "`NAME.n5`, or a folder in it", "[N5 and plain Zarr](#n5-and-plain-zarr)"),
     ),
 )

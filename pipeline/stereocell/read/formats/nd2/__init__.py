@@ -32,14 +32,6 @@ FORMAT = Format(
     marks=(Mark("an ND2 file of Nikon", rb"\xda\xce\xbe\x0a"),),
     is_unmarked=_is_old,
     guides=(
-        Guide(
-            "Nikon ND2",
-            "`NAME.nd2`",
-            (
-                "channels with names and colours, time, spacing; stage positions by `--series`. "
-                "An axis that is not calibrated has no length, and a note says that planes were "
-                "taken downwards"
-            ),
-        ),
+        Guide("Nikon ND2", "`NAME.nd2`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
     ),
 )

@@ -39,7 +39,7 @@ FORMAT = Format(
         Guide(
             "Analyze 7.5",
             "`NAME.hdr` or `NAME.img`, also `.gz`",
-            "as NIfTI; it states no orientation, which a note says",
+            "as NIfTI, without an orientation",
         ),
     ),
 )

@@ -24,19 +24,6 @@ FORMAT = Format(
     marks=(Mark("an NRRD file", rb"NRRD0"),),
     is_unmarked=_is_unmarked,
     guides=(
-        Guide(
-            "NRRD",
-            "`NAME.nrrd`, `NAME.nhdr`",
-            (
-                "raw, gzip, bzip2. Where `space` names axes of the body the image lies in the "
-                "patient, as [NIfTI](dicom.md) does, in mm unless `space units` or `units` says "
-                "otherwise; else it is a stack, whose spacing is in these units, and whose axes "
-                "stand in the order of their `labels` (z, y, x, depth, ...). An axis of `kinds` "
-                "time is time, one without direction is channels: a note says which values they "
-                "are, and parts of vectors, tensors and colours have their names. Images of "
-                "diffusion (`DWMRI_gradient`, `DWMRI_B-matrix`) count as points in time, b 0 "
-                "first, and a note names the b-values"
-            ),
-        ),
+        Guide("NRRD", "`NAME.nrrd`, `NAME.nhdr`", "[NRRD and MetaImage](#nrrd-and-metaimage)"),
     ),
 )

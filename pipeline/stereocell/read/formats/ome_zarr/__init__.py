@@ -50,21 +50,13 @@ FORMAT = Format(
     guides=(
         Guide(
             "OME-Zarr 0.1 to 0.6",
-            (
-                "`NAME.zarr`, or an image in it; a zip file on this machine (`NAME.ozx`, "
-                "`NAME.zarr.zip`), or an image in it"
-            ),
+            "`NAME.zarr`, a zip file of it (`NAME.ozx`), or an image in either",
             "[OME-Zarr](#ome-zarr)",
         ),
         Guide(
-            "Zarr, versions 2 and 3, without OME-Zarr's metadata",
+            "Zarr 2 and 3",
             "the folder of an array, or of a group of one",
-            (
-                "axes: names of dimensions, the attributes that list them (as in HDF5), `--axes`,"
-                " else three are z, y, x; spacing, direction and axes also by arrays of positions"
-                " beside it, as xarray writes them; attributes as in "
-                "[HDF5](#hdf5-netcdf-4-and-matlab)"
-            ),
+            "[N5 and plain Zarr](#n5-and-plain-zarr)",
         ),
     ),
 )

@@ -1,0 +1,64 @@
+"""Rings of either kind of mesh: how surfaces and interfaces differ in a collapse."""
+
+from stereocell.kernels.compiled import step
+from stereocell.kernels.interface_rings import (
+    check_sheets_link,
+    collect_neighbours,
+    collect_triangles,
+    join_sheets,
+)
+from stereocell.kernels.rings import TRIANGLES, Flags, Mesh, Ring
+from stereocell.kernels.surface_rings import check_fan_link, collect_fan, join_fans, mark_fan
+
+
+@step
+def is_surface(mesh: Mesh) -> bool:
+    """Return whether the mesh is a surface; else it is interfaces."""
+    return len(mesh.on_line) == 0
+
+
+@step
+def collect_ring(u: int, mesh: Mesh, ring: Ring) -> bool:
+    """Write the ring of u; return whether there is room for it, and it is not empty."""
+    if is_surface(mesh):
+        return collect_fan(u, mesh, ring)
+    if not collect_triangles(u, mesh, ring):
+        return False
+    collect_neighbours(ring)
+    return ring.sizes[TRIANGLES] > 0
+
+
+@step
+def mark_ring(u: int, mesh: Mesh, ring: Ring, marks: Flags) -> None:
+    """Mark the neighbours of u."""
+    if is_surface(mesh):
+        mark_fan(u, mesh, marks)
+    else:
+        collect_triangles(u, mesh, ring)
+        for k in range(ring.sizes[TRIANGLES]):
+            marks[ring.first[k]] = marks[ring.second[k]] = True
+
+
+@step
+def check_link(mesh: Mesh, ring: Ring, chosen: int, other: Ring) -> bool:
+    """Return whether topology stays when the ring's vertex moves onto the chosen neighbour.
+
+    other  room for the ring of the neighbour
+    """
+    if is_surface(mesh):
+        return check_fan_link(mesh, ring, chosen)
+    return check_sheets_link(mesh, ring, chosen, other)
+
+
+@step
+def move_onto(u: int, chosen: int, mesh: Mesh, ring: Ring, strayed: float) -> None:
+    """Let u become the chosen neighbour; what went into u is at most `strayed` from the result."""
+    v = ring.near[chosen]
+    mesh.at[v, 3] = max(mesh.at[v, 3], strayed)
+    if is_surface(mesh):
+        join_fans(mesh, ring, chosen)
+    else:
+        join_sheets(mesh, ring, v)
+    for p in range(11):
+        mesh.quadrics[v, p] += mesh.quadrics[u, p]
+    mesh.start[u] = -1

@@ -1,0 +1,97 @@
+"""Arrays that a collapse works in: a mesh that changes in place, and the ring of one vertex."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.kernels.edge_records import RECORD
+from stereocell.kernels.half_edges import Ints
+from stereocell.kernels.triangles import Points
+
+Flags = NDArray[np.bool_]
+
+MAX_NEIGHBOURS = 512  # neighbours of a vertex of a surface that is looked at
+MAX_TRIANGLES = 96  # triangles of a vertex of interfaces that is looked at
+CACHE_LINE = 64  # bytes
+TRIANGLES, NEIGHBOURS, STAMP = 0, 1, 2  # places in Ring.sizes
+
+
+class Mesh(NamedTuple):
+    """A surface or interfaces, of n vertices and m triangles."""
+
+    at: Points  # float64 (n, 4): position, um; largest distance from here of what came here, um
+    quadrics: Points  # float64 (n, 12): kernels/quadrics.py
+    edges: Ints  # int32 (8 m,): kernels/edge_records.py
+    start: Ints  # int32 (n,), a half-edge that leaves each vertex, or -1
+    is_left: Flags  # bool (m,), triangles that no collapse has taken
+    stays: Flags  # bool (n,), vertices that no collapse moves
+    on_line: Flags  # interfaces: bool (n,), vertices of lines; a surface: (0,)
+    planes: NDArray[np.uint8]  # uint8 (n,), a bit for each cut plane that a vertex lies in
+    errors: Points  # float64 (n,), largest root of the mean squared distance from the planes
+
+
+class Ring(NamedTuple):
+    """The triangles around a vertex, and its neighbours; the arrays have room for the most."""
+
+    out: Ints  # half-edge of each triangle that leaves the vertex
+    first: Ints  # next corner of each triangle
+    second: Ints  # last corner of each triangle
+    near: Ints  # neighbours; the first corners in a surface
+    shared: Ints  # interfaces: number of triangles at the edge to each neighbour
+    price: Points  # price of moving onto each neighbour
+    marks: Ints  # interfaces: marks of neighbours
+    slot: Ints  # interfaces: int32 (n,), place among the neighbours of vertices with the last stamp
+    stamp: Ints  # int32 (n,)
+    sizes: Ints  # int32 (3,): number of triangles, number of neighbours, last stamp
+
+
+def make_ring(n: int, *, is_surface: bool) -> Ring:
+    """Return room for a ring in a mesh of n vertices."""
+    most = MAX_NEIGHBOURS if is_surface else MAX_TRIANGLES
+    first, room = np.empty(most, np.int32), 0 if is_surface else 2 * most
+    return Ring(
+        out=np.empty(most, np.int32),
+        first=first,
+        second=np.empty(most, np.int32),
+        near=first if is_surface else np.empty(room, np.int32),
+        shared=np.empty(room, np.int32),
+        price=np.empty(max(most, room)),
+        marks=np.empty(room, np.int32),
+        slot=np.zeros(0 if is_surface else n, np.int32),
+        stamp=np.zeros(n, np.int32),
+        sizes=np.zeros(3, np.int32),
+    )
+
+
+def make_mesh(
+    n: int,
+    m: int,
+    *,
+    on_line: Flags | None = None,
+    planes: NDArray[np.uint8] | None = None,
+    errors: Points | None = None,
+) -> Mesh:
+    """Return a mesh of n vertices and m triangles without positions and edges.
+
+    numpy makes the arrays, since it asks for large pages.
+    """
+    return Mesh(
+        at=_zeros(4 * n, np.float64).reshape(n, 4),
+        quadrics=_zeros(12 * n, np.float64).reshape(n, 12),
+        edges=_zeros(RECORD * m, np.int32),
+        start=np.empty(n, np.int32),
+        is_left=np.ones(m, bool),
+        stays=np.zeros(n, bool),
+        on_line=np.zeros(0, bool) if on_line is None else on_line,
+        planes=np.zeros(n, np.uint8) if planes is None else planes,
+        errors=np.zeros(n) if errors is None else errors,
+    )
+
+
+def _zeros(size: int, kind: type[np.float64 | np.int32]) -> NDArray[Any]:
+    """Return zeros that start where a line of the cache does."""
+    numbers = CACHE_LINE // np.dtype(kind).itemsize
+    room = np.zeros(size + numbers, kind)
+    start = -room.ctypes.data % CACHE_LINE // room.itemsize
+    return room[start : start + size]

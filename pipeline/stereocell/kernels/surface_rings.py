@@ -1,0 +1,90 @@
+"""Rings of a surface: each edge has two triangles, and a vertex one fan of them."""
+
+import numpy as np
+
+from stereocell.kernels.compiled import kernel, step
+from stereocell.kernels.edge_records import RECORD, TWIN, ahead, behind, count_common, fill_records
+from stereocell.kernels.edge_records import join as join_records
+from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_twins
+from stereocell.kernels.quadrics import price_of
+from stereocell.kernels.rings import MAX_NEIGHBOURS, NEIGHBOURS, STAMP, TRIANGLES, Flags, Mesh, Ring
+
+VALENCE = 24  # most neighbours of two ends together
+
+
+@kernel
+def fill_fans(mesh: Mesh, triangles: Ints, locked: Flags) -> None:
+    """Write a surface's half-edges, and which vertices stay: locked ones and those of borders."""
+    twins = match_twins(triangles, len(mesh.start))
+    start, valence = count_fans(triangles, twins, len(mesh.start))
+    mesh.stays[:] = find_fixed(locked, triangles.ravel(), twins, valence)
+    fill_records(triangles, twins, start, mesh.edges)
+    mesh.start[:] = start
+
+
+@step
+def collect_fan(u: int, mesh: Mesh, ring: Ring) -> bool:
+    """Write the ring of u, which is on no border; return whether there is room for it."""
+    size, start = 0, mesh.start[u]
+    h = start
+    while size < MAX_NEIGHBOURS:
+        ring.out[size], ring.first[size] = h, mesh.edges[ahead(h)]
+        ring.second[size] = mesh.edges[behind(h)]
+        size += 1
+        h = mesh.edges[behind(h) + TWIN]
+        if h == start:
+            ring.sizes[TRIANGLES] = ring.sizes[NEIGHBOURS] = size
+            return True
+    return False
+
+
+@step
+def stamp_fan(ring: Ring) -> None:
+    """Give the neighbours the next stamp."""
+    ring.sizes[STAMP] += 1
+    for k in range(ring.sizes[TRIANGLES]):
+        ring.stamp[ring.first[k]] = ring.sizes[STAMP]
+
+
+@step
+def mark_fan(u: int, mesh: Mesh, marks: Flags) -> None:
+    """Mark all neighbours of u, which is on no border."""
+    start = mesh.start[u]
+    h = start
+    while True:
+        marks[mesh.edges[ahead(h)]] = True
+        h = mesh.edges[behind(h) + TWIN]
+        if h == start:
+            return
+
+
+@step
+def check_fan_link(mesh: Mesh, ring: Ring, chosen: int) -> bool:
+    """Return whether the two ends of an edge have two common neighbours, and few in all.
+
+    ring    stamped, see `stamp_fan`
+    chosen  number of the edge's far end among the neighbours
+    """
+    common, others = count_common(ring.out[chosen], mesh.edges, ring.stamp, ring.sizes[STAMP])
+    return common == 2 and 7 <= others + ring.sizes[TRIANGLES] <= VALENCE
+
+
+@step
+def join_fans(mesh: Mesh, ring: Ring, chosen: int) -> None:
+    """Put the chosen neighbour in the place of the ring's vertex, and take two triangles out."""
+    h = ring.out[chosen]
+    mesh.is_left[h // RECORD] = mesh.is_left[mesh.edges[h + TWIN] // RECORD] = False
+    v = ring.first[chosen]
+    join_records(h, v, ring.out, ring.sizes[TRIANGLES], mesh.edges, mesh.start)
+
+
+@step
+def find_cheapest_in_fan(u: int, mesh: Mesh, enough: float) -> float:
+    """Return the least price of u's collapses, or one below `enough`; u is on no border."""
+    start = mesh.start[u]
+    best, h = np.inf, start
+    while True:
+        best = min(best, price_of(mesh.quadrics, u, mesh.at, mesh.edges[ahead(h)]))
+        h = mesh.edges[behind(h) + TWIN]
+        if h == start or best < enough:
+            return best

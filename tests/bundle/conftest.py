@@ -1,0 +1,32 @@
+"""A stage of two tiles, its bundle, and bundles of layers that edit it."""
+
+import pytest
+
+from support.bundles import write, write_tiles
+from support.stages import edit_over
+
+
+@pytest.fixture(scope="session")
+def stage(tmp_path_factory):
+    """The two tiles' stage, to be read only."""
+    return write_tiles(tmp_path_factory.mktemp("stage"))
+
+
+@pytest.fixture(scope="session")
+def bundle(stage, tmp_path_factory):
+    """Its bundle, to be read only."""
+    out = tmp_path_factory.mktemp("bundle") / "bundle"
+    write(stage, out)
+    return out
+
+
+@pytest.fixture
+def edit(stage, tmp_path):
+    """Write a layer over the stage and return its bundle: `edit(lambda stage: ...)`."""
+
+    def export(change):
+        path = edit_over(tmp_path / "edited.usda", stage, change)
+        export.told = write(path, tmp_path / "bundle")
+        return tmp_path / "bundle"
+
+    return export

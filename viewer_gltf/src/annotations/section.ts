@@ -1,0 +1,126 @@
+/** The panel's section and the keys of measuring: what a tap does, the newest measurement, and the list. Pure. */
+
+import { command, controlsOf } from "../panel/control_templates";
+import type { Control, PartSection } from "../panel/controls";
+import { type KeyGroup, key, keysOf, no } from "../panel/key";
+import { measuredText } from "../panel/measured";
+import { measurementText } from "../probe/measure";
+import type { Action } from "../state/actions";
+import { allOf, type Measurement, missing } from "../state/measurements";
+import { MEASURE_PARAMETERS } from "../state/parameters/tools";
+import { REFUSED } from "../state/refusals";
+import type { ViewerState } from "../state/viewer_state";
+
+declare module "../state/commands" {
+  interface CommandNames {
+    /** The measurements as a file. */
+    "save-csv": true;
+  }
+}
+
+const POINT_NAMES = ["First point", "Second point", "Third point"] as const;
+/** So many finished ones have a row; the file has all. */
+const MAX_LISTED = 12;
+
+/** Of the newest one, then of the list; null: there is none. */
+function clearMeasured({ measured, measurements }: ViewerState): Action | null {
+  if (measured.length > 0) return { type: "measure", points: [] };
+  if (measurements.length === 0) return null;
+  return { type: "set-measurements", measurements: measurements.slice(0, -1) };
+}
+
+/** @param values of each measured point: the channels' values there, as `DAPI 1210` */
+export function measureSections(
+  state: ViewerState,
+  values: readonly (readonly string[])[],
+): readonly PartSection[] {
+  const items = measureItems(state, values);
+  return [{ id: "measure", label: "Measure", rank: 30, isDeeper: true, items }];
+}
+
+function measureItems(
+  state: ViewerState,
+  values: readonly (readonly string[])[],
+): readonly Control[] {
+  const { measured, measuredAs, measurements } = state;
+  const isOpen = missing(measuredAs, measured) > 0;
+  return [
+    ...controlsOf(MEASURE_PARAMETERS, state),
+    { kind: "text", id: "distance", label: "Measured", value: measuredText(state) },
+    ...POINT_NAMES.slice(0, Math.max(2, measured.length)).map((label, i): Control => {
+      const value = (values[i] ?? []).join(" · ");
+      return { kind: "text", id: `values-${i}`, label, value };
+    }),
+    {
+      kind: "button",
+      id: "finish-measuring",
+      label: "Done: keep the measurement",
+      refusal: isOpen ? REFUSED.points : "",
+      to: () => ({ type: "finish-measuring" }),
+    },
+    {
+      kind: "button",
+      id: "clear-measured",
+      label: "Clear",
+      name: "Clear the newest measurement",
+      refusal: clearMeasured(state) === null ? REFUSED.measured : "",
+      to: () => clearMeasured(state) ?? { type: "measure", points: [] },
+    },
+    ...measurements.slice(-MAX_LISTED).flatMap((each, i) => {
+      const index = Math.max(0, measurements.length - MAX_LISTED) + i;
+      return listed(each, index, measurements);
+    }),
+    {
+      ...command("save-csv", "Save as CSV"),
+      refusal: isOpen && measurements.length === 0 ? REFUSED.measured : "",
+    },
+  ];
+}
+
+function listed(
+  { name, kind, points }: Measurement,
+  index: number,
+  all: readonly Measurement[],
+): readonly Control[] {
+  const change = (measurements: readonly Measurement[]): Action => ({
+    type: "set-measurements",
+    measurements,
+  });
+  return [
+    { kind: "text", id: `measurement-${index}`, label: name, value: measurementText(kind, points) },
+    {
+      kind: "search",
+      id: `measurement-${index}-name`,
+      label: `Name of ${name}`,
+      value: name,
+      to: (text) => change(all.map((each, i) => (i === index ? { ...each, name: text } : each))),
+    },
+    {
+      kind: "button",
+      id: `measurement-${index}-remove`,
+      label: `Remove ${name}`,
+      to: () => change(all.filter((_, i) => i !== index)),
+    },
+  ];
+}
+
+const NOT_MEASURED = no(REFUSED.measured);
+
+export const MEASURE_KEYS: readonly KeyGroup[] = [
+  {
+    name: "Tools",
+    rank: 75,
+    keys: [
+      ...MEASURE_PARAMETERS.flatMap(keysOf),
+      key("_", "The measurement is done: it goes to the list", ({ state }) => {
+        if (state.measured.length === 0) return NOT_MEASURED;
+        if (missing(state.measuredAs, state.measured) > 0) return no(REFUSED.points);
+        return { type: "finish-measuring" };
+      }),
+      key("u", "Clear the newest measurement", ({ state }) => clearMeasured(state) ?? NOT_MEASURED),
+      key("(", "Save the measurements as CSV", ({ state }) =>
+        allOf(state).length === 0 ? NOT_MEASURED : "save-csv",
+      ),
+    ],
+  },
+];

@@ -1,0 +1,9 @@
+/** The parts of the viewer, a line each. Without its line, and its folder, a part is gone and the others still work. */
+export { annotations } from "../annotations/part";
+export { capture } from "../capture/part";
+export { messages } from "../messages/part";
+export { objects } from "../objects/part";
+export { share } from "../share/part";
+export { slices } from "../slices/part";
+export { stereo } from "../stereo/part";
+export { tapCard } from "../tap_card/part";

@@ -1,0 +1,176 @@
+/** Pictures and videos as a part of the viewer, and the views that a video goes through. */
+import { fileName, saveFile } from "../dom/save_file";
+import type { Part, PartDefinition, PartHost } from "../host/part";
+import type { PosterMaker } from "../host/services";
+import { isSameLook } from "../interaction/orbit_camera";
+import type { PartSection } from "../panel/controls";
+import { REFUSED } from "../state/refusals";
+import type { Scene } from "./save_picture";
+import { SAVE_KEYS, saveSections } from "./section";
+
+const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
+const NEXT_KEPT = "“Next kept view” goes through them.";
+const ONLY_VIEW = "That is the only kept view.";
+
+/** A file that was made; null: the user has cancelled it. */
+type Made = Readonly<{ suffix: string; content: Blob }> | null;
+
+/** Loads the code that draws and writes files. Rejects with a DOMException. */
+function loadSaving() {
+  return import("./save_picture").catch((cause) => {
+    throw new DOMException(
+      `the part of the page for it could not be loaded (${cause})`,
+      "NetworkError",
+    );
+  });
+}
+
+class CapturePart implements Part, PosterMaker {
+  readonly id = "capture";
+  readonly services = { posters: this };
+  readonly commands = {
+    "keep-view": () => this.keep(),
+    "next-view": () => this.goToNext(),
+    "forget-views": () => this.forget(),
+  };
+  readonly pageCommands = {
+    "save-picture": () => void this.save("picture", (signal) => this.makePicture(signal)),
+    "save-video": () => void this.save("video", (signal) => this.makeVideo(signal)),
+  };
+  /** While a picture or a video is made. */
+  private filming: AbortController | null = null;
+  /** Index of the kept view that is shown next. */
+  private nextView = 0;
+
+  constructor(private readonly host: PartHost) {}
+
+  panel(): readonly PartSection[] {
+    return saveSections(this.host.state, this.filming !== null);
+  }
+
+  async poster(longest_px: number): Promise<Blob> {
+    const { posterOf } = await loadSaving();
+    return posterOf(this.filmed, longest_px);
+  }
+
+  private get filmed(): Scene {
+    const { stage, state, bundle, display } = this.host;
+    const { renderer, studio, viewpoint, contents } = display;
+    const { parent } = contents.surfaces.group;
+    return {
+      renderer,
+      navigation: viewpoint.navigation,
+      studio,
+      height_px: stage.clientHeight,
+      specimen: viewpoint.specimen,
+      labelled: parent ?? contents.surfaces.group,
+      state,
+      manifest: bundle.manifest,
+      colorsOf: (channel) => this.host.service("objects")?.legend(channel) ?? null,
+    };
+  }
+
+  /** The view as large as is chosen. */
+  private async makePicture(signal: AbortSignal): Promise<Made> {
+    const { savePicture } = await loadSaving();
+    const scale = Number(this.host.state.pictureSize);
+    const say = (words: string) => this.host.announce(`Picture: ${words}`);
+    const content = await savePicture(this.filmed, scale, say, signal);
+    return content && { suffix: "png", content };
+  }
+
+  /** Through the kept views, or once round. */
+  private async makeVideo(signal: AbortSignal): Promise<Made> {
+    const { saveVideo } = await loadSaving();
+    const { viewpoint } = this.host.display;
+    const before = viewpoint.cameraView;
+    const say = (done: number, of: number) => this.host.announce(`Video: ${done} of ${of}`);
+    try {
+      return await saveVideo(this.filmed, this.host.state.keptViews, say, signal);
+    } finally {
+      viewpoint.restore(before);
+    }
+  }
+
+  /** Makes a file and hands it to the user. Asked for once more while a file is made, it cancels that one. */
+  private async save(
+    what: "picture" | "video",
+    make: (signal: AbortSignal) => Promise<Made>,
+  ): Promise<void> {
+    const { host } = this;
+    if (host.isInRoom) {
+      host.announce(ON_THE_SCREEN);
+      return;
+    }
+    if (this.filming !== null) {
+      this.filming.abort();
+      return;
+    }
+    this.filming = new AbortController();
+    const { signal } = this.filming;
+    host.panel.changed.emit();
+    try {
+      const made = await make(signal);
+      const doing = what === "picture" ? "Saving the picture" : "Making the video";
+      if (made === null) host.announce(`${doing} was cancelled.`);
+      else {
+        const name = fileName(host.bundle.manifest.specimen.name, what, made.suffix);
+        saveFile(name, made.content);
+        host.announce(`Saved: ${name}`);
+      }
+    } catch (error) {
+      if (!(error instanceof DOMException)) throw error;
+      const done = what === "picture" ? "saved" : "made";
+      host.announce(`The ${what} can't be ${done}: ${error.message}.`);
+    } finally {
+      this.filming = null;
+      host.panel.changed.emit();
+    }
+  }
+
+  private keep(): boolean {
+    const { state, isInRoom, display } = this.host;
+    if (isInRoom) return false;
+    this.setViews([...state.keptViews, display.viewpoint.navigation.lookNow]);
+    return true;
+  }
+
+  private forget(): boolean {
+    if (this.host.isInRoom) return false;
+    this.setViews([]);
+    return true;
+  }
+
+  private setViews(views: PartHost["state"]["keptViews"]): void {
+    this.nextView = 0;
+    this.host.dispatch({ type: "keep-views", views });
+    const { length } = this.host.state.keptViews;
+    this.host.announce(
+      length === 0 ? "No view is kept any more." : `${length} views are kept: ${NEXT_KEPT}`,
+    );
+  }
+
+  private goToNext(): boolean {
+    const { state, isInRoom, undo, display } = this.host;
+    const { navigation } = display.viewpoint;
+    const { keptViews } = state;
+    if (isInRoom || keptViews.length === 0) return false;
+    undo.noteLook();
+    const before = navigation.lookNow;
+    navigation.lookFrom(keptViews[this.nextView++ % keptViews.length]);
+    if (isSameLook(before, navigation)) this.host.announce(ONLY_VIEW);
+    display.redraw();
+    return true;
+  }
+
+  dispose(): void {
+    this.filming?.abort();
+  }
+}
+
+export const capture: PartDefinition = {
+  id: "capture",
+  keys: SAVE_KEYS,
+  waysOn: { [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }) },
+  create: (host) => new CapturePart(host),
+};

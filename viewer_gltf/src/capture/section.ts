@@ -1,0 +1,56 @@
+/** The panel's section of pictures and videos, and its keys. Pure. */
+
+import { command, controlsOf } from "../panel/control_templates";
+import type { Control, PartSection } from "../panel/controls";
+import { type Key, type KeyGroup, key, keysOf, no } from "../panel/key";
+import { PICTURE_PARAMETERS } from "../state/parameters/tools";
+import { REFUSED } from "../state/refusals";
+import type { ViewerState } from "../state/viewer_state";
+
+function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
+  const { length } = state.keptViews;
+  const path = length > 1 ? `through ${length} views` : "once round";
+  const none = length === 0 ? REFUSED.views : "";
+  return [
+    ...controlsOf(PICTURE_PARAMETERS, state),
+    command("save-picture", isFilming ? "Cancel" : "Save the picture"),
+    command("save-video", isFilming ? "Cancel" : `Save a video, ${path}`),
+    command("keep-view", length === 0 ? "Keep this view" : `Keep this view (${length} kept)`),
+    { ...command("next-view", "Next kept view"), refusal: none },
+    { ...command("forget-views", "Forget the kept views"), refusal: none },
+  ];
+}
+
+declare module "../state/commands" {
+  interface CommandNames {
+    /** Saves the view as large as is chosen; once more: cancels it. */
+    "save-picture": true;
+    /** Saves a video: once round, or through the kept views; once more: cancels it. */
+    "save-video": true;
+    "keep-view": true;
+    "next-view": true;
+    "forget-views": true;
+  }
+}
+
+export function saveSections(state: ViewerState, isFilming: boolean): readonly PartSection[] {
+  const items = saveItems(state, isFilming);
+  return [{ id: "save", label: "Pictures and video", rank: 70, items }];
+}
+
+const NO_VIEW = no(REFUSED.views);
+
+const KEYS: readonly Key[] = [
+  ...PICTURE_PARAMETERS.flatMap(keysOf),
+  key('"', "Save the picture; again: cancel", "save-picture"),
+  key(")", "Save a video: once round, or through the kept views; again: cancel", "save-video"),
+  key("'", "Keep this view for a video", "keep-view"),
+  key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? NO_VIEW : "next-view")),
+  key("End", "Forget the kept views", ({ state }) =>
+    state.keptViews.length === 0 ? NO_VIEW : "forget-views",
+  ),
+];
+
+export const SAVE_KEYS: readonly KeyGroup[] = [
+  { name: "Pictures and video", rank: 90, keys: KEYS },
+];

@@ -1,0 +1,267 @@
+/** All that draws the specimen: the scene, its contents, the eyes before it, and the loop of frames. */
+import type { WebGLRenderer } from "three";
+import type { Bundle } from "../bundle/load";
+import { shownBox } from "../math/pick";
+import { Reading } from "../probe/probe_reader";
+import { Hybrid } from "../render/gaze_focus";
+import { Room } from "../render/scene";
+import type { Action } from "../state/actions";
+import { setTo } from "../state/parameters/kinds";
+import { SCREEN_STEREO } from "../state/parameters/tools";
+import type { ViewerState } from "../state/viewer_state";
+import { Stereo, type StereoOptions } from "../xr/stereo";
+import { Background } from "./background";
+import { CanvasFit } from "./canvas";
+import { Contents } from "./contents";
+import { FrameLoop } from "./frame_loop";
+import type { Display, FrameView } from "./part";
+import type { Parts } from "./parts";
+import { type Snapshot, snapshotOf } from "./snapshot";
+import type { StillMaker } from "./still";
+import { Viewpoint } from "./viewpoint";
+
+export type DisplayOptions = Readonly<{
+  bundle: Bundle;
+  renderer: WebGLRenderer;
+  /** Holds the canvas. */
+  stage: HTMLElement;
+  parts: Parts;
+  state: () => ViewerState;
+  dispatch: (action: Action, isStep?: boolean) => void;
+  report: (error: unknown) => void;
+  stereo: Pick<StereoOptions, "layOut" | "onCommand" | "onLenses" | "onChoose">;
+  /** Brings the display and the parts to the state once more. */
+  follow: () => void;
+  /** Stereo has begun, or has ended. */
+  onStereo: () => void;
+  /** Called after every frame drawn. */
+  onFrame: () => void;
+}>;
+
+export class GpuDisplay implements Display {
+  readonly renderer: WebGLRenderer;
+  readonly contents: Contents;
+  readonly reading: Reading;
+  readonly viewpoint: Viewpoint;
+  readonly stereo: Stereo;
+  readonly background: Background;
+  private readonly room: Room;
+  private readonly hybrid: Hybrid;
+  private readonly loop: FrameLoop;
+  private readonly canvas: CanvasFit;
+  /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
+  private perInch: number | null = null;
+
+  constructor(private readonly options: DisplayOptions) {
+    const { bundle, renderer, stage, report } = options;
+    const { manifest } = bundle;
+    const { bounds_um: bounds } = manifest.specimen;
+    this.renderer = renderer;
+    this.room = new Room(manifest);
+    this.hybrid = new Hybrid(manifest);
+    const onChange = () => this.redraw();
+    this.viewpoint = new Viewpoint({
+      ...{ canvas: renderer.domElement, bounds, specimen: this.room.specimen, onChange },
+      stereo: () => this.stereo,
+    });
+    this.loop = this.makeLoop();
+    this.contents = new Contents({
+      ...{ bundle, renderer, picture: this.loop.scene.picture },
+      dispatch: (action) => options.dispatch(action),
+      onChange: () => this.requestFrame(),
+      onError: report,
+    });
+    this.reading = this.makeReading();
+    this.stereo = this.makeStereo();
+    this.background = new Background(this.room, onChange);
+    this.room.specimen.group.add(this.contents.surfaces.group);
+    this.canvas = new CanvasFit(renderer, stage, this.viewpoint.navigation, onChange);
+  }
+
+  /** Starts to draw. The parts have been made by now. */
+  start(): void {
+    const { parts, follow } = this.options;
+    for (const group of parts.groups) this.room.specimen.group.add(group);
+    follow();
+    this.loop.start();
+  }
+
+  /** Brings all but the parts to a state. */
+  sync(state: ViewerState): void {
+    const { isolated, selected, quality, eyeDistance_mm, stereoStrength } = state;
+    this.stereo.setEyes({
+      distance_m: eyeDistance_mm / 1000,
+      strength: stereoStrength,
+      cssPixelsPerInch: this.perInch,
+    });
+    const { manifest } = this.options.bundle;
+    this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
+    this.followScreenStereo(state);
+    this.reading.state = state;
+    this.contents.sync(state, this.hybrid);
+    this.room.mark(isolated === null ? selected : null);
+    this.loop.setLevel(quality);
+    this.redraw();
+  }
+
+  requestFrame(): void {
+    this.loop.requestFrame();
+  }
+
+  redraw(): void {
+    this.loop.redraw();
+  }
+
+  get studio(): StillMaker {
+    return this.loop.studio;
+  }
+
+  get frames(): number {
+    return this.loop.frames;
+  }
+
+  nextFrame(): Promise<void> {
+    return this.loop.nextFrame();
+  }
+
+  async settled(): Promise<void> {
+    await this.background.settled;
+    return this.loop.settled();
+  }
+
+  setScreen(perInch: number | null): void {
+    this.perInch = perInch;
+    this.options.follow();
+  }
+
+  get cssPixelsPerInch(): number | null {
+    return this.perInch;
+  }
+
+  fit(): void {
+    this.canvas.fit();
+  }
+
+  limitEdge(edge: number): void {
+    this.contents.limitEdge(edge);
+    this.options.follow();
+  }
+
+  get isLoading(): boolean {
+    return this.contents.isLoading || this.options.parts.isLoading;
+  }
+
+  snapshot(): Snapshot {
+    const { parts, state } = this.options;
+    const { renderer, room, hybrid, contents, stereo, viewpoint, loop } = this;
+    const measuredValues = parts.service("measured")?.values ?? [];
+    const { isLoading } = this;
+    const drawn = { renderer, room, hybrid, contents, stereo, viewpoint, loop };
+    return snapshotOf({ ...drawn, state: state(), isLoading, measuredValues });
+  }
+
+  /** The graphics context is gone, and with it the texels and the times that were asked of it. */
+  forget(): void {
+    this.contents.forget();
+    this.loop.forget();
+  }
+
+  /** There is a graphics context again. */
+  renew(): void {
+    this.contents.forget(); // texels that have come since
+    this.loop.renew();
+    this.options.follow();
+  }
+
+  private makeLoop(): FrameLoop {
+    const { bundle, renderer, stage, parts, state, follow, onFrame } = this.options;
+    return new FrameLoop({
+      ...{ renderer, stage, onFrame, room: this.room, hybrid: this.hybrid },
+      bounds: bundle.manifest.specimen.bounds_um,
+      shown: () => {
+        const { contents, stereo, viewpoint } = this;
+        return { contents, parts, stereo, viewpoint, state: state() };
+      },
+      onAdvance: (frame) => this.advance(frame),
+      onFocus: follow,
+      onOverview: follow,
+    });
+  }
+
+  private advance(frame: FrameView): void {
+    this.reading.specimen = frame.specimen;
+    this.reading.disc = frame.disc;
+    this.options.parts.advance(frame);
+  }
+
+  private makeReading(): Reading {
+    const { bundle, parts, report, state } = this.options;
+    const { contents } = this;
+    const options = {
+      values: contents.values,
+      manifest: bundle.manifest,
+      base: bundle.base,
+      surfaces: () => contents.surfaces.meshes,
+      volumes: () => contents.shownVolumes,
+      source: (tile: string, channel: string) => contents.volumes.source(tile, channel),
+      sourceOf: (tile: string, channel: string) => contents.volumes.sourceOf(tile, channel),
+      pick: (ray: Parameters<Parts["pick"]>[0]) =>
+        parts.pick(ray, ({ object }) => object === undefined),
+      corner: (eye: Parameters<Parts["cutBefore"]>[0]) => parts.cutBefore(eye),
+      onError: report,
+    };
+    return new Reading(options, state());
+  }
+
+  private makeStereo(): Stereo {
+    const { bundle, renderer, parts, state, dispatch, onStereo } = this.options;
+    return new Stereo(renderer, {
+      ...this.options.stereo,
+      scene: this.room.scene,
+      specimen: this.room.specimen,
+      tiles: bundle.manifest.tiles,
+      handles: () => parts.targets,
+      onAction: dispatch,
+      objectAlong: (ray) => {
+        const hit = parts.pick(ray, ({ object }) => object !== undefined);
+        const length_um = Math.hypot(...ray.direction);
+        const id = `${hit?.channel}/${hit?.object?.row}`;
+        return hit && { id, distance: hit.distance_um / length_um };
+      },
+      onStart: () => {
+        this.viewpoint.enterStereo(state().specimenSize_m);
+        onStereo();
+      },
+      onEnd: () => {
+        this.viewpoint.leaveStereo();
+        this.fit();
+        onStereo();
+      },
+    });
+  }
+
+  /** Brings the page's own screen to the stereo that is asked for. */
+  private followScreenStereo({ screenStereo }: ViewerState): void {
+    const { stage, dispatch, report } = this.options;
+    if (stage.dataset.stereo === screenStereo) return;
+    stage.dataset.stereo = screenStereo;
+    this.stereo.showOnScreen(screenStereo).then(
+      () => this.redraw(),
+      (error) => {
+        report(error);
+        dispatch(setTo(SCREEN_STEREO, "off"), false);
+      },
+    );
+    this.fit();
+  }
+
+  dispose(): void {
+    this.loop.stop();
+    this.stereo.dispose();
+    this.viewpoint.dispose();
+    this.reading.dispose();
+    this.contents.dispose();
+    this.loop.dispose();
+    this.canvas.dispose();
+  }
+}

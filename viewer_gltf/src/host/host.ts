@@ -1,0 +1,260 @@
+/** The host of the viewer's parts: the state, its history, the parts, and what draws them. */
+import type { Vector2 } from "three";
+import type { Bundle } from "../bundle/load";
+import { isSameLook } from "../interaction/orbit_camera";
+import type { Ray } from "../math/vec3";
+import type { Lenses } from "../panel/controls";
+import type { KeyTable } from "../panel/keys";
+import type { WaysOn } from "../panel/ways_on";
+import type { Theme } from "../render/theme";
+import type { Action } from "../state/actions";
+import { announcementOf } from "../state/announce_change";
+import { CANT, type Command, STAYS } from "../state/commands";
+import { initialState } from "../state/initial_state";
+import { newNotice, reduce } from "../state/reduce";
+import { Signal } from "../state/signal";
+import type { ViewerState } from "../state/viewer_state";
+import { makeRenderer } from "./canvas";
+import { DROPPED, Faults } from "./faults";
+import { GpuDisplay } from "./gpu_display";
+import { PanelModel } from "./panel_model";
+import type { CommandTable, Hit, Part, PartDefinition, PartHost } from "./part";
+import { Parts } from "./parts";
+import type { Services } from "./services";
+import { Taps } from "./taps";
+import { Undo } from "./undo";
+
+/** Commands before which the place from which the specimen is seen is a step of its own. */
+const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
+const NOTHING_AHEAD = "Nothing is in the middle of the view.";
+
+export class Host implements PartHost {
+  readonly display: GpuDisplay;
+  readonly undo: Undo;
+  readonly panel: PanelModel;
+  readonly changed = new Signal<ViewerState>();
+  readonly drawn = new Signal<void>();
+  readonly announced = new Signal<string>();
+  readonly revealed = new Signal<string>();
+  readonly lensesChosen = new Signal<Lenses>();
+  state: ViewerState;
+  private readonly parts: Parts;
+  private readonly faults: Faults;
+  private readonly taps: Taps;
+  private readonly disposed = new AbortController();
+
+  /** @param view the part of the page with the stage */
+  constructor(
+    readonly bundle: Bundle,
+    readonly stage: HTMLElement,
+    readonly view: HTMLElement,
+    definitions: readonly PartDefinition[],
+  ) {
+    const { manifest } = bundle;
+    const { signal } = this.disposed;
+    const renderer = makeRenderer(stage);
+    const canTrace = renderer.getContext().getExtension("EXT_color_buffer_float") !== null;
+    this.state = initialState(manifest, canTrace);
+    this.parts = new Parts(definitions);
+    this.faults = new Faults({
+      state: () => this.state,
+      dispatch: (action) => this.dispatch(action),
+      isIncomplete: () => this.display.contents.isIncomplete,
+    });
+    this.display = this.makeDisplay(renderer);
+    this.undo = new Undo({
+      ...{ viewpoint: this.display.viewpoint, signal },
+      state: () => this.state,
+      isInRoom: () => this.isInRoom,
+      restore: (state) => this.dispatch({ type: "restore", state }),
+      announce: (text) => this.announce(text),
+      onChange: () => this.changed.emit(this.state),
+    });
+    this.panel = this.makePanel();
+    this.taps = new Taps(this, this.parts, signal);
+    for (const { create } of definitions) this.parts.add(create(this));
+    this.listen(renderer.domElement, signal);
+    this.display.start();
+    this.parts.begin();
+  }
+
+  /** Adds a part that is made after the host, such as the page. */
+  add(part: Part): void {
+    this.parts.add(part);
+  }
+
+  dispatch(action: Action, isStep = action.type !== "restore"): void {
+    const previous = this.state;
+    const next = reduce(previous, action);
+    if (next === previous) return;
+    const notice = newNotice(previous, next);
+    const announcement = announcementOf(previous, next, this.bundle.manifest.tiles);
+    const { stereo } = this.display;
+    const larger = next.specimenSize_m / previous.specimenSize_m;
+    if (isStep) this.undo.add(action, next);
+    this.state = next;
+    if (larger !== 1) stereo.resize(larger, next);
+    if (notice !== null) stereo.announce(notice);
+    if (announcement !== null) this.announce(announcement);
+    this.follow(previous);
+    this.changed.emit(this.state);
+  }
+
+  /** @param isOnPage false: by the panel in the room */
+  run(command: Command, isOnPage = true): boolean {
+    const { state } = this;
+    const { navigation } = this.display.viewpoint;
+    const before = this.isInRoom ? null : navigation.lookNow;
+    if (this.parts.run(command, isOnPage)) return true;
+    if (ENDS_A_LOOK.has(command)) this.undo.noteLook();
+    if (!this.carryOut(command)) {
+      this.announce(CANT);
+      return false;
+    }
+    const stays = STAYS[command];
+    const isSame = this.state === state && before !== null && isSameLook(before, navigation);
+    if (isSame && stays !== undefined) this.announce(stays);
+    this.display.redraw();
+    return true;
+  }
+
+  private carryOut(command: Command): boolean {
+    const own = this.commands[command];
+    if (own !== undefined) return own() !== false;
+    const { stereo, viewpoint } = this.display;
+    return this.isInRoom ? stereo.run(command, this.state) : viewpoint.navigation.run(command);
+  }
+
+  /** The host's own commands; all others move the specimen or the camera. */
+  private readonly commands: CommandTable = {
+    undo: () => this.undo.step("undo"),
+    redo: () => this.undo.step("redo"),
+    reset: () => {
+      this.dispatch({ type: "isolate", tile: null });
+      this.display.viewpoint.recentre();
+    },
+    back: () => {
+      const type = this.state.isolated !== null ? "isolate" : "select";
+      this.dispatch({ type, tile: null });
+    },
+    retry: () => this.retry(),
+    press: () => {
+      const { stereo, viewpoint } = this.display;
+      if (this.isInRoom) return stereo.run("press", this.state);
+      if (!this.taps.tap(viewpoint.rayAhead, "key")) this.announce(NOTHING_AHEAD);
+      return true;
+    },
+  };
+
+  get keys(): KeyTable {
+    return this.parts.keys;
+  }
+
+  get waysOn(): WaysOn {
+    return this.parts.waysOn;
+  }
+
+  get hasStandingPart(): boolean {
+    return this.parts.hasStandingPart;
+  }
+
+  get isInRoom(): boolean {
+    return this.display.stereo.kind !== null;
+  }
+
+  get doubleTapped(): Signal<void> {
+    return this.taps.doubled;
+  }
+
+  rayAt(point: Vector2): Ray {
+    return this.taps.rayAt(point);
+  }
+
+  announce(text: string): void {
+    this.announced.emit(text);
+    this.display.stereo.announce(text);
+  }
+
+  report(error: unknown): void {
+    this.faults.report(error);
+  }
+
+  /** Shows a notice while files wait for another try; 0 takes it away. */
+  noteWaiting(files: number): void {
+    this.faults.noteWaiting(files);
+  }
+
+  service<K extends keyof Services>(name: K): Services[K] | null {
+    return this.parts.service(name);
+  }
+
+  objectAlong(ray: Ray): Hit | null {
+    return this.parts.pick(ray, ({ object }) => object !== undefined);
+  }
+
+  /** Draws the background of the flat picture. */
+  dress(theme: Theme, isPlain: boolean): void {
+    this.display.background.dress(theme, isPlain);
+  }
+
+  private makeDisplay(renderer: GpuDisplay["renderer"]): GpuDisplay {
+    return new GpuDisplay({
+      ...{ bundle: this.bundle, stage: this.stage, renderer, parts: this.parts },
+      state: () => this.state,
+      dispatch: (action, isStep) => this.dispatch(action, isStep),
+      report: (error) => this.report(error),
+      follow: () => this.follow(),
+      stereo: {
+        layOut: (view) => this.panel.layOut(view),
+        onCommand: (command) => this.run(command, false),
+        onLenses: (lenses) => this.lensesChosen.emit(lenses),
+        onChoose: (ray, tile, isByGaze) => this.taps.choose(ray, tile, isByGaze),
+      },
+      onStereo: () => this.changed.emit(this.state),
+      onFrame: () => this.drawn.emit(),
+    });
+  }
+
+  private makePanel(): PanelModel {
+    const { manifest } = this.bundle;
+    return new PanelModel(manifest, () => ({
+      ...{ manifest, state: this.state, stereo: this.display.stereo, undo: this.undo },
+      snapshot: () => this.display.snapshot(),
+      histogram: (channel) => this.display.contents.transferFunctions2d.histogram(channel),
+      objects: this.service("objects"),
+      sections: (view) => this.parts.sections(view),
+    }));
+  }
+
+  private listen(canvas: HTMLCanvasElement, signal: AbortSignal): void {
+    canvas.addEventListener("webglcontextlost", () => {
+      this.dispatch({ type: "notify", text: DROPPED });
+      this.display.forget();
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.display.renew();
+      this.dispatch({ type: "dismiss", texts: [DROPPED] });
+    });
+    addEventListener("online", () => this.retry(), { signal });
+  }
+
+  /** Brings the display and the parts to the state. */
+  private follow(previous = this.state): void {
+    this.display.sync(this.state);
+    this.parts.sync(this.state, previous);
+  }
+
+  /** Asks again for all that has failed. */
+  private retry(): void {
+    this.dispatch({ type: "dismiss", texts: this.state.mendable });
+    this.display.contents.retryFailed();
+    this.parts.retryFailed();
+    this.follow();
+  }
+
+  dispose(): void {
+    this.disposed.abort();
+    this.parts.dispose();
+    this.display.dispose();
+  }
+}

@@ -1,0 +1,154 @@
+/** The panel as plain data: what is open and meant in it, and its content for the present state. */
+import type { Manifest } from "../bundle/generated/bundle";
+import type { Box } from "../math/box";
+import { shownBox } from "../math/pick";
+import {
+  changePanel,
+  type Layout,
+  type PanelChange,
+  type PanelView,
+  type PartSection,
+  START_VIEW,
+} from "../panel/controls";
+import { type Facts, layOut, MORE } from "../panel/layout";
+import { keepPlaces, type Ranges } from "../panel/sections/channels";
+import { unitOf } from "../probe/measure";
+import { Signal } from "../state/signal";
+import type { XrSupport } from "../state/stereo";
+import type { ViewerState } from "../state/viewer_state";
+import type { Histogram } from "../volumes/transfer_functions_loader";
+import { faultOfCode } from "../xr/cardboard/viewer_profile";
+import type { Stereo } from "../xr/stereo";
+import type { ObjectMaps } from "./services";
+import type { Snapshot } from "./snapshot";
+import type { Undo } from "./undo";
+
+/** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
+const SPLIT: XrSupport = { isAvailable: true, reason: "" };
+
+/** What the page and the browser offer. */
+export type PageFacts = Readonly<{
+  subtitle: string;
+  stereo: XrSupport;
+  /** Whether the browser reads QR codes. */
+  canScan: boolean;
+  /** Whether the specimen can stand in the user's own room. */
+  hasRoom: boolean;
+}>;
+
+export type PanelSource = Readonly<{
+  manifest: Manifest;
+  state: ViewerState;
+  stereo: Stereo;
+  undo: Undo;
+  snapshot: () => Snapshot;
+  /** Voxels of a channel by value and gradient; null: not yet, it is being fetched. */
+  histogram: (channel: string) => Histogram | null;
+  objects: ObjectMaps | null;
+  sections: (view: PanelView) => readonly PartSection[];
+}>;
+
+/** Whether a change gives the cards to the channels that are shown by then. */
+const laysOutCards = (change: PanelChange) =>
+  change.panel === "find" || (change.panel === "unfold" && change.section === "channels");
+
+export class PanelModel {
+  /** The view of the panel in the page; a panel in the room has its own. */
+  view: PanelView = START_VIEW;
+  /** In the source's values, by channel. */
+  readonly ranges: Ranges;
+  /** The panel in the page has to show something else. */
+  readonly changed = new Signal<void>();
+  /** The panel in the page shows the present state. */
+  readonly refreshed = new Signal<void>();
+  private page: PageFacts = {
+    ...{ subtitle: "", canScan: false, hasRoom: false },
+    stereo: { isAvailable: false, reason: "" },
+  };
+
+  constructor(
+    manifest: Manifest,
+    private readonly source: () => PanelSource,
+  ) {
+    const unit = unitOf(manifest);
+    this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
+  }
+
+  get facts(): PageFacts {
+    return this.page;
+  }
+
+  /** Learns more of what the page and the browser offer. */
+  learn(facts: Partial<PageFacts>): void {
+    this.page = { ...this.page, ...facts };
+    this.changed.emit();
+  }
+
+  change(change: PanelChange): void {
+    this.view = changePanel(this.view, change);
+    if (laysOutCards(change)) this.view = { ...this.view, channelsWithCard: null };
+    this.changed.emit();
+  }
+
+  /** Sets parts of the view. */
+  show(view: Partial<PanelView>): void {
+    this.view = { ...this.view, ...view };
+    this.changed.emit();
+  }
+
+  unfold(section: string): void {
+    this.show({ open: [...new Set([...this.view.open, section, MORE])] });
+  }
+
+  /** The specimen, or the isolated tile; um, world. */
+  get shown(): Box {
+    const { manifest, state } = this.source();
+    return shownBox(manifest, state.isolated);
+  }
+
+  /** The content of the panel in the page. */
+  layOutPage(): Layout {
+    this.view = keepPlaces(this.view, this.source().state);
+    return this.layOut(this.view);
+  }
+
+  /** The content of a panel; one in the room has its own sections open. */
+  layOut(view: PanelView): Layout {
+    const source = this.source();
+    return layOut(source.state, this.factsFor(source, view), view, source.sections(view));
+  }
+
+  private factsFor(source: PanelSource, { isHistogramOpen, picked }: PanelView): Facts {
+    const { manifest, stereo, undo, histogram, objects } = source;
+    const { subtitle, hasRoom, canScan, stereo: support } = this.page;
+    const hasHistogram = isHistogramOpen && picked !== null && this.ranges.has(picked);
+    const now = source.snapshot();
+    const { triangles, traced, isLoading, discLimit_deg, frame_ms, isStereo, settings } = now;
+    const drawn = [...now.volumes, traced];
+    const levels = drawn.flatMap(({ level }) => (level === null ? [] : [level]));
+    return {
+      title: manifest.specimen.name,
+      subtitle,
+      shown: this.shown,
+      ranges: this.ranges,
+      histogram: hasHistogram ? histogram(picked) : null,
+      objectColors: objects?.colors,
+      focusTile: now.gazed,
+      discLimit_deg,
+      isStereo,
+      stereo: support,
+      split: stereo.kind === "headset" ? null : SPLIT,
+      canScan,
+      hasRoom: hasRoom && stereo.kind === null,
+      faultOfCode,
+      frame_ms: frame_ms > 0 ? frame_ms : null,
+      settings,
+      triangles,
+      volumeLevel: levels.length > 0 ? Math.min(...levels) : null,
+      samples: traced.level === null ? null : traced.samples,
+      isLoading,
+      undo: undo.undoes,
+      redo: undo.redoes,
+    };
+  }
+}

@@ -1,0 +1,135 @@
+/** The parts of a viewer: each question of the host goes to all of them. */
+import type { Object3D } from "three";
+import type { Target } from "../interaction/ray_pointer";
+import type { ClipPlane } from "../math/clip";
+import type { Ray, Vec3 } from "../math/vec3";
+import type { PanelView, PartSection } from "../panel/controls";
+import { KeyTable, OWN_KEYS } from "../panel/keys";
+import type { WaysOn } from "../panel/ways_on";
+import type { Command } from "../state/commands";
+import type { ViewerState } from "../state/viewer_state";
+import type { CommandTable, FrameView, Hit, Part, PartDefinition, Tap } from "./part";
+import type { Services } from "./services";
+
+export class Parts {
+  readonly keys: KeyTable;
+  readonly waysOn: WaysOn;
+  private all: readonly Part[] = [];
+  /** The newest state: a part may change it while the parts follow an older one. */
+  private newest: ViewerState | null = null;
+
+  constructor(definitions: readonly PartDefinition[]) {
+    this.keys = new KeyTable([...OWN_KEYS, ...definitions.flatMap(({ keys = [] }) => keys)]);
+    this.waysOn = Object.assign({}, ...definitions.map(({ waysOn = {} }) => waysOn));
+  }
+
+  add(part: Part): void {
+    this.all = [...this.all, part];
+  }
+
+  begin(): void {
+    for (const part of this.all) part.begin?.();
+  }
+
+  sync(state: ViewerState, previous: ViewerState): void {
+    this.newest = state;
+    for (const part of this.all) {
+      part.sync?.(state, previous);
+      if (this.newest !== state) return; // a part has changed the state, and all have followed that
+    }
+  }
+
+  advance(frame: FrameView): void {
+    for (const part of this.all) part.advance?.(frame);
+  }
+
+  get groups(): readonly Object3D[] {
+    return this.scenes.map(({ group }) => group);
+  }
+
+  get overlays(): readonly Object3D[] {
+    return this.scenes.flatMap(({ overlays }) => overlays);
+  }
+
+  get solid(): number {
+    return this.scenes.reduce((sum, { solid }) => sum + solid, 0);
+  }
+
+  get hasStandingPart(): boolean {
+    return this.scenes.some(({ isStanding }) => isStanding);
+  }
+
+  get targets(): readonly Target[] {
+    return this.all.flatMap(({ targets = [] }) => targets);
+  }
+
+  get isLoading(): boolean {
+    return this.all.some(({ isLoading = false }) => isLoading);
+  }
+
+  cutBefore(eye: Vec3): readonly ClipPlane[] | undefined {
+    const cuts = this.all.map((part) => part.cutBefore?.(eye));
+    return cuts.find((each) => each !== undefined);
+  }
+
+  /** The nearest hit of a kind; null: none. */
+  pick(ray: Ray, isMeant: (hit: Hit) => boolean): Hit | null {
+    const hits = this.all.flatMap((part) => part.pick?.(ray) ?? []).filter(isMeant);
+    if (hits.length === 0) return null;
+    return hits.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
+  }
+
+  hearTap(tap: Tap): void {
+    for (const part of this.all) part.hearTap?.(tap);
+  }
+
+  /** Gives a tap to the parts until one has used it. */
+  tap(tap: Tap): "used" | "met" | null {
+    let answer: "met" | null = null;
+    for (const part of this.all) {
+      const ofPart = part.tap?.(tap) ?? null;
+      if (ofPart === "used") return "used";
+      answer ??= ofPart;
+    }
+    return answer;
+  }
+
+  openCard(tap: Tap): void {
+    for (const part of this.all) part.openCard?.(tap);
+  }
+
+  /** Carries out a command; false: no part knows it. @param isOnPage false: by the panel in the room */
+  run(command: Command, isOnPage: boolean): boolean {
+    const tables = this.all.flatMap(({ commands = {}, pageCommands = {} }): CommandTable[] =>
+      isOnPage ? [commands, pageCommands] : [commands],
+    );
+    return tables.some((table) => {
+      const carryOut = table[command];
+      return carryOut !== undefined && carryOut() !== false;
+    });
+  }
+
+  sections(view: PanelView): readonly PartSection[] {
+    return this.all.flatMap((part) => part.panel?.(view) ?? []);
+  }
+
+  service<K extends keyof Services>(name: K): Services[K] | null {
+    for (const { services } of this.all) {
+      const found = services?.[name];
+      if (found !== undefined) return found;
+    }
+    return null;
+  }
+
+  retryFailed(): void {
+    for (const part of this.all) part.retryFailed?.();
+  }
+
+  dispose(): void {
+    for (const part of this.all) part.dispose();
+  }
+
+  private get scenes() {
+    return this.all.flatMap(({ scene }) => scene ?? []);
+  }
+}

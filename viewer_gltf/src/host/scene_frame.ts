@@ -1,0 +1,135 @@
+/** One frame of the scene: poses the eyes, moves what moves, and draws. */
+import { type Camera, type Matrix4, Vector3, type WebGLRenderer } from "three";
+import type { Bounds } from "../bundle/generated/bundle";
+import { rayAhead } from "../interaction/rays";
+import { sightOf } from "../marks/sight";
+import type { Vec3 } from "../math/vec3";
+import { type FramePace, Picture } from "../render/frame_renderer";
+import type { Hybrid } from "../render/gaze_focus";
+import type { Room } from "../render/scene";
+import { marchedTile } from "../state/representation";
+import type { ViewerState } from "../state/viewer_state";
+import type { Stereo } from "../xr/stereo";
+import type { Contents } from "./contents";
+import type { FrameView } from "./part";
+import type { Parts } from "./parts";
+import type { Viewpoint } from "./viewpoint";
+
+export type SceneFrameOptions = Readonly<{
+  renderer: WebGLRenderer;
+  stage: HTMLElement;
+  room: Room;
+  hybrid: Hybrid;
+  /** Of the specimen, um. */
+  bounds: Bounds;
+  /** What the frames are of; made after the picture, which gives it what its shaders share. */
+  shown: () => Readonly<{
+    contents: Contents;
+    parts: Parts;
+    stereo: Stereo;
+    viewpoint: Viewpoint;
+    state: ViewerState;
+  }>;
+  /** A part needs the frame's view before it is drawn. */
+  onAdvance: (frame: FrameView) => void;
+  /** The gaze has moved to another tile, so other forms show. */
+  onFocus: () => void;
+}>;
+
+export class SceneFrame {
+  readonly picture: Picture;
+  private readonly eye = new Vector3();
+
+  constructor(private readonly options: SceneFrameOptions) {
+    const { renderer, room, hybrid } = options;
+    this.picture = new Picture(renderer, room, hybrid);
+  }
+
+  /** Places the flat camera. Returns it. */
+  poseMono(dt_s: number): Camera {
+    const { viewpoint, contents, state } = this.options.shown();
+    const { navigation } = viewpoint;
+    const outline = contents.outline(state);
+    if (outline !== null) navigation.surround(outline);
+    const shown = contents.shownPoints(state);
+    if (shown !== null) this.options.room.standUnder(navigation.inRoom(shown));
+    navigation.update(dt_s);
+    this.followScreen();
+    return navigation.camera;
+  }
+
+  /** Places the eyes before the page's own screen. */
+  followScreen(): void {
+    const { stereo, viewpoint } = this.options.shown();
+    const { camera, controls } = viewpoint.navigation;
+    stereo.followScreen(this.picture.eyes, camera, controls.target);
+  }
+
+  /** Follows the gaze, and goes on with what moves and what fades. Returns whether each goes on. */
+  advance(dt_s: number, fade_s = dt_s): Readonly<{ isChanging: boolean; isFading: boolean }> {
+    const { hybrid, room, onFocus } = this.options;
+    const { contents, stereo, viewpoint, state } = this.options.shown();
+    const { head } = viewpoint;
+    const { specimen } = room;
+    const isMoving = specimen.advance(dt_s);
+    this.picture.fade.advance(fade_s);
+    if (specimen.takeJump() && stereo.kind !== null) this.picture.fade.begin();
+    const isReady = (tile: string) => contents.volumes.isReady(tile);
+    if (hybrid.look(state, head, specimen.group.matrixWorld, isReady, dt_s)) onFocus();
+    const isFading = contents.advance(fade_s);
+    this.options.onAdvance(this.viewOf(head, dt_s));
+    return { isChanging: isMoving || hybrid.isChanging(state), isFading };
+  }
+
+  private viewOf(head: Matrix4, dt_s: number): FrameView {
+    const { hybrid, room, stage } = this.options;
+    const { stereo, viewpoint } = this.options.shown();
+    const { group } = room.specimen;
+    const { camera, controls } = viewpoint.navigation;
+    const flat = { camera, height_px: stage.clientHeight, focus: controls.target };
+    const screen = stereo.kind === null ? flat : null;
+    return {
+      head,
+      specimen: group.matrixWorld,
+      screen,
+      gaze: rayAhead(head, group),
+      disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
+      isPanelOpen: stereo.isPanelOpen,
+      isBarBelow: !stereo.isInUsersRoom,
+      sight: sightOf(head, group.matrixWorld, screen),
+      dt_s,
+    };
+  }
+
+  draw(pace: FramePace): void {
+    const { contents, parts, stereo, viewpoint, state } = this.options.shown();
+    const { head } = viewpoint;
+    const { volumes, traced, surfaces } = contents;
+    const drawn = {
+      volumes,
+      traced,
+      panes: surfaces.blended,
+      overlays: [...parts.overlays, ...stereo.overlays],
+      bounds: this.options.bounds,
+      openTile: this.openTile(state),
+      solids: surfaces.triangles + parts.solid,
+    };
+    const clip = { ...state.clip, corner: parts.cutBefore(this.eyeOnSpecimen(head)) };
+    stereo.present(() => this.picture.draw(head, drawn, clip, pace));
+  }
+
+  private openTile(state: ViewerState): Bounds | null {
+    const { room, hybrid } = this.options;
+    return room.boundsOf(marchedTile(state, hybrid.focusTiles));
+  }
+
+  /** um, world. */
+  private eyeOnSpecimen(head: Matrix4): Vec3 {
+    const { group } = this.options.room.specimen;
+    return group.worldToLocal(this.eye.setFromMatrixPosition(head)).toArray();
+  }
+
+  dispose(): void {
+    this.picture.dispose();
+  }
+}

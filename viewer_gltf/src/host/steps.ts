@@ -1,0 +1,117 @@
+/**
+ * The user's steps, for undo and redo: states of the viewer, and from where the specimen was seen then.
+ * Moving the camera goes by no action: it is noted before whatever ends it.
+ */
+import type { CameraView } from "../state/camera_view";
+import { type History, NO_HISTORY, redone, undone, withStep } from "../state/history";
+import type { ViewerState } from "../state/viewer_state";
+
+export type Moment = Readonly<{
+  state: ViewerState;
+  /** null: as it opens. */
+  camera: CameraView | null;
+  /** In stereo the head looks: there the camera means nothing. */
+  isInRoom: boolean;
+}>;
+
+/** The name of a step of the camera. */
+const LOOK = "viewpoint";
+/** Largest difference of two numbers of a place that is the same, m. */
+const SAME_M = 1e-4;
+
+export class Steps {
+  private history: History<Moment> = NO_HISTORY;
+  /** From where the specimen was seen after the last step. */
+  private seenFrom: CameraView | null;
+  private gesture = 0;
+  private held = 0;
+
+  constructor(
+    private readonly now: () => Moment,
+    signal: AbortSignal,
+  ) {
+    this.seenFrom = now().camera;
+    const options = { signal, capture: true };
+    const change = (by: number) => () => {
+      this.gesture++;
+      this.held = Math.max(0, this.held + by);
+    };
+    addEventListener("pointerdown", change(1), options);
+    addEventListener("pointerup", change(-1), options);
+    addEventListener("pointercancel", change(-1), options);
+  }
+
+  get undoes(): string | null {
+    const { camera, isInRoom } = this.now();
+    if (!isInRoom && !isSame(camera, this.seenFrom)) return LOOK;
+    return this.history.past.at(-1)?.name ?? null;
+  }
+
+  get redoes(): string | null {
+    return this.history.future[0]?.name ?? null;
+  }
+
+  /** Make a step of how the camera was moved since the last one, if it was. */
+  note(): void {
+    const moment = this.now();
+    if (moment.isInRoom || isSame(moment.camera, this.seenFrom)) return;
+    this.push({ ...moment, camera: this.seenFrom }, LOOK, null);
+    this.seenFrom = moment.camera;
+  }
+
+  /** Before the state changes. */
+  add(name: string, key: string | null): void {
+    this.note();
+    this.push(this.now(), name, key);
+  }
+
+  undo() {
+    this.note();
+    return this.take(undone(this.history, this.now()));
+  }
+
+  redo() {
+    const moment = this.now();
+    return this.take(redone(this.history, moment));
+  }
+
+  /** The newest step; null: there is none. It marks a place in the history. */
+  get newest(): object | null {
+    return this.history.past.at(-1) ?? null;
+  }
+
+  /** How many steps were made since that one was the newest, moves of the camera included. */
+  since(newest: object | null): number {
+    this.note();
+    const past: readonly (object | null)[] = this.history.past;
+    return past.length - 1 - past.lastIndexOf(newest);
+  }
+
+  forget(): void {
+    this.history = NO_HISTORY;
+    this.seenFrom = this.now().camera;
+  }
+
+  private push(before: Moment, name: string, key: string | null): void {
+    const { gesture, held } = this;
+    const occasion = { key, gesture, isHeld: held > 0, time_s: performance.now() / 1000 };
+    this.history = withStep(this.history, before, name, occasion);
+  }
+
+  private take(found: ReturnType<typeof undone<Moment>>) {
+    if (found === null) return null;
+    this.history = found.history;
+    if (!found.moment.isInRoom) this.seenFrom = found.moment.camera;
+    return found;
+  }
+}
+
+function isSame(a: CameraView | null, b: CameraView | null): boolean {
+  if (a === null || b === null) return a === b;
+  const numbers = ({ position, target, specimen }: CameraView) => [
+    ...[...position, ...target],
+    ...(specimen === null ? [] : [...specimen.position, ...specimen.orientation, specimen.scale]),
+  ];
+  const [ofA, ofB] = [numbers(a), numbers(b)];
+  return ofA.length === ofB.length && ofA.every((v, i) => Math.abs(v - ofB[i]) < SAME_M);
+}

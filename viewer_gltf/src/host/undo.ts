@@ -1,0 +1,110 @@
+/** Undo and redo of the user's steps, and the way back from a single change. */
+import { isSameLook, type Look } from "../interaction/orbit_camera";
+import type { Action } from "../state/actions";
+import type { CameraView } from "../state/camera_view";
+import { isSameView, keyOfChange, nameOfChange } from "../state/history";
+import { REFUSED } from "../state/refusals";
+import type { ViewerState } from "../state/viewer_state";
+import { Steps } from "./steps";
+import type { Viewpoint } from "./viewpoint";
+
+/** A moment that `takeBack` can return to. */
+export type Mark = Readonly<{
+  state: ViewerState;
+  camera: CameraView | null;
+  look: Look;
+  newest: object | null;
+}>;
+
+export type UndoOptions = Readonly<{
+  viewpoint: Viewpoint;
+  state: () => ViewerState;
+  isInRoom: () => boolean;
+  restore: (state: ViewerState) => void;
+  announce: (text: string) => void;
+  /** The panel has to show what can be undone now. */
+  onChange: () => void;
+  signal: AbortSignal;
+}>;
+
+export class Undo {
+  private readonly steps: Steps;
+
+  constructor(private readonly options: UndoOptions) {
+    const { viewpoint, state, isInRoom, signal } = options;
+    this.steps = new Steps(
+      () => ({ state: state(), camera: viewpoint.cameraView, isInRoom: isInRoom() }),
+      signal,
+    );
+    viewpoint.navigation.controls.addEventListener("start", () => this.noteLook());
+  }
+
+  /** Names the change that undoing would take back; null: there is none. */
+  get undoes(): string | null {
+    return this.steps.undoes;
+  }
+
+  get redoes(): string | null {
+    return this.steps.redoes;
+  }
+
+  /** Makes a step of how the camera was moved since the last one, if it was. */
+  noteLook(): void {
+    this.steps.note();
+  }
+
+  /** Adds the step of an action that leads to the next state. */
+  add(action: Action, next: ViewerState): void {
+    const state = this.options.state();
+    if (!isSameView(state, next)) this.steps.add(nameOfChange(action, state), keyOfChange(action));
+  }
+
+  step(command: "undo" | "redo"): void {
+    const { viewpoint, isInRoom, restore, announce, onChange } = this.options;
+    const found = command === "undo" ? this.steps.undo() : this.steps.redo();
+    if (found === null) {
+      announce(REFUSED[command]);
+      return;
+    }
+    const { state, camera, isInRoom: wasInRoom } = found.moment;
+    restore(state);
+    // in a room the head looks, and what stands there was put there
+    if (!wasInRoom && !isInRoom()) viewpoint.restore(camera);
+    announce(`${command === "undo" ? "Undone" : "Redone"}: ${found.name}.`);
+    onChange();
+  }
+
+  get mark(): Mark {
+    const { viewpoint, state } = this.options;
+    const { cameraView: camera, navigation } = viewpoint;
+    return { state: state(), camera, look: navigation.lookNow, newest: this.steps.newest };
+  }
+
+  /** Whether the user would see a difference since then. */
+  hasChangedSince({ state, look }: Mark): boolean {
+    const { viewpoint, state: now } = this.options;
+    return !isSameView(state, now()) || !isSameLook(look, viewpoint.navigation);
+  }
+
+  /** The newest step of the history; it marks a place there. */
+  get newest(): object | null {
+    return this.steps.newest;
+  }
+
+  /** Returns to the state of a moment and to where the specimen was seen from. */
+  takeBack({ state, camera, newest }: Mark): void {
+    const { viewpoint, isInRoom, onChange } = this.options;
+    if (!isSameView(state, this.options.state())) {
+      // a change that was joined with the step before it made no step of its own
+      for (let left = Math.max(1, this.steps.since(newest)); left > 0; left--) this.step("undo");
+    }
+    if (!isInRoom()) viewpoint.restore(camera);
+    onChange();
+  }
+
+  /** Clears the history. Changes made while opening are not steps that a user can undo. */
+  forget(): void {
+    this.steps.forget();
+    this.options.onChange();
+  }
+}

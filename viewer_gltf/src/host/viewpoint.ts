@@ -1,0 +1,190 @@
+/** From where the specimen is seen, and where it stands: the flat camera, the head in stereo, the specimen's pose. */
+import { type Matrix4, Quaternion, type Vector2, Vector3 } from "three";
+import type { Bounds } from "../bundle/generated/bundle";
+import { Navigation, type Stand } from "../interaction/orbit_camera";
+import { rayAhead, rayUnder } from "../interaction/rays";
+import { type Box, centerOf } from "../math/box";
+import { type HandPose, zoomAbout } from "../math/grab";
+import type { Ray, Vec3 } from "../math/vec3";
+import {
+  OVER_FLOOR_M,
+  place,
+  ROOM_DISTANCE_M,
+  ROOM_SIZE,
+  UNDER_EYES_M,
+  XR_DISTANCE_M,
+} from "../render/placement";
+import type { Specimen } from "../render/specimen_pose";
+import type { CameraView } from "../state/camera_view";
+import { START_TOOLS } from "../state/parameters/tools";
+import { ahead } from "../xr/head_pose";
+import type { Stereo } from "../xr/stereo";
+import { StereoTransition } from "./stereo_transition";
+
+/** Distance of the eye from an object that it flies to, in the object's lengths, and at least, m. */
+const NEAREST_OBJECT = 6;
+const NEAREST_OBJECT_M = 0.08;
+/** Directions from which an object may be seen: corners, edges and faces of a cube, the front ones first. */
+const ASIDE = [1, 0, -1].flatMap((z) =>
+  [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
+);
+/** Least length of an object that is brought before the eyes in stereo, m. */
+const OBJECT_IN_ROOM_M = 0.15;
+
+export type ViewpointOptions = Readonly<{
+  canvas: HTMLCanvasElement;
+  /** Of the specimen, um. */
+  bounds: Bounds;
+  specimen: Specimen;
+  /** Made after the viewpoint. */
+  stereo: () => Stereo;
+  /** The picture has to change at once. */
+  onChange: () => void;
+}>;
+
+export class Viewpoint {
+  readonly navigation: Navigation;
+  private readonly transition: StereoTransition;
+
+  constructor(private readonly options: ViewpointOptions) {
+    const { canvas, bounds, specimen, onChange } = options;
+    this.navigation = new Navigation(canvas, place(bounds), onChange);
+    this.transition = new StereoTransition(this.navigation, specimen);
+  }
+
+  /** Pose of the head in the room, or of the mono camera. */
+  get head(): Matrix4 {
+    return this.options.stereo().head ?? this.navigation.camera.matrixWorld;
+  }
+
+  /** From um to the room. */
+  get specimen(): Matrix4 {
+    return this.options.specimen.group.matrixWorld;
+  }
+
+  /** From where the specimen is seen; null: as it opens. */
+  get cameraView(): CameraView | null {
+    return this.transition.cameraView;
+  }
+
+  lookFrom(view: CameraView): void {
+    this.transition.lookFrom(view);
+    this.options.onChange();
+  }
+
+  /** Goes back to an earlier `cameraView`. */
+  restore(view: CameraView | null): void {
+    this.transition.restore(view);
+    this.options.onChange();
+  }
+
+  /** Opens the view at a stand, or as the specimen opens. */
+  openAt(stand: Stand): void {
+    this.navigation.openAt(stand);
+    this.options.onChange();
+  }
+
+  /** Someone has touched the page. */
+  stopTurning(): void {
+    this.navigation.stopTurning();
+  }
+
+  /** The ray (um) under a point of the picture, -1..1. */
+  rayAt(point: Vector2): Ray {
+    return rayUnder(point, this.navigation.camera, this.options.specimen.group);
+  }
+
+  /** The ray (um) straight ahead. */
+  get rayAhead(): Ray {
+    return rayAhead(this.head, this.options.specimen.group);
+  }
+
+  /** Steps back until points (um) are in the picture. */
+  stepBackFor(points: readonly Vec3[]): void {
+    this.navigation.stepBackFor(
+      points.map((point) => new Vector3(...point).applyMatrix4(this.specimen)),
+    );
+  }
+
+  /** Flies towards a point, um. */
+  flyTowards(point: Vec3): void {
+    this.navigation.flyTowards(new Vector3(...point).applyMatrix4(this.specimen));
+    this.options.onChange();
+  }
+
+  /** Brings the specimen to where it opens: in stereo straight before the head, at its height. */
+  recentre(): void {
+    const { specimen } = this.options;
+    const stereo = this.options.stereo();
+    const head = stereo.recentre();
+    if (head === null) specimen.goHome();
+    else if (stereo.isInUsersRoom) {
+      const { position, orientation } = this.tableBefore(head);
+      specimen.anchorAt(position, ROOM_SIZE, orientation);
+    } else specimen.anchorAt(ahead(head, XR_DISTANCE_M));
+    this.navigation.reset();
+  }
+
+  /** @param size_m length of the specimen's longest edge in stereo */
+  enterStereo(size_m: number): void {
+    const { isInUsersRoom, head } = this.options.stereo();
+    const table = isInUsersRoom && head !== null ? this.tableBefore(head) : null;
+    const { specimen } = this.options;
+    this.transition.enter(size_m / START_TOOLS.specimenSize_m, table);
+    specimen.isJumping = true;
+    specimen.takeJump(); // there is no picture yet to fade from
+  }
+
+  leaveStereo(): void {
+    this.options.specimen.isJumping = false;
+    this.transition.leave();
+  }
+
+  /**
+   * Brings an object near: the flat camera goes to where nothing lies before it, if there is such a place; in stereo
+   * the object comes before the eyes. Returns whether nothing lies before it.
+   *
+   * @param isSeen whether an eye (um) sees the object
+   */
+  flyTo(box: Box, isSeen: (eye: Vec3) => boolean): boolean {
+    const { specimen } = this.options;
+    const middle = new Vector3(...centerOf(box)).applyMatrix4(this.specimen);
+    const edge_m = specimen.scale * Math.max(...box.max.map((v, i) => v - box.min[i]));
+    this.options.onChange();
+    if (this.options.stereo().kind === null) return this.flyOnScreen(middle, edge_m, isSeen);
+    const larger = Math.max(1, OBJECT_IN_ROOM_M / edge_m);
+    const pose = zoomAbout(specimen.pose, middle, larger);
+    pose.position.add(specimen.anchor).sub(middle);
+    specimen.jumpTo(pose, new Vector3().setFromMatrixPosition(this.head));
+    return true;
+  }
+
+  private flyOnScreen(middle: Vector3, edge_m: number, isSeen: (eye: Vec3) => boolean): boolean {
+    const toSpecimen = this.specimen.clone().invert();
+    const { position, target } = this.navigation.lookNow;
+    const distance_m = Math.max(NEAREST_OBJECT * edge_m, NEAREST_OBJECT_M);
+    const now = new Vector3(...position).sub(new Vector3(...target));
+    const eyes = [now, ...ASIDE.map((way) => new Vector3(...way))].map((way) =>
+      way.setLength(distance_m).add(middle),
+    );
+    const free = eyes.find((eye) => isSeen(eye.clone().applyMatrix4(toSpecimen).toArray()));
+    const { x, y, z } = free ?? eyes[0];
+    this.navigation.lookFrom({ position: [x, y, z], target: middle.toArray() });
+    return free !== undefined;
+  }
+
+  /** Where things stand in the user's own room, facing a head. */
+  private tableBefore(head: Matrix4): HandPose {
+    const position = ahead(head, ROOM_DISTANCE_M);
+    const eye = new Vector3().setFromMatrixPosition(head);
+    const heading = Math.atan2(eye.x - position.x, eye.z - position.z);
+    const { hasFloor } = this.options.stereo().headset;
+    const height_m = hasFloor ? OVER_FLOOR_M : eye.y - UNDER_EYES_M;
+    const orientation = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), heading);
+    return { position: position.setY(height_m), orientation };
+  }
+
+  dispose(): void {
+    this.navigation.dispose();
+  }
+}

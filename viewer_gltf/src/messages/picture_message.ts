@@ -1,0 +1,82 @@
+/** Messages over the picture say why it is empty, or why a request was refused. Each offers a way back. */
+import type { PartHost } from "../host/part";
+import type { Offer } from "../panel/controls";
+import { type Content, emptyViewOf } from "../panel/empty_view";
+import { type Message, ViewMessage } from "../panel/html/view_message";
+import { offerFor } from "../panel/ways_on";
+import type { ViewerState } from "../state/viewer_state";
+
+export class PictureMessage {
+  private readonly message: ViewMessage;
+  /** Channels whose list of volumes was asked for. */
+  private readonly asked = new Set<string>();
+  private readonly known = new Set<string>();
+
+  constructor(
+    private readonly host: PartHost,
+    private readonly opening: ViewerState,
+  ) {
+    this.message = new ViewMessage(host.view);
+  }
+
+  /** Brings the message to the present state and to the files that have arrived. */
+  update(): void {
+    const { state, display, isInRoom, hasStandingPart } = this.host;
+    if (display.isLoading) return;
+    const empty = isInRoom || hasStandingPart ? null : emptyViewOf(state, this.content);
+    this.message.show(empty && { text: empty.text, ...this.buttonOf(empty.offer) });
+  }
+
+  /** The button that leads on from a refusal; null: nothing does. */
+  buttonFor(refusal: string): Omit<Message, "text"> | null {
+    const { host } = this;
+    const objects = host.service("objects")?.rowsShown ?? new Map();
+    const now = { state: host.state, shown: host.panel.shown, objects };
+    const offer = offerFor(refusal, now, host.waysOn);
+    return offer && this.buttonOf(offer);
+  }
+
+  private buttonOf({ label, to }: Offer): Omit<Message, "text"> {
+    const act = () => {
+      // one step for all: undoing leads back to before the first
+      to.forEach((each, i) => {
+        if (typeof each === "string") this.host.run(each);
+        else this.host.dispatch(each, i === 0);
+      });
+    };
+    return { label, act };
+  }
+
+  private get content(): Content {
+    const { opening, host } = this;
+    const { surfaces, volumes } = host.display.contents;
+    return {
+      opening,
+      tiles: host.bundle.manifest.tiles,
+      outline: ({ id, hasSurface, volume }) =>
+        hasSurface ? surfaces.outline(id) : volume ? volumes.outline(id) : null,
+      hasSurface: (channel, tile) => surfaces.of(channel).some((each) => each.tile === tile),
+      hasVolume: (channel, tile) => {
+        this.ask(channel);
+        return this.known.has(channel) ? volumes.source(tile, channel) !== null : null;
+      },
+      objectsLeft: (channel) => host.service("objects")?.left(channel) ?? null,
+    };
+  }
+
+  /** Asks which tiles have volumes of a channel; surfaces alone do not need to know. */
+  private ask(channel: string): void {
+    if (this.asked.has(channel)) return;
+    this.asked.add(channel);
+    const { volumes } = this.host.display.contents;
+    void volumes.sourcesOf(channel).then((sources) => {
+      if (sources === null) return;
+      this.known.add(channel);
+      this.update();
+    });
+  }
+
+  dispose(): void {
+    this.message.dispose();
+  }
+}

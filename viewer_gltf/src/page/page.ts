@@ -1,0 +1,130 @@
+/** The panel in the page: shows what the panel's model has, and grants the requests of controls and keys. */
+import { chooseFile } from "../dom/choose_file";
+import { toggleFullScreen } from "../dom/full_screen";
+import type { Part, PartHost } from "../host/part";
+import type { PagePanel } from "../host/services";
+import type { Refusal, Wish } from "../panel/controls";
+import type { Said } from "../panel/html/overlays";
+import { Panel } from "../panel/html/panel";
+import { withKeys } from "../panel/keys";
+import { setTo } from "../state/parameters/kinds";
+import { ENVIRONMENT } from "../state/parameters/light";
+import { Keyboard } from "./keyboard";
+import { rememberChange, rememberedView } from "./remembered";
+
+/** Time between updates of the figures that change with each frame, ms. */
+const REFRESH_MS = 250;
+const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
+
+export class Page implements Part, PagePanel {
+  readonly id = "page";
+  readonly services = { page: this };
+  readonly pageCommands = {
+    undo: () => this.keyboard.undo(),
+    find: () => this.find(),
+    "full-screen": () => void this.toggleFullScreen(),
+    "own-light": () => void this.lightByFile(),
+  };
+  private readonly html: Panel;
+  private readonly keyboard: Keyboard;
+  private readonly disposed = new AbortController();
+  private timer = 0;
+
+  constructor(
+    private readonly host: PartHost,
+    parent: HTMLElement,
+    private readonly said: Said,
+  ) {
+    const { signal } = this.disposed;
+    this.html = new Panel((wish) => this.perform(wish));
+    parent.append(this.html.root);
+    this.keyboard = new Keyboard(host, this, parent, signal);
+    host.panel.show(rememberedView());
+    host.announced.subscribe((text) => said.say(text));
+    host.revealed.subscribe((control) => this.html.reveal(control));
+    host.changed.subscribe(() => this.refresh());
+    host.panel.changed.subscribe(() => this.refresh());
+    host.drawn.subscribe(() => this.refreshSoon());
+    // A link to another view of the same bundle: what it leaves out is as the bundle opens.
+    addEventListener("hashchange", () => location.reload(), { signal });
+    this.refresh();
+  }
+
+  private refresh(): void {
+    clearTimeout(this.timer);
+    this.timer = 0;
+    const { panel } = this.host;
+    this.html.update(panel.layOutPage());
+    if (this.keyboard.update()) this.said.withdraw();
+    panel.refreshed.emit();
+  }
+
+  /** Brings the figures to the newest frame now and then. */
+  private refreshSoon(): void {
+    if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
+  }
+
+  perform(wish: Wish | Refusal): void {
+    const { host } = this;
+    if (typeof wish === "string") host.run(wish);
+    else if ("refusal" in wish) void this.explain(wish);
+    else if ("panel" in wish) {
+      if (wish.panel === "hide" && host.display.stereo.togglePanel()) return;
+      host.panel.change(wish);
+      rememberChange(wish, host.panel.view);
+      if (wish.panel === "reveal") this.html.reveal(wish.control);
+    } else host.dispatch(wish);
+  }
+
+  focus(section: string, control: string): boolean {
+    const { panel } = this.host;
+    panel.show({ isHidden: false });
+    panel.unfold(section);
+    return this.html.focus(control);
+  }
+
+  offer(words: string, label: string, act: () => void): void {
+    this.said.offer(words, label, act);
+  }
+
+  /** Says why a request does nothing now, with a button where something leads on. */
+  private async explain({ refusal }: Refusal): Promise<void> {
+    const { host } = this;
+    const words = withKeys(refusal, host.panel.view.keyChanges);
+    host.announce(words);
+    if (host.isInRoom) return;
+    const button = (await host.service("messages")?.buttonFor(refusal)) ?? null;
+    if (button !== null) this.offer(words, button.label, button.act);
+  }
+
+  private find(): void {
+    const isLong = this.focus("channels", "find-channel");
+    if (!isLong) this.host.announce("The panel lists all channels.");
+  }
+
+  private async toggleFullScreen(): Promise<void> {
+    const isDone = await toggleFullScreen();
+    if (!isDone) this.host.announce(NO_FULL_SCREEN);
+  }
+
+  /** Lights the traced picture by a file of the user's. */
+  private async lightByFile(): Promise<void> {
+    const file = await chooseFile(".hdr,.exr");
+    if (file === null) return;
+    const { traced } = this.host.display.contents;
+    try {
+      await traced.lightBy(file);
+      this.host.dispatch(setTo(ENVIRONMENT, "own"));
+      this.host.announce(`Lit by ${file.name}`);
+    } catch (error) {
+      this.host.report(error);
+    }
+  }
+
+  dispose(): void {
+    clearTimeout(this.timer);
+    this.disposed.abort();
+    this.html.root.remove();
+    this.keyboard.dispose();
+  }
+}

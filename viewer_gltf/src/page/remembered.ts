@@ -1,0 +1,41 @@
+/** The panel as the reader left it on the visit before. */
+import { store, stored } from "../dom/stored";
+import { type PanelChange, type PanelView, START_VIEW } from "../panel/controls";
+import type { KeyChanges } from "../panel/keys";
+
+const OPEN_KEY = "stereocell-open";
+const LETTERS_KEY = "stereocell-letters";
+const KEYS_KEY = "stereocell-keys";
+
+export function rememberedView(): Partial<PanelView> {
+  return {
+    open: rememberedOpen(),
+    hasLetters: stored(LETTERS_KEY) !== "off",
+    keyChanges: rememberedKeys(),
+  };
+}
+
+/** The keys that the reader has changed. */
+function rememberedKeys(): KeyChanges {
+  try {
+    const found: unknown = JSON.parse(stored(KEYS_KEY) ?? "{}");
+    const pairs = Object.entries(found ?? {}).filter((pair) => typeof pair[1] === "string");
+    return Object.fromEntries(pairs);
+  } catch {
+    return {}; // another program's words: then as at first
+  }
+}
+
+/** The open sections, but for those of label maps: the rows below would move when a table has come. */
+function rememberedOpen(): readonly string[] {
+  const text = stored(OPEN_KEY);
+  const sections = text === null ? START_VIEW.open : text.split(" ");
+  return sections.filter((id) => !id.startsWith("objects"));
+}
+
+/** @param view after the change */
+export function rememberChange(change: PanelChange, view: PanelView): void {
+  if (change.panel === "unfold") store(OPEN_KEY, view.open.join(" "));
+  if (change.panel === "letters") store(LETTERS_KEY, change.areOn ? "on" : "off");
+  if (change.panel === "keys") store(KEYS_KEY, JSON.stringify(change.changes));
+}

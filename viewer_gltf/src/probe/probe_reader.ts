@@ -1,0 +1,178 @@
+/** The specimen where a ray meets it: surface, volume or tile, and the channels' values. */
+
+import type { Matrix4 } from "three";
+import type { Manifest } from "../bundle/generated/bundle";
+import type { TileVolume } from "../bundle/generated/volumes";
+import type { ValuesHost } from "../bundle/values_host";
+import type { Clip, ClipPlane } from "../math/clip";
+import { pickTile, shownTiles } from "../math/pick";
+import type { Ray, Vec3 } from "../math/vec3";
+import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
+import type { ViewerState } from "../state/viewer_state";
+import { VolumeSource } from "../volumes/volume_source";
+import { measuredText, unitOf, valueAt, valueText, voxelAt } from "./measure";
+import {
+  type Cone,
+  nearestIn,
+  type Probed,
+  type ProbedVolume,
+  probeBoxes,
+  probeSurfaces,
+  probeVolumes,
+  tileAt,
+  unitRay,
+} from "./probe";
+import { levelAtHand, TexelCache } from "./texel_cache";
+
+/** Most texels of the level in which the reader looks for a ray's hit. */
+const PROBED_TEXELS = 2 * 1024 * 1024;
+
+export type ReadingOptions = Readonly<{
+  manifest: Manifest;
+  /** Address of the bundle's manifest. */
+  base: string;
+  /** On screen now. */
+  surfaces: () => readonly ShownSurface[];
+  volumes: () => readonly ShownVolume[];
+  /** null: not known yet, or there is none. */
+  source: (tile: string, channel: string) => LevelSource | null;
+  /** The same, once it is known. */
+  sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
+  /** Voxels as they were measured; null: the host has none. */
+  values: ValuesHost | null;
+  /** The nearest place where a ray meets something else that shows; null: none. */
+  pick?: (ray: Ray) => Probed | null;
+  /** Planes before which the specimen is cut away for an eye. */
+  corner?: (eye: Vec3) => readonly ClipPlane[] | undefined;
+  onError: (error: unknown) => void;
+}>;
+
+export class Reading {
+  state: ViewerState;
+  /** From um to the room, in which the surfaces are; null before the first frame. */
+  specimen: Matrix4 | null = null;
+  /** Where volumes show in disc mode. */
+  disc: Cone | null = null;
+  private readonly cache: TexelCache;
+  private isDisposed = false;
+
+  constructor(
+    private readonly options: ReadingOptions,
+    state: ViewerState,
+  ) {
+    this.state = state;
+    this.cache = new TexelCache((volume) => new VolumeSource(options.base, volume));
+  }
+
+  /** What a ray (um) means; null: it meets no surface, no volume and no slice. */
+  async probe(ray: Ray): Promise<Probed | null> {
+    const along = unitRay(ray);
+    const surface = this.probeSurfaces(along);
+    const clip = this.clipFor(along);
+    const { mode } = this.state;
+    const disc = mode === "disc" ? this.disc : null;
+    const volume = probeVolumes(along, await this.volumesAlong(along), clip, disc);
+    const other = this.options.pick?.(along) ?? null;
+    const met = [surface, volume, other].filter((each) => each !== null);
+    if (met.length === 0) return null;
+    return met.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
+  }
+
+  /** The same, but at once and without volumes. */
+  glance(ray: Ray): Probed | null {
+    const along = unitRay(ray);
+    const clip = this.clipFor(along);
+    if (pickTile(along, this.tiles, clip) === null) return null;
+    return this.probeSurfaces(along) ?? probeBoxes(along, this.tiles, clip);
+  }
+
+  /** A line for each shown channel: its name and its value at a point, on the source's scale. */
+  async valuesAt(point: Vec3): Promise<readonly string[]> {
+    const tile = this.tileAt(point);
+    const lines = await Promise.all(
+      this.shownChannels.map(async (channel) => {
+        const source = await this.options.sourceOf(tile, channel.id);
+        const place = source && nearestIn(source.volume, point);
+        if (source === null || place === null) return [];
+        const unit = unitOf(this.options.manifest);
+        const measured = await this.measuredAt(source.volume, channel.id, place);
+        if (measured !== null) return [`${channel.name} ${measuredText(measured, unit)}`];
+        const level = await this.orReport(this.cache.best(source));
+        const value = level && valueAt(source.volume, level, channel.window, place);
+        return value === null ? [] : [`${channel.name} ${valueText(value, channel.window, unit)}`];
+      }),
+    );
+    return lines.flat();
+  }
+
+  /** The voxel's value where the host has the stage; null: it has not, or is out of reach. */
+  private async measuredAt(volume: TileVolume, channel: string, point: Vec3) {
+    const { values } = this.options;
+    const voxel = values === null || volume.measured === undefined ? null : voxelAt(volume, point);
+    if (values === null || voxel === null) return null;
+    return values.ask(volume.tile, channel, voxel).catch(() => null);
+  }
+
+  /** What these values depend on: they may differ only if this does. */
+  sourcesKey(points: readonly Vec3[]): string {
+    const known = points.flatMap((point) => {
+      const tile = this.tileAt(point);
+      return this.shownChannels.map(({ id }) => {
+        const source = this.options.source(tile, id);
+        return `${id} ${source && levelAtHand(source)}`;
+      });
+    });
+    return known.join();
+  }
+
+  /** What is cut away, also by slices: the corner before them, as seen from where the ray begins. */
+  private clipFor({ origin }: Ray): Clip {
+    return { ...this.state.clip, corner: this.options.corner?.(origin) };
+  }
+
+  private get tiles() {
+    return shownTiles(this.options.manifest.tiles, this.state.isolated);
+  }
+
+  private probeSurfaces(along: Ray): Probed | null {
+    if (this.specimen === null) return null;
+    const clip = this.clipFor(along);
+    return probeSurfaces(along, this.options.surfaces(), this.specimen, clip, this.tiles);
+  }
+
+  private async volumesAlong(along: Ray): Promise<readonly ProbedVolume[]> {
+    const clip = this.clipFor(along);
+    const met = this.tiles.filter((tile) => pickTile(along, [tile], clip) !== null);
+    const found: ProbedVolume[] = [];
+    for (const { source, ...shown } of this.options.volumes()) {
+      if (!met.some(({ id }) => id === shown.tile)) continue;
+      const level = await this.orReport(this.cache.atHand(source, PROBED_TEXELS));
+      if (level !== null) found.push({ ...shown, volume: source.volume, level });
+    }
+    return found;
+  }
+
+  private tileAt(point: Vec3): string {
+    return tileAt(this.options.manifest, point);
+  }
+
+  private get shownChannels() {
+    const shown = new Set(this.state.channels.flatMap((c) => (c.shown ? [c.id] : [])));
+    return this.options.manifest.channels.filter(({ id }) => shown.has(id));
+  }
+
+  /** null after a fault, which was reported. */
+  private async orReport<T>(promise: Promise<T>): Promise<T | null> {
+    try {
+      return await promise;
+    } catch (error) {
+      if (!this.isDisposed) this.options.onError(error);
+      return null;
+    }
+  }
+
+  dispose(): void {
+    this.isDisposed = true;
+    this.cache.dispose();
+  }
+}

@@ -1,0 +1,33 @@
+/** The link to the view that a viewer shows. */
+import type { PartHost } from "../host/part";
+import type { CameraView } from "../state/camera_view";
+import type { ObjectView } from "../state/objects";
+import type { ViewerState } from "../state/viewer_state";
+import { writeLink } from "./permalink";
+
+/**
+ * @param start the state in which the page opens; a link holds what differs from it
+ * @param view another view than the present one
+ */
+export function linkOf(
+  host: PartHost,
+  start: ViewerState,
+  view: Readonly<{ state: ViewerState; camera: CameraView | null }> = {
+    state: host.state,
+    camera: host.display.viewpoint.cameraView,
+  },
+): string {
+  const objects = host.service("objects");
+  const linked = (channel: string, of: ObjectView) =>
+    objects?.linked(channel, of)?.text ?? of.linked;
+  return writeLink(view.state, start, view.camera, linked);
+}
+
+/** Number of objects in lists that are too long for a link. */
+export function leftOutOfLink(host: PartHost): number {
+  const objects = host.service("objects");
+  return Object.entries(host.state.objects).reduce(
+    (sum, [id, view]) => sum + (objects?.linked(id, view)?.leftOut ?? 0),
+    0,
+  );
+}

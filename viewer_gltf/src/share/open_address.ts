@@ -1,0 +1,55 @@
+/** Opens the view that the page's address asks for. */
+import { BundleError } from "../bundle/errors";
+import type { PartHost } from "../host/part";
+import { setTo } from "../state/parameters/kinds";
+import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
+import { settingsOf, standOf } from "./page_parameters";
+
+/** Least switch distance at the opening, as a multiple of the eye's distance from the middle. */
+const NEAR_AT_START = 1.1;
+
+const NOT_LOADED =
+  "The part of the page that reads links could not be loaded. Check the connection and try again.";
+
+/** Reads a link for a state, within the specimen's bounds. */
+export type LinkReader = (
+  state: Parameters<typeof import("./permalink").readLink>[1],
+  bounds_um: Parameters<typeof import("./permalink").readLink>[2],
+) => ReturnType<typeof import("./permalink").readLink>;
+
+/** Returns a reader of a link; its code loads only where there is a link. Rejects with a BundleError. */
+export async function loadLink(link: string): Promise<LinkReader> {
+  if (link.length < 2) return () => ({ actions: [], camera: null });
+  const { readLink } = await import("./permalink").catch((cause) => {
+    throw new BundleError(NOT_LOADED, { cause });
+  });
+  return (state, bounds_um) => readLink(link, state, bounds_um);
+}
+
+export function openAddress(host: PartHost, search: string, readLink: LinkReader): void {
+  const { viewpoint } = host.display;
+  const { bounds_um } = host.bundle.manifest.specimen;
+  const { actions, camera } = readLink(host.state, bounds_um);
+  const asked = [...settingsOf(search), ...actions];
+  for (const action of asked) host.dispatch(action);
+  const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
+  const stand = standOf(search); // what `reset` returns to, wherever a link looks from
+  host.display.fit(); // the panel has its place by now
+  if (stand !== null) viewpoint.openAt(stand);
+  else if (camera === null) openSlowly(host, saysDistance);
+  if (camera !== null) viewpoint.lookFrom(camera);
+  host.panel.show({ channelsWithCard: null });
+  host.undo.forget();
+}
+
+/** Shows all of the specimen, near enough for volumes, and slowly turning until someone touches it. */
+function openSlowly(host: PartHost, saysDistance: boolean): void {
+  const { navigation } = host.display.viewpoint;
+  const away_m = NEAR_AT_START * navigation.openingDistance_m;
+  const isFar = away_m > host.state.switchDistance_m;
+  if (isFar && !saysDistance) host.dispatch(setTo(SWITCH_DISTANCE, away_m));
+  // light is gathered while nothing moves
+  const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  if (!isCalm && !isTraced(host.state)) navigation.turnSlowly();
+  host.display.redraw();
+}

@@ -1,0 +1,39 @@
+/** The keys of the slice planes: one chooses a number of them, two turn it. Pure. */
+
+import { type Key, type KeyGroup, key, keysOf, neighbour, no, refusalOf } from "../panel/key";
+import { setTo, shareOf, valueAtShare } from "../state/parameters/kinds";
+import { isSliced, SLICE_NUMBERS, SLICE_PICTURES, SLICE_PLANES } from "../state/parameters/slices";
+import { REFUSED } from "../state/refusals";
+import { STRAIGHT } from "./section";
+
+/** Steps of a number's slider by one press. */
+const STEPS = 2;
+
+function turn(steps: number): Key["to"] {
+  return ({ state, view }) => {
+    const row = SLICE_NUMBERS.find(({ id }) => id === view.parameter) ?? SLICE_NUMBERS[0];
+    const at = shareOf(row, row.get(state)) + steps / row.steps;
+    const refused = refusalOf(row, state);
+    if (refused !== null) return refused;
+    return setTo(row, valueAtShare(row, Math.min(1, Math.max(0, at))));
+  };
+}
+
+const KEYS: readonly Key[] = [
+  ...keysOf(SLICE_PICTURES),
+  ...keysOf(SLICE_PLANES),
+  key("^", "Next setting of the slices: where they meet, how they are turned", ({ view }) => {
+    const ids = SLICE_NUMBERS.map(({ id }) => id);
+    const parameter = neighbour(ids, view.parameter ?? undefined, 1);
+    return parameter === null ? no("There is no number.") : { panel: "parameter", parameter };
+  }),
+  key("{", "Less of that setting", turn(-STEPS)),
+  key("}", "More of that setting", turn(STEPS)),
+  key("~", "Slices back to the middle, not turned", ({ state }) =>
+    isSliced(state) ? STRAIGHT : no(REFUSED.slices),
+  ),
+];
+
+export const SLICE_KEYS: readonly KeyGroup[] = [
+  { name: "Slices", rank: 50, keys: KEYS, needsVolumes: true },
+];

@@ -1,0 +1,12 @@
+/** A stream of values to which several listeners subscribe. */
+export class Signal<T> {
+  private readonly listeners = new Set<(value: T) => void>();
+
+  subscribe(listener: (value: T) => void): void {
+    this.listeners.add(listener);
+  }
+
+  emit(value: T): void {
+    for (const listener of this.listeners) listener(value);
+  }
+}

@@ -1,0 +1,150 @@
+/** The ways into stereo as a part of the viewer: headset, the user's own room, and the split screen of a phone. */
+import { BundleError } from "../bundle/errors";
+import { NOT_LOADED } from "../host/later";
+import type { Part, PartDefinition, PartHost } from "../host/part";
+import type { Lenses } from "../panel/controls";
+import type { CardMeasure } from "../panel/html/card_measure";
+import type { ViewerState } from "../state/viewer_state";
+import { canScan, scanCode } from "../xr/cardboard/scan_qr";
+import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/viewer_profile";
+import type { ImmersiveMode } from "../xr/session";
+import {
+  rememberEyes,
+  rememberedEyes,
+  rememberedLens,
+  rememberedScreen,
+  rememberLens,
+  rememberScreen,
+} from "./remembered";
+import { startSplit } from "./start_split";
+
+const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
+
+class StereoPart implements Part {
+  readonly id = "stereo";
+  readonly pageCommands = {
+    stereo: () => this.toggleHeadset(),
+    room: () => this.toggleRoom(),
+    split: () => this.splitScreen(),
+    scan: () => void this.scan(),
+    "measure-screen": () => void this.measureScreen(),
+  };
+  private card: CardMeasure | null = null;
+
+  constructor(private readonly host: PartHost) {
+    host.lensesChosen.subscribe((lenses) => this.changeLenses(lenses));
+  }
+
+  begin(): void {
+    const { host } = this;
+    host.panel.show(rememberedLens());
+    host.display.setScreen(rememberedScreen());
+    for (const action of rememberedEyes()) host.dispatch(action);
+    void canScan().then((isAble) => host.panel.learn({ canScan: isAble }));
+  }
+
+  sync(state: ViewerState, previous: ViewerState): void {
+    rememberEyes(state, previous);
+  }
+
+  private toggleHeadset(): void {
+    const { display, panel, isInRoom } = this.host;
+    const { isAvailable, reason } = panel.facts.stereo;
+    if (isInRoom) display.stereo.end();
+    else if (isAvailable) void this.enter("immersive-vr");
+    else this.host.announce(reason);
+  }
+
+  private toggleRoom(): void {
+    const { display, panel, isInRoom } = this.host;
+    if (isInRoom) display.stereo.end();
+    else if (panel.facts.hasRoom) void this.enter("immersive-ar");
+    else this.host.announce(NO_ROOM);
+  }
+
+  /** Must be called from within a click or a key. */
+  private async enter(mode: ImmersiveMode): Promise<void> {
+    if (navigator.xr === undefined) return;
+    try {
+      await this.host.display.stereo.startHeadset(navigator.xr, mode);
+    } catch (error) {
+      if (!(error instanceof DOMException || error instanceof BundleError)) throw error;
+      const text = `Stereo could not start: ${error.message}`;
+      this.host.dispatch({ type: "notify", text });
+    }
+  }
+
+  private splitScreen(): void {
+    const { host } = this;
+    const { lenses, code } = host.panel.view;
+    host.display.stereo.showInPanel({ lenses, code });
+    this.withProfile((profile) => {
+      startSplit(host, profile).catch((error) => host.report(error));
+    });
+  }
+
+  /** In stereo: the phone is in another viewer. */
+  private changeLenses(lenses: Lenses): void {
+    this.host.panel.change({ panel: "lenses", lenses });
+    this.withProfile((profile) => this.host.display.stereo.setLenses(profile));
+  }
+
+  private withProfile(use: (profile: Profile) => void): void {
+    const { lenses, code } = this.host.panel.view;
+    try {
+      use(lenses === "own" ? parseProfile(code) : BUILT_IN[lenses]);
+      rememberLens({ lenses, code });
+    } catch (error) {
+      if (!(error instanceof ProfileError)) throw error;
+      this.host.announce(error.message);
+    }
+  }
+
+  private async scan(): Promise<void> {
+    const { host } = this;
+    const scanner = await import("../panel/html/qr_scanner").catch(() => null);
+    if (scanner === null) {
+      host.announce(NOT_LOADED);
+      return;
+    }
+    try {
+      const text = await scanner.scanByCamera(document.body, scanCode);
+      if (text !== null) host.panel.change({ panel: "code", text });
+    } catch (error) {
+      if (!(error instanceof ProfileError || error instanceof DOMException)) throw error;
+      host.announce(error.message);
+    }
+  }
+
+  private async measureScreen(): Promise<void> {
+    const { host } = this;
+    const { display } = host;
+    const parts = await Promise.all([
+      import("../panel/html/card_measure"),
+      import("../xr/cardboard/lens"),
+    ]).catch(() => null);
+    if (parts === null) {
+      host.announce(NOT_LOADED);
+      return;
+    }
+    const [{ CardMeasure }, { cssPixelsPerInch }] = parts;
+    this.card ??= new CardMeasure(host.view.parentElement ?? host.view, (perInch) => {
+      rememberScreen(perInch);
+      display.setScreen(perInch);
+      host.announce(
+        `The screen has ${perInch} pixels an inch: split the screen to see it in true size.`,
+      );
+    });
+    const { userAgent } = navigator;
+    this.card.open(display.cssPixelsPerInch ?? cssPixelsPerInch(userAgent, devicePixelRatio));
+  }
+
+  dispose(): void {
+    this.card?.dispose();
+  }
+}
+
+export const stereo: PartDefinition = {
+  id: "stereo",
+  create: (host) => new StereoPart(host),
+};

@@ -1,0 +1,267 @@
+/** Buttons, hands and fingers that hold something: a control that goes on, a handle, the specimen. */
+import type { Vector3 } from "three";
+import {
+  type Met,
+  meetFirst,
+  type Pointer,
+  pointOn,
+  type RoomRay,
+  type Target,
+} from "../interaction/ray_pointer";
+import { TILE, type TileTarget } from "../interaction/tile_target";
+import type { HandPose } from "../math/grab";
+import type { Command } from "../state/commands";
+import type { ViewerState } from "../state/viewer_state";
+import type { Gesture } from "./cardboard/fingers";
+import type { Controllers, Hand, HandEvent } from "./controllers";
+import {
+  type HeadHold,
+  moveByHead,
+  moveByHolders,
+  moveByStick,
+  STEPS_PER_S,
+} from "./hold_specimen";
+import type { SpecimenMover } from "./specimen_mover";
+
+/** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
+const HOLD_S = 0.35;
+const HOLD_M = 0.02;
+/** Time for which a Cardboard's button is held before the head holds the specimen by it, s: a thumb is slow. */
+const HEAD_HOLD_S = 0.6;
+
+/** A trigger that is down. */
+type Press = {
+  /** Where it went down. */
+  readonly met: Met | null;
+  readonly at: Vector3 | null;
+  elapsed_s: number;
+  /** It drags or holds something: letting go of it chooses nothing. */
+  isUsed: boolean;
+};
+
+/** `source`: of the button that is held; null: the gaze stays. */
+type GoesOn = {
+  readonly met: Met;
+  readonly source: XRInputSource | "finger" | null;
+  elapsed_s: number;
+};
+
+/** A gesture on the split screen, with its time on the clock of events. */
+export type TimedGesture = readonly [Gesture, time_ms: number];
+
+export type GripOptions = Readonly<{
+  controllers: Controllers;
+  pointer: Pointer;
+  mover: SpecimenMover;
+  tiles: TileTarget;
+  /** The gaze, and the targets that can be chosen now. */
+  aim: () => Readonly<{ gaze: RoomRay; free: readonly Target[] }>;
+  /** Moves the specimen by a share of a command's step. */
+  run: (command: Command, state: ViewerState, share: number) => boolean;
+  onPress: (ray: RoomRay, time_ms: number) => void;
+  onTap: (time_ms: number) => void;
+}>;
+
+export class Grips {
+  private readonly presses = new Map<XRInputSource, Press>();
+  /** The hands that hold the specimen, and their places in the frame before. */
+  private held = new Map<XRInputSource, HandPose | null>();
+  /** A finger that rests on the split screen; `met`: what was gazed at when it came. */
+  private touched: { met: Met | null; isUsed: boolean; elapsed_s: number } | null = null;
+  /** The head holds the specimen by a button that is down. */
+  headHold: HeadHold | null = null;
+  /** What is gone on with. */
+  private goesOn: GoesOn | null = null;
+  private readonly mover: SpecimenMover;
+  private readonly pointer: Pointer;
+
+  constructor(private readonly options: GripOptions) {
+    this.mover = options.mover;
+    this.pointer = options.pointer;
+  }
+
+  get isHolding(): boolean {
+    return this.held.size > 0;
+  }
+
+  /** Whether a control goes on. */
+  get isGoingOn(): boolean {
+    return this.goesOn !== null;
+  }
+
+  get tracked(): readonly Hand[] {
+    return this.options.controllers.hands.filter(({ isTracked }) => isTracked);
+  }
+
+  private get aim() {
+    return this.options.aim();
+  }
+
+  /** A gaze that stays goes on with a control that it has chosen. */
+  goOnWith(met: Met): void {
+    if (met.repeats !== undefined) this.goesOn = { met, source: null, elapsed_s: 0 };
+  }
+
+  /** Lets go of everything. */
+  drop(): void {
+    this.presses.clear();
+    this.held.clear();
+    this.touched = null;
+    this.goesOn = null;
+    this.headHold = null;
+  }
+
+  private handOf(source: XRInputSource): Hand | undefined {
+    return this.options.controllers.hands.find((hand) => hand.source === source);
+  }
+
+  handle({ kind, source, ray, time_ms }: HandEvent): void {
+    const press = this.presses.get(source);
+    switch (kind) {
+      case "press":
+        this.presses.set(source, this.begin(source, ray, time_ms));
+        break;
+      case "select":
+        if (!press?.isUsed) this.options.onPress(ray ?? this.aim.gaze, time_ms);
+        break;
+      case "release":
+        this.presses.delete(source);
+        if (press?.isUsed) this.held.delete(source);
+        break;
+      case "squeeze":
+        this.held.set(source, null);
+        break;
+      case "let-go":
+        this.held.delete(source);
+        break;
+    }
+  }
+
+  private begin(source: XRInputSource, ray: RoomRay | null, time_ms: number): Press {
+    const met = meetFirst(ray ?? this.aim.gaze, this.aim.free);
+    // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
+    const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
+    if (met !== null && isUsed && this.pointer.press(met, this.aim.free, time_ms)) {
+      met.target.choose(met, met.ray, false);
+    }
+    if (met?.repeats !== undefined) this.goesOn = { met, source, elapsed_s: 0 };
+    const at = this.handOf(source)?.pose?.position ?? null;
+    return { met, at, elapsed_s: 0, isUsed };
+  }
+
+  /** What fingers on the split screen have done since the frame before; whether anything has moved. */
+  followFingers(gestures: readonly TimedGesture[], state: ViewerState): boolean {
+    const before = this.mover.pose;
+    for (const [gesture, time_ms] of gestures) {
+      if (gesture.kind === "press") {
+        const met = meetFirst(this.aim.gaze, this.aim.free);
+        this.touched = { met, isUsed: false, elapsed_s: 0 };
+        if (met?.repeats !== undefined) this.goesOn = { met, source: "finger", elapsed_s: 0 };
+      } else if (gesture.kind === "release") this.touched = null;
+      else if (gesture.kind === "tap") {
+        if (this.touched?.isUsed === false) this.options.onTap(time_ms);
+      } else {
+        this.mover.byFingers(gesture, state, this.aim.gaze.origin);
+      }
+    }
+    return this.mover.pose !== before;
+  }
+
+  /** Input sources come and go, also while they hold something. */
+  forgetTheLost(): void {
+    for (const map of [this.presses, this.held]) {
+      for (const source of [...map.keys()]) {
+        if (this.handOf(source) === undefined) map.delete(source);
+      }
+    }
+  }
+
+  /** What the buttons that are down drag and hold; whether anything has moved. */
+  hold(dt_s: number): boolean {
+    for (const [source, press] of this.presses) this.advance(source, press, dt_s);
+    const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
+    const pose = moveByHolders(this.mover.pose, this.held, now);
+    this.held = now;
+    return this.mover.to(pose, this.aim.gaze.origin);
+  }
+
+  private advance(source: XRInputSource, press: Press, dt_s: number): void {
+    const hand = this.handOf(source);
+    press.elapsed_s += dt_s;
+    const { met } = press;
+    if (met?.key == null) return;
+    if (met.hold !== undefined) {
+      if (press.isUsed) met.target.drag?.(met.key, hand?.ray ?? this.aim.gaze);
+      return;
+    }
+    const mayHold = hand?.pose && !hand.canSqueeze && met.key.startsWith(TILE);
+    if (press.isUsed || !mayHold || !hand?.pose) return;
+    const isFar = press.at !== null && press.at.distanceTo(hand.pose.position) > HOLD_M;
+    if (!isFar && press.elapsed_s < HOLD_S) return;
+    press.isUsed = true;
+    this.held.set(source, null);
+  }
+
+  /** What was chosen by a gaze that stays, or a button that is held, goes on; whether it has moved. */
+  goOn(dt_s: number, state: ViewerState): boolean {
+    const { goesOn } = this;
+    if (goesOn === null) return false;
+    const { met, source } = goesOn;
+    const press = typeof source === "object" ? source && this.presses.get(source) : this.touched;
+    const isHeld = source === null || press != null;
+    const ray = (typeof source === "object" && source && this.handOf(source)?.ray) || this.aim.gaze;
+    if (!isHeld || meetFirst(ray, this.aim.free)?.key !== met.key || met.repeats === undefined) {
+      this.goesOn = null;
+      return false;
+    }
+    goesOn.elapsed_s += dt_s;
+    if (goesOn.elapsed_s < HOLD_S) return false;
+    if (press != null) press.isUsed = true; // letting go of it is no further step
+    return this.options.run(met.repeats, state, STEPS_PER_S * dt_s);
+  }
+
+  /**
+   * A button that is held where no control is takes the specimen along with the head, if no hand is there to
+   * do it; whether it has moved.
+   */
+  followHead(dt_s: number, state: ViewerState): boolean {
+    if (this.touched !== null) this.touched.elapsed_s += dt_s;
+    const handless = [...this.presses].filter(([source]) => this.handOf(source)?.pose == null);
+    const press = [this.touched, ...handless.map(([, each]) => each)].find(
+      (each) => each != null && (each.isUsed ? this.headHold !== null : mayFollow(each.met)),
+    );
+    if (press == null || press.elapsed_s < HEAD_HOLD_S) {
+      this.headHold = null;
+      return false;
+    }
+    const { gaze } = this.aim;
+    press.isUsed = true; // letting go of it chooses nothing
+    if (this.headHold === null) {
+      this.headHold = this.mover.holdBy(gaze, state);
+      return false;
+    }
+    this.mover.to(moveByHead(this.headHold, gaze), gaze.origin);
+    return true;
+  }
+
+  moveBySticks(dt_s: number, state: ViewerState): boolean {
+    if (this.isHolding) return false;
+    let { pose } = this.mover;
+    for (const { stick, ray } of this.tracked) {
+      if (stick.x === 0 && stick.y === 0) continue;
+      const met = this.tileAlong(ray) ?? this.tileAlong(this.aim.gaze);
+      pose = moveByStick(pose, stick, met ?? this.mover.middle(state), dt_s);
+    }
+    return this.mover.to(pose, this.aim.gaze.origin);
+  }
+
+  private tileAlong(ray: RoomRay | null): Vector3 | null {
+    const hit = ray && this.options.tiles.meet(ray);
+    return hit && pointOn({ ...hit, ray });
+  }
+}
+
+/** Of what was met when the button went down: a control has its own use for it. */
+function mayFollow(met: Met | null): boolean {
+  return met === null || met.key?.startsWith(TILE) === true;
+}
