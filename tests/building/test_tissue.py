@@ -13,6 +13,7 @@ import zarr
 from numpy.typing import NDArray
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.replaced_plan import replace_plan
 from stereocell.cli.__main__ import main
 from stereocell.planning.plan_file import from_json, to_json
 from stereocell.samples.head import make_head
@@ -128,7 +129,7 @@ def test_a_copy_reads_its_own_classes_wherever_it_lies(planned: Path, tmp_path: 
         voxels = tmp_path.resolve() / "moved" / "tissue" / "classes.ome.zarr"
         assert (Path(after.source), after.fingerprint) == (voxels, before.fingerprint)
     assert str(planned.resolve()) not in copy.plan_file.read_text("utf-8")
-    assert copy.save_plan(there) is False
+    assert replace_plan(copy, there) is False
 
 
 @pytest.mark.exhaustive

@@ -18,15 +18,13 @@ from stereocell.engine.step import key_of
 from stereocell.model.errors import OutputError, UsageError
 from stereocell.planning.plan import Plan
 from stereocell.planning.plan_file import from_json, to_json
-from stereocell.planning.settings import load
 from stereocell.storage import workspace
 from stereocell.storage.contents import contents_of
 from stereocell.storage.documents import NOT_WRITTEN, SETTINGS, parse
 from stereocell.storage.file_list import sizes_of
 from stereocell.storage.json_files import find_sealed, read_json, read_sealed, sealed, write_sealed
 from stereocell.storage.kinds import Kind
-from stereocell.storage.overwriting import is_forced, or_force, require_free
-from stereocell.storage.sealed_text import is_sealed_text
+from stereocell.storage.overwriting import require_free
 
 SURVEY = "units.schema.json#Survey"
 PLAN = "plan.schema.json"
@@ -133,52 +131,10 @@ class OutFolder:
 
     # --- the plan
 
-    def save_plan(self, plan: Plan) -> bool:
-        """Write plan.json; return whether it changed.
-
-        Raises OutputError where OUT holds a build of another input.
-        """
-        if self.replaced_plan(plan) == plan:
-            return False
+    def save_plan(self, plan: Plan) -> None:
+        """Write plan.json."""
         self.require_readable(plan)
         write_sealed(self.plan_file, to_json(self._without_place(plan)))
-        return True
-
-    def replaced_plan(self, plan: Plan) -> Plan | None:
-        """Return the plan that `plan` would replace; None: there is none.
-
-        Raises OutputError, unless it is forced, where that was changed by hand or is of another
-        input.
-        """
-        try:
-            there = self.plan() if workspace.is_file(self.plan_file) else None
-        except OutputError:
-            if not is_forced():
-                raise
-            return None
-        fingerprint = contents_of(self.out).fingerprint if there is None else there.fingerprint
-        if fingerprint not in ("", plan.fingerprint) and not is_forced():
-            found = f"another input (fingerprint {fingerprint[:12]})"
-            found = found if there is None else _what_differs(there, plan)
-            raise OutputError(
-                f"{self.out}: holds a build of {found}: {or_force('choose another OUT')}"
-            )
-        return there
-
-    def require_own_settings(self, plan: Plan, there: Plan | None) -> None:
-        """Raise OutputError where stereocell.toml is the user's own file, not a plan's record."""
-        file = self.settings_file
-        if not workspace.is_file(file) or is_sealed_text(file) or is_forced():
-            return
-        try:
-            found = load(None, file, flags={})
-        except UsageError:
-            found = None
-        if found is None or found not in (plan.settings, there and there.settings):
-            raise OutputError(
-                f"{file}: was written or changed by hand, expected the record of an earlier plan: "
-                + or_force("move it elsewhere and give it by --config")
-            )
 
     def require_readable(self, plan: Plan) -> None:
         """Raise OutputError where commands could not read the plan once it is written."""
@@ -327,24 +283,3 @@ class OutFolder:
 def _with_sources(plan: Plan, change: Callable[[str], str]) -> Plan:
     channels = (replace(one, source=change(one.source)) for one in plan.channels)
     return replace(plan, channels=tuple(channels))
-
-
-def _what_differs(there: Plan, plan: Plan) -> str:
-    """Return the difference between the two inputs: OUT's, then the requested one."""
-    old, new = there.settings.plan, plan.settings.plan
-    if there.source == plan.source and old.time != new.time:
-        return f"{there.name!r} with --time {old.time}, not {new.time}"
-    if there.source == plan.source and old.series != new.series:
-        return f"{there.name!r} with --series {old.series}, not {new.series}"
-    if there.source == plan.source and old.spacing_um != new.spacing_um:
-        return f"{there.name!r} with {_spacing(old.spacing_um)}, not {_spacing(new.spacing_um)}"
-    return (
-        f"{there.name!r} (fingerprint {there.fingerprint[:12]}), "
-        f"not of {plan.name!r} ({plan.fingerprint[:12]})"
-    )
-
-
-def _spacing(spacing_um: tuple[float, ...]) -> str:
-    if not spacing_um:
-        return "the file's own voxel spacing"
-    return "--spacing-um " + ",".join(f"{length:g}" for length in spacing_um)

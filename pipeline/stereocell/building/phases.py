@@ -25,6 +25,7 @@ from stereocell.building.own_parts import (
 )
 from stereocell.building.passes import Passes
 from stereocell.building.phase import Phase, digest_of_bundle, digest_of_stage, phase_of
+from stereocell.building.replaced_plan import replace_plan, replaced_plan, require_own_settings
 from stereocell.building.running_pass import remove_mixed
 from stereocell.building.surface_cover import notes_on_cover
 from stereocell.building.survey_file import read_survey, save_survey
@@ -86,15 +87,15 @@ def make_plan(
         plan = replace(plan, notes=(*plan.notes, *notes_on_levels(plan)))
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()
-        there = out_folder.replaced_plan(plan)
-        out_folder.require_own_settings(plan, there)
+        there = replaced_plan(out_folder, plan)
+        require_own_settings(out_folder, plan, there)
         if engine is not None:
             require_own_places(out_folder, is_same_plan=there == plan)
             engine.join()
         print_notes(plan)  # only now, since an error is printed alone
         if there is not None and (changes := changes_of(there, plan)):
             phase.print(changes)
-        phase.is_up_to_date = not out_folder.save_plan(plan)
+        phase.is_up_to_date = not replace_plan(out_folder, plan)
         write_sealed_text(out_folder.settings_file, text)
         write_sealed(out_folder.provenance_file, provenance_record(plan))
     console.print(f"plan: {summary_of(plan)}")

@@ -18,6 +18,7 @@ from stereocell.building.input_unchanged import require_input, require_still
 from stereocell.building.model_process import ModelBounds, opened_network
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_places, require_own_tissue
+from stereocell.building.replaced_plan import replace_plan
 from stereocell.building.sealed_documents import require_documents
 from stereocell.building.tissue_files import (
     FOLDER,
@@ -140,7 +141,7 @@ def _add(
         record = _learn(out_folder, plan, step, options, network)
     plan = with_tissue(plan, out, record)
     require_own_places(out_folder, is_same_plan=out_folder.plan() == plan)
-    out_folder.save_plan(plan)
+    replace_plan(out_folder, plan)
     write_sealed(out_folder.provenance_file, provenance_record(plan))
     return plan
 
