@@ -19,6 +19,8 @@ import {
   Vector3,
   Vector4,
 } from "three";
+import bothEyesFragment from "./chunks/both_eyes_fragment.glsl?raw";
+import bothEyesVertex from "./chunks/both_eyes_vertex.glsl?raw";
 import type { Eyes } from "./eyes";
 
 /** The layer of what is drawn so; no other camera sees it. WebXR has 1 and 2. */
@@ -36,24 +38,6 @@ function makeUniforms() {
   };
 }
 export type BothEyesUniforms = ReturnType<typeof makeUniforms>;
-
-/** In a vertex shader, after `gl_Position` is set; knows `mvPosition`, sets `vEye`. */
-export const TO_EACH_EYE = `
-  vEye = -1.0;
-  if (uIsForBoth) {
-    vEye = float(gl_InstanceID);
-    gl_Position = uEyeClip[gl_InstanceID] * mvPosition;
-  }
-`;
-export const TO_EACH_EYE_DECLARED = `varying float vEye;
-uniform bool uIsForBoth;
-uniform mat4 uEyeClip[2];
-`;
-/** In a fragment shader: what reaches into the other eye's part. */
-export const NOT_THE_OTHERS = `
-  if (vEye >= 0.0 && (gl_FragCoord.x < uMiddle) != (vEye < 0.5)) discard;
-`;
-export const NOT_THE_OTHERS_DECLARED = "varying float vEye;\nuniform float uMiddle;\n";
 
 /** Made of each geometry, also of one that many share. */
 const made = new WeakMap<BufferGeometry, InstancedBufferGeometry>();
@@ -118,14 +102,15 @@ export class BothEyes {
     material.onBeforeCompile = (shader) => {
       Object.assign(shader.uniforms, uniforms);
       const end = shader.vertexShader.lastIndexOf("}");
-      shader.vertexShader = `${TO_EACH_EYE_DECLARED}${shader.vertexShader.slice(0, end)}${TO_EACH_EYE}}`;
+      const body = shader.vertexShader.slice(0, end);
+      shader.vertexShader = `${bothEyesVertex}${body}\ttoEachEye(mvPosition);\n}`;
       shader.fragmentShader =
-        NOT_THE_OTHERS_DECLARED +
-        shader.fragmentShader.replace("void main() {", `void main() {${NOT_THE_OTHERS}`);
+        bothEyesFragment +
+        shader.fragmentShader.replace("void main() {", "void main() {\n\tkeepToOwnEye();");
     };
   }
 
-  /** A material whose shaders have the parts above draws for whom the camera is. */
+  /** A material whose shaders have the chunks of both eyes draws for whom the camera is. */
   adopt(material: Material): void {
     this.adopted.add(material);
     const { uIsForBoth } = this.uniforms;

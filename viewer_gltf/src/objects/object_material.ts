@@ -26,14 +26,14 @@ import objectLight from "./chunks/object_light.glsl?raw";
 import objectStain from "./chunks/object_stain.glsl?raw";
 import objectTexel from "./chunks/object_texel.glsl?raw";
 import { middleOf } from "./gap";
+import objectFragment from "./shaders/object_surface.frag.glsl?raw";
+import objectVertex from "./shaders/object_surface.vert.glsl?raw";
 
-/** Vertex attribute: the row of its object, in place of the glb's number in the tile. */
+/** Vertex attributes, by their names in shaders/object_surface.vert.glsl: the row of its object, in place of the glb's number in the tile. */
 export const ROW = "object_row";
 /** Vertex attribute: the direction out of its object, the same for all vertices in one place. */
 const OUTWARDS = "object_outwards";
 const FEATURE = "_feature_id_0";
-/** Vertex attribute, by its name in three's loader: intensity of the painted stain. Absent: 0. */
-const PAINT = "_paint";
 /** Rows in a line of a texture. */
 const LINE = 256;
 /** What three's loader makes metres of is um. */
@@ -46,32 +46,6 @@ const CHUNKS = {
   "chunks/object_stain": objectStain,
 };
 const include = (source: string) => includeChunks(source, CHUNKS);
-
-const VERTEX = `attribute float ${ROW};
-attribute vec3 ${OUTWARDS};
-attribute float ${PAINT};
-flat varying float vObject;
-varying float vStain;
-uniform sampler2D uFlags;
-uniform float uInset;
-uniform sampler2D uMiddles;
-uniform mat4 uUmToRoom;
-uniform float uGap;
-#include <chunks/object_texel>
-#include <chunks/object_gap>
-`;
-const FRAGMENT = `flat varying float vObject;
-varying float vStain;
-uniform float uStained;
-uniform vec3 uStain;
-uniform sampler2D uFlags;
-uniform sampler2D uColumn;
-uniform sampler2D uColors;
-uniform bool uIsColored;
-#include <chunks/object_texel>
-#include <chunks/object_light>
-#include <chunks/object_stain>
-`;
 
 /**
  * Directions out of each object, as signed bytes. At a crease a vertex is there once for each side, with that
@@ -165,21 +139,13 @@ export class ObjectMaterial {
       key: "objects",
       uniforms: this.uniforms,
       vertex: {
-        declared: include(VERTEX),
-        place: `vObject = ${ROW};
-	vStain = ${PAINT};
-	transformed -= uInset * ${OUTWARDS};
-	transformed = objectDrawnIn(transformed, modelMatrix, uUmToRoom, objectMiddle(uMiddles, ${ROW}), uGap);`,
-        // a triangle whose corners all lie there is none
-        end: `if (objectTexel(uFlags, ${ROW}) == 0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);`,
+        declared: include(objectVertex),
+        place: "transformed = objectPlace(transformed);",
+        end: "gl_Position = objectEnd(gl_Position);",
       },
       fragment: {
-        declared: include(FRAGMENT),
-        color: `if (uIsColored) {
-		diffuseColor.rgb = texelFetch(uColors, ivec2(objectTexel(uColumn, vObject), 0), 0).rgb;
-	}
-	diffuseColor.rgb = objectStain(diffuseColor.rgb, uStain, uStained * vStain);
-	diffuseColor.rgb = objectLight(diffuseColor.rgb, objectTexel(uFlags, vObject));`,
+        declared: include(objectFragment),
+        color: "diffuseColor.rgb = objectColor(diffuseColor.rgb);",
       },
     };
   }

@@ -18,18 +18,14 @@ import {
   ReplaceStencilOp,
   ShaderMaterial,
 } from "three";
-import {
-  type BothEyes,
-  type BothEyesUniforms,
-  NOT_THE_OTHERS,
-  NOT_THE_OTHERS_DECLARED,
-  TO_EACH_EYE,
-  TO_EACH_EYE_DECLARED,
-} from "../gpu/both_eyes";
+import type { BothEyes, BothEyesUniforms } from "../gpu/both_eyes";
 import type { Cuts } from "../gpu/clip_planes";
 import { type Disc, LAID, type MarchedUniforms } from "../gpu/composite_pass";
 import { CHUNKS } from "../gpu/glsl_chunks";
 import { includeChunks } from "../gpu/glsl_include";
+import surfaceFragment from "./shaders/surface.frag.glsl?raw";
+import depthFragment from "./shaders/surface_depth.frag.glsl?raw";
+import depthVertex from "./shaders/surface_depth.vert.glsl?raw";
 
 /**
  * What all surfaces share, by reference: the disc's cone and the cuts in the room, metres, and the
@@ -97,85 +93,58 @@ const NO_PART: Pick<SurfacePart, "uniforms" | "vertex" | "fragment"> = {
   fragment: { declared: "", color: "" },
 };
 
-const VARYINGS = "varying vec3 vRoom;\n";
-const DECLARED = includeChunks(
-  `${VARYINGS}${NOT_THE_OTHERS_DECLARED}
-#include <chunks/clip_planes>
-uniform vec2 uDisc;
-uniform vec3 uApex;
-uniform vec3 uAxis;
-uniform float uOpacity;
-uniform float uTaken;
-uniform bool uInDisc;
-uniform bool uCrosses;
-#include <chunks/focus_disc>
-// What the volume takes of the surface here, 0..1.
-float shareTaken() {
-  return uTaken * (uInDisc ? discWeight(vRoom, uApex, uAxis, uDisc) : 1.0);
-}
-// One that is mixed with its volume's picture is drawn also where that has taken all of it.
-bool isGone() {
-  return uOpacity <= 0.0 || (!uCrosses && shareTaken() >= 1.0);
-}
-`,
+/** What is inserted into the shaders of three's standard material, and before which of its chunks. */
+const VERTEX_DECLARED = includeChunks(
+  "varying vec3 vRoom;\n#include <chunks/both_eyes_vertex>\n",
   CHUNKS,
 );
+const FRAGMENT_DECLARED = includeChunks(surfaceFragment, CHUNKS);
+const DEPTH_FRAGMENT = includeChunks(depthFragment, CHUNKS);
+const PLACED = `
+	vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
+	toEachEye(mvPosition);
+`;
+const KEPT = `
+	keepToOwnEye();
+	if (isGone(vRoom) || isCut(vRoom)) discard;
+`;
+const FACED = `
+	if (!gl_FrontFacing) normal = insideNormal(normal, cameraPosition);
+`;
+const BLENDED = `
+#ifndef OPAQUE
+	gl_FragColor = blended(gl_FragColor, diffuseColor.a);
+#endif
+`;
 
 /**
  * Writes depth alone, cut as the surfaces are.
  *
  * @param uniforms with those of `both`
- * @param condition statement that may discard; knows `vRoom`
+ * @param isShared whether nothing is written where a volume has taken all of the surface
  */
 export function depthMaterial(
   uniforms: Record<string, { value: unknown }>,
   both: BothEyes,
-  condition = "",
+  isShared = false,
 ): ShaderMaterial {
   const material = new ShaderMaterial({
     glslVersion: GLSL3,
     colorWrite: false,
     side: DoubleSide,
     uniforms,
-    vertexShader: `${VARYINGS}${TO_EACH_EYE_DECLARED}
-void main() {
-  vec3 transformed = position;
-  vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
-  vec4 mvPosition = modelViewMatrix * vec4(transformed, 1.0);
-  gl_Position = projectionMatrix * mvPosition;
-  ${TO_EACH_EYE}
-}`,
-    fragmentShader: `${DECLARED}
-out vec4 oColor;
-void main() {
-  ${NOT_THE_OTHERS}
-  if (isCut(vRoom)) discard;
-  ${condition}
-  oColor = vec4(0.0);
-}`,
+    defines: isShared ? { SHARED: 1 } : {},
+    vertexShader: depthVertexWith(NO_PART.vertex),
+    fragmentShader: DEPTH_FRAGMENT,
   });
   both.adopt(material);
   return material;
 }
 
-const OPENED = includeChunks("#include <chunks/open_tile>\n", CHUNKS);
-/** The picture of the volumes. */
-const MARCHED = `${includeChunks("#include <chunks/marched_light>", CHUNKS)}\n`;
-/**
- * Light, times its opacity. In the disc both pictures, of surface and of volume, are mixed: one laid over
- * the other would be dark between.
- */
-const BLENDED = `
-#ifndef OPAQUE
-  float taken = shareTaken();
-  float own = uOpacity * diffuseColor.a;
-  gl_FragColor = vec4(own * (1.0 - taken) * gl_FragColor.rgb, own * (1.0 - taken));
-  if (uCrosses && taken > 0.0) {
-    vec4 volume = marchedLight(gl_FragCoord.xy);
-    gl_FragColor += taken * volume;
-  }
-#endif
-`;
+function depthVertexWith({ declared, place, end }: SurfacePart["vertex"]): string {
+  const part = { part_declared: declared, part_place: place, part_end: end };
+  return includeChunks(depthVertex, { ...CHUNKS, ...part });
+}
 
 /** Before the depth of surfaces without a share, after all opaque ones. */
 const AFTER_OPAQUE = 1;
@@ -219,7 +188,7 @@ export class BlendedSurface {
       material.forceSinglePass = true; // the depth that is written first sorts both sides
       Object.assign(material, LAID_OVER);
     }
-    this.depth = depthMaterial(this.uniforms, both, "if (isGone()) discard;");
+    this.depth = depthMaterial(this.uniforms, both, true);
     // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
     // what lies behind a rim through.
     for (const material of [...materials, this.depth]) {
@@ -243,33 +212,14 @@ export class BlendedSurface {
     material.onBeforeCompile = (shader) => {
       const { vertex, fragment, uniforms } = this.part ?? NO_PART;
       Object.assign(shader.uniforms, this.uniforms, uniforms);
-      const declared = VARYINGS + TO_EACH_EYE_DECLARED + vertex.declared;
-      shader.vertexShader = (declared + shader.vertexShader).replace(
+      shader.vertexShader = (VERTEX_DECLARED + vertex.declared + shader.vertexShader).replace(
         "#include <project_vertex>",
-        `${vertex.place}\n#include <project_vertex>\n\tvRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;` +
-          TO_EACH_EYE +
-          vertex.end,
+        (chunk) => `${vertex.place}\n${chunk}\n${PLACED}${vertex.end}`,
       );
-      shader.fragmentShader = (
-        DECLARED +
-        OPENED +
-        MARCHED +
-        fragment.declared +
-        shader.fragmentShader
-      )
-        .replace("#include <dithering_fragment>", `${BLENDED}\n#include <dithering_fragment>`)
-        .replace(
-          "#include <color_fragment>",
-          `#include <color_fragment>\n${fragment.color}${NOT_THE_OTHERS}\tif (isGone() || isCut(vRoom)) discard;`,
-        )
-        .replace(
-          "#include <normal_fragment_maps>",
-          "#include <normal_fragment_maps>\n\tif (!gl_FrontFacing) {\n" +
-            "\t\tvec3 flatNormal = cutNormal(cameraPosition, vRoom);\n" +
-            "\t\tif (flatNormal == vec3(0.0)) flatNormal = openNormal(cameraPosition, vRoom);\n" +
-            "\t\tif (flatNormal != vec3(0.0)) {\n" +
-            "\t\t\tnormal = normalize((viewMatrix * vec4(flatNormal, 0.0)).xyz);\n\t\t}\n\t}",
-        );
+      shader.fragmentShader = (FRAGMENT_DECLARED + fragment.declared + shader.fragmentShader)
+        .replace("#include <dithering_fragment>", (chunk) => `${BLENDED}\n${chunk}`)
+        .replace("#include <color_fragment>", (chunk) => `${chunk}\n${fragment.color}${KEPT}`)
+        .replace("#include <normal_fragment_maps>", (chunk) => `${chunk}\n${FACED}`);
     };
     material.customProgramCacheKey = () => `blended ${this.part?.key}`;
   }
@@ -277,12 +227,9 @@ export class BlendedSurface {
   /** Have a part from now on. */
   wear(part: SurfacePart): void {
     this.part = part;
-    const { declared, place, end } = part.vertex;
     const { depth } = this;
     Object.assign(depth.uniforms, part.uniforms);
-    depth.vertexShader = (declared + depth.vertexShader)
-      .replace("vec3 transformed = position;", (found) => `${found}\n${place}`)
-      .replace(/}$/, `${end}}`);
+    depth.vertexShader = depthVertexWith(part.vertex);
     for (const material of [...this.materials, depth]) material.needsUpdate = true;
     // in the pass for the depth, too, what is gone is not there
     for (const material of this.materials) material.allowOverride = false;

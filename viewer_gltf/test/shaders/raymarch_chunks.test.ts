@@ -710,6 +710,58 @@ describeInChromium("the shader's chunks", () => {
     expect(await normalAt(eye, [0, 0, -3], new Array<number>(24).fill(0))).toEqual([0, 0, 0]);
   });
 
+  it("put each instance of a scene into its eye's part of the picture", async () => {
+    const chunks = await readChunks("both_eyes_vertex");
+    const drawn = async (isForBoth: boolean, eye: number) => {
+      const text = chunks["chunks/both_eyes_vertex"]
+        .replace("varying float vEye;", "float vEye;")
+        .replace("uniform bool uIsForBoth;", `const bool uIsForBoth = ${isForBoth};`)
+        .replace("uniform mat4 uEyeClip[2];", "mat4 uEyeClip[2] = mat4[2](mat4(2.0), mat4(3.0));")
+        .replaceAll("gl_InstanceID", `${eye}`)
+        .replaceAll("gl_Position", "place");
+      const body = "toEachEye(vec4(1.0)); oColor = vec4(place.xy, vEye, 0.0);";
+      return runProgram(bare.page, {}, `vec4 place = vec4(7.0);\n${text}`, body);
+    };
+    expect(await drawn(false, 1)).toEqual([7, 7, -1, 0]);
+    expect(await drawn(true, 0)).toEqual([2, 2, 0, 0]);
+    expect(await drawn(true, 1)).toEqual([3, 3, 1, 0]);
+  });
+
+  it("keep a fragment to its own eye's part of the picture", async () => {
+    const chunks = await readChunks("both_eyes_fragment");
+    /** Mean of two pixels, 0.5 and 1.5, of which the right one begins the right eye's part; discarded is 0. */
+    const mean = async (eye: number) => {
+      const text = chunks["chunks/both_eyes_fragment"]
+        .replace("varying float vEye;", `const float vEye = ${eye.toFixed(1)};`)
+        .replace("uniform float uMiddle;", "const float uMiddle = 1.0;");
+      const body = "keepToOwnEye(); oColor = vec4(gl_FragCoord.x);";
+      return (await runProgram(bare.page, {}, text, body, {}, 2))[0];
+    };
+    expect(await mean(0)).toBe(0.25);
+    expect(await mean(1)).toBe(0.75);
+    expect(await mean(-1)).toBe(1);
+  });
+
+  it("leave of a surface what its volume doesn't take", async () => {
+    const [focus, share] = ["focus_disc", "surface_share"];
+    const chunks = await readChunks(focus, share);
+    const left = async (taken: number, isInDisc: boolean, crosses: boolean, x = 0) => {
+      const text = chunks[`chunks/${share}`].replace(/^uniform .*$/gm, "");
+      const head = `const vec2 uDisc = vec2(0.99, 0.9); const vec3 uApex = vec3(0.0);
+        const vec3 uAxis = vec3(0.0, 0.0, -1.0); const float uOpacity = 1.0;
+        const float uTaken = ${taken.toFixed(2)}; const bool uInDisc = ${isInDisc};
+        const bool uCrosses = ${crosses};\n${chunks[`chunks/${focus}`]}\n${text}`;
+      const at = vec(x, 0, -1);
+      const body = `oColor = vec4(shareTaken(${at}), isGone(${at}) ? 1.0 : 0.0, 0.0, 0.0);`;
+      return (await runProgram(bare.page, {}, head, body)).slice(0, 2);
+    };
+    expect(await left(0.25, false, false)).toEqual([0.25, 0]);
+    expect(await left(1, false, false)).toEqual([1, 1]);
+    expect(await left(1, false, true)).toEqual([1, 0]); // mixed with the volume's picture
+    expect(await left(1, true, false)).toEqual([1, 1]);
+    expect(await left(1, true, false, 5)).toEqual([0, 0]); // beside the disc
+  });
+
   it("have a test each", async () => {
     const tests = [
       "raymarch_chunks.test.ts",

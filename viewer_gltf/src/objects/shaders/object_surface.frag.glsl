@@ -1,0 +1,20 @@
+// What the surfaces of a label map have beside all others, in the fragment shader.
+flat varying float vObject;
+varying float vStain;
+uniform float uStained;
+uniform vec3 uStain;
+uniform sampler2D uFlags;
+uniform sampler2D uColumn;
+uniform sampler2D uColors;
+uniform bool uIsColored;
+#include <chunks/object_texel>
+#include <chunks/object_light>
+#include <chunks/object_stain>
+
+// An object's colour, linear: of its value in the column, with the stain over it, lit as its flag says.
+vec3 objectColor(vec3 own) {
+  vec3 color = own;
+  if (uIsColored) color = texelFetch(uColors, ivec2(objectTexel(uColumn, vObject), 0), 0).rgb;
+  color = objectStain(color, uStain, uStained * vStain);
+  return objectLight(color, objectTexel(uFlags, vObject));
+}

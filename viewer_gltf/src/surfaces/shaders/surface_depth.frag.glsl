@@ -1,0 +1,16 @@
+// Writes depth alone, cut as the surfaces are; with SHARED, where anything of the surface is left.
+varying vec3 vRoom;
+#include <chunks/both_eyes_fragment>
+#include <chunks/clip_planes>
+#include <chunks/focus_disc>
+#include <chunks/surface_share>
+out vec4 oColor;
+
+void main() {
+  keepToOwnEye();
+  if (isCut(vRoom)) discard;
+#ifdef SHARED
+  if (isGone(vRoom)) discard;
+#endif
+  oColor = vec4(0.0);
+}
