@@ -1,6 +1,6 @@
 /** The viewer in numbers: for automation, the panel and the benchmark. */
 import type { WebGLRenderer } from "three";
-import type { Look } from "../interaction/orbit_camera";
+import type { Look } from "../interaction/named_views";
 import type { Hybrid } from "../render/gaze_focus";
 import type { Room } from "../render/scene";
 import { discLimit } from "../state/focus_tiles";

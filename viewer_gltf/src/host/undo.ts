@@ -1,5 +1,6 @@
 /** Undo and redo of the user's steps, and the way back from a single change. */
-import { isSameLook, type Look } from "../interaction/orbit_camera";
+import type { Look } from "../interaction/named_views";
+import { isSameLook } from "../interaction/orbit_camera";
 import type { Action } from "../state/actions";
 import type { CameraView } from "../state/camera_view";
 import { isSameView, keyOfChange, nameOfChange } from "../state/history";

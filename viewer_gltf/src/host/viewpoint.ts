@@ -1,7 +1,8 @@
 /** From where the specimen is seen, and where it stands: the flat camera, the head in stereo, the specimen's pose. */
 import { type Matrix4, Quaternion, type Vector2, Vector3 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
-import { Navigation, type Stand } from "../interaction/orbit_camera";
+import type { Stand } from "../interaction/named_views";
+import { Navigation } from "../interaction/orbit_camera";
 import { rayAhead, rayUnder } from "../interaction/rays";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";

@@ -6,15 +6,19 @@
  */
 import { PerspectiveCamera, Spherical, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { around, cornersOf } from "../math/box";
 import type { Vec3 } from "../math/vec3";
-import { framePoints, openingView, towardsEye } from "../render/opening_view";
-import { distanceToSee, framingDistance, type Placement } from "../render/placement";
+import { distanceToSee, type Placement } from "../render/placement";
 import type { Command } from "../state/commands";
+import {
+  type Covered,
+  FARTHEST_M,
+  FIELD_OF_VIEW_DEG,
+  type Look,
+  NamedViews,
+  type Stand,
+} from "./named_views";
 
-const FIELD_OF_VIEW_DEG = 40;
 const NEAREST_M = 0.05;
-const FARTHEST_M = 8;
 /** Share of a glide that is left a second after the hand let go. */
 const LEFT_AFTER_A_SECOND = 0.88 ** 60;
 /** Turn by one key press, radians. */
@@ -25,25 +29,6 @@ const FLIGHT_S = 0.4;
 /** Move by one key press, as a share of the picture's height. */
 const PAN = 0.1;
 
-/** The turn that a specimen opens with: so far to either side, and the time to and fro, s. */
-const SWAY_RAD = Math.PI / 10;
-const SWAY_S = 30;
-/** Parts of it at which the eye may be farthest. */
-const TURNED = [-0.25, -0.125, 0, 0.125, 0.25];
-
-/** A view that has a name: it follows the window's shape as long as nobody moves. */
-export const STANDS = ["opening", "front", "side", "top"] as const;
-export type Stand = (typeof STANDS)[number];
-
-/** Metres of the room. */
-export type Look = Readonly<{
-  position: readonly [number, number, number];
-  target: readonly [number, number, number];
-}>;
-
-/** Shares of the picture's height, at its edges, that something lies over. */
-export type Covered = Readonly<{ top: number; bottom: number }>;
-
 /** Largest difference of two numbers of a look that is the same, m. */
 const SAME_M = 1e-4;
 
@@ -53,12 +38,27 @@ export function isSameLook(look: Look, { lookNow }: Pick<Navigation, "lookNow">)
   return was.every((v, i) => Math.abs(v - is[i]) < SAME_M);
 }
 
-/** Most that is left out of the picture's height when the opening is framed. */
-const MOST_COVERED = 0.6;
+/** The acts of the camera, by command. */
+const ACTS: Readonly<Partial<Record<Command, (navigation: Navigation) => void>>> = {
+  front: (navigation) => navigation.standStill("front"),
+  side: (navigation) => navigation.standStill("side"),
+  top: (navigation) => navigation.standStill("top"),
+  "zoom-in": (navigation) => navigation.move(0, 0, ZOOM),
+  "zoom-out": (navigation) => navigation.move(0, 0, 1 / ZOOM),
+  "turn-left": (navigation) => navigation.move(-TURN_RAD, 0, 1),
+  "turn-right": (navigation) => navigation.move(TURN_RAD, 0, 1),
+  "turn-up": (navigation) => navigation.move(0, -TURN_RAD, 1),
+  "turn-down": (navigation) => navigation.move(0, TURN_RAD, 1),
+  "pan-left": (navigation) => navigation.pan(-1, 0),
+  "pan-right": (navigation) => navigation.pan(1, 0),
+  "pan-up": (navigation) => navigation.pan(0, 1),
+  "pan-down": (navigation) => navigation.pan(0, -1),
+};
 
 export class Navigation {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
   readonly controls: OrbitControls;
+  private readonly views: NamedViews;
   /** The view that `reset` returns to. */
   private home: Stand = "opening";
   /** The view that still holds; null: someone has moved. */
@@ -66,20 +66,8 @@ export class Navigation {
   /** Since the turn of the opening began, s; null: there is none. */
   private swayed_s: number | null = null;
   private flight: Readonly<{ from: Look; to: Look; elapsed_s: number }> | null = null;
-  private readonly reach: Vector3;
-  /** Outermost points of what is there of the specimen, room: the opening is framed on them. */
-  private occupied: readonly Vec3[];
-  /** The opening is framed on what is free of the picture. */
-  private covered: Covered = { top: 0, bottom: 0 };
-
-  constructor(
-    canvas: HTMLElement,
-    private readonly placement: Placement,
-    onChange: () => void,
-  ) {
-    this.reach = new Vector3(...placement.size).multiplyScalar(0.5);
-    const { x, y, z } = this.reach;
-    this.occupied = cornersOf({ min: [-x, -y, -z], max: [x, y, z] });
+  constructor(canvas: HTMLElement, placement: Placement, onChange: () => void) {
+    this.views = new NamedViews(placement);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
     this.controls.minDistance = NEAREST_M;
@@ -108,9 +96,7 @@ export class Navigation {
 
   /** The window has this shape now. */
   fit(aspect: number, covered: Covered = { top: 0, bottom: 0 }): void {
-    // buttons and words may be higher than a very low picture
-    const share = Math.min(1, MOST_COVERED / (covered.top + covered.bottom || 1));
-    this.covered = { top: share * covered.top, bottom: share * covered.bottom };
+    this.views.fit(aspect, covered);
     this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
     if (this.stand !== null) this.standAt(this.stand);
@@ -130,15 +116,18 @@ export class Navigation {
 
   /** Outermost points of what is there of the specimen, um: the opening is framed on them. */
   surround(points: readonly Vec3[]): void {
-    this.occupied = this.inRoom(points);
+    this.views.surround(points);
     if (this.stand !== null) this.standAt(this.stand);
   }
 
   /** Points of the specimen (um) in the room (m), as a flat screen shows it. */
   inRoom(points: readonly Vec3[]): readonly Vec3[] {
-    const { center, scale } = this.placement;
-    const [cx, cy, cz] = center;
-    return points.map(([x, y, z]) => [(x - cx) * scale, (y - cy) * scale, (z - cz) * scale]);
+    return this.views.inRoom(points);
+  }
+
+  /** Farthest distance of the eye from the middle during the opening's turn. */
+  get openingDistance_m(): number {
+    return this.views.openingDistance_m;
   }
 
   /** Turn slowly to and fro, as long as nobody moves and the opening holds. */
@@ -215,7 +204,9 @@ export class Navigation {
   }
 
   private place({ position, target }: Look): void {
-    this.controls.target.fromArray(target).clamp(this.reach.clone().negate(), this.reach);
+    this.controls.target
+      .fromArray(target)
+      .clamp(this.views.reach.clone().negate(), this.views.reach);
     this.camera.position.fromArray(position);
     this.camera.up.set(0, 1, 0);
     this.controls.update();
@@ -234,109 +225,34 @@ export class Navigation {
     this.lookFrom({ position: eye.toArray(), target: target.toArray() });
   }
 
-  /** Whether the command was one of the camera's. */
+  /** Return whether the command was one of the camera's. */
   run(command: Command): boolean {
-    switch (command) {
-      case "front":
-      case "side":
-      case "top":
-        this.swayed_s = null;
-        this.standAt(command);
-        return true;
-      case "zoom-in":
-        this.move(0, 0, ZOOM);
-        return true;
-      case "zoom-out":
-        this.move(0, 0, 1 / ZOOM);
-        return true;
-      case "turn-left":
-        this.move(-TURN_RAD, 0, 1);
-        return true;
-      case "turn-right":
-        this.move(TURN_RAD, 0, 1);
-        return true;
-      case "turn-up":
-        this.move(0, -TURN_RAD, 1);
-        return true;
-      case "turn-down":
-        this.move(0, TURN_RAD, 1);
-        return true;
-      case "pan-left":
-        this.pan(-1, 0);
-        return true;
-      case "pan-right":
-        this.pan(1, 0);
-        return true;
-      case "pan-up":
-        this.pan(0, 1);
-        return true;
-      case "pan-down":
-        this.pan(0, -1);
-        return true;
-      default:
-        return false;
-    }
+    const act = ACTS[command];
+    act?.(this);
+    return act !== undefined;
   }
 
   /** Bring the point that is looked at back into its box, and the eye along: the view is not turned. */
   private stayWithin(): void {
     const { target } = this.controls;
     const beyond = target.clone();
-    target.clamp(this.reach.clone().negate(), this.reach);
+    target.clamp(this.views.reach.clone().negate(), this.views.reach);
     this.camera.position.add(target).sub(beyond);
   }
 
+  /** See the specimen from a named view that does not turn. */
+  standStill(stand: Stand): void {
+    this.swayed_s = null;
+    this.standAt(stand);
+  }
+
   private standAt(stand: Stand): void {
-    this.place(this.lookAt(stand));
+    this.place(this.views.lookAt(stand, this.swayed_s ?? 0));
     this.stand = stand;
   }
 
-  /** The whole specimen: x to the right and y up from the front. */
-  private lookAt(stand: Stand): Look {
-    const target = [0, 0, 0] as const;
-    if (stand === "opening") return this.lookAround(this.swayed_s ?? 0);
-    if (stand === "front") return { position: [0, 0, this.framing(2)], target };
-    if (stand === "side") return { position: [this.framing(0), 0, 0], target };
-    return { position: [0, this.framing(1), 1e-4], target };
-  }
-
-  /** The opening after so much of its turn. */
-  private lookAround(swayed_s: number): Look {
-    const { top, bottom } = this.covered;
-    const free = 1 - top - bottom;
-    const half = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360); // of the picture, a metre away
-    const lens = { fov_rad: 2 * Math.atan(free * half), aspect: this.camera.aspect / free };
-    const still = openingView(around(this.occupied), lens);
-    const sway_rad = SWAY_RAD * Math.sin((2 * Math.PI * swayed_s) / SWAY_S);
-    const direction = { ...still, aside_rad: still.aside_rad + sway_rad };
-    const framed = framePoints(this.occupied, direction, lens, (bottom - top) * half);
-    const target = new Vector3(...framed.target).clamp(this.reach.clone().negate(), this.reach);
-    const away_m = Math.min(FARTHEST_M, framed.distance);
-    const eye = target.clone().addScaledVector(new Vector3(...towardsEye(direction)), away_m);
-    return { position: eye.toArray(), target: target.toArray() };
-  }
-
-  /** Farthest distance of the eye from the middle during the opening's turn. */
-  get openingDistance_m(): number {
-    const looks = TURNED.map((part) => this.lookAround(part * SWAY_S));
-    return Math.max(
-      ...looks.map(({ position, target }) => Math.hypot(...position.map((v, i) => v - target[i]))),
-    );
-  }
-
-  private framing(axis: 0 | 1 | 2): number {
-    const [x, y, z] = this.placement.size;
-    const seen = (
-      [
-        [z, y, x],
-        [x, z, y],
-        [x, y, z],
-      ] as const
-    )[axis];
-    return framingDistance(seen, (FIELD_OF_VIEW_DEG * Math.PI) / 180, this.camera.aspect);
-  }
-
-  private move(turn_rad: number, tilt_rad: number, zoom: number): void {
+  /** Turn about the point that is looked at, and change the distance from it by a factor. */
+  move(turn_rad: number, tilt_rad: number, zoom: number): void {
     const { target } = this.controls;
     const offset = this.camera.position.clone().sub(target);
     const at = new Spherical().setFromVector3(offset);
@@ -351,7 +267,7 @@ export class Navigation {
   }
 
   /** Steps to the right and up, as far as the point that is looked at may go. */
-  private pan(right: number, up: number): void {
+  pan(right: number, up: number): void {
     const { target } = this.controls;
     const { position, quaternion } = this.camera;
     const height_m =
@@ -360,7 +276,7 @@ export class Navigation {
       .applyQuaternion(quaternion)
       .multiplyScalar(PAN * height_m)
       .add(target)
-      .clamp(this.reach.clone().negate(), this.reach);
+      .clamp(this.views.reach.clone().negate(), this.views.reach);
     const from = position.clone().add(to).sub(target);
     this.lookFrom({ position: from.toArray(), target: to.toArray() });
   }

@@ -3,42 +3,18 @@
  * against each other. It comes with the code of objects/. Pure but for what its pictures draw.
  */
 import type { ObjectColumn } from "../bundle/generated/objects";
-import type { Control, Picture, Wish } from "../panel/controls";
-import {
-  ALL_BYTES,
-  type ObjectView,
-  PALETTES,
-  type PaletteName,
-  START_OBJECTS,
-} from "../state/objects";
+import type { Control } from "../panel/controls";
+import { ALL_BYTES, type ObjectView, START_OBJECTS } from "../state/objects";
 import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
+import { ColumnSection } from "./column_section";
 import { filtered } from "./flags";
+import { ObjectControls } from "./object_controls";
 import type { Objects } from "./objects";
-import { byteValue, tableOf } from "./palettes";
-import {
-  byteAt,
-  categoryAt,
-  countBytes,
-  drawCategories,
-  drawHistogram,
-  drawScatter,
-  inLasso,
-  legendOf,
-  NO_CATEGORY,
-  numberText,
-  placeOf,
-  ROWS_OF_LEGEND,
-  unitText,
-} from "./pictures";
+import { tableOf } from "./palettes";
+import { drawScatter, inLasso, numberText, unitText } from "./pictures";
 import type { ObjectTable } from "./table";
 
-const PALETTE_NAMES: Readonly<Record<PaletteName, string>> = {
-  viridis: "Viridis",
-  cividis: "Cividis",
-  magma: "Magma",
-  diverging: "Blue–red",
-};
 /** Most results of a search that have a row. */
 const MAX_FOUND = 6;
 /** Least way of a lasso from one corner to the next, shares of the plot. */
@@ -46,16 +22,17 @@ const LASSO_STEP = 0.012;
 /** The gap's slider: so much of a cell of this kind of table. */
 const GAP_STEPS = 40;
 
-const percent = (bytes: readonly [number, number]) =>
-  [placeOf(bytes[0]), placeOf(bytes[1])] as const;
-
 export function objectItems(
   objects: Objects,
   state: ViewerState,
   channel: string,
   isLast: boolean,
 ): readonly Control[] {
-  const items = new Layout(objects, state.objects[channel] ?? START_OBJECTS, channel).items();
+  const items = new ObjectSection(
+    objects,
+    state.objects[channel] ?? START_OBJECTS,
+    channel,
+  ).items();
   return isLast ? [...items, SAVE] : items;
 }
 
@@ -67,15 +44,19 @@ const SAVE: Control = {
   to: () => "save-objects",
 };
 
-class Layout {
+class ObjectSection {
   private readonly table;
+  private readonly controls;
+  private readonly columns;
 
   constructor(
     private readonly objects: Objects,
     private readonly view: ObjectView,
-    private readonly channel: string,
+    channel: string,
   ) {
     this.table = objects.table;
+    this.controls = new ObjectControls(channel);
+    this.columns = new ColumnSection(objects, view, this.controls);
   }
 
   items(): readonly Control[] {
@@ -83,8 +64,8 @@ class Layout {
     const by = table.column(objects.colorBy);
     const others = Object.keys({ ...view.ranges, ...view.without }).filter((id) => id !== by?.id);
     return [
-      this.text("count", "Shown", `${objects.left} of ${table.count} objects`),
-      this.columnChoice(
+      this.controls.text("count", "Shown", `${objects.left} of ${table.count} objects`),
+      this.controls.columnChoice(
         "color-by",
         "Colour by",
         objects.colorBy,
@@ -96,13 +77,13 @@ class Layout {
           isLog: null,
         }),
       ),
-      ...(by === null ? [] : this.columnItems(by, true)),
+      ...(by === null ? [] : this.columns.items(by, true)),
       ...this.stain(),
       ...others.flatMap((id) => {
         const column = table.column(id);
-        return column === null ? [] : this.columnItems(column, false);
+        return column === null ? [] : this.columns.items(column, false);
       }),
-      this.columnChoice(
+      this.controls.columnChoice(
         "filter-by",
         "Filter by",
         "",
@@ -124,205 +105,16 @@ class Layout {
     ];
   }
 
-  private id(part: string): string {
-    return `${this.channel}/objects-${part}`;
-  }
-
-  private change(change: Partial<ObjectView>): Wish {
-    return { type: "objects", channel: this.channel, change };
-  }
-
-  private text(part: string, label: string, value: string): Control {
-    return { kind: "text", id: this.id(part), label, value };
-  }
-
-  private button(part: string, label: string, change: Partial<ObjectView>, refusal = ""): Control {
-    return { kind: "button", id: this.id(part), label, refusal, to: () => this.change(change) };
-  }
-
-  private columnChoice(
-    part: string,
-    label: string,
-    value: string,
-    columns: readonly ObjectColumn[],
-    none: string,
-    change: (id: string) => Partial<ObjectView>,
-  ): Control {
-    const listed = columns.map(({ id, name }) => ({ value: id, label: name }));
-    return {
-      kind: "choice",
-      id: this.id(part),
-      label,
-      value,
-      options: [{ value: "", label: none }, ...listed],
-      isInline: false,
-      to: (id) => this.change(change(id)),
-    };
-  }
-
-  /** A column's picture, in which what shows is chosen. @param colors whether it is the one that colours */
-  private columnItems(column: ObjectColumn, colors: boolean): readonly Control[] {
-    const bytes = this.table.bytes(column.id);
-    if (bytes === null) return [this.text(`wait-${column.id}`, column.name, "loading …")];
-    const [all, left] = countBytes(bytes, this.objects.flags);
-    const table = tableOf(column, colors ? this.view : { ...this.view, ...GREY });
-    const state = [
-      this.view.palette,
-      this.view.span,
-      this.view.isLog,
-      this.objects.version,
-      colors,
-    ];
-    return column.kind === "category"
-      ? this.categories(column, [all, left], table, state.join())
-      : this.numbers(column, [all, left], table, state.join(), colors);
-  }
-
-  private categories(
-    column: ObjectColumn,
-    counts: readonly [Uint32Array, Uint32Array],
-    table: Uint8Array,
-    version: string,
-  ): readonly Control[] {
-    const { view } = this;
-    const without = view.without[column.id] ?? [];
-    const { indices, page, pages, count } = legendOf(column, counts[0][0] > 0, view.legend);
-    const nameOf = (index: number) => column.categories?.[index] ?? NO_CATEGORY;
-    const first = page * ROWS_OF_LEGEND;
-    const picture: Picture = {
-      kind: "picture",
-      id: this.id(`column-${column.id}`),
-      label: `${column.name}: tap one to leave it out`,
-      about: column.about,
-      height: 0.12 * indices.length,
-      version: `${version} ${without} ${page}`,
-      text: indices
-        .map((index) => {
-          const out = without.includes(index) ? ", left out" : "";
-          return `${nameOf(index)} ${counts[1][index + 1]}${out}`;
-        })
-        .join("; "),
-      draw: (context, width, height) => {
-        const rows = indices.map((index) => ({ index, name: nameOf(index) }));
-        drawCategories(context, width, height, rows, counts, table, without);
-      },
-      press: (_, down) => {
-        const index = categoryAt(indices, down);
-        const next = without.includes(index)
-          ? without.filter((each) => each !== index)
-          : [...without, index];
-        return this.change({ without: { ...view.without, [column.id]: next } });
-      },
-    };
-    if (pages === 1) return [picture];
-    const turn = (part: string, label: string, to: number) =>
-      this.button(`${part}-${column.id}`, label, { legend: (to + pages) % pages });
-    return [
-      picture,
-      this.text(
-        `legend-${column.id}`,
-        "Categories",
-        `${first + 1} to ${first + indices.length} of ${count}`,
-      ),
-      turn("legend-next", "Next categories", page + 1),
-      turn("legend-back", "Previous categories", page - 1),
-    ];
-  }
-
-  private numbers(
-    column: ObjectColumn,
-    counts: readonly [Uint32Array, Uint32Array],
-    table: Uint8Array,
-    version: string,
-    colors: boolean,
-  ): readonly Control[] {
-    const { view } = this;
-    const { id, name, range, unit } = column;
-    const brush = view.ranges[id] ?? ALL_BYTES;
-    if (range === undefined) return [this.text(`none-${id}`, name, "no object has a value")];
-    const words = (byte: number) =>
-      `${numberText(byteValue(range, byte))} ${unitText(unit)}`.trim();
-    const set = (bytes: readonly [number, number]) =>
-      this.change({ ranges: { ...view.ranges, [id]: bytes } });
-    const moved = (across: number) => {
-      const byte = byteAt(across);
-      const isLow = byte < brush[0] || (byte <= brush[1] && byte - brush[0] < brush[1] - byte);
-      return set(isLow ? [byte, brush[1]] : [brush[0], byte]);
-    };
-    const window = (
-      part: string,
-      label: string,
-      value: readonly [number, number],
-      to: typeof set,
-    ) =>
-      ({
-        kind: "window",
-        id: this.id(`${part}-${id}`),
-        label,
-        name: `${name}: ${label}`,
-        value: percent(value),
-        steps: 254,
-        texts: [words(value[0]), words(value[1])],
-        to: (ends: readonly [number, number]) => to([byteAt(ends[0]), byteAt(ends[1])]),
-      }) as const;
-    const picture: Picture = {
-      kind: "picture",
-      id: this.id(`column-${id}`),
-      label: name,
-      about: column.about,
-      height: 0.28,
-      version: `${version} ${brush}`,
-      text: `${words(brush[0])} to ${words(brush[1])} shown`,
-      draw: (context, width, height) =>
-        drawHistogram(context, width, height, column, counts, table, brush),
-      press: moved,
-      drag: moved,
-    };
-    return [
-      picture,
-      window("range", "Shown", brush, set),
-      ...(colors
-        ? [
-            window("span", "Colours", view.span, (span) => this.change({ span })),
-            this.palette(),
-            ...(range.low > 0 ? [this.logarithm(range.scale === "log")] : []),
-          ]
-        : []),
-    ];
-  }
-
-  private palette(): Control {
-    return {
-      kind: "choice",
-      id: this.id("palette"),
-      label: "Palette",
-      value: this.view.palette,
-      options: PALETTES.map((value) => ({ value, label: PALETTE_NAMES[value] })),
-      isInline: false,
-      to: (palette) => this.change({ palette: palette as PaletteName }),
-    };
-  }
-
-  private logarithm(isUsual: boolean): Control {
-    return {
-      kind: "toggle",
-      id: this.id("log"),
-      label: "Colours by the logarithm",
-      value: this.view.isLog ?? isUsual,
-      to: (isLog) => this.change({ isLog }),
-    };
-  }
-
   private stain(): readonly Control[] {
     const { stainName } = this.objects;
     if (stainName === "") return [];
     return [
       {
         kind: "toggle",
-        id: this.id("stain"),
+        id: this.controls.id("stain"),
         label: `${stainName} painted on the objects`,
         value: this.view.isStained,
-        to: (isStained) => this.change({ isStained }),
+        to: (isStained) => this.controls.change({ isStained }),
       },
     ];
   }
@@ -333,17 +125,20 @@ class Layout {
     return [
       {
         kind: "search",
-        id: this.id("search"),
+        id: this.controls.id("search"),
         label: "Find by name or number",
         value: view.search,
         hints: table.names.slice(0, 24),
-        to: (search) => this.change({ search }),
+        to: (search) => this.controls.change({ search }),
       },
       ...found.map((row) =>
-        this.button(`found-${row}`, `Go to ${table.title(row)}`, { picked: row, aim: { row } }),
+        this.controls.button(`found-${row}`, `Go to ${table.title(row)}`, {
+          picked: row,
+          aim: { row },
+        }),
       ),
       ...(view.search.trim() !== "" && found.length === 0
-        ? [this.text("found-none", "Found", "no object")]
+        ? [this.controls.text("found-none", "Found", "no object")]
         : []),
     ];
   }
@@ -353,20 +148,26 @@ class Layout {
     const { table, view } = this;
     const row = view.picked;
     if (row === null || row >= table.count) {
-      return [this.text("card", "Object", "Tap an object, or look at it, to open its card.")];
+      return [
+        this.controls.text("card", "Object", "Tap an object, or look at it, to open its card."),
+      ];
     }
     const title = table.title(row);
     const label = table.label(row);
     const others = [...table.neighbours(row)];
     const wall = largestWall(table, row);
     return [
-      this.text("card", "Object", title === label ? title : `${title} (${label})`),
-      this.button("fly", "Go there", { aim: { row } }),
-      this.button("only", "Only this object", { only: [row] }),
+      this.controls.text("card", "Object", title === label ? title : `${title} (${label})`),
+      this.controls.button("fly", "Go there", { aim: { row } }),
+      this.controls.button("only", "Only this object", { only: [row] }),
       ...(table.hasNeighbours
-        ? [this.button("only-next", "Only it and its neighbours", { only: [row, ...others] })]
+        ? [
+            this.controls.button("only-next", "Only it and its neighbours", {
+              only: [row, ...others],
+            }),
+          ]
         : []),
-      this.button(
+      this.controls.button(
         "select",
         view.selected.includes(row) ? "Take out of the selection" : "Add to the selection",
         {
@@ -375,22 +176,19 @@ class Layout {
             : [...view.selected, row],
         },
       ),
-      this.button("hide", "Hide this object", { hidden: [...view.hidden, row], picked: null }),
-      this.button("close", "Close the card", { picked: null }),
+      this.controls.button("hide", "Hide this object", {
+        hidden: [...view.hidden, row],
+        picked: null,
+      }),
+      this.controls.button("close", "Close the card", { picked: null }),
       ...table.columns.map((column) =>
-        this.text(`card-${column.id}`, column.name, this.valueText(column, row)),
+        this.controls.text(`card-${column.id}`, column.name, valueText(table, column, row)),
       ),
-      ...(table.hasNeighbours ? [this.text("card-next", "Neighbours", String(others.length))] : []),
-      ...(wall === "" ? [] : [this.text("card-wall", "Largest interface, with", wall)]),
+      ...(table.hasNeighbours
+        ? [this.controls.text("card-next", "Neighbours", String(others.length))]
+        : []),
+      ...(wall === "" ? [] : [this.controls.text("card-wall", "Largest interface, with", wall)]),
     ];
-  }
-
-  private valueText(column: ObjectColumn, row: number): string {
-    const value = this.table.value(column.id, row);
-    if (value === null) return "…";
-    if (column.kind === "category") return column.categories?.[value] ?? "none";
-    const text = numberText(value);
-    return text === "" ? "none" : `${text} ${unitText(column.unit)}`.trim();
   }
 
   /** What is done with the selected ones, or with all that show. */
@@ -400,21 +198,21 @@ class Layout {
     const none = selected.length === 0 ? REFUSED.objects : "";
     const isWhole = view.hidden.length === 0 && view.only === null && filtered(view).length === 0;
     return [
-      this.text(
+      this.controls.text(
         "selected",
         "Selected",
         selected.length === 0 ? "none" : `${selected.length} objects`,
       ),
-      this.button("select-shown", "Select all that show", { selected: objects.shown }),
-      this.button(
+      this.controls.button("select-shown", "Select all that show", { selected: objects.shown }),
+      this.controls.button(
         "hide-selected",
         "Hide the selected",
         { hidden: [...view.hidden, ...selected], selected: [], lasso: [] },
         none,
       ),
-      this.button("only-selected", "Only the selected", { only: selected }, none),
-      this.button("unselect", "Select none", { selected: [], lasso: [] }, none),
-      this.button(
+      this.controls.button("only-selected", "Only the selected", { only: selected }, none),
+      this.controls.button("unselect", "Select none", { selected: [], lasso: [] }, none),
+      this.controls.button(
         "all",
         "Show all",
         { hidden: [], only: null, ranges: {}, without: {} },
@@ -428,12 +226,12 @@ class Layout {
     const { gap_um } = this.view;
     return {
       kind: "slider",
-      id: this.id("gap"),
+      id: this.controls.id("gap"),
       label: "Gap between objects",
       value: Math.min(1, gap_um / most_um),
       steps: GAP_STEPS,
       text: `${numberText(gap_um)} µm`,
-      to: (share) => this.change({ gap_um: Number((share * most_um).toPrecision(3)) }),
+      to: (share) => this.controls.change({ gap_um: Number((share * most_um).toPrecision(3)) }),
     };
   }
 
@@ -445,7 +243,7 @@ class Layout {
       (id, i) => numbers.find((column) => column.id === id) ?? numbers[i],
     );
     const choices = (["Across", "Up"] as const).map((label, i) => ({
-      ...this.columnChoice(`scatter-${i}`, label, axes[i].id, numbers, "", (id) => ({
+      ...this.controls.columnChoice(`scatter-${i}`, label, axes[i].id, numbers, "", (id) => ({
         scatter: (i === 0 ? [id, axes[1].id] : [axes[0].id, id]) as [string, string],
         lasso: [],
       })),
@@ -459,15 +257,15 @@ class Layout {
       return colors && bytes ? `rgb(${colors[at]} ${colors[at + 1]} ${colors[at + 2]})` : "#8fa3c0";
     };
     if (xs === null || ys === null)
-      return [...choices, this.text("wait-scatter", "Plot", "loading …")];
+      return [...choices, this.controls.text("wait-scatter", "Plot", "loading …")];
     const lassoed = (lasso: ObjectView["lasso"]) =>
-      this.change({ lasso, selected: inLasso(lasso, objects.flags, [xs, ys]) });
+      this.controls.change({ lasso, selected: inLasso(lasso, objects.flags, [xs, ys]) });
     const name = (column: ObjectColumn) => `${column.name} ${unitText(column.unit)}`.trim();
     return [
       ...choices,
       {
         kind: "picture",
-        id: this.id("scatter"),
+        id: this.controls.id("scatter"),
         label: `Draw around points to select them: ${name(axes[0])} across, ${name(axes[1])} up`,
         height: 0.75,
         version: [
@@ -482,7 +280,7 @@ class Layout {
         text: `${view.selected.length} objects selected`,
         draw: (context, width, height) =>
           drawScatter(context, width, height, table, view, objects.flags, [xs, ys], colorOf),
-        press: (x, y) => this.change({ lasso: [[x, y]], selected: [] }),
+        press: (x, y) => this.controls.change({ lasso: [[x, y]], selected: [] }),
         drag: (x, y) => {
           const [px, py] = view.lasso.at(-1) ?? [x, y];
           return Math.hypot(x - px, y - py) < LASSO_STEP ? null : lassoed([...view.lasso, [x, y]]);
@@ -490,6 +288,14 @@ class Layout {
       },
     ];
   }
+}
+
+function valueText(table: ObjectTable, column: ObjectColumn, row: number): string {
+  const value = table.value(column.id, row);
+  if (value === null) return "…";
+  if (column.kind === "category") return column.categories?.[value] ?? "none";
+  const text = numberText(value);
+  return text === "" ? "none" : `${text} ${unitText(column.unit)}`.trim();
 }
 
 /** The neighbour that a row shares the most with, `liver, 120 µm²`; "": none, or not known. */
@@ -503,6 +309,3 @@ export function largestWall(
   const other = table.neighbours(row)[areas.indexOf(largest)];
   return `${table.title(other)}, ${numberText(largest)} ${unitText("um2")}`;
 }
-
-/** View of a column that does not colour: grey. */
-const GREY = { palette: "cividis", span: [254, 255], isLog: false } as const;

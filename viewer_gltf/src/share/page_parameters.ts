@@ -3,7 +3,7 @@
  * high), `switch` (metres of the room), `disc` (degrees), `stereo` (off, anaglyph, side-by-side), `view` (front,
  * side, top), `panel` (off), `theme` (light, dark), `backdrop` (plain). Pure.
  */
-import { STANDS, type Stand } from "../interaction/orbit_camera";
+import { STANDS, type Stand } from "../interaction/named_views";
 import type { Action } from "../state/actions";
 import { type Parameter, setTo, type Value } from "../state/parameters/kinds";
 import { IN_ADDRESS } from "../state/parameters/table";

@@ -1,0 +1,111 @@
+/** The views of a specimen that have a name, as a flat screen frames them. Lengths are metres of the scene. */
+import { Vector3 } from "three";
+import { around, cornersOf } from "../math/box";
+import type { Vec3 } from "../math/vec3";
+import { framePoints, openingView, towardsEye } from "../render/opening_view";
+import { framingDistance, type Placement } from "../render/placement";
+
+export const FIELD_OF_VIEW_DEG = 40;
+export const FARTHEST_M = 8;
+/** The turn that a specimen opens with: so far to either side, and the time to and fro, s. */
+const SWAY_RAD = Math.PI / 10;
+const SWAY_S = 30;
+/** Parts of it at which the eye may be farthest. */
+const TURNED = [-0.25, -0.125, 0, 0.125, 0.25];
+
+/** A view that has a name: it follows the window's shape as long as nobody moves. */
+export const STANDS = ["opening", "front", "side", "top"] as const;
+export type Stand = (typeof STANDS)[number];
+
+/** Metres of the room. */
+export type Look = Readonly<{
+  position: readonly [number, number, number];
+  target: readonly [number, number, number];
+}>;
+
+/** Shares of the picture's height, at its edges, that something lies over. */
+export type Covered = Readonly<{ top: number; bottom: number }>;
+
+/** Most that is left out of the picture's height when the opening is framed. */
+const MOST_COVERED = 0.6;
+
+export class NamedViews {
+  /** Half of the specimen's edges. */
+  readonly reach: Vector3;
+  /** Outermost points of what is there of the specimen: the opening is framed on them. */
+  private occupied: readonly Vec3[];
+  /** The opening is framed on what is free of the picture. */
+  private covered: Covered = { top: 0, bottom: 0 };
+  private aspect = 1;
+
+  constructor(private readonly placement: Placement) {
+    this.reach = new Vector3(...placement.size).multiplyScalar(0.5);
+    const { x, y, z } = this.reach;
+    this.occupied = cornersOf({ min: [-x, -y, -z], max: [x, y, z] });
+  }
+
+  /** The picture has this shape, and something lies over its edges. */
+  fit(aspect: number, covered: Covered): void {
+    // buttons and words may be higher than a very low picture
+    const share = Math.min(1, MOST_COVERED / (covered.top + covered.bottom || 1));
+    this.covered = { top: share * covered.top, bottom: share * covered.bottom };
+    this.aspect = aspect;
+  }
+
+  /** Outermost points of what is there of the specimen, um. */
+  surround(points: readonly Vec3[]): void {
+    this.occupied = this.inRoom(points);
+  }
+
+  /** Points of the specimen (um) in the room (m), as a flat screen shows it. */
+  inRoom(points: readonly Vec3[]): readonly Vec3[] {
+    const { center, scale } = this.placement;
+    const [cx, cy, cz] = center;
+    return points.map(([x, y, z]) => [(x - cx) * scale, (y - cy) * scale, (z - cz) * scale]);
+  }
+
+  /** The whole specimen: x to the right and y up from the front. */
+  lookAt(stand: Stand, swayed_s: number): Look {
+    const target = [0, 0, 0] as const;
+    if (stand === "opening") return this.lookAround(swayed_s);
+    if (stand === "front") return { position: [0, 0, this.framing(2)], target };
+    if (stand === "side") return { position: [this.framing(0), 0, 0], target };
+    return { position: [0, this.framing(1), 1e-4], target };
+  }
+
+  /** The opening after so much of its turn. */
+  private lookAround(swayed_s: number): Look {
+    const { top, bottom } = this.covered;
+    const free = 1 - top - bottom;
+    const half = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360); // of the picture, a metre away
+    const lens = { fov_rad: 2 * Math.atan(free * half), aspect: this.aspect / free };
+    const still = openingView(around(this.occupied), lens);
+    const sway_rad = SWAY_RAD * Math.sin((2 * Math.PI * swayed_s) / SWAY_S);
+    const direction = { ...still, aside_rad: still.aside_rad + sway_rad };
+    const framed = framePoints(this.occupied, direction, lens, (bottom - top) * half);
+    const target = new Vector3(...framed.target).clamp(this.reach.clone().negate(), this.reach);
+    const away_m = Math.min(FARTHEST_M, framed.distance);
+    const eye = target.clone().addScaledVector(new Vector3(...towardsEye(direction)), away_m);
+    return { position: eye.toArray(), target: target.toArray() };
+  }
+
+  /** Farthest distance of the eye from the middle during the opening's turn. */
+  get openingDistance_m(): number {
+    const looks = TURNED.map((part) => this.lookAround(part * SWAY_S));
+    return Math.max(
+      ...looks.map(({ position, target }) => Math.hypot(...position.map((v, i) => v - target[i]))),
+    );
+  }
+
+  private framing(axis: 0 | 1 | 2): number {
+    const [x, y, z] = this.placement.size;
+    const seen = (
+      [
+        [z, y, x],
+        [x, z, y],
+        [x, y, z],
+      ] as const
+    )[axis];
+    return framingDistance(seen, (FIELD_OF_VIEW_DEG * Math.PI) / 180, this.aspect);
+  }
+}
