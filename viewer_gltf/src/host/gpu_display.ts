@@ -245,7 +245,7 @@ export class GpuDisplay implements Display {
     const { stage, dispatch, report } = this.options;
     if (stage.dataset.stereo === screenStereo) return;
     stage.dataset.stereo = screenStereo;
-    this.stereo.showOnScreen(screenStereo).then(
+    this.stereo.screen.show(screenStereo).then(
       () => this.redraw(),
       (error) => {
         report(error);

@@ -29,7 +29,8 @@ import { howItWorks, isToBeTold } from "./how_it_works";
 import { LastChoice } from "./last_choice";
 import { type MenuEntry, menuEntries } from "./panel/menu_entries";
 import { RoomNotice } from "./panel/notice";
-import { PANEL, RoomPanel } from "./panel/panel";
+import { RoomPanel } from "./panel/panel";
+import { PANEL } from "./panel/panel_surface";
 import type { Setting } from "./panel/placement";
 import { SpecimenMover } from "./specimen_mover";
 

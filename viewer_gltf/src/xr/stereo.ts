@@ -7,11 +7,9 @@ import {
   type Vector3,
   type WebGLRenderer,
 } from "three";
-import { BundleError } from "../bundle/errors";
 import type { Eyes } from "../gpu/eyes";
 import type { PanelView } from "../panel/controls";
 import type { Command } from "../state/commands";
-import type { ScreenStereo } from "../state/parameters/tools";
 import type { ViewerState } from "../state/viewer_state";
 import type { SplitSession } from "./cardboard/split_session";
 import { askInTap } from "./cardboard/user_gesture";
@@ -20,7 +18,7 @@ import type { HandsOptions } from "./hands_options";
 import { betweenEyes } from "./head_pose";
 import type { Hands } from "./interaction";
 import type { MenuEntry } from "./panel/menu_entries";
-import type { ScreenPictures } from "./screen/screen_stereo";
+import { LaterScreen, notLoaded } from "./screen/later_screen";
 import { type ImmersiveMode, XrSession } from "./session";
 import { spreadEyes } from "./stereo_strength";
 
@@ -35,15 +33,6 @@ export type EyeSettings = Readonly<{
   cssPixelsPerInch: number | null;
 }>;
 
-const NOT_LOADED =
-  "The part of the page that shows stereo could not be loaded. Check the connection, load " +
-  "the page again, and tap again.";
-
-/** The error for a part of the page that did not load. */
-function notLoaded(cause: unknown): never {
-  throw new BundleError(NOT_LOADED, { cause });
-}
-
 export class Stereo {
   readonly headset: XrSession;
   /** Gaze, hands and the panel in the room; null until stereo is first wanted. */
@@ -52,9 +41,8 @@ export class Stereo {
   /** The page's own choices, for the panel in the room as soon as it is loaded. */
   private choices: Partial<PanelView> = {};
   private split: SplitSession | null = null;
-  /** What the page's own screen shows for two eyes, once it was asked for. */
-  private pictures: ScreenPictures | null = null;
-  private onScreen: ScreenStereo = "off";
+  /** Stereo on the page's own screen. */
+  readonly screen: LaterScreen;
   private eyes: EyeSettings = { distance_m: 0.063, strength: 1, cssPixelsPerInch: null };
   /** A split screen that is being asked for. */
   private starting: Promise<readonly string[]> | null = null;
@@ -66,6 +54,7 @@ export class Stereo {
     private readonly renderer: WebGLRenderer,
     private readonly options: StereoOptions,
   ) {
+    this.screen = new LaterScreen(renderer);
     this.headset = new XrSession(
       renderer,
       () => {
@@ -105,29 +94,14 @@ export class Stereo {
     return this.headset.start(xr, mode, this.prepare());
   }
 
-  /** Show stereo on the page's own screen. Rejects with a BundleError where its part could not be loaded. */
-  async showOnScreen(kind: ScreenStereo): Promise<void> {
-    this.onScreen = kind;
-    if (kind === "off" || this.pictures !== null) return;
-    const { ScreenPictures } = await import("./screen/screen_stereo").catch(notLoaded);
-    this.pictures ??= new ScreenPictures(this.renderer);
-  }
-
   /** The eyes before the page's own screen, which look at `focus`: two, where it shows stereo. */
   followScreen(eyes: Eyes, camera: PerspectiveCamera, focus: Vector3): void {
-    const { pictures, onScreen } = this;
-    const pupils_m = this.eyes.distance_m * this.eyes.strength;
-    if (pictures === null || onScreen === "off") eyes.followScreen(this.renderer, camera);
-    else pictures.follow(eyes, camera, focus, pupils_m, onScreen);
+    this.screen.follow(eyes, camera, focus, this.eyes.distance_m * this.eyes.strength);
   }
 
   /** What the user has set for the eyes. */
   setEyes(eyes: EyeSettings): void {
-    const { distance_m, strength, cssPixelsPerInch } = this.eyes;
-    const isSame =
-      eyes.distance_m === distance_m &&
-      eyes.strength === strength &&
-      eyes.cssPixelsPerInch === cssPixelsPerInch;
+    const isSame = JSON.stringify(eyes) === JSON.stringify(this.eyes);
     this.eyes = eyes;
     if (!isSame) this.split?.set(this.splitOptions);
   }
@@ -234,9 +208,7 @@ export class Stereo {
   present(draw: () => void): void {
     const { split } = this;
     if (!split?.isRunning) {
-      const { pictures } = this;
-      const isAnaglyph = this.onScreen === "anaglyph" && this.kind === null;
-      if (isAnaglyph && pictures !== null) pictures.present(draw);
+      if (this.kind === null) this.screen.present(draw);
       else draw();
       return;
     }
@@ -321,6 +293,6 @@ export class Stereo {
   dispose(): void {
     this.hands?.dispose();
     this.split?.dispose();
-    this.pictures?.dispose();
+    this.screen.dispose();
   }
 }

@@ -3,9 +3,9 @@
  * always there and opens it.
  */
 import { Group, type Matrix4, Vector3 } from "three";
-import type { Hit, RoomRay, Target } from "../../interaction/ray_pointer";
+import type { RoomRay, Target } from "../../interaction/ray_pointer";
 import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../../panel/canvas/bar";
-import { type CanvasWish, holds, type Mark, type Region } from "../../panel/canvas/draw_list";
+import type { CanvasChange, CanvasWish, Region } from "../../panel/canvas/draw_list";
 import {
   type CanvasView,
   CONTENT,
@@ -28,6 +28,7 @@ import type { Command } from "../../state/commands";
 import { START_VOLUMES } from "../../state/parameters/volumes";
 import type { ViewerState } from "../../state/viewer_state";
 import { CanvasQuad, type Spot } from "./canvas_quad";
+import { PANEL, PanelSurface, type PlacedTarget } from "./panel_surface";
 import {
   type Bearing,
   barPitch,
@@ -39,16 +40,10 @@ import {
   pointAt,
   type Setting,
 } from "./placement";
+import { SwatchFan } from "./swatch_fan";
 
-/** Over a specimen that is brought nearer than the panel, by which it is brought; under a notice. */
-const RENDER_ORDER = 1800;
 /** Time between readings of values outside the state (frame time, gazed tile), s. */
 const REFRESH_S = 0.5;
-/** Time, s, after which colours lie beside a swatch that is looked at. */
-const FAN_S = 0.4;
-
-export const PANEL = "panel:";
-
 export type RoomPanelOptions = Readonly<{
   layOut: (view: PanelView) => Layout;
   onWish: (wish: Action | Command) => void;
@@ -65,85 +60,11 @@ export type RoomPanelOptions = Readonly<{
   isPainted?: boolean;
 }>;
 
-type Shown = Readonly<{ marks: readonly Mark[]; regions: readonly Region[] }>;
-
-function placeOf({ rect: { x, y, width, height } }: Region): string {
-  return `${x} ${y} ${width} ${height}`;
-}
-
-/** A quad with targets: the page, or the bar. */
-class Surface implements Target {
-  readonly isOnTop = true;
-  shown: Shown = { marks: [], regions: [] };
-  /** The places of the targets, and the number of times that they have changed. */
-  private arrangement = "";
-  private changes = 0;
-
-  constructor(
-    private readonly name: string,
-    readonly quad: CanvasQuad,
-    private readonly onChoose: (region: Region, spot: Spot, ray: RoomRay, isPress: boolean) => void,
-    /** Lays the targets out again, if a choice has changed them. */
-    private readonly freshen: () => void,
-  ) {
-    quad.drawOver(RENDER_ORDER);
-  }
-
-  /** Changes whenever a target appears, disappears or moves. */
-  get layout(): string {
-    return `${this.name} ${this.quad.mesh.visible} ${this.changes}`;
-  }
-
-  /** Whether it looks otherwise than before. */
-  show(shown: Shown): boolean {
-    this.shown = shown;
-    const arrangement = shown.regions.map((each) => `${each.id} ${placeOf(each)}`).join("\n");
-    if (arrangement !== this.arrangement) this.changes++;
-    this.arrangement = arrangement;
-    return this.quad.show(shown.marks);
-  }
-
-  /** Light up what is pointed at. */
-  light(id: string | null): void {
-    this.quad.light(this.shown.regions.find((region) => region.id === id)?.rect ?? null);
-  }
-
-  meet(ray: RoomRay): Hit | null {
-    const spot = this.quad.meet(ray);
-    if (spot === null) return null;
-    const region = this.shown.regions.find(({ rect }) => holds(rect, spot));
-    const { distance_m } = spot;
-    if (region === undefined) return { key: null, distance_m };
-    const { id, repeats, isStep, isCarry, isGlance } = region;
-    const hit: Hit = { key: PANEL + id, distance_m, place: placeOf(region), isStep, isGlance };
-    if (repeats !== undefined) return { ...hit, repeats, isStep: true };
-    if (isCarry) return { ...hit, hold: "carry" };
-    if (!region.isSlide) return hit;
-    // what is first taken hold of can be carried by the gaze alone
-    return { ...hit, hold: region.press === undefined ? "slide" : "carry" };
-  }
-
-  choose({ key }: Hit, ray: RoomRay): void {
-    if (key !== null) this.grant(key, ray, true);
-  }
-
-  drag(key: string, ray: RoomRay): void {
-    this.freshen(); // what was taken hold of is part of it by now
-    this.grant(key, ray, false);
-  }
-
-  private grant(key: string, ray: RoomRay, isPress: boolean): void {
-    const region = this.shown.regions.find(({ id }) => PANEL + id === key);
-    const spot = this.quad.meet(ray);
-    if (region === undefined || (spot === null && !region.isCarry)) return;
-    this.onChoose(region, spot ?? { x: 0, y: 0, distance_m: 0 }, ray, isPress);
-  }
-}
-
 export class RoomPanel {
   readonly group = new Group();
-  private readonly menu: Surface;
-  private readonly bar: Surface;
+  readonly quad: CanvasQuad;
+  private readonly menu: PanelSurface;
+  private readonly bar: PanelSurface;
   private page: Page | null = null;
   private view: PanelView = START_VIEW;
   private section: CanvasView = START_CANVAS;
@@ -156,9 +77,7 @@ export class RoomPanel {
   private wantsPlace: "bar" | "head" | null = null;
   /** The last request: a button that is held still asks for nothing more. */
   private dragged = "";
-  /** The target that is pointed at, and for how long. */
-  private lit: string | null = null;
-  private lit_s = 0;
+  private readonly fan = new SwatchFan();
   private lastMode = START_VOLUMES.mode;
   /** The page of the section from which a group was opened. */
   private sectionPage = 0;
@@ -174,8 +93,14 @@ export class RoomPanel {
     const freshen = () => {
       if (this.isStale && this.state !== null) this.refresh(this.state);
     };
-    this.menu = new Surface("menu", new CanvasQuad(WIDTH, HEIGHT, context), choose, freshen);
-    this.bar = new Surface("bar", new CanvasQuad(BAR_WIDTH, BAR_HEIGHT, context), choose, freshen);
+    this.quad = new CanvasQuad(WIDTH, HEIGHT, context);
+    this.menu = new PanelSurface("menu", this.quad, choose, freshen);
+    this.bar = new PanelSurface(
+      "bar",
+      new CanvasQuad(BAR_WIDTH, BAR_HEIGHT, context),
+      choose,
+      freshen,
+    );
     this.group.name = "panel";
     this.group.visible = false;
     this.group.add(this.menu.quad.mesh, this.bar.quad.mesh);
@@ -184,10 +109,6 @@ export class RoomPanel {
   /** In the order in which rays meet them. */
   get targets(): readonly Target[] {
     return [this.menu, this.bar];
-  }
-
-  get quad(): CanvasQuad {
-    return this.menu.quad;
   }
 
   /** The page's own panel has chosen it, and this one shows it. */
@@ -250,7 +171,11 @@ export class RoomPanel {
     this.bar.quad.place(pointAt(under, eye, panelDistance_m(setting)), eye);
     this.bar.quad.mesh.visible = !this.isCarrying;
     this.rested_s += dt_s;
-    this.fan(dt_s);
+    const fanned = this.fan.advance(dt_s, this.section.fanned);
+    if (fanned !== this.section.fanned) {
+      this.section = { ...this.section, fanned };
+      this.isStale = true;
+    }
     if (state !== this.state || this.rested_s >= REFRESH_S) this.isStale = true;
     if (this.isOpen) this.view = keepPlaces(this.view, state);
     this.state = state;
@@ -265,19 +190,14 @@ export class RoomPanel {
   /** Light up what is pointed at. */
   light(key: string | null): void {
     const id = key?.startsWith(PANEL) ? key.slice(PANEL.length) : null;
-    if (id !== this.lit) this.lit_s = 0;
-    this.lit = id;
+    this.fan.point(id);
     for (const surface of [this.menu, this.bar]) surface.light(id);
   }
 
   /** The bar and what the panel has now, each with a point of it in the room: of a slider at 0.3 of it. */
-  get places(): readonly Readonly<{ id: string; label: string; at: Vector3 }>[] {
+  get places(): readonly PlacedTarget[] {
     if (!this.group.visible) return []; // a flat screen
-    const all = [...(this.isOpen ? this.menu.shown.regions : []), ...this.bar.shown.regions];
-    return all.flatMap(({ id, label, isSlide }) => {
-      const at = this.pointOf(id, isSlide ? 0.3 : 0.5);
-      return at === null ? [] : [{ id, label, at }];
-    });
+    return [...(this.isOpen ? this.menu.places : []), ...this.bar.places];
   }
 
   /** What was ahead is another way of the room now: the panel stays where it is to the head. */
@@ -290,11 +210,7 @@ export class RoomPanel {
 
   /** Where the middle of a region is in the room; for tests. */
   pointOf(id: string, across = 0.5, down = 0.5): Vector3 | null {
-    for (const { quad, shown } of [this.menu, this.bar]) {
-      const region = shown.regions.find((each) => each.id === id);
-      if (region !== undefined && quad.mesh.visible) return quad.pointOf(region.rect, across, down);
-    }
-    return null;
+    return this.menu.pointOf(id, across, down) ?? this.bar.pointOf(id, across, down);
   }
 
   dispose(): void {
@@ -312,22 +228,6 @@ export class RoomPanel {
   private go(section: CanvasView): void {
     this.section = section;
     this.view = { ...this.view, channelsWithCard: null };
-    this.isStale = true;
-  }
-
-  /**
-   * The colours of the swatch that is looked at lie over the channel's name until the gaze has left the row for
-   * as long: a head that trembles is still there.
-   */
-  private fan(dt_s: number): void {
-    this.lit_s += dt_s;
-    if (this.lit_s < FAN_S) return;
-    const { fanned } = this.section;
-    const swatch = this.lit?.endsWith("/open") ? this.lit.slice(0, -"/open".length) : null;
-    const isInRow = fanned !== null && this.lit?.startsWith(`${fanned}/`) === true;
-    const next = swatch ?? (isInRow ? fanned : null);
-    if (next === fanned) return;
-    this.section = { ...this.section, fanned: next };
     this.isStale = true;
   }
 
@@ -361,50 +261,53 @@ export class RoomPanel {
   }
 
   private grant(wish: CanvasWish): void {
-    const { options, section } = this;
+    const { options } = this;
     if (typeof wish === "string") options.onWish(wish);
     else if ("panel" in wish) {
       this.view = changePanel(this.view, wish);
       if (wish.panel === "lenses") options.onLenses(wish.lenses);
     } else if ("type" in wish) options.onWish(wish);
-    else {
-      switch (wish.canvas) {
-        case "open":
-          this.wantsPlace = "bar";
-          break;
-        case "tab":
-          this.go({ ...START_CANVAS, tab: wish.section });
-          break;
-        case "fan":
-          this.section = { ...section, fanned: wish.group };
-          break;
-        case "group":
-          this.take({ picked: wish.group });
-          this.sectionPage = section.page;
-          this.go({ ...section, group: wish.group, page: 0, fanned: null });
-          break;
-        case "page":
-          this.section = { ...section, page: wish.page, fanned: null };
-          break;
-        case "back":
-          if (section.group === null) this.go({ ...START_CANVAS, tab: null });
-          else this.go({ ...section, group: null, page: this.sectionPage });
-          break;
-        case "announce":
-          options.onAnnounce(wish.text);
-          break;
-        case "undo":
-          options.onUndo();
-          break;
-        case "close":
-          this.close();
-          break;
-        case "leave":
-          options.onLeave();
-          break;
-        case "carry":
-          break; // see choose
-      }
+    else this.act(wish);
+  }
+
+  private act(wish: CanvasChange): void {
+    const { options, section } = this;
+    switch (wish.canvas) {
+      case "open":
+        this.wantsPlace = "bar";
+        break;
+      case "tab":
+        this.go({ ...START_CANVAS, tab: wish.section });
+        break;
+      case "fan":
+        this.section = { ...section, fanned: wish.group };
+        break;
+      case "group":
+        this.take({ picked: wish.group });
+        this.sectionPage = section.page;
+        this.go({ ...section, group: wish.group, page: 0, fanned: null });
+        break;
+      case "page":
+        this.section = { ...section, page: wish.page, fanned: null };
+        break;
+      case "back":
+        if (section.group === null) this.go({ ...START_CANVAS, tab: null });
+        else this.go({ ...section, group: null, page: this.sectionPage });
+        break;
+      case "announce":
+        options.onAnnounce(wish.text);
+        break;
+      case "undo":
+        options.onUndo();
+        break;
+      case "close":
+        this.close();
+        break;
+      case "leave":
+        options.onLeave();
+        break;
+      case "carry":
+        break; // see choose
     }
   }
 }
