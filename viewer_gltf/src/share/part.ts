@@ -7,20 +7,25 @@ import { initialState } from "../state/initial_state";
 import { isPassingStep, writeAddress } from "./address";
 import { SETTINGS } from "./page_parameters";
 
+type LinkCode = typeof import("./link_of");
+
 class SharePart implements Part {
   readonly id = "share";
   readonly commands = { share: () => void this.share() };
 
+  /** The code that writes links; null until a link is first wanted. */
+  private code: LinkCode | null = null;
+
   constructor(private readonly host: PartHost) {}
 
   private async share(): Promise<void> {
+    if (this.code === null) this.code = await import("./link_of").catch(() => null);
+    if (this.code === null) this.host.announce(NOT_LOADED);
+    else await this.shareBy(this.code);
+  }
+
+  private async shareBy({ leftOutOfLink, linkOf }: LinkCode): Promise<void> {
     const { host } = this;
-    const part = await import("./link_of").catch(() => null);
-    if (part === null) {
-      host.announce(NOT_LOADED);
-      return;
-    }
-    const { leftOutOfLink, linkOf } = part;
     const address = new URL(pageAddress());
     for (const name of SETTINGS) address.searchParams.delete(name);
     address.hash = linkOf(host, initialState(host.bundle.manifest));

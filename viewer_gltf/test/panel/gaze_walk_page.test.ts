@@ -87,6 +87,8 @@ async function walk(stand: Stand, only = "") {
         }
         // what was chosen already, or told for another control, comes after another
         for (const id of again) {
+          // code that is loaded when it is first wanted has come by then
+          await new Promise((resolve) => setTimeout(resolve, 500));
           const following = walked[walked.lastIndexOf(id) + 1];
           if (ids().includes(following)) gaze(following);
           pass(6); // what was told has gone
