@@ -404,7 +404,7 @@ def test_a_build_with_nothing_to_do_reads_no_file_of_units_and_stage(
     hashed: list[Path] = []
     _count_hashed(hashed, monkeypatch)
     _go_on(out)
-    assert hashed == []
+    assert [file for file in hashed if (out / "bundle") not in file.parents] == []
 
 
 def test_a_copy_with_new_times_is_hashed_once(

@@ -84,13 +84,13 @@ def test_another_version_of_a_package_of_the_extra_makes_results_with_maps_again
     assert main(command) == 0
     assert keys(out)[0] == units
     assert keys(out)[1] != bundle
-    monkeypatch.setattr("stereocell.steps.unit.unwrapper_version", lambda: "99")
+    monkeypatch.setattr("stereocell.planning.unit_steps.unwrapper_version", lambda: "99")
     assert main(command) == 0
     assert all(key != units[name] for name, key in keys(out)[0].items())
 
     for package in PACKAGES:
         monkeypatch.setitem(sys.modules, package, None)
-    monkeypatch.setattr("stereocell.steps.unit.unwrapper_version", unwrapper_version)
+    monkeypatch.setattr("stereocell.planning.unit_steps.unwrapper_version", unwrapper_version)
     capsys.readouterr()
     for phase in ("bundle", "units"):
         assert main([phase, str(out), "--workers", "1"]) == 2

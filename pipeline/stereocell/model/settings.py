@@ -8,6 +8,7 @@ from stereocell.model.errors import UsageError
 AUTO = "auto"
 MAX_LENGTH_UM = 1e12  # um: float32 and browsers still draw places so far from the origin
 MAX_COUNT = 2**53  # whole numbers up to here stay whole in JSON and in float64
+EIGHT_BITS = 8  # of a voxel in the stage; with more, the voxels as measured are kept as well
 MAX_VOXEL_VALUE = 1e30  # squares and differences of larger ones overflow float32
 
 

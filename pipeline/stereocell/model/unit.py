@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from stereocell.model.mesh import Lod, Mesh
 
-EIGHT_BITS = 8  # a voxel of the volume; with other numbers the voxels as measured are kept, too
-
 
 @dataclass(frozen=True, slots=True)
 class Closed:

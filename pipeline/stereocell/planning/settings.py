@@ -21,13 +21,13 @@ from stereocell.model.settings import (
     AUTO,
     COUNT,
     COUNT_OR_NONE,
+    EIGHT_BITS,
     LENGTH_UM,
     Bounds,
     Flag,
     require_bounds,
     setting,
 )
-from stereocell.model.unit import EIGHT_BITS
 from stereocell.objects.options import ObjectOptions
 from stereocell.planning.setting_values import finite, require_utf8
 from stereocell.storage.documents import SETTINGS

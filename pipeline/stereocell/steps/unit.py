@@ -18,10 +18,11 @@ from stereocell.meshes.rims import thin_rims
 from stereocell.model.lattice import Lattice, Step
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
+from stereocell.model.settings import EIGHT_BITS
 from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
-from stereocell.model.unit import EIGHT_BITS, Cover, Unit
+from stereocell.model.unit import Cover, Unit
 from stereocell.model.volume import Volume
 from stereocell.steps.closed_copy import close_tile
 from stereocell.textures.ambient_occlusion import find_ambient_visibility

@@ -86,6 +86,7 @@ def write_usdz(
         if shown is not None and (found := list(_read_parts(stage, prims, some, shown))):
             break
     if shown is None or not found:
+        path.unlink(missing_ok=True)
         return None
     boxes = [hinted_box(prim) for prim in prims]
     low = np.min([box[0] for box in boxes], axis=0)
