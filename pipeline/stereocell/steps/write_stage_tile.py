@@ -52,7 +52,7 @@ class TableOfTile:
 
 @dataclass(frozen=True, slots=True)
 class WriteStageTile(Keyed):
-    """What one tile of the stage depends on.
+    """The key of one tile of the stage: its fields are all that the tile depends on.
 
     content  the tile without its channels
     shared   IDs of the channels whose volume is another channel's: they have surfaces alone

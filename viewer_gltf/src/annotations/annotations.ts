@@ -136,7 +136,7 @@ export class Marks {
     this.measured.update(this.sight);
   }
 
-  /** Of each measured point: each shown channel's value, as `DAPI 1210`; those that have come. */
+  /** For each measured point the values of the shown channels that have come, as `DAPI 1210`. */
   get values(): readonly (readonly string[])[] {
     return this.state.measured.map((_, i) =>
       this.measured

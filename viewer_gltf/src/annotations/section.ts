@@ -19,7 +19,7 @@ declare module "../state/commands" {
 }
 
 const POINT_NAMES = ["First point", "Second point", "Third point"] as const;
-/** So many finished ones have a row; the file has all. */
+/** Most finished measurements that have a row in the panel; the CSV file lists all of them. */
 const MAX_LISTED = 12;
 
 /** Of the newest one, then of the list; null: there is none. */

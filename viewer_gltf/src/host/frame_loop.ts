@@ -78,7 +78,7 @@ export class FrameLoop {
     this.pulse.stop();
   }
 
-  /** What is looked at, or from where, is another: the picture has to follow at once. */
+  /** The view or the specimen in it has changed: the picture has to follow at once. */
   redraw(): void {
     this.isStale = true;
     this.pulse.wake();

@@ -26,7 +26,7 @@ import type { Undo } from "./undo";
 /** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 
-/** What the page and the browser offer. */
+/** The facts about page and browser on which the panel depends. */
 export type PageFacts = Readonly<{
   subtitle: string;
   stereo: XrSupport;

@@ -29,7 +29,7 @@ export type FlatScreen = Readonly<{
   camera: PerspectiveCamera;
   /** CSS pixels. */
   height_px: number;
-  /** What is looked at, room: the scale bar is true there. */
+  /** The point that is looked at, in the scene, m: the scale bar is true there. */
   focus: Vector3;
 }>;
 

@@ -20,9 +20,9 @@ export type SceneFrameOptions = Readonly<{
   stage: HTMLElement;
   room: Room;
   hybrid: Hybrid;
-  /** Of the specimen, um. */
+  /** The box of the specimen, um. */
   bounds: Bounds;
-  /** What the frames are of; made after the picture, which gives it what its shaders share. */
+  /** The contents of the frames. They are made after the picture, whose uniforms their shaders share. */
   shown: () => Readonly<{
     contents: Contents;
     parts: Parts;

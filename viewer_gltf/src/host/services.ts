@@ -14,11 +14,11 @@ export type ColorLegend = Readonly<{
 
 /** The objects of the label maps that are shown. */
 export interface ObjectMaps {
-  /** What the colours of a channel's objects mean; null: they have the stage's, or have not come. */
+  /** Returns the legend of a channel's objects; null: they have the stage's colours, or have not come. */
   legend(channel: string): ColorLegend | null;
   /** Some of the objects' colours, by channel. */
   readonly colors: ReadonlyMap<string, readonly string[]>;
-  /** What a link says of a channel's objects, and how many it leaves out; null: their table has not come. */
+  /** Returns a link's text on a channel's objects, and how many it leaves out; null: their table has not come. */
   linked(channel: string, view: ObjectView): Readonly<{ text: string; leftOut: number }> | null;
   /** Rows of the objects that show, by channel. */
   readonly rowsShown: ReadonlyMap<string, readonly number[]>;
@@ -28,7 +28,7 @@ export interface ObjectMaps {
 
 /** Pictures of the view, for whatever saves them. */
 export interface PosterMaker {
-  /** What the screen shows, no larger than so many pixels, as soon as can be. Rejects with a DOMException. */
+  /** Makes an image of the screen, with a longest edge of at most so many pixels. Rejects with a DOMException. */
   poster(longest_px: number): Promise<Blob>;
 }
 
@@ -40,7 +40,7 @@ export interface HandleLights {
 
 /** The measured points. */
 export interface MeasuredPoints {
-  /** Of each measured point: each shown channel's value, as `DAPI 1210`; those that have come. */
+  /** For each measured point the values of the shown channels that have come, as `DAPI 1210`. */
   readonly values: readonly (readonly string[])[];
 }
 

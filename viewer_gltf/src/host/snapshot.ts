@@ -41,7 +41,7 @@ export type Snapshot = Readonly<{
   frame_ms: number;
   /** The settings of the last frame. */
   settings: QualitySettings;
-  /** Of each measured point: each shown channel's value there. */
+  /** For each measured point the value of each shown channel there. */
   measuredValues: readonly (readonly string[])[];
   /** Of three's own count. */
   gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;

@@ -34,7 +34,7 @@ const OBJECT_IN_ROOM_M = 0.15;
 
 export type ViewpointOptions = Readonly<{
   canvas: HTMLCanvasElement;
-  /** Of the specimen, um. */
+  /** The box of the specimen, um. */
   bounds: Bounds;
   specimen: Specimen;
   /** Made after the viewpoint. */

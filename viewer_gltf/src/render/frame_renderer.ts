@@ -36,9 +36,9 @@ export type Drawn = Readonly<{
   traced: TracedVolume;
   /** Surfaces that are not opaque now. */
   panes: readonly BlendedScene[];
-  /** What else is not, besides the room's own. */
+  /** Other objects that are not opaque, besides those of the scene itself. */
   overlays: readonly Object3D[];
-  /** Of the specimen, um. */
+  /** The box of the specimen, um. */
   bounds: Bounds;
   /** The tile that is drawn as a volume among surfaces, um; null: there is none. */
   openTile: Bounds | null;

@@ -48,7 +48,7 @@ const OTHERS = PARAMETERS.filter((row) => !NAMED_APART.has(row));
 
 export type Shared = Readonly<{ actions: readonly Action[]; camera: CameraView | null }>;
 
-/** What a link says of a channel's objects; "": nothing. */
+/** Returns a link's text on a channel's objects; "": the link has none. */
 type WriteObjects = (channel: string, view: ObjectView) => string;
 
 /**

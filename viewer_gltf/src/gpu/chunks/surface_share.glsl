@@ -7,7 +7,7 @@ uniform float uTaken;  // what the volume takes, 0..1: in the disc, or everywher
 uniform bool uInDisc;
 uniform bool uCrosses;  // whether the volume's picture is mixed with the surface's in the disc
 
-// What the volume takes of the surface at a place of the room, 0..1.
+// Returns the share of the surface that the volume takes at a place of the scene, 0..1.
 float shareTaken(vec3 p) {
   return uTaken * (uInDisc ? discWeight(p, uApex, uAxis, uDisc) : 1.0);
 }
