@@ -19,7 +19,7 @@ export type Snapshot = Readonly<{
   look: Look;
   /** Whether all tiles show, in the first channel. */
   hasFirstPicture: boolean;
-  /** Of all shown channels. */
+  /** The progress of the overviews of all shown channels. */
   overview: Progress;
   isLoading: boolean;
   /** Triangles of the surfaces on screen. */
@@ -29,7 +29,7 @@ export type Snapshot = Readonly<{
   volumes: readonly VolumeStatus[];
   /** Of the GPU's memory. */
   volumeBytes: number;
-  /** Of the path-traced picture: samples a pixel, and the mip level; null: there is none. */
+  /** The path-traced picture's samples of a pixel and its mip level; null: there is no such picture. */
   traced: Readonly<{ samples: number; level: number | null }>;
   /** The tile in the middle of the view, if it is near. */
   gazed: string | null;

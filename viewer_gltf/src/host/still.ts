@@ -7,7 +7,7 @@ export const TRACED_SAMPLES = 192;
 export type Still = Readonly<{
   frames: number;
   isDone: boolean;
-  /** Of each pixel, where it is traced; null: it is not. */
+  /** Samples of each pixel, where it is traced; null: it is not. */
   samples: number | null;
 }>;
 

@@ -143,7 +143,7 @@ class ObjectSection {
     ];
   }
 
-  /** What can be done with the object that was picked, and all that is known of it: there may be many columns. */
+  /** The acts on the picked object, and all its values: there may be many columns. */
   private card(): readonly Control[] {
     const { table, view } = this;
     const row = view.picked;
@@ -191,7 +191,7 @@ class ObjectSection {
     ];
   }
 
-  /** What is done with the selected ones, or with all that show. */
+  /** The acts on the selected objects, or on all that show. */
   private choiceOfMany(): readonly Control[] {
     const { view, objects } = this;
     const { selected } = view;

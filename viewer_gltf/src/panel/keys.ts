@@ -66,7 +66,7 @@ export class KeyTable {
     return this.byName.get(name)?.key.label ?? "";
   }
 
-  /** What a key asks for, or why it does nothing now; null: there is no such key. */
+  /** Returns the request of a key, or why it does nothing now; null: there is no such key. */
   wishOf(name: string, context: KeyContext): Wish | Refusal | null {
     const found = this.byName.get(name);
     if (found === undefined) return null;

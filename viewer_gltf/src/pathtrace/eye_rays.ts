@@ -78,7 +78,7 @@ export type ViewsBefore = Readonly<{
   mayTremble: boolean;
 }>;
 
-/** What earlier frames are worth to paths from the present views. */
+/** Returns how much earlier frames are worth to paths from the present views. */
 export function historyOf(
   views: readonly TraceView[],
   { anchors, seen, middle, mayTremble }: ViewsBefore,

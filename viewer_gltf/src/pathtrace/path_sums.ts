@@ -32,7 +32,7 @@ export class PathSums {
   private sample = 0;
   /** Samples of a pixel since the picture began; tiles that rest have fewer. */
   samples = 0;
-  /** Those of them whose paths are from the present view. */
+  /** The samples among them whose paths are from the present view. */
   rested = 0;
   /** Where among the tiles the next turn begins, 0..1. */
   private turn = 0;

@@ -102,7 +102,7 @@ export class Tracer {
     return this.sums.samples;
   }
 
-  /** Those of them whose paths are from the present view. */
+  /** The samples among them whose paths are from the present view. */
   get rested(): number {
     return this.sums.rested;
   }

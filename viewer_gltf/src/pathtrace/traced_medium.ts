@@ -10,7 +10,7 @@ import type { VolumeSource } from "../volumes/volume_source";
 import { type ChannelSources, MediumLoader, type MediumTexels, withVolumes } from "./medium_loader";
 import { frameOf } from "./texel_frame";
 
-/** What is wanted of the volumes. */
+/** The channels and tiles whose texels are wanted. */
 export type MediumRequest = Readonly<{ channels: readonly string[]; tiles: readonly string[] }>;
 
 export type MediumHandlers = Readonly<{

@@ -93,7 +93,7 @@ const NO_PART: Pick<SurfacePart, "uniforms" | "vertex" | "fragment"> = {
   fragment: { declared: "", color: "" },
 };
 
-/** What is inserted into the shaders of three's standard material, and before which of its chunks. */
+/** The text that is inserted into the shaders of three's standard material, by `patch`. */
 const VERTEX_DECLARED = includeChunks(
   "varying vec3 vRoom;\n#include <chunks/both_eyes_vertex>\n",
   CHUNKS,

@@ -49,7 +49,7 @@ export type Surface = Readonly<{
   materials: readonly MeshStandardMaterial[];
   /** Linear, as the glb has it. */
   colors: readonly Rgb[];
-  /** Those that are drawn when it is on screen. */
+  /** The number of triangles that are drawn when the surface is on screen. */
   triangles: number;
   blend: BlendedSurface;
   /** Leave the thin rests at a face out from now on; null: draw all. */

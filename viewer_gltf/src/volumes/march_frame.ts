@@ -49,7 +49,7 @@ export function lightByRoom(light: MarchLight): void {
 /** Uniforms that all tiles share in a frame, by reference. */
 export type MarchFrame = Readonly<{
   uSceneDepth: { value: DepthTexture };
-  /** Of the nearest translucent surface, if there is any. */
+  /** The depth of the nearest translucent surface, if there is one. */
   uPaneDepth: { value: DepthTexture };
   uHasPane: { value: boolean };
   uNoise: { value: Texture };

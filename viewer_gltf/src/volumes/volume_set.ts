@@ -33,7 +33,7 @@ export class VolumeSet {
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
-  /** What is drawn. */
+  /** The marches that draw the volumes. */
   readonly marches: Marches;
   readonly appearances: ChannelAppearances;
   private state: ViewerState | null = null;

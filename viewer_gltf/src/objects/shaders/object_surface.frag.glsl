@@ -1,4 +1,4 @@
-// What the surfaces of a label map have beside all others, in the fragment shader.
+// The colours of a label map's surfaces, for the fragment shader of surfaces.
 flat varying float vObject;
 varying float vStain;
 uniform float uStained;

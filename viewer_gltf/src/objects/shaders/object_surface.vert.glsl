@@ -1,4 +1,4 @@
-// What the surfaces of a label map have beside all others, in the vertex shader.
+// The places of a label map's surfaces, for the vertex shader of surfaces.
 attribute float object_row;  // the row of the object in its table
 attribute vec3 object_outwards;  // the direction out of the object, the same for all vertices in one place
 attribute float _paint;  // intensity of the painted stain; 0 where a mesh has none

@@ -1,4 +1,4 @@
-// What surfaces have beside three's standard material. The calls are inserted by ../blend_material.ts.
+// The functions that surfaces call beside three's standard material. ../blend_material.ts inserts the calls.
 varying vec3 vRoom;
 #include <chunks/both_eyes_fragment>
 #include <chunks/clip_planes>

@@ -15,7 +15,7 @@ export function notLoaded(cause: unknown): never {
 }
 
 export class LaterScreen {
-  /** What the screen shows for two eyes, once it was asked for. */
+  /** The pictures for two eyes on the screen; null until stereo there is first wanted. */
   private pictures: ScreenPictures | null = null;
   private kind: ScreenStereo = "off";
 
