@@ -337,10 +337,9 @@ describeInChromium("the objects of a label map", () => {
     expect(lines[0]).toBe("label,name,volume_um3 (um3),x_um (um),CD8 (counts),row,cell_type");
     expect(lines).toHaveLength(selected.length + 1);
     await choose("color-by", "CD8");
-    await page.keyboard.press("l");
-    await expect.poll(() => page.evaluate(() => location.hash)).toContain("objects=");
+    const { hash } = new URL(await stand.viewer.writeLink());
+    expect(hash).toContain("objects=");
     const linked = await view();
-    const hash = await page.evaluate(() => location.hash);
     await open(hash);
     await stand.viewer.settled();
     await expect.poll(async () => (await view()).selected).toEqual(selected);

@@ -89,11 +89,10 @@ describeInChromium("the editor of value and gradient", () => {
     await page().keyboard.press("ArrowRight"); // moves the shape, not the specimen
     const [kept, added] = await shapes();
     expect(added.values[0]).toBeCloseTo(0.4 + 2 / 255, 3);
-    await page().keyboard.press("l");
+    const address = await stand.viewer.writeLink();
     await expect.poll(said).not.toBe("");
     await expect.poll(said).toBe(""); // it lies over the picture
     const own = await picture();
-    const address = page().url();
     await page().goto("about:blank");
     await stand.viewer.open(address);
     expect(difference(own, await picture())).toBeLessThan(SAME);

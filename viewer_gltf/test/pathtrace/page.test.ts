@@ -183,10 +183,9 @@ describeInChromium("the path-traced page", () => {
     expect(await notices()).toEqual([]);
 
     // a link brings all of it back
-    await press("Z", "I", "M", "l");
-    await expect.poll(() => page().url()).toContain("light=");
+    await press("Z", "I", "M");
+    const address = await stand.viewer.writeLink();
     const wanted = await trace();
-    const address = page().url();
     await page().goto("about:blank");
     await stand.viewer.open(address);
     await stand.viewer.settled();
@@ -241,10 +240,7 @@ describeInChromium("the path-traced page", () => {
       return [middle[0] + px * x * edge_m, middle[1] - px * y * edge_m] as const;
     }
     async function eyeOf(): Promise<string> {
-      await page().evaluate(() => history.replaceState(null, "", "#"));
-      await press("l");
-      await expect.poll(() => page().url(), PATIENT).toContain("v=1");
-      return /eye=([^&]*)/.exec(page().url())?.[1] ?? "";
+      return /eye=([^&]*)/.exec(await stand.viewer.writeLink())?.[1] ?? "";
     }
     expect(center).toEqual([32, -24, 12]);
     const light =

@@ -16,7 +16,6 @@ const SAME_IN_HEADSET = 0.008;
 describeInChromium("the share link", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 270 } });
   const page = () => stand.viewer.page;
-  const hash = () => page().evaluate(() => location.hash);
   const said = () => page().locator("[data-said]").textContent();
 
   /** What a view is made of; notices and the order of showing are not. */
@@ -36,10 +35,11 @@ describeInChromium("the share link", () => {
     await viewer.slide(`${F}/opacity`, 0.5);
     await viewer.chooseTile("r0_c0");
     await viewer.chooseMode("all");
-    for (const key of ["n", "j", "p", "l"]) await page().keyboard.press(key);
+    for (const key of ["n", "j", "p"]) await page().keyboard.press(key);
+    await viewer.still();
+    const address = await viewer.writeLink();
     await viewer.still();
     const [before, picture] = [viewOf(await viewer.snapshot()), await takePicture(page())];
-    const address = page().url();
     expect(address).toContain("#v=1&");
     // A setting of the address is part of the view by now.
     expect(new URL(address).search).toBe("?bundle=..%2Fbundle%2F");
@@ -61,8 +61,8 @@ describeInChromium("the share link", () => {
     };
     /** Eye and specimen in the link. */
     const written = async (): Promise<readonly number[]> => {
-      await press("l");
-      const parts = new URLSearchParams((await hash()).slice(1));
+      const link = new URL(await stand.viewer.writeLink()).hash;
+      const parts = new URLSearchParams(link.slice(1));
       return ["eye", "pose"].flatMap((name) => parts.get(name)?.split(",").map(Number) ?? []);
     };
     /** What is announced before the eyes has gone. */

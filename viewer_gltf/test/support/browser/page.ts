@@ -32,6 +32,21 @@ export class ViewerPage {
     await this.page.evaluate(() => window.stereocell?.settled());
   }
 
+  /**
+   * Ask for a link to the view, and return it once it stands in the address.
+   *
+   * The address is emptied first. What stood there before, or what the page writes there by itself as it
+   * follows the view, can so not be taken for the link.
+   */
+  async writeLink(): Promise<string> {
+    await this.page.evaluate(() => history.replaceState(history.state, "", "#"));
+    await this.page.keyboard.press("l");
+    await this.page.waitForFunction(() => location.hash.startsWith("#v=1"), null, {
+      timeout: 60_000,
+    });
+    return this.page.url();
+  }
+
   async snapshot(): Promise<Snapshot> {
     const snapshot = await this.page.evaluate(() => window.stereocell?.snapshot());
     if (snapshot === undefined) throw new Error("the page has no window.stereocell");
