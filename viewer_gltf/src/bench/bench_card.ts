@@ -8,7 +8,7 @@ import { drawChart } from "./chart";
 import type { Report } from "./report";
 import { runAll, type Step, type Subject } from "./runs";
 
-export type StereoKind = "split" | "headset";
+type StereoKind = "split" | "headset";
 
 export type BenchOptions = Readonly<{
   subject: Subject;

@@ -1,7 +1,7 @@
 import { BundleError } from "./errors";
 
 /** A document without a web host (a notebook's frame, or a scene in one file) gives these to the page in it. */
-export type PageHost = Readonly<{
+type PageHost = Readonly<{
   /** Replaces the page's address in a notebook's frame, which has none. The view stands behind its `#`. */
   page?: string;
   /** The bundle's folder, which the document itself answers for; absent: the bundle lies beside `page`. */

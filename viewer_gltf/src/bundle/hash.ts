@@ -5,7 +5,7 @@ import { BundleError } from "./errors";
 export type HashForm = Readonly<{ name: string; write: (digest: Uint8Array) => string }>;
 
 /** As the manifest and the lists of volumes have it: lower-case hexadecimal. */
-export const SHA_256: HashForm = {
+const SHA_256: HashForm = {
   name: "SHA-256",
   write: (digest) => Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join(""),
 };

@@ -2,7 +2,7 @@
 import { TemporaryError } from "./errors";
 
 /** Pauses before the second, third and fourth try, ms. */
-export const PAUSES_MS: readonly number[] = [300, 1200, 4000];
+const PAUSES_MS: readonly number[] = [300, 1200, 4000];
 /** Longest wait for a network at each pause, ms, on a device that knows that it has none. */
 const OFFLINE_MS = 30_000;
 

@@ -9,8 +9,8 @@ import type { ChannelTransfer2D } from "./generated/transfer2d";
 import type { ChannelVolumes } from "./generated/volumes";
 import { faultOf, MAX_SHAPES } from "./transfer_2d";
 
-export const FORMAT = "stereocell-bundle";
-export const VERSION = 1;
+const FORMAT = "stereocell-bundle";
+const VERSION = 1;
 
 export function checkSchema(schema: object, value: unknown, path: string): void {
   const result = new Validator(schema as Schema, "2020-12", true).validate(value);

@@ -24,7 +24,7 @@ export type SharedChannel = Readonly<{
   /** In the source's values. */
   window: readonly [number, number];
 }>;
-export type SharedView = Readonly<{ eye_um: Vec3; target_um: Vec3 }>;
+type SharedView = Readonly<{ eye_um: Vec3; target_um: Vec3 }>;
 /** `tile`, `channel` and `object`: absent where nobody has looked, as of a point that Python names. */
 export type Picked = Readonly<{
   point_um: Vec3;

@@ -16,7 +16,7 @@ export function filtered({ ranges, without }: ObjectView): readonly string[] {
   return [...narrowed, ...Object.keys(without).filter((id) => without[id].length > 0)];
 }
 
-export function isWhole([low, high]: readonly [number, number]): boolean {
+function isWhole([low, high]: readonly [number, number]): boolean {
   return low <= ALL_BYTES[0] && high >= ALL_BYTES[1];
 }
 

@@ -8,7 +8,7 @@ import workerAddress from "./sw?worker&url";
 const CLAIM_MS = 10_000;
 
 /** Only on a host that browsers trust (https, or this machine), and for bundles of that host. */
-export function canKeep(page: string, isSecure: boolean): boolean {
+function canKeep(page: string, isSecure: boolean): boolean {
   return /^https?:/.test(page) && isSecure && ownBundle(page) !== null;
 }
 

@@ -136,7 +136,7 @@ export type Window = Base &
     texts: readonly [string, string];
     to: (value: readonly [number, number]) => Wish;
   }>;
-export type Option = Readonly<{ value: string; label: string }>;
+type Option = Readonly<{ value: string; label: string }>;
 export type Choice = Base &
   Readonly<{
     kind: "choice";

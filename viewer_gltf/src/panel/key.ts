@@ -49,7 +49,7 @@ export function neighbour<T>(items: readonly T[], present: T | undefined, by: nu
 }
 
 /** The channel that the channel keys mean: the open card's, or the first one shown. */
-export function meantChannel({ state, view }: KeyContext): ChannelState | undefined {
+function meantChannel({ state, view }: KeyContext): ChannelState | undefined {
   const shown = state.channels.filter((channel) => channel.shown);
   return shown.find(({ id }) => id === view.picked) ?? shown[0];
 }

@@ -49,7 +49,7 @@ export function firesOn(name: string, focus: Focus): boolean {
 const TEXT_INPUTS = ["text", "search", "url", "number", "email", "password", "tel"];
 
 /** Groups of buttons with one stop of the Tab key take their arrows themselves: see roving_tabindex.ts. */
-export function focusOf(target: EventTarget | null): Focus {
+function focusOf(target: EventTarget | null): Focus {
   if (!(target instanceof HTMLElement)) return "page";
   if (target.isContentEditable || target instanceof HTMLTextAreaElement) return "field";
   if (target instanceof HTMLSelectElement) return "list";

@@ -1,6 +1,6 @@
 /** Tiles by row and column, where their ids hold them: r<row>_c<column>. Row 0 is on top. Pure. */
 
-export type Cell = Readonly<{ id: string; row: number; column: number }>;
+type Cell = Readonly<{ id: string; row: number; column: number }>;
 export type Grid = Readonly<{ rows: number; columns: number; cells: readonly Cell[] }>;
 
 /** Most cells of a map: the user could not tap on more. */

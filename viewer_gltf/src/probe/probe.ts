@@ -52,7 +52,7 @@ export function unitRay({ origin, direction }: Ray): Ray {
   return { origin, direction: new Vector3(...direction).normalize().toArray() };
 }
 
-export function pointOn({ origin: o, direction: d }: Ray, t: number): Vec3 {
+function pointOn({ origin: o, direction: d }: Ray, t: number): Vec3 {
   return [o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]];
 }
 

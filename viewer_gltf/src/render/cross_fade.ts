@@ -9,7 +9,7 @@ import { ScreenPass } from "../gpu/screen_pass";
 import { KEEP_FRAGMENT } from "../gpu/shaders/sources";
 
 /** Length of a fade, s. */
-export const FADE_S = 0.25;
+const FADE_S = 0.25;
 
 export class CrossFade {
   /** Linear light of the picture from before the jump. */

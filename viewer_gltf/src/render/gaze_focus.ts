@@ -12,7 +12,7 @@ import {
 import type { ViewerState } from "../state/viewer_state";
 
 /** Time in which the disc opens once its volumes are there, s. */
-export const OPENING_S = 0.4;
+const OPENING_S = 0.4;
 /** Share of the outer radius within which there is no surface any more. */
 const INNER = 0.6;
 /** Time that the gaze stays on the same tiles before finer levels are fetched, s. */

@@ -38,8 +38,6 @@ export type SlicesOptions = Readonly<{
   onPaint: () => void;
 }>;
 
-export type SliceImage = Readonly<{ canvas: HTMLCanvasElement; size: Size }>;
-
 type Layer = Readonly<{ channel: ChannelState; blocks: readonly TexelBlock[] }>;
 
 export class SliceImages {

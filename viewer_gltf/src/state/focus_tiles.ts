@@ -55,7 +55,7 @@ export const FAR_AWAY: FocusState = {
 };
 
 /** Distance of a point to a box; 0 inside. */
-export function distanceTo(point: Vec3, { min, max }: BoxedTile["bounds_um"]): number {
+function distanceTo(point: Vec3, { min, max }: BoxedTile["bounds_um"]): number {
   const off = point.map((v, i) => Math.max(min[i] - v, 0, v - max[i]));
   return Math.hypot(off[0], off[1], off[2]);
 }

@@ -22,7 +22,7 @@ export type Measuring = Readonly<{
 export const MAX_MEASUREMENTS = 100;
 /** Most points of a line. */
 export const MAX_POINTS = 64;
-export const LONGEST_NAME = 60;
+const LONGEST_NAME = 60;
 
 export const NAMES: Readonly<Record<MeasureKind, string>> = {
   distance: "Distance",

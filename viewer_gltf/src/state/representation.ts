@@ -29,7 +29,7 @@ export type WantedTile = Readonly<{
 }>;
 
 /** The tile that volumes follow: the selected one, or the gazed one. */
-export function focusTileOf(state: ViewerState, focusTiles: FocusTiles): string | null {
+function focusTileOf(state: ViewerState, focusTiles: FocusTiles): string | null {
   return state.selected ?? focusTiles.focusTile;
 }
 

@@ -106,7 +106,7 @@ function soften(depth: number, softness: number): number {
 }
 
 /** The values between which a shape lies at a gradient magnitude. */
-export function sidesAt(shape: Shape, gradient: number): Range {
+function sidesAt(shape: Shape, gradient: number): Range {
   const [low, high] = shape.values;
   if (shape.kind === "rectangle") return shape.values;
   const share = gradient / shape.gradients[1];

@@ -18,7 +18,7 @@ type Job = Readonly<{
   reject: (error: Error) => void;
 }>;
 
-export function startOccupancyWorker(): Worker {
+function startOccupancyWorker(): Worker {
   return new Worker(new URL("./empty_space_worker.ts", import.meta.url), { type: "module" });
 }
 

@@ -2,7 +2,7 @@
 import type { MipLevel } from "../bundle/generated/volumes";
 
 /** Largest level for the first picture, bytes: it comes from the finest one within this. */
-export const FIRST_LEVEL_BYTES = 64 * 1024;
+const FIRST_LEVEL_BYTES = 64 * 1024;
 
 /** What volumes may take, all together or each. */
 export type VolumeLimits = Readonly<{

@@ -5,7 +5,7 @@ import type { TileMarch } from "./tile_raymarch";
 import type { Packed, TileTexture } from "./tile_texture";
 
 /** Length of a fade, s: a volume that has come fades in, one that goes fades out. */
-export const PRESENCE_S = 0.25;
+const PRESENCE_S = 0.25;
 /** Tiles that stay for a while after the gaze has left them: it often comes back. */
 const KEPT_TILES = 2;
 /** Bytes of a level with the next coarser one, as a factor: both stay during a fade. */

@@ -3,7 +3,7 @@ import type { SpecimenPose } from "../math/grab";
 import type { ViewerState } from "../state/viewer_state";
 
 /** Time after a choice in which it can be undone, s. */
-export const UNDO_S = 4;
+const UNDO_S = 4;
 
 /** All that a choice can change. */
 export type Moment = Readonly<{ state: ViewerState; pose: SpecimenPose }>;

@@ -35,7 +35,7 @@ import { histogramBlock } from "./transfer_function_2d";
  * phone viewer, which is read with the phone out of it, the screen's size, which is measured by a
  * card held to it, files of the user's, the list of a keyboard's keys, and pictures beside the specimen.
  */
-export const ELSEWHERE: ReadonlySet<string> = new Set([
+const ELSEWHERE: ReadonlySet<string> = new Set([
   ...["stereo", "split"],
   ...["scan", "lens-code", "measure-screen"],
   ...["own-light", "save-csv", "save-objects"],

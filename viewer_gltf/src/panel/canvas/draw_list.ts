@@ -109,7 +109,7 @@ export const GAP = 12;
  * Sizes of letters. The smaller one is 35 mm at 1 m: its x-height takes 6 pixels of a phone of 1600 x 720
  * in either Cardboard (xr/legibility.test.ts).
  */
-export const TEXT = 38;
+const TEXT = 38;
 export const SMALL = 34;
 
 /** The part of a row that is painted. */

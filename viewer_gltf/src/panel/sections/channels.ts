@@ -18,7 +18,7 @@ import { transferTitle } from "../transfer_titles";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
 /** Largest number of channels that all have a card. */
-export const FEW = 9;
+const FEW = 9;
 /** Channels of a page of the list; fewer need no search. */
 export const PAGE = 6;
 /** Steps of a window's slider: the volumes have 8 bits. */
@@ -54,7 +54,7 @@ function shownToggle({ id, name, shown }: ChannelState): Control {
 }
 
 /** A share of the intensities as the source counts them. */
-export function intensityText(share: number, range: Range | undefined): string {
+function intensityText(share: number, range: Range | undefined): string {
   if (range === undefined) return `${Math.round(100 * share)} %`;
   const [start, end] = range;
   return valueText(start + (end - start) * share, [start, end]);
@@ -150,7 +150,7 @@ function withCards(
 }
 
 /** The channels of the list whose name or id contains the text that is searched for. */
-export function foundChannels(
+function foundChannels(
   state: ViewerState,
   view: PanelView,
   search = view.search,

@@ -95,7 +95,7 @@ export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
   spoken: ({ quality }) => `Quality: ${quality}`,
 };
 
-export const PICTURE_SIZE: ChoiceParameter<ToolSettings, PictureSize> = {
+const PICTURE_SIZE: ChoiceParameter<ToolSettings, PictureSize> = {
   kind: "choice",
   id: "picture-size",
   label: "Picture",
@@ -133,7 +133,7 @@ export const STEREO_STRENGTH: NumberParameter<ToolSettings> = {
 const size = (value: number) =>
   value < 1 ? `${Math.round(100 * value)} cm` : `${value.toFixed(1)} m`;
 
-export const SPECIMEN_SIZE: NumberParameter<ToolSettings> = {
+const SPECIMEN_SIZE: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "specimen-size",
   label: "Size in stereo",

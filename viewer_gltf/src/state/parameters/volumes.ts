@@ -8,14 +8,14 @@ import { type ChoiceParameter, lensesOf, type NumberParameter, type Parameter } 
  * in all tiles. `stage`: as the stage has it; there are none of these unless an artist chose it.
  * `traced`: in all tiles, by paths of light. `off`: nowhere. The first two hold within the switch distance.
  */
-export const MODES = ["disc", "tile", "all", "stage", "traced", "off"] as const;
+const MODES = ["disc", "tile", "all", "stage", "traced", "off"] as const;
 export type Mode = (typeof MODES)[number];
 
 /**
  * What a ray makes of its samples. `over`: each veils those behind it. `maximum`: the largest value of each
  * channel, within its window. `sum`: their light adds up, and nothing veils.
  */
-export const COMPOSITINGS = ["over", "maximum", "sum"] as const;
+const COMPOSITINGS = ["over", "maximum", "sum"] as const;
 export type Compositing = (typeof COMPOSITINGS)[number];
 
 /** The volumes' parameters of a bundle that has just opened. */
@@ -132,7 +132,7 @@ export const COMPOSITING: ChoiceParameter<Volumes, Compositing> = {
 
 const percent = (value: number) => `${Math.round(100 * value)} %`;
 
-export const DEPTH_SHADING: NumberParameter<Volumes> = {
+const DEPTH_SHADING: NumberParameter<Volumes> = {
   kind: "number",
   id: "depth-shading",
   label: "Depth shading",

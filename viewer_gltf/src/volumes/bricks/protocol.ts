@@ -13,7 +13,7 @@ export type BrickView = Readonly<{
   pixels_per_radian: number;
 }>;
 
-export type Part = Readonly<{ tree: number; at: number; bytes: Uint8Array<ArrayBuffer> }>;
+type Part = Readonly<{ tree: number; at: number; bytes: Uint8Array<ArrayBuffer> }>;
 export type Frame = Readonly<{ kind: number; sequence: number; parts: readonly Part[] }>;
 
 /** The server's text messages. */

@@ -17,7 +17,7 @@ const HEADER = 64;
 const RECORD = 40;
 const EMPTY = 1;
 
-export type Node = Readonly<{
+type Node = Readonly<{
   level: number;
   isEmpty: boolean;
   /** Of an empty node, everywhere. */

@@ -7,7 +7,7 @@ import { BundleError } from "../../bundle/errors";
 import { type Alignment, isIncreasing, type LensModel } from "./lens_model";
 import { type Fields, readFields } from "./protobuf";
 
-export type Button = "none" | "magnet" | "touch" | "indirect-touch";
+type Button = "none" | "magnet" | "touch" | "indirect-touch";
 
 export type Profile = LensModel & Readonly<{ vendor: string; model: string; button: Button }>;
 
