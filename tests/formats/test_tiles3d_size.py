@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from stereocell.bundle.write import describe_bundle, describe_channel
-from stereocell.bundle.write_tile import BundleTile, FileRef
+from stereocell.bundle.describe import describe_bundle, describe_channel
+from stereocell.bundle.tile_part import BundleTile, FileRef
 from stereocell.formats.tiles3d import TILESET, TileLod, make_tilesets
 from stereocell.model.channel import TransferFunctions2d
 from stereocell.storage.assets import schema_path

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from stereocell.bundle.write import describe_bundle
+from stereocell.bundle.describe import describe_bundle
+from stereocell.bundle.tile_part import BundleTile, write_file
 from stereocell.bundle.write_objects import write_objects
-from stereocell.bundle.write_tile import BundleTile, write_file
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.formats.gltf_features import tile_features
 from stereocell.formats.ktx2 import encode_2d

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.bundle.write_tile import PackedObjects, TileChannel
+from stereocell.bundle.tile_part import PackedObjects, TileChannel
 from stereocell.model.object_table import Column, ObjectTable
 
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.bundle.write_tile import FileRef, write_file
+from stereocell.bundle.tile_part import FileRef, write_file
 from stereocell.model.object_table import MISSING, Column, ObjectTable
 from stereocell.storage.json_files import compact_json
 

@@ -4,22 +4,25 @@ A tile's part is a folder that holds its files under their names in the bundle, 
 says what the bundle's own files need to know of it.
 """
 
-import hashlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from functools import cache
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pxr import Usd
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from stereocell.bundle.edited_meshes import shown_lods, with_vertex_occlusion
+from stereocell.bundle.tile_part import (
+    BundleTile,
+    FileRef,
+    PackedObjects,
+    TileChannel,
+    write_file,
+    write_record,
+)
 from stereocell.bundle.windowed_voxels import read_windowed
-from stereocell.bundle.write_transfer2d import count_tile
-from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
+from stereocell.bundle.write_volume import write_volume
 from stereocell.formats.basis_textures import (
     encode_color_map,
     encode_normal_map,
@@ -27,13 +30,10 @@ from stereocell.formats.basis_textures import (
 )
 from stereocell.formats.gltf import Glb, Textures, encode_glb
 from stereocell.formats.gltf_features import Features
-from stereocell.formats.ktx2 import encode_3d
 from stereocell.formats.tiles3d import TileLod
-from stereocell.model.errors import OutputError, StageError
+from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
-from stereocell.storage.atomic_write import replacing_folder, write_bytes
-from stereocell.storage.file_list import measure, sizes_of
-from stereocell.storage.json_files import read_json, write_json
+from stereocell.storage.atomic_write import replacing_folder
 from stereocell.usd.layer import move_box
 from stereocell.usd.read_appearances import ComposedAppearance
 from stereocell.usd.read_attributes import Point
@@ -41,106 +41,11 @@ from stereocell.usd.read_levels import ComposedLod, mesh_at
 from stereocell.usd.read_objects import read_columns, read_tile_objects
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage
 from stereocell.usd.read_textures import read_image
-from stereocell.usd.read_variants import Representation
 from stereocell.usd.read_volume import ComposedVolume, read_volume
 from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.written_files import AsWritten
 
-_RECORD = "tile.json"
 FIRST_COLUMN = "volume_um3"  # first column of every table of objects
-
-
-@dataclass(frozen=True, slots=True)
-class FileRef:
-    """A file of the bundle. `path` is relative to its root, with forward slashes."""
-
-    path: str
-    bytes: int
-    sha256: str
-
-
-@dataclass(frozen=True, slots=True)
-class PackedObjects:
-    """The objects of one tile: little-endian arrays as bytes.
-
-    labels    uint64 (n,)
-    names     by object; empty: there are none
-    values    float32 (n,) by column ID
-    boxes     float32 (n, 6): least and largest (x, y, z), world um
-    touching  uint64 (m, 2), labels of objects that share a wall
-    wall_um2  float32 (m,), its area; NaN: not known
-    """
-
-    __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
-
-    labels: bytes
-    names: tuple[str, ...]
-    values: dict[str, bytes]
-    boxes: bytes
-    touching: bytes
-    wall_um2: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class TileChannel:
-    """One (tile, channel) in the bundle.
-
-    lods       for the tileset, finest first; addresses relative to it
-    triangles  by level of detail; levels finer than the finest have as many as that
-    distances  by level, too: the stated and the largest distance from the iso-surface, um
-    volume     its entry in volumes.json, or None
-    files      all that was written
-    joint      the volume's histogram of value and gradient, packed; see bundle/write_transfer2d.py
-    objects    of a label map's tile; None: it has none
-    edit       what was edited by hand of its surface, and what follows from that; or empty
-    """
-
-    __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
-
-    channel_id: str
-    lods: tuple[TileLod, ...]
-    triangles: tuple[int, ...]
-    distances: tuple[tuple[float, float], ...]
-    volume: dict[str, Any] | None
-    files: tuple[FileRef, ...]
-    joint: bytes | None
-    edit: str = ""
-    objects: PackedObjects | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class BundleTile:
-    """One tile in the bundle. `low`, `high`: corners (x, y, z) of its box in the world, um."""
-
-    id: str
-    representation: Representation
-    low: Point
-    high: Point
-    channels: tuple[TileChannel, ...]
-
-
-def write_file(root: Path, path: str, content: bytes) -> FileRef:
-    """Write one file of a bundle. Raises OutputError."""
-    write_bytes(root / path, content)
-    return FileRef(path, len(content), hashlib.sha256(content).hexdigest())
-
-
-@cache
-def _records() -> TypeAdapter[BundleTile]:
-    return TypeAdapter(BundleTile)
-
-
-def find_part(part: Path) -> BundleTile | None:
-    """Return the tile whose part lies in a folder, or None where it isn't there as a whole."""
-    try:
-        tile = _records().validate_python(read_json(part / _RECORD, None, ""))
-    except (OutputError, ValidationError):
-        return None
-    sizes = sizes_of(part)
-    refs = [ref for channel in tile.channels for ref in channel.files]
-    # by these names files are moved: they must be of this folder
-    is_own = tile.id == part.name and all(sizes.get(ref.path) == ref.bytes for ref in refs)
-    return tile if is_own else None
 
 
 def export_tile(
@@ -180,7 +85,7 @@ def export_tile(
         ]
         low, high = find_bounds(tile, volumes)
         made = BundleTile(tile_id, choice.representation, low, high, tuple(channels))
-        write_json(root / _RECORD, _records().dump_python(made, mode="json"))
+        write_record(root, made)
     return made, as_written.changed
 
 
@@ -236,7 +141,7 @@ def _export_channel(
     entry = joint = None
     if volume is not None:
         voxels = read_windowed(volume, appearance, as_written=as_written)
-        entry, written, joint = _export_volume(root, tile.GetName(), appearance, volume, voxels)
+        entry, written, joint = write_volume(root, tile.GetName(), appearance, volume, voxels)
         files += written
     return TileChannel(
         channel_id,
@@ -343,45 +248,6 @@ def _encode(
         )
     except ValueError as error:  # what an artist may have done to the mesh
         raise StageError(f"{prim}: lod{lod.level}: {error}") from error
-
-
-def _export_volume(
-    root: Path,
-    tile_id: str,
-    appearance: ComposedAppearance,
-    volume: ComposedVolume,
-    voxels: NDArray[np.uint8],
-) -> tuple[dict[str, Any], list[FileRef], bytes]:
-    texture = encode_3d(mip_levels(voxels))
-    bricks = encode_3d([min_max_bricks(voxels)])
-    path = f"volumes/{tile_id}/{appearance.id}"
-    files = [
-        write_file(root, f"{path}.ktx2", texture.data),
-        write_file(root, f"{path}_bricks.ktx2", bricks.data),
-    ]
-    entry = {
-        "tile": tile_id,
-        "file": asdict(files[0]),
-        "bricks": asdict(files[1]),
-        "size": list(volume.size),
-        "apron": volume.apron,
-        "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
-        # row by row for row vectors is column by column for column vectors
-        "matrix": [float(n) for n in volume.matrix.ravel()],
-        **({} if volume.measured is None else {"measured": measure(volume.measured)}),
-        "levels": [
-            {
-                "size": list(level.size),
-                "offset": level.offset,
-                "length": level.length,
-                "sha256": hashlib.sha256(
-                    texture.data[level.offset : level.offset + level.length]
-                ).hexdigest(),
-            }
-            for level in texture.levels
-        ],
-    }
-    return entry, files, count_tile(voxels, volume, appearance.transfer_2d.gradient_max)
 
 
 def _point(values: Any) -> Point:

@@ -11,7 +11,8 @@ them when a 2D function is drawn or edited.
 import zlib
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +20,30 @@ from numpy.typing import NDArray
 from stereocell.formats.ktx2 import encode_2d
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
 from stereocell.usd.read_appearances import ComposedAppearance
-from stereocell.usd.read_volume import ComposedVolume
+from stereocell.usd.read_attributes import Point
 
 COUNTED_VOXELS = 4_000_000  # voxels of a tile; a larger tile is counted in part
 _STORED = np.dtype("<u4")
 
 
-def count_tile(voxels: NDArray[np.uint8], volume: ComposedVolume, gradient_max: float) -> bytes:
+class PlacedVolume(Protocol):
+    """The place of a volume, as in `usd.read_volume.ComposedVolume`."""
+
+    @property
+    def measured(self) -> Path | None: ...
+    @property
+    def size(self) -> tuple[int, int, int]: ...
+    @property
+    def apron(self) -> int: ...
+    @property
+    def low(self) -> Point: ...
+    @property
+    def high(self) -> Point: ...
+    @property
+    def matrix(self) -> NDArray[np.float64]: ...
+
+
+def count_tile(voxels: NDArray[np.uint8], volume: PlacedVolume, gradient_max: float) -> bytes:
     """Return the counts of one tile's volume, packed: thousands of them wait for their sum.
 
     uint8 (z, y, x) with the apron, whose voxels are neighbours only. A plane that tiles share is

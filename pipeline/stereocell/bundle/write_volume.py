@@ -1,0 +1,62 @@
+"""Write one volume of a bundle: a 3D texture with its mip levels, and the ranges of its bricks."""
+
+import hashlib
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.bundle.tile_part import FileRef, write_file
+from stereocell.bundle.write_transfer2d import PlacedVolume, count_tile
+from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
+from stereocell.formats.ktx2 import encode_3d
+from stereocell.storage.file_list import measure
+from stereocell.usd.read_appearances import ComposedAppearance
+
+
+def write_volume(
+    root: Path,
+    tile_id: str,
+    appearance: ComposedAppearance,
+    volume: PlacedVolume,
+    voxels: NDArray[np.uint8],
+) -> tuple[dict[str, Any], list[FileRef], bytes]:
+    """Write one volume; return its entry in volumes.json, its files and its counts.
+
+    voxels  uint8 (z, y, x) with the apron, window applied
+
+    The counts are the histogram of value and gradient, packed as `count_tile` returns them.
+    Raises OutputError where a file can't be written.
+    """
+    texture = encode_3d(mip_levels(voxels))
+    bricks = encode_3d([min_max_bricks(voxels)])
+    path = f"volumes/{tile_id}/{appearance.id}"
+    files = [
+        write_file(root, f"{path}.ktx2", texture.data),
+        write_file(root, f"{path}_bricks.ktx2", bricks.data),
+    ]
+    entry = {
+        "tile": tile_id,
+        "file": asdict(files[0]),
+        "bricks": asdict(files[1]),
+        "size": list(volume.size),
+        "apron": volume.apron,
+        "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
+        # row by row for row vectors is column by column for column vectors
+        "matrix": [float(n) for n in volume.matrix.ravel()],
+        **({} if volume.measured is None else {"measured": measure(volume.measured)}),
+        "levels": [
+            {
+                "size": list(level.size),
+                "offset": level.offset,
+                "length": level.length,
+                "sha256": hashlib.sha256(
+                    texture.data[level.offset : level.offset + level.length]
+                ).hexdigest(),
+            }
+            for level in texture.levels
+        ],
+    }
+    return entry, files, count_tile(voxels, volume, appearance.transfer_2d.gradient_max)
